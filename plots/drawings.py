@@ -7,7 +7,7 @@ from html import escape
 
 import graphviz
 
-__all__ = ["DrawnGraph", "MermaidText", "Svg", "image"]
+__all__ = ["DrawnGraph", "MermaidText", "PlantUMLText", "Svg", "TikzText", "image"]
 
 
 def image(svg: str, words: str) -> str:
@@ -103,3 +103,33 @@ class MermaidText(str):
 
     def _repr_markdown_(self) -> str:
         return f"```mermaid\n{self}```"
+
+
+class PlantUMLText(str):
+    """PlantUML text.
+
+    Examples
+    --------
+    >>> PlantUMLText("@startuml")
+    <PlantUML text of 9 characters>
+    """
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f"<PlantUML text of {len(self)} characters>"
+
+
+class TikzText(str):
+    r"""A TikZ picture as text.
+
+    Examples
+    --------
+    >>> TikzText(r"\begin{tikzpicture}")
+    <TikZ text of 19 characters>
+    """
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f"<TikZ text of {len(self)} characters>"

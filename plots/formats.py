@@ -106,6 +106,18 @@ def _mermaid(graph: Any) -> bytes:
     return mermaid(graph.chart).encode()
 
 
+def _plantuml(graph: Any) -> bytes:
+    from plots.plantuml import plantuml
+
+    return plantuml(graph.chart).encode()
+
+
+def _tikz(graph: Any) -> bytes:
+    from plots.tikz import tikz
+
+    return tikz(graph.chart).encode()
+
+
 def _matplotlib(form: str, **metadata: None) -> Callable[[Any], bytes]:
     def write(figure: Any) -> bytes:
         from plots.figures._saving import picture
@@ -151,6 +163,8 @@ FORMATS: list[Format] = [
     Format(".dot", "graph", "DOT text", "gms-fsm", _dot),
     Format(".gv", "graph", "DOT text", "gms-fsm", _dot),
     Format(".mmd", "chart", "Mermaid text", "gms-fsm", _mermaid),
+    Format(".puml", "chart", "PlantUML text", "gms-fsm", _plantuml),
+    Format(".tikz", "chart", "TikZ text", "gms-fsm", _tikz),
     Format(".png", "figure", "a figure", "matplotlib", _matplotlib("png"), "plots", usual=True),
     Format(".svg", "figure", "a figure", "matplotlib", _svg, "plots", usual=True),
     Format(".pdf", "figure", "a figure", "matplotlib", _pdf, "plots"),
@@ -260,8 +274,8 @@ def listed(*subjects: Subject) -> str:
     --------
     >>> listed("figure")
     '.png, .svg, .pdf or .pgf'
-    >>> listed("graph", "chart")
-    '.svg, .png, .pdf for a picture or .dot, .gv for DOT text or .mmd for Mermaid text'
+    >>> listed("chart")
+    '.mmd for Mermaid text or .puml for PlantUML text or .tikz for TikZ text'
     """
     kinds: dict[str, list[str]] = {}
     for each in of(*subjects):

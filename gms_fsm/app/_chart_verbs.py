@@ -16,6 +16,10 @@ from gms_fsm.errors import ParameterError
 
 if TYPE_CHECKING:
     from gms_fsm import Model, Report, Rig
+    from gms_fsm.app._own_files import OwnFile
+    from gms_fsm.run.start import Start
+
+SECONDS = 10.0  # of a demonstration of a system, whose file has no [run]
 
 __all__ = [
     "blocks_command",
@@ -293,12 +297,17 @@ def code_command(
         ),
     ] = None,
 ) -> None:
-    """Print the stand-alone if-else program of a chart (the paper's Fig. 2c) or a system."""
-    from gms_fsm import Prescribed, PulledSlider, Slider
+    """Print the stand-alone if-else program of a chart (the paper's Fig. 2c) or a system.
+
+    The program runs by itself: it takes steps of the rig's motion, or of the
+    scenario's, and prints the switches.
+    """
+    from gms_fsm import Contact, Prescribed, PulledSlider, Slider
     from gms_fsm.app._catalogue import chosen
     from gms_fsm.app._own_files import any_model, own_file
-    from gms_fsm.lowering._generated import standalone
-    from gms_fsm.lowering.program import lower
+    from gms_fsm.exporters._charts import PERIOD, slow_velocity
+    from gms_fsm.run._printed import printed
+    from gms_fsm.run.start import Start
     from gms_fsm.systems.models import demonstration
 
     own = own_file(name, law)
@@ -307,7 +316,7 @@ def code_command(
             raise ParameterError(
                 f"{name} says what the friction acts on", place="--rig", advice="leave it out"
             )
-        typer.echo(standalone(lower(own.system).source), nl=False)
+        typer.echo(printed(_start_of_file(own)), nl=False)
         return
     rigs: dict[RigName, Rig] = {
         RigName.prescribed: Prescribed(VELOCITY),
@@ -320,7 +329,10 @@ def code_command(
         chart = own.only_chart()
     try:
         model = demonstration(found, law) if own is None else any_model(chart)
-        program = lower(model, rigs[rig or RigName.prescribed])
+        start = Start.of(model, rigs[rig or RigName.prescribed], PERIOD)
+        if rig in (None, RigName.prescribed):  # slower, if the model is stiff
+            slow = Prescribed(slow_velocity(Contact("friction", model)))
+            start = Start.of(model, slow, PERIOD)
     except ParameterError as error:
         if rig is not None:
             raise
@@ -329,4 +341,20 @@ def code_command(
             other = f"--rig slider, or {other}"
         advice = f"{error.advice}; here, give {other}"
         raise error.replaced(advice=advice).inside(name) from None
-    typer.echo(standalone(program.source), nl=False)
+    typer.echo(printed(start), nl=False)
+
+
+def _start_of_file(own: OwnFile) -> Start:
+    """Return the run of a scenario file, or ten seconds of a system."""
+    from gms_fsm._toml import parsed
+    from gms_fsm.app.scenario import kind_of, load_scenario
+    from gms_fsm.run.start import Start
+
+    assert own.system is not None
+    data = parsed(own.path)
+    if kind_of(data) == "system" and "run" not in data:
+        return Start.of(own.system, None, SECONDS)
+    given = load_scenario(own.path).arguments
+    return Start.of(
+        own.system, None, given["t_end"], t_start=given["t_start"], initial=given.get("initial")
+    )

@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm._display import displayed
@@ -20,6 +20,9 @@ from gms_fsm.charts._reader import Reader
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
 from gms_fsm.errors import ChartError, cut, shown
 from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, Condition, Value, spell
+
+if TYPE_CHECKING:
+    from gms_fsm.charts._imported import GivenTexts
 
 __all__ = ["Chart", "State", "Transition"]
 
@@ -294,6 +297,97 @@ class Chart:
 
         return load(checked_path("path", path))
 
+    # ------------------------------------------------------------------ from other programs
+    @classmethod
+    def from_transitions(cls, machine: Any, **texts: Unpack[GivenTexts]) -> Chart:
+        """Build a chart from a machine of the package transitions, and texts given beside it.
+
+        The machine gives the states, the edges (one for each trigger, of its name) and their
+        priority (the order of the triggers). Functions cannot be read: a text of `guards` stands
+        for the conditions of its trigger.
+
+        Parameters
+        ----------
+        machine : transitions.Machine
+            Plain, without callbacks.
+        **texts
+            ``inputs``, ``variables``, ``parameters``, ``outputs``, ``name``, ``reference``,
+            ``let``, ``velocities`` and ``contact_outputs`` as for `Chart`; a parameter may be a
+            mapping of the fields of `Parameter`. By the name of an edge: ``guards``, all of them,
+            and ``actions``. By the name of a state: ``flows``, ``entry``, ``exit`` and
+            ``state_outputs``. ``locked`` names the states that lock the contact.
+
+        Returns
+        -------
+        Chart
+            Checked, as any chart.
+
+        Raises
+        ------
+        ChartError, ExpressionError
+            If the machine has something without counterpart in a chart, which is named, such as a
+            callback, ``unless``, a nested state or an internal transition; or if a text is wrong.
+
+        Examples
+        --------
+        >>> from transitions import Machine
+        >>> edges = [["slips", "stick", "slip"], ["sticks", "slip", "stick"]]
+        >>> machine = Machine(states=["stick", "slip"], initial="stick", transitions=edges)
+        >>> chart = Chart.from_transitions(machine, name="a spring that slips", variables=("z",),
+        ...     parameters=("k", "z_s"), outputs={"F": "k * z"}, flows={"stick": {"z": "v"}},
+        ...     guards={"slips": "abs(z) >= z_s", "sticks": "z * v < 0"})
+        >>> chart.guard_text("slips")
+        '|z| >= z_s'
+        """
+        from gms_fsm.charts import _from_transitions, _imported
+
+        given = _imported.Texts.of(texts, _from_transitions.HERE)
+        states, edges = _from_transitions.read(machine)
+        return _imported.built(states, edges, given, _from_transitions.HERE)
+
+    @classmethod
+    def from_scxml(cls, path: str | Path, **texts: Unpack[GivenTexts]) -> Chart:
+        """Build a chart from an SCXML document, and texts given beside it.
+
+        The document gives the states, the transitions in their order, and what is assigned. What
+        the export ``scxml`` keeps there in a namespace of its own need not be given.
+
+        Parameters
+        ----------
+        path : str or Path
+            The document. The name of an edge is the event of the transition, if no other has the
+            same, or else ``source_target``.
+        **texts
+            As for `from_transitions`; they replace what the document says. Guards that are not
+            given are read from ``cond``, if that is written as in Python or ECMAScript.
+
+        Returns
+        -------
+        Chart
+            Checked, as any chart.
+
+        Raises
+        ------
+        ChartError, ExpressionError
+            If the document cannot be read, or has something without counterpart in a chart, which
+            is named, such as a parallel or nested state, a history, a script; or if a text is
+            wrong.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from gms_fsm import export
+        >>> from gms_fsm.charts import GMS_ELEMENT
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     _ = export(GMS_ELEMENT["signed"], "scxml", folder, name="gms")
+        ...     Chart.from_scxml(f"{folder}/gms.scxml") == GMS_ELEMENT["signed"]
+        True
+        """
+        from gms_fsm.charts import _from_scxml
+
+        return _from_scxml.load(checked_path("path", path), texts)
+
+    # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
         """Write the chart to a TOML file, from which `load` returns an equal one.
 

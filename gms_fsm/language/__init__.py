@@ -39,7 +39,7 @@ from gms_fsm.language._normal import (
     turning_inside,
 )
 from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, integer_power, product_power
-from gms_fsm.language._print import LEVELS, MATLAB_LIKE, PYTHON, Spelling, spell
+from gms_fsm.language._print import ECMASCRIPT, LEVELS, MATLAB_LIKE, PYTHON, Spelling, spell
 from gms_fsm.language._read import Owner, parse_condition, parse_value
 from gms_fsm.language._tree import (
     Binary,
@@ -63,6 +63,7 @@ from gms_fsm.language._vectors import truths, values_of
 __all__ = [
     "COMPARISONS",
     "CONSTANTS",
+    "ECMASCRIPT",
     "FUNCTIONS",
     "LARGEST_PRODUCT_POWER",
     "LEVELS",

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from gms_fsm.language._fold import fold
+from gms_fsm.language._functions import FUNCTIONS
 from gms_fsm.language._powers import product_power
 from gms_fsm.language._tree import Binary, Both, Call, Either, Name, Negative, Node, Not, Relation
 
-__all__ = ["LEVELS", "MATLAB_LIKE", "PYTHON", "Spelling", "spell"]
+__all__ = ["ECMASCRIPT", "LEVELS", "MATLAB_LIKE", "PYTHON", "Spelling", "spell"]
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,8 @@ class Spelling:
     Parameters
     ----------
     both, either, negation : str
-        The words for and, or and not, with their spaces.
+        The words for and, or and not, with their spaces; a space before that for not if it stands
+        after its operand.
     true : str
         The condition that always holds.
     bars : bool
@@ -30,6 +32,8 @@ class Spelling:
         Write small integer powers as products, and other powers as ``pow(a, b)``.
     timers : bool
         Write ``age >= T`` as ``after(T)``.
+    functions : mapping of str to str
+        What functions are called, ``pow`` among them, where not as in Python.
     """
 
     both: str
@@ -39,10 +43,29 @@ class Spelling:
     bars: bool
     products: bool
     timers: bool = False
+    functions: Mapping[str, str] = field(default_factory=dict, hash=False)
+
+    def called(self, function: str) -> str:
+        """Return what a function is called."""
+        return self.functions.get(function, function)
 
 
 PYTHON = Spelling(" and ", " or ", "not ", "True", bars=False, products=True)
 MATLAB_LIKE = Spelling(" && ", " || ", "!", "true", bars=True, products=False, timers=True)
+# The data model of SCXML. Negation is written as a comparison, which Python's readers of SCXML know
+# as well; they do not know "!".
+ECMASCRIPT = Spelling(
+    " && ",
+    " || ",
+    " == false",
+    "true",
+    bars=False,
+    products=True,
+    functions={
+        **{name: f"Math.{name}" for name in (*FUNCTIONS, "pow")},
+        "sgn": "Math.sign",
+    },
+)
 
 # How tightly each operator binds (its precedence).
 LEVELS = {"or": 1, "and": 2, "not": 3, "<": 4, "+": 5, "-": 5, "*": 6, "/": 6, "neg": 7, "**": 8}
@@ -122,7 +145,7 @@ class _Printer:
             return _Printed(f"{base.at(_ATOM)}^{exponent.at(_ATOM)}", LEVELS["**"])
         whole = product_power(node.left, node.right)
         if whole is None:
-            return _Printed(f"pow({base.text}, {exponent.text})", _ATOM)
+            return _Printed(f"{self.spelling.called('pow')}({base.text}, {exponent.text})", _ATOM)
         if whole == 0:
             return _Printed("1.0", _ATOM)
         if whole == 1:
@@ -137,7 +160,7 @@ class _Printer:
         arguments = ", ".join(part.text for part in parts)
         if node.function == "abs" and self.spelling.bars:
             return _Printed(f"|{arguments}|", _ATOM)
-        return _Printed(f"{node.function}({arguments})", _ATOM)
+        return _Printed(f"{self.spelling.called(node.function)}({arguments})", _ATOM)
 
     def relation(self, node: Relation, parts: Iterator[_Printed]) -> _Printed:
         left, right = (part.at(LEVELS["+"]) for part in parts)
@@ -151,6 +174,8 @@ class _Printer:
 
     def negation(self, _: Not, parts: Iterator[_Printed]) -> _Printed:
         word = self.spelling.negation
+        if word.startswith(" "):  # after the operand
+            return _Printed(next(parts).at(_ATOM) + word, LEVELS["<"])
         operand = next(parts).at(_ATOM if word == "!" else LEVELS["not"])
         return _Printed(word + operand, LEVELS["not"])
 

@@ -24,7 +24,7 @@ from gms_fsm.language import NAMESPACE
 from gms_fsm.language._parser import PARSER
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
-__all__ = ["ieee", "load", "load_careful", "standalone"]
+__all__ = ["bare", "ieee", "load", "load_careful", "standalone"]
 
 
 def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def standalone(source: str) -> str:
         )
     borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
     parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []
-    parts += ["\n" + _bare(known[name]) for name in missing if name not in borrowed]
+    parts += ["\n" + bare(known[name]) for name in missing if name not in borrowed]
     head, body = _split_head(source)
     return "\n".join([head, *parts, "\n" + body.lstrip("\n")])
 
@@ -142,7 +142,7 @@ def _split_head(source: str) -> tuple[str, str]:
     return "".join(lines[:end]), "".join(lines[end:])
 
 
-def _bare(function: Callable[..., Any]) -> str:
+def bare(function: Callable[..., Any]) -> str:
     """Return a function's text without annotations, with its docstring cut to the first line."""
     tree = _tree(inspect.getsource(function))
     for node in ast.walk(tree):

@@ -7,62 +7,11 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from gms_fsm import Chart, Parameter, State, Transition
+from gms_fsm import Chart, State, Transition
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import OutputError
-
-TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
-VALUES = st.sampled_from(["0", "k * z", "-k", "exp(-v**2) + σ_0", "F_c * sgn(v)", "1e-300 * w"])
-GUARDS = st.sampled_from(["True", "v > 0", "F < -k and z >= σ_0", "after(0.1)", "not w < 1"])
-NAMES = ("stuck", "slip", "Schlupf", "αβ", "x1_")
-
-
-@st.composite
-def charts(draw: st.DrawFn) -> Chart:
-    """Return a chart with any of the parts that a chart can have."""
-
-    def some(keys: tuple[str, ...]) -> dict[str, str]:
-        return draw(st.dictionaries(st.sampled_from(keys), VALUES, max_size=len(keys)))
-
-    names = draw(st.lists(st.sampled_from(NAMES), min_size=1, unique=True))
-    states = []
-    for name in names:
-        locked = draw(st.booleans())
-        texts = [some(("z", "w")) for _ in range(3)]
-        states.append(State(name, *texts, {} if locked else some(("F",)), locked))
-    edges = [
-        Transition(
-            f"edge_{k}",
-            draw(st.lists(st.sampled_from(names), min_size=1, unique=True)),
-            draw(st.sampled_from(names)),
-            draw(GUARDS),
-            some(("z", "v")),
-        )
-        for k in range(draw(st.integers(0, 3)))
-    ]
-    parameters = [
-        "k",
-        Parameter(
-            "F_c", "N", draw(st.sampled_from(["finite", "> 0", ">= k"])), meaning=draw(TEXTS)
-        ),
-        Parameter(
-            "σ_0", per_element=draw(st.booleans()), assumed=draw(st.sampled_from(["", "> 0"]))
-        ),
-    ]
-    return Chart(
-        draw(TEXTS),
-        inputs=draw(st.sampled_from([("v",), ("t", "v", "x"), ()])),
-        variables=("z", "w"),
-        parameters=draw(st.permutations(parameters)),
-        states=states,
-        transitions=edges,
-        outputs={"F": draw(VALUES)},
-        reference=draw(TEXTS),
-        let=draw(st.sampled_from([{}, {"S": "k * v", "T": "S + 1"}])),
-        contact_outputs=draw(st.sampled_from([{}, {"F": "F + v"}])),
-    )
+from tests.random_charts import charts
 
 
 @pytest.mark.slow

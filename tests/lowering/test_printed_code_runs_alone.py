@@ -41,6 +41,7 @@ RIGS: dict[str, Rig] = {
     "slider": Slider(1.0, paper.FORCE),
     "pulled": PulledSlider(1.0, 2.0, 0.1),
 }
+NOT_MAIN = '__name__ = "imported"\n'
 # The computations of a fresh process for each state, printed without losing a bit.
 ASK = """
 import json, sys
@@ -90,7 +91,7 @@ def _compare(model: Model, rig: Rig, text: str, t_end: float) -> None:
     seen = 2 + (2 + len(model.chart.variables)) * model.n
     given = f"STATES, P, SEEN, LIVE = {states!r}, {program.p!r}, {seen}, {program.live!r}\n"
     done = subprocess.run(
-        [sys.executable, "-I", "-S", "-c", text + "\n\n" + given + ASK],
+        [sys.executable, "-I", "-S", "-c", NOT_MAIN + text + "\n\n" + given + ASK],
         capture_output=True,
         text=True,
         check=False,

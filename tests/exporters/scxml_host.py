@@ -1,0 +1,164 @@
+"""A host for exported SCXML documents: it integrates the flows, and asks a tool for the states."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Protocol
+
+from gms_fsm import Trace
+from gms_fsm.language import Node, evaluate, parse_value
+from gms_fsm.systems.models import Model
+
+__all__ = ["PythonStateMachine", "Scion", "Tool", "moved_by", "run", "switches_of"]
+
+Switch = tuple[float, str, str]  # when, from which state, to which
+MATH = SimpleNamespace(
+    abs=abs,
+    min=min,
+    max=max,
+    exp=math.exp,
+    log=math.log,
+    sqrt=math.sqrt,
+    sin=math.sin,
+    cos=math.cos,
+    tanh=math.tanh,
+    atan=math.atan,
+    asinh=math.asinh,
+    pow=math.pow,
+    sign=lambda u: float((u > 0) - (u < 0)),
+)
+
+
+class Tool(Protocol):
+    """A program that has loaded a document."""
+
+    def step(self, values: Mapping[str, float]) -> tuple[str, Mapping[str, Any]]:
+        """Send ``values`` and ``step``; return the state, and the data model."""
+
+
+class PythonStateMachine:
+    """The package python-statemachine."""
+
+    def __init__(self, path: Path) -> None:
+        from statemachine.io import load
+
+        self.machine: Any = load(path, trusted=True)(SimpleNamespace(Math=MATH))
+
+    def step(self, values: Mapping[str, float]) -> tuple[str, Mapping[str, Any]]:
+        """Send ``values`` and ``step``; return the state, and the data model."""
+        self.machine.send("values", **values)
+        self.machine.send("step")
+        (state,) = self.machine.configuration
+        return state.id, vars(self.machine.model)
+
+
+DRIVER = """
+const scxml = require('@scion-scxml/scxml');
+const text = require('fs').readFileSync(process.argv[2], 'utf8');
+const fail = (error) => { if (error) { console.error(error); process.exit(1); } };
+scxml.documentStringToModel('', text, (error, model) => {
+  fail(error);
+  model.prepare((failed, ready) => {
+    fail(failed);
+    const chart = new scxml.core.Statechart(ready);
+    chart.start();
+    // Not earlier: lines that come before somebody listens are lost.
+    const lines = require('readline').createInterface({ input: process.stdin });
+    lines.on('line', (line) => {
+      chart.gen({ name: 'values', data: JSON.parse(line) });
+      chart.gen({ name: 'step' });
+      const [states, , , data] = chart.getSnapshot();
+      console.log(JSON.stringify([states, data]));
+    });
+  });
+});
+"""
+
+
+class Scion:
+    """The package SCION in node, in a process of its own."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        driver = folder / "drive.js"
+        driver.write_text(DRIVER, encoding="utf-8")
+        self.process = subprocess.Popen(
+            ["node", str(driver), str(path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+        )
+
+    def step(self, values: Mapping[str, float]) -> tuple[str, Mapping[str, Any]]:
+        """Send ``values`` and ``step``; return the state, and the data model."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(json.dumps(dict(values)) + "\n")
+        self.process.stdin.flush()
+        (state,), data = json.loads(self.process.stdout.readline())
+        return state, data
+
+    def close(self) -> None:
+        """End the process."""
+        self.process.communicate(timeout=20)
+
+
+def moved_by(text: str) -> Callable[[float], float]:
+    """Return a velocity."""
+    tree = parse_value(text, ["t"])
+    return lambda t: float(evaluate(tree, {"t": t}))
+
+
+def switches_of(trace: Trace, element: int) -> list[Switch]:
+    """Return the switches of one element of a run."""
+    return [
+        (float(each.t), str(each.source), str(each.target))
+        for each in trace.transitions
+        if each.element == element
+    ]
+
+
+def run(
+    tool: Tool,
+    model: Model,
+    element: int,
+    velocity: Callable[[float], float],
+    t_end: float,
+    step: float,
+) -> list[Switch]:
+    """Step one element by Euler's method; the tool says in which state it is, and what it sets."""
+    chart, curve = model.chart, model.stribeck
+    numbers = {
+        name: float(value if not hasattr(value, "__len__") else value[element])
+        for name, value in model.values.items()
+    }
+    variables = dict.fromkeys(chart.variables, 0.0)
+    state, t, x, count, found = chart.default_state.name, 0.0, 0.0, 0, list[Switch]()
+    while True:
+        outside = {"t": t, "x": x, "v": velocity(t)}
+        if curve is not None:
+            outside["s"] = float(model.weights[element] * curve(outside["v"]))
+        known = {name: outside[name] for name in {*chart.inputs, *chart.velocities}}
+        after, given = tool.step({**known, **variables})
+        if after != state:
+            found.append((t, state, after))
+        state, variables = after, {name: float(given[name]) for name in variables}
+        if t >= t_end:
+            return found
+        count += 1
+        t_new = min(count * step, t_end)
+        now = {**numbers, **known, **variables}
+        for name, tree in chart.lets.items():
+            now[name] = _value(tree, now)
+        rates = {name: _value(chart.flows[state, name], now) for name in variables}
+        variables = {name: variables[name] + (t_new - t) * rates[name] for name in variables}
+        t, x = t_new, x + (t_new - t) * outside["v"]
+
+
+def _value(tree: Node, values: Mapping[str, float]) -> float:
+    return float(evaluate(tree, values))

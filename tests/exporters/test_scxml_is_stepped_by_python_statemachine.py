@@ -1,0 +1,87 @@
+"""python-statemachine loads an exported SCXML document and steps it as `simulate` switches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gms_fsm import Chart, Prescribed, State, Transition, export, simulate
+from gms_fsm.charts import CHARTS
+from gms_fsm.errors import ParameterError
+from tests.exporters.charts_to_export import model
+from tests.exporters.scxml_host import PythonStateMachine, moved_by, run, switches_of
+from tests.helpers import stick_slip
+
+VELOCITY = "0.15 * sin(2 * pi * t / 25)"
+
+
+def test_the_gms_element(tmp_path: Path) -> None:
+    pytest.importorskip("statemachine", reason="needs python-statemachine")
+    gms = stick_slip("signed")
+    path, *_ = export(gms, "scxml", tmp_path, name="gms")
+    trace = simulate(
+        gms, Prescribed(VELOCITY), 25.0, method="euler", step=0.05, events="step", engine="ifelse"
+    )
+    mine = run(PythonStateMachine(path), gms, 0, moved_by(VELOCITY), 25.0, 0.05)
+    assert len(mine) == 4
+    assert mine == switches_of(trace, 0)
+
+
+def test_the_readme_is_a_program(tmp_path: Path) -> None:
+    pytest.importorskip("statemachine", reason="needs python-statemachine")
+    export(model("seven-parameter"), "scxml", tmp_path, name="own")
+    text = (tmp_path / "README-scxml.md").read_text(encoding="utf-8")
+    block = text.partition("    pip install")[2].partition("\n\n")[2].partition("What it does")[0]
+    said: list[Any] = []
+    program = "\n".join(line.removeprefix("    ") for line in block.splitlines())
+    program = program.replace('Path("', f'Path("{tmp_path}/').replace("print(", "said.append((")
+    exec(program.rstrip() + ")", {"said": said})
+    ((states, values),) = said
+    assert states == ["stick"]
+    assert values["k_t"] == 1e5
+
+
+# --------------------------------------------------------------------------- refusals
+def chart(**parts: Any) -> Chart:
+    given: dict[str, Any] = {
+        "states": (State("a"), State("b")),
+        "transitions": (Transition("go", "a", "b", "v > 0"),),
+        "outputs": {"F": "v"},
+    }
+    return Chart(**{"name": "own", **given, **parts})
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (CHARTS["karnopp"], "state 'stuck': it locks the contact"),
+        (CHARTS["backlash"], "edge 'leave_right': guard: it reads 'F', a force of the contact"),
+        (
+            chart(transitions=(Transition("go", "a", "b", "a < 1"),)),
+            "edge 'go': guard: it reads 'a', an acceleration",
+        ),
+        (
+            chart(transitions=(Transition("go", "a", "b", "v < 1", {"v": "0"}),)),
+            "edge 'go': action 'v': it sets the velocity",
+        ),
+        (chart(parameters=("delete",)), "name 'delete': it is a word of the format's language"),
+        (chart(variables=("Math",)), "name 'Math': it is a word of the format's language"),
+        (chart(parameters=("σ",)), "name 'σ': the format has only names of ASCII"),
+        (chart(name="a\x00b"), "name: it has the character '\\x00', which no XML"),
+        (chart(reference="\ufffe"), "reference: it has the character 'U+FFFE"),
+    ],
+)
+def test_what_cannot_be_written_is_named(given: Chart, said: str, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError) as caught:
+        export(given, "scxml", tmp_path / "out", name="own")
+    assert said in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_names_that_a_tool_keeps_for_itself_are_in_the_readme(tmp_path: Path) -> None:
+    export(chart(parameters=("model",)), "scxml", tmp_path, name="own")
+    text = (tmp_path / "README-scxml.md").read_text(encoding="utf-8")
+    assert "python-statemachine keeps the names model for itself" in text
+    assert "set every <data> without expr" in text

@@ -1,0 +1,109 @@
+"""Claim: two tools step exported SCXML documents through the states of `simulate`.
+
+python-statemachine (Python) and SCION (node) evaluate the conditions and the assignments; the host
+only integrates the flows. SCION is installed into ``.foreign/node`` (110 MB) where there is npm;
+``GMS_FSM_NODE`` names another folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from gms_fsm import Prescribed, export, simulate
+from tests.exporters.charts_to_export import MODELS, model
+from tests.exporters.scxml_host import PythonStateMachine, Scion, moved_by, run, switches_of
+from tests.helpers import ROOT
+
+Ran = Callable[..., None]
+PACKAGE = "@scion-scxml/scxml@4.3.27"
+NAMES = [name for name in MODELS if name != "backlash"]  # its guards read F
+SWITCHING = {
+    "gms-signed",
+    "gms-published",
+    "maxwell-slip",
+    "elasto-plastic",
+    "reset-integrator",
+    "seven-parameter",
+}
+GENTLE = "0.0015 * sin(2 * pi * t / 5)"  # m/s: Euler's method is stable for all
+
+
+def motion(name: str) -> tuple[str, float, float]:
+    """Return velocity, end and step with which Euler's method shows the switches."""
+    if name.startswith("gms"):
+        return "0.15 * sin(2 * pi * t / 25)", 25.0, 0.05
+    return GENTLE, 7.5, 5e-3
+
+
+def check(name: str, path: Path, start: Callable[[], PythonStateMachine | Scion]) -> int:
+    """Step a document with a tool, and compare with `simulate`; return the switches."""
+    velocity, t_end, step = motion(name)
+    trace = simulate(
+        model(name),
+        Prescribed(velocity),
+        t_end,
+        method="euler",
+        step=step,
+        events="step",
+        engine="ifelse",
+    )
+    element = int(path.stem.removeprefix("own").removeprefix("_") or 1) - 1
+    mine = run(start(), model(name), element, moved_by(velocity), t_end, step)
+    assert mine == switches_of(trace, element)
+    assert len(mine) > 2 or name not in SWITCHING
+    return len(mine)
+
+
+@pytest.fixture(scope="module")
+def scion(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with SCION."""
+    folder = Path(os.environ.get("GMS_FSM_NODE", ROOT / ".foreign" / "node"))
+    if shutil.which("node") is None or shutil.which("npm") is None:
+        pytest.skip("SCION needs node and npm on PATH")
+    if not (folder / "node_modules/@scion-scxml/scxml").is_dir():
+        folder.mkdir(parents=True, exist_ok=True)
+        command = ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(folder), PACKAGE]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
+        if done.returncode != 0:
+            pytest.skip(f"npm could not install SCION: {done.stderr.strip()[-300:]}")
+    return folder
+
+
+def test_python_statemachine(ran: Ran, tmp_path: Path) -> None:
+    count = 0
+    for name in NAMES:
+        paths = export(model(name), "scxml", tmp_path / name, name="own")[:-1]
+        for path in paths:
+            count += check(name, path, lambda path=path: PythonStateMachine(path))  # type: ignore[misc]
+    ran(
+        "scxml",
+        f"python-statemachine {version('python-statemachine')}",
+        f"{len(NAMES)} included charts stepped, all elements",
+        f"{count} switches, all as in simulate with Euler's method",
+    )
+
+
+def test_scion(ran: Ran, scion: Path, tmp_path: Path) -> None:
+    count = 0
+    for name in NAMES:
+        for path in export(model(name), "scxml", tmp_path / name, name="own")[:-1]:
+            tool = Scion(path, scion)
+            try:
+                count += check(name, path, lambda tool=tool: tool)  # type: ignore[misc]
+            finally:
+                tool.close()
+    package = json.loads((scion / "node_modules/@scion-scxml/scxml/package.json").read_text())
+    ran(
+        "scxml",
+        f"SCION {package['version']} (node)",
+        f"{len(NAMES)} included charts stepped, all elements",
+        f"{count} switches, all as in simulate with Euler's method",
+    )

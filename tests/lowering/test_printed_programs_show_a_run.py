@@ -1,0 +1,137 @@
+"""``gms-fsm code NAME > prog.py; python prog.py`` runs by itself and prints the switches of a run.
+
+With a number of steps given, they are those of `simulate` with Euler's method, guards once a step.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gms_fsm import simulate
+from gms_fsm.app.paper import FORCE
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.charts.registry import registered
+from gms_fsm.systems.models import demonstration
+from gms_fsm.systems.rigs import Prescribed, PulledSlider, Slider
+from tests.helpers import ROOT
+from tests.scenario_files import CommandLine
+
+SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
+FAST = ("gms-signed", "servo")
+LAWS = {
+    "-".join(filter(None, (each.name, law))): (each.name, law)
+    for each in registered().values()
+    for law in each.laws or ("",)
+}
+
+
+def program(path: Path, *arguments: str) -> list[str]:
+    """Run a printed program without gms-fsm and numpy; return its lines."""
+    done = subprocess.run(
+        [sys.executable, "-I", "-S", str(path), *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def printed(gms_fsm: CommandLine, *arguments: str) -> Path:
+    done = gms_fsm("code", *arguments)
+    assert done.code == 0, done.err
+    path = Path("prog.py")
+    path.write_text(done.out, encoding="utf-8")
+    return path
+
+
+def slow_unless_fast(names: list[str]) -> list[Any]:
+    return [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in names]
+
+
+@pytest.mark.parametrize("name", slow_unless_fast([*LAWS]))
+def test_every_included_chart(name: str, gms_fsm: CommandLine) -> None:
+    entry, law = LAWS[name]
+    chart = registered()[entry].chart(law)
+    if len(chart.velocities) > 1:
+        pytest.skip("a chart with two velocities runs in a system file only")
+    more = ["--law", law] if law else []
+    more += ["--rig", "slider"] if chart.locks or chart.sets_velocity else []
+    *switches, last, values = program(printed(gms_fsm, entry, *more))
+    assert last.startswith(f"{len(switches)} switches in ")
+    assert "to t = 25 s" in last
+    assert all(" -> " in line for line in switches)
+    assert values.startswith("x = ")
+
+
+@pytest.mark.parametrize("name", slow_unless_fast([path.stem for path in SCENARIOS]))
+def test_every_shipped_scenario(name: str, gms_fsm: CommandLine) -> None:
+    if name == "tribometer":
+        data = os.environ.get("GMS_FSM_DATA")
+        if data is None:
+            pytest.skip("the record is not part of the repository; set GMS_FSM_DATA")
+        assert Path(data).is_dir()
+    path = printed(gms_fsm, str(ROOT / "scenarios" / f"{name}.toml"))
+    end = load_scenario(ROOT / "scenarios" / f"{name}.toml").arguments["t_end"]
+    *switches, last, _ = program(path, repr(float(end)), "4000")
+    assert last == f"{len(switches)} switches in 4000 steps to t = {end:.6g} s"
+
+
+def log_of(trace: Any) -> list[tuple[str, str]]:
+    return [(f"t = {float(each.t):.6g} s", str(each.edge)) for each in trace.transitions]
+
+
+def said(lines: list[str]) -> list[tuple[str, str]]:
+    return [
+        (line.partition("  ")[0], line.partition(": ")[2].partition(" -> ")[0]) for line in lines
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "rig"),
+    [
+        (["gms", "--law", "signed"], Prescribed("0.15*sin(2*pi*t/25)")),
+        (["karnopp", "--rig", "pulled"], PulledSlider(1.0, 2.0, 0.1)),
+        (["stiction", "--rig", "slider"], Slider(1.0, FORCE)),
+    ],
+    ids=lambda each: each[0] if isinstance(each, list) else "",
+)
+def test_the_switches_are_those_of_simulate(
+    arguments: list[str], rig: Any, gms_fsm: CommandLine
+) -> None:
+    path = printed(gms_fsm, *arguments)
+    *lines, _, _ = program(path, "25", "5000")
+    entry = registered()[arguments[0]]
+    model = demonstration(entry, "signed" if entry.laws else "")
+    trace = simulate(model, rig, 25.0, method="euler", step=5e-3, events="step", engine="ifelse")
+    assert len(lines) > 3 or arguments[-1] == "slider"
+    assert said(lines) == log_of(trace)
+
+
+@pytest.mark.slow
+def test_a_servo_with_a_controller_and_two_contacts(gms_fsm: CommandLine) -> None:
+    loaded = load_scenario(ROOT / "scenarios" / "servo.toml")
+    path = printed(gms_fsm, str(ROOT / "scenarios" / "servo.toml"))
+    *lines, _, _ = program(path, "0.1", "20000")
+    arguments = {"method": "euler", "step": 5e-6, "events": "step", "engine": "ifelse"}
+    trace = simulate(loaded.system, 0.1, **arguments)
+    assert [edge for _, edge in said(lines)] == [edge for _, edge in log_of(trace)]
+
+
+def test_too_few_steps_are_refused_in_one_sentence(gms_fsm: CommandLine) -> None:
+    path = printed(gms_fsm, "dahl")
+    done = subprocess.run(
+        [sys.executable, "-I", "-S", str(path), "25", "400"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "not finite: take more than 400 steps to t = 25.0 s, or an earlier end" in done.stderr
