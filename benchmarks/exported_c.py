@@ -1,8 +1,8 @@
 """What exported C costs: code, memory, and the time of a call with a sample of 1 ms.
 
-Each case is exported with ``gms-fsm export --to c99`` and compiled by gcc: the engine, which locates
-switches, and the plain form, which asks its guards once a step. Both run over the same random
-motion, in interleaved rounds with `FrictionState` on the engine's machine code.
+Each case is exported with ``gms-fsm export --to c99`` and compiled by gcc: the engine, which
+locates switches, and the plain form, which asks its guards once a step. Both run over the same
+random motion, in interleaved rounds with `FrictionState` on the engine's machine code.
 
     python benchmarks/exported_c.py [--rounds 9]
     python benchmarks/exported_c.py --write        the table in docs/howto/exports.md
@@ -37,12 +37,12 @@ TIMER = """\
 int main(void)
 {{
     static double v[{calls} + 1];
-    static {name}_state s;
+    static {kind} s;
     double F = 0.0;
     for (int k = 0; k <= {calls}; k++)
         if (scanf("%lf", &v[k]) != 1)
             return 1;
-    {name}_init(&s);
+    {name}_{begin}(&s);
     clock_t start = clock();
     for (int k = 0; k < {calls}; k++) {{
         {call}
@@ -86,8 +86,9 @@ def motion() -> list[float]:
 class Program:
     """A compiled form of a friction."""
 
-    def __init__(self, folder: Path, name: str, call: str) -> None:
-        timer = TIMER.format(name=name, calls=CALLS, call=call.format(name=name))
+    def __init__(self, folder: Path, name: str, call: str, kind: str, begin: str) -> None:
+        call = call.format(name=name)
+        timer = TIMER.format(name=name, calls=CALLS, call=call, kind=kind, begin=begin)
         (folder / f"{name}_timer.c").write_text(timer)
         self.path = folder / name
         sources = [f"{name}.c", f"{name}_timer.c"]
@@ -103,7 +104,7 @@ class Program:
             code, data, *_ = map(int, text.splitlines()[1].split()[:3])
             self.sizes.append(code + data)
         probe = f'#include "{name}.h"\n#include <stdio.h>\n'
-        probe += f'int main(void) {{ printf("%zu", sizeof({name}_state)); return 0; }}\n'
+        probe += f'int main(void) {{ printf("%zu", sizeof({kind})); return 0; }}\n'
         (folder / "probe.c").write_text(probe)
         subprocess.run(["gcc", "-std=c99", "probe.c", "-o", "probe"], cwd=folder, check=True)
         self.state = int(subprocess.run([folder / "probe"], check=True, capture_output=True).stdout)
@@ -131,7 +132,8 @@ def row(name: str, model: Model, rounds: int) -> list[tuple[str, ...]]:
         folder = Path(place)
         export(model, "c99", folder, name="it")
         lines = len(engine_of(Subject.of(model, "c99", name="it")).source.splitlines())
-        engine, plain = Program(folder, "it", ENGINE), Program(folder, "it_plain", PLAIN)
+        engine = Program(folder, "it", ENGINE, "it_state", "init")
+        plain = Program(folder, "it_plain", PLAIN, "it_plain", "start")
         found = []
         for _ in range(rounds):
             found.append((engine.timed(text), plain.timed(text), in_python(model, v)))
@@ -151,7 +153,16 @@ def row(name: str, model: Model, rounds: int) -> list[tuple[str, ...]]:
 
 def page(rounds: int) -> str:
     """Return what the page says, measured here."""
-    head = ("", "form", "lines", "code -O2, kB", "-Os, kB", "struct, B", "call, µs", "in Python, µs")
+    head = (
+        "",
+        "form",
+        "lines",
+        "code -O2, kB",
+        "-Os, kB",
+        "struct, B",
+        "call, µs",
+        "in Python, µs",
+    )
     rows = [each for name, model in cases().items() for each in row(name, model, rounds)]
     gcc = subprocess.run(["gcc", "-dumpversion"], capture_output=True, text=True, check=True).stdout
     about = f"{machine('llvmlite')}, gcc {gcc.strip()}; medians of {rounds} interleaved rounds."

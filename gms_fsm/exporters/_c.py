@@ -17,6 +17,7 @@ from gms_fsm._version import __version__
 from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
+from gms_fsm.exporters._plain_c import C_WORDS
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import names_in, spell
@@ -35,14 +36,9 @@ from integrators.stepping import FULL_LOG, RESUMED, SWITCHES, step_to
 
 __all__ = ["WORDS", "Engine", "engine_of", "filled"]
 
-KEYWORDS = """
-    auto bool break case char complex const continue default do double else enum extern false float
-    for goto if imaginary inline int long register restrict return short signed sizeof static struct
-    switch true typedef union unsigned void volatile while
-"""
-FIELDS = "t switches logged word"  # of the struct
+FIELDS = ("t", "switches", "logged", "word")  # of the struct
 TEMPLATES = Path(__file__).parent / "_templates"
-WORDS = frozenset(f"{KEYWORDS} {FIELDS} INFINITY NAN NULL".split())
+WORDS = C_WORDS | {*FIELDS, "INFINITY", "NAN", "NULL"}
 BAD_ARGUMENT = -1
 
 

@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
+from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._c import WORDS, Engine, engine_of, filled
+from gms_fsm.exporters._plain_c import plain_c, plain_c_notes
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering.scales import scales_of
@@ -35,13 +37,25 @@ def c99(subject: Subject) -> dict[str, str]:
     """
     made = engine_of(subject)
     name = made.name
+    plain, notes = _plain(subject)
     return {
+        **plain,
         f"{name}.h": made.header,
         f"{name}.c": made.source,
         f"{name}_main.c": _main(made),
         f"{name}_record.csv": _record(subject),
-        "README-c99.md": _readme(subject, made),
+        "README-c99.md": f"{_readme(subject, made)}\n{notes}",
     }
+
+
+def _plain(subject: Subject) -> tuple[dict[str, str], str]:
+    """Return the files of the plain form, if there can be one, and what the README says of it."""
+    if isinstance(subject.given, System):
+        return {}, ""
+    try:
+        return plain_c(subject), f"## The plain form\n\n{plain_c_notes(subject)}"
+    except ParameterError as error:
+        return {}, f"There is no plain form: {error}\n"
 
 
 def _main(made: Engine) -> str:

@@ -158,7 +158,7 @@ def alone(given: Model | Contact) -> Contact:
         raise ParameterError(
             f"it has the velocities {', '.join(chart.velocities)}",
             place=here,
-            advice="only charts with one velocity can be stepped; use a System and simulate",
+            advice="only charts with one velocity can be stepped; put it into a System",
         )
     if chart.locks or chart.sets_velocity:
         why = (
@@ -169,7 +169,7 @@ def alone(given: Model | Contact) -> Contact:
         raise ParameterError(
             why,
             place=here,
-            advice="use a System and simulate, or a chart without locks, such as GMS or LuGre",
+            advice="put it into a System, or use a chart without locks, such as GMS or LuGre",
         )
     if not isinstance(given, Contact):
         return Contact("friction", given)

@@ -76,13 +76,13 @@ def same_bits(
             # Steps end at the rows of a record; without one, give one that nobody reads.
             rows = {} if inputs else {"nothing": Corners(t, 0.0 * t, held=False)}
             stopped = replace(given, signals={**given.signals, **rows})
-            trace = simulate(stopped, t[-1], initial=initial, **options)
+            trace = simulate(stopped, t[-1], t_start=t[0], initial=initial, **options)
         else:
             trace = simulate(given, Prescribed((t, inputs["v"])), t[-1], **options)
     except GMSError:
         trace = None
-    export(given, "c99", folder, name="it", initial=initial)
-    made = engine_of(Subject.of(given, "c99", name="it", initial=initial))
+    export(given, "c99", folder, name="it", initial=initial, t_start=t[0])
+    made = engine_of(Subject.of(given, "c99", name="it", initial=initial, t_start=t[0]))
     for compiler in compilers:
         found = run(built(folder, "it", compiler), t, **inputs)
         if trace is None:

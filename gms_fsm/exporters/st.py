@@ -1,0 +1,368 @@
+"""Format ``st``: the plain form as IEC 61131-3 structured text, a function block for a PLC."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._element import Constant, Element
+from gms_fsm.exporters._names import identifier
+from gms_fsm.exporters._notation import Notation
+from gms_fsm.exporters._plain_form import (
+    ByState,
+    Declare,
+    Enter,
+    Guards,
+    Plain,
+    Set,
+    Statement,
+    plain_form,
+)
+from gms_fsm.exporters._registry import Exporter, register
+from gms_fsm.exporters._subject import Subject
+from gms_fsm.language import Name, Node
+
+__all__ = ["WORDS", "structured_text"]
+
+# Keywords and elementary types of IEC 61131-3 (third edition), standard functions and function
+# blocks. The letters of instruction lists and of action qualifiers (S, R, N ...) are names in
+# structured text.
+WORDS = frozenset(
+    re.findall(
+        r"\w+",
+        """
+    ABS ABSTRACT ACOS ACTION ADD AND ANY ANY_BIT ANY_DATE ANY_DERIVED ANY_ELEMENTARY ANY_INT
+    ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_STRING ARRAY ASIN AT ATAN ATAN2 BOOL BY BYTE CASE CHAR CLASS
+    CONCAT CONFIGURATION CONSTANT CONTINUE COS CTD CTU CTUD DATE DATE_AND_TIME DELETE DINT DIV DO DT
+    DWORD ELSE ELSIF END_ACTION END_CASE END_CLASS END_CONFIGURATION END_FOR END_FUNCTION
+    END_FUNCTION_BLOCK END_IF END_INTERFACE END_METHOD END_NAMESPACE END_PROGRAM END_PROPERTY
+    END_REPEAT END_RESOURCE END_STEP END_STRUCT END_TRANSITION END_TYPE END_UNION END_VAR END_WHILE
+    EN ENO EQ EXIT EXP EXPT EXTENDS FALSE FINAL FIND FOR FROM FUNCTION FUNCTION_BLOCK F_EDGE F_TRIG
+    GE GOTO GT IF IMPLEMENTS INITIAL_STEP INSERT INT INTERFACE INTERNAL INTERVAL LDATE
+    LDATE_AND_TIME LDT LE LEFT LEN LIMIT LINT LN LOG LREAL LT LTIME LTIME_OF_DAY LTOD LWORD MAX
+    METHOD MID MIN MOD MOVE MUL MUX NAMESPACE NE NON_RETAIN NOT NULL OF ON OR OVERLAP OVERRIDE
+    POINTER PRIORITY PRIVATE PROGRAM PROPERTY PROTECTED PUBLIC READ_ONLY READ_WRITE REAL REF
+    REFERENCE REF_TO REPEAT REPLACE RESOURCE RETAIN RETURN RIGHT ROL ROR RS R_EDGE R_TRIG SEL SHL
+    SHR SIN SINGLE SINT SQRT SR STEP STRING STRUCT SUB SUPER TAN TASK THEN THIS TIME TIME_OF_DAY TO
+    TOD TOF TON TP TRANSITION TRUE TRUNC TYPE UDINT UINT ULINT UNION UNTIL USING USINT VAR
+    VAR_ACCESS VAR_CONFIG VAR_EXTERNAL VAR_GLOBAL VAR_INPUT VAR_IN_OUT VAR_OUTPUT VAR_TEMP WCHAR
+    WHILE WITH WORD WSTRING XOR
+    """,
+    )
+)
+FUNCTIONS = {
+    "abs": "ABS({0})",
+    "exp": "EXP({0})",
+    "log": "LN({0})",
+    "sqrt": "SQRT({0})",
+    "min": "MIN({0}, {1})",
+    "max": "MAX({0}, {1})",
+    "sin": "SIN({0})",
+    "cos": "COS({0})",
+    "atan": "ATAN({0})",
+}  # the standard has no tanh and no asinh; sgn is a function of the text itself
+SGN = """\
+FUNCTION {name} : LREAL
+VAR_INPUT
+    u : LREAL;
+END_VAR
+IF u > 0.0 THEN
+    {name} := 1.0;
+ELSIF u < 0.0 THEN
+    {name} := -1.0;
+ELSE
+    {name} := 0.0;
+END_IF;
+END_FUNCTION
+
+"""
+
+
+class _Words(frozenset[str]):
+    """Words that are the same in capitals and in small letters."""
+
+    def __contains__(self, word: object) -> bool:
+        return isinstance(word, str) and super().__contains__(word.upper())
+
+
+def structured_text(subject: Subject) -> dict[str, str]:
+    """Return the plain form of a friction as a function block.
+
+    Parameters
+    ----------
+    subject : Subject
+        One friction, whose velocity is an input.
+
+    Returns
+    -------
+    dict of str to str
+        ``<name>.st`` and ``README-st.md``.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be expressed; what is in the way is named.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> text = structured_text(Subject.of(model, "st", name="gms"))["gms.st"]
+    >>> "ELSIF z_i <= -s AND v < -v_c THEN" in text
+    True
+    """
+    printer = _Printer(subject)
+    return {f"{subject.name}.st": printer.text(), "README-st.md": printer.readme()}
+
+
+class _Printer:
+    """Prints the plain form of a friction."""
+
+    def __init__(self, subject: Subject) -> None:
+        name = subject.name
+        identifier(name.upper(), WORDS, f"name {name!r}")
+        self.name, self.element = name, Element.of(subject, WORDS, cases=False)
+        element = self.element
+        self.force = element.free("force")  # F would be the same as a chart's f
+        self.form: Plain = plain_form(element, "cycle")
+        self.notation = Notation(
+            " AND ",
+            " OR ",
+            "NOT ",
+            "TRUE",
+            {**FUNCTIONS, "sgn": f"{name}_sgn({{0}})"},
+            "EXPT({0}, {1})",
+        )
+        for tree in self.form.trees:
+            self.notation.check(tree, f"chart {subject.title!r}", "structured text")
+        # One element needs no arrays and no loop.
+        self.i = element.free("i") if element.n > 1 else ""
+        self.at = f"[{self.i}]" if self.i else ""
+        self.now = {
+            each.name: element.free(f"{each.name}_i") if self.i else each.name
+            for each in element.variables
+        }
+        numbers = {c.name for c in element.constants if isinstance(c.value, tuple)}
+        self.texts = {each: f"{each}{self.at}" for each in numbers} | self.now
+        self.texts[self.form.force] = self.force
+        self.states = [element.free(f"STATE_{each.name.upper()}") for each in element.states]
+        names = [*self.names(), *(each for each, _ in element.inputs)]
+        for each in names:
+            if "__" in each or each.endswith("_"):
+                raise ParameterError(
+                    "structured text has no names with two underscores in a row or one at the end",
+                    place=f"chart {subject.title!r}, name {each!r}",
+                    advice="give it another name",
+                )
+
+    def names(self) -> list[str]:
+        """Return the names of the chart that stand in the text."""
+        element = self.element
+        return [each.name for each in (*element.constants, *element.lets, *element.variables)]
+
+    # ------------------------------------------------------------------ the text
+    def text(self) -> str:
+        element, name = self.element, self.name
+        body = self.body()
+        inputs = [*element.inputs, (self.form.dt, "s: since the last call")]
+        lines = [
+            f"(* {_plain_text(element.title)}: the plain form, to be called once a cycle. *)",
+            f"FUNCTION_BLOCK {name}",
+            *_block("VAR_INPUT", (f"{each} : LREAL;{_note(about)}" for each, about in inputs)),
+            *_block("VAR_OUTPUT", [f"{self.force} : LREAL;  (* N: friction force *)"]),
+            *_block("VAR CONSTANT", self.constants()),
+            *_block("VAR", self.memory()),
+            *_block("VAR", self.locals()),
+            *body,
+            "END_FUNCTION_BLOCK",
+        ]
+        text = "\n".join(lines) + "\n"
+        return SGN.format(name=f"{name}_sgn") + text if f"{name}_sgn(" in text else text
+
+    def constants(self) -> Iterator[str]:
+        yield from map(self.constant, self.element.constants)
+        if len(self.element.states) > 1:
+            for index, name in enumerate(self.states):
+                yield f"{name} : INT := {index};"
+
+    def constant(self, constant: Constant) -> str:
+        value = constant.value
+        if isinstance(value, tuple):
+            return f"{constant.name} : {self.array('LREAL', value)};{_note(constant.about)}"
+        number = self.notation.number(value)
+        return f"{constant.name} : LREAL := {number};{_note(constant.about)}"
+
+    def array(self, kind: str, values: Sequence[float | int]) -> str:
+        number = self.notation.number
+        texts = [number(each) if isinstance(each, float) else str(each) for each in values]
+        if len(values) == 1:
+            return f"{kind} := {texts[0]}"
+        return f"ARRAY [1..{len(values)}] OF {kind} := [{', '.join(texts)}]"
+
+    def memory(self) -> Iterator[str]:
+        """Declare what is kept from call to call."""
+        element = self.element
+        for each in element.variables:
+            yield f"{each.name} : {self.array('LREAL', each.start)};{_note(each.about)}"
+        if element.position:
+            start = self.notation.number(element.position_start)
+            yield f"{element.position} : LREAL := {start};  (* m: position *)"
+        if len(element.states) > 1:
+            yield f"state : {self.array('INT', element.start)};"
+
+    def locals(self) -> Iterator[str]:
+        """Declare what is computed in every call."""
+        if self.i:
+            yield f"{self.i} : INT;"
+        found = dict.fromkeys(self.now.values() if self.i else ())
+        for each in (*self.form.shared, *self.form.guards, *self.form.flows):
+            found |= dict.fromkeys(_assigned(each))
+        for name in found:
+            yield f"{name} : LREAL;"
+
+    def body(self) -> list[str]:
+        element, form = self.element, self.form
+        inner = [*self.statements(form.guards), *self.statements(form.flows)]
+        inner.append(f"{self.force} := {self.force} + {form.part};")
+        inner += [f"{each.name}{self.at} := {self.spell(each.tree)};" for each in form.updates]
+        lines = [f"{self.force} := 0.0;", *self.statements(form.shared)]
+        if self.i:
+            loads = [f"{now} := {name}[{self.i}];" for name, now in self.now.items()]
+            inner = _indented([*loads, *inner])
+            lines += [f"FOR {self.i} := 1 TO {element.n} DO", *inner, "END_FOR;"]
+        else:
+            lines += inner
+        if element.total.tree != Name(form.force):
+            lines.append(f"{self.force} := {self.spell(element.total.tree)};")
+        if element.position:
+            x, (v, _) = element.position, element.inputs[0]
+            lines.append(f"{x} := {x} + {form.dt} * {v};")
+        return lines
+
+    # ------------------------------------------------------------------ statements
+    def spell(self, tree: Node) -> str:
+        return self.notation.spell(tree, self.texts)
+
+    def statements(self, found: Iterable[Statement]) -> list[str]:
+        return [line for each in found for line in self.statement(each)]
+
+    def statement(self, statement: Statement) -> Iterator[str]:
+        match statement:
+            case Set(name, tree, note):
+                yield f"{self.texts.get(name, name)} := {self.spell(tree)};{_note(note)}"
+            case Enter(state):
+                if len(self.element.states) > 1:
+                    yield f"state{self.at} := {self.states[state]};"
+            case Guards(edges):
+                word = "IF"
+                for edge, taken in edges:
+                    yield f"{word} {self.spell(edge.guard)} THEN{_note(edge.name)}"
+                    yield from _indented(self.statements(taken) or [";"])
+                    word = "ELSIF"
+                yield "END_IF;"
+            case ByState(branches):
+                yield from self.by_state(branches)
+
+    def by_state(self, branches: Sequence[Sequence[Statement]]) -> Iterator[str]:
+        if len(branches) == 1:
+            yield from self.statements(branches[0])
+            return
+        word, last = "IF", len(branches) - 1
+        for index, branch in enumerate(branches):
+            name = self.states[index]
+            test = f"{word} state{self.at} = {name} THEN"
+            yield f"ELSE{_note(name)}" if index == last else test
+            yield from _indented(self.statements(branch) or [";"])
+            word = "ELSIF"
+        yield "END_IF;"
+
+    # ------------------------------------------------------------------ for people
+    def readme(self) -> str:
+        name, element = self.name, self.element
+        inputs = "".join(f", {each} := ..." for each, _ in element.inputs[1:])
+        about = "".join(f"- {each}: {text}\n" for each, text in element.inputs if text)
+        numbers = "".join(
+            f"- {each.name} = {_shown(each)}{f' ({each.about})' if each.about else ''}\n"
+            for each in element.constants
+        )
+        sgn = f" and the function {name}_sgn" if f"{name}_sgn(" in self.text() else ""
+        return f"""\
+# {element.title} as structured text (IEC 61131-3)
+
+- {name}.st: the function block {name}{sgn}
+
+## How to run it
+
+Import {name}.st into the project of a PLC, declare an instance, and call it once in every cycle of
+a task with a fixed interval:
+
+    VAR friction : {name}; END_VAR
+    friction(v := velocity{inputs}, {self.form.dt} := 0.001);
+    force := friction.{self.force};
+
+## What it computes
+
+{element.title}, {element.n} element{"s" if element.n > 1 else ""}{_reference(element)}
+Each call looks at every guard once, gives the force, and takes one explicit Euler step of length
+{self.form.dt} with this velocity. These are the numbers of
+simulate(model, Prescribed(record), t_end, method="euler", step=..., events="step").
+
+Inputs:
+
+{about}- {self.form.dt}: s: time since the last call
+
+Numbers:
+
+{numbers}
+## What it does not do
+
+Switches are seen at the next call, not where they happen, so the result is of first order in the
+cycle time. A velocity that passes through a narrow guard between two calls is not noticed.
+AND and OR may evaluate both sides.
+"""
+
+
+def _reference(element: Element) -> str:
+    return f", {element.reference}.\n" if element.reference else ".\n"
+
+
+def _shown(constant: Constant) -> str:
+    value = constant.value
+    return ", ".join(map(repr, value)) if isinstance(value, tuple) else repr(value)
+
+
+def _assigned(statement: Statement) -> Iterator[str]:
+    """Return the names that a statement computes anew in every call."""
+    match statement:
+        case Set(name, _, _, True):
+            yield name
+        case Declare(names):
+            yield from names
+        case ByState(branches):
+            for branch in branches:
+                for each in branch:
+                    yield from _assigned(each)
+
+
+def _block(head: str, lines: Iterable[str]) -> list[str]:
+    inner = _indented(lines)
+    return [head, *inner, "END_VAR"] if inner else []
+
+
+def _indented(lines: Iterable[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
+def _note(text: str) -> str:
+    return f"  (* {_plain_text(text)} *)" if text else ""
+
+
+def _plain_text(text: str) -> str:
+    """Return a text that may stand in a comment."""
+    return re.sub(r"\s+", " ", text.replace("*)", "* )").replace("(*", "( *"))
+
+
+register(
+    Exporter("st", "IEC 61131-3 structured text, the plain form", structured_text, _Words(WORDS))
+)

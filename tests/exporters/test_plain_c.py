@@ -1,0 +1,162 @@
+"""Claim: the plain form in C has the bits of the engine that looks at guards once a step."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gms_fsm import GMS, Chart, ChartModel, Contact, GMSParameters, State, Transition
+from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._plain_c import plain_c
+from gms_fsm.exporters._subject import Subject
+from tests.exporters.text_cases import NAMES, case
+
+STEP = 1e-3
+COMPILERS = [each for each in ("gcc", "clang") if shutil.which(each)]
+STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off")
+needs_c = pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+
+
+def compiled(
+    folder: Path, subject: Subject, compiler: str = "", *more: str
+) -> Callable[..., float]:
+    """Return the step of a friction that has begun, as a function of its inputs and dt."""
+    files = plain_c(subject)
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    source, library = folder / f"{subject.name}_plain.c", folder / f"{subject.name}.so"
+    command = [compiler or COMPILERS[0], *STRICT, *more, "-shared", "-fPIC", str(source), "-lm"]
+    done = subprocess.run(
+        [*command, "-o", str(library)], capture_output=True, text=True, check=False
+    )
+    assert not done.returncode, done.stderr
+    loaded = ctypes.CDLL(str(library))
+    step, memory = loaded[f"{subject.name}_plain_step"], ctypes.create_string_buffer(65536)
+    kind = ctypes.c_float if more else ctypes.c_double
+    step.restype = kind
+    loaded[f"{subject.name}_plain_start"](memory)
+    return lambda *inputs: float(step(memory, *map(kind, inputs)))
+
+
+@needs_c
+@pytest.mark.parametrize("name", NAMES)
+def test_the_bits_of_the_engine(name: str, tmp_path: Path) -> None:
+    switches = 0
+    for seed in range(3):
+        given = case(name, seed)
+        trace = given.simulated(method="euler", step=STEP, events="step")
+        switches += len(trace.transitions)
+        last = np.append(np.diff(trace.t) > 0.0, True)  # of the rows at one time: after switching
+        t, v, F = trace.t[last], trace.v[last], trace.F[last]
+        for compiler in COMPILERS:
+            step = compiled(
+                tmp_path, Subject.of(given.model, "c99", name=f"f{seed}{compiler}"), compiler
+            )
+            found = [step(v[k], t[k + 1] - t[k]) for k in range(len(t) - 1)]
+            assert found == F[:-1].tolist(), f"repeat with case({name!r}, {seed})"
+    assert switches or name == "lugre"
+
+
+@needs_c
+def test_further_inputs_position_and_time(tmp_path: Path) -> None:
+    """What a chart reads besides v becomes an argument; x is the integral of v."""
+    chart = Chart(
+        "loaded",
+        inputs=("v", "x", "t", "N"),
+        variables=("z",),
+        parameters=("mu",),
+        states=(State("a", flow={"z": "v - z * abs(v) / (mu * max(N, 1))"}), State("b")),
+        transitions=(
+            Transition(
+                "go", "a", "b", guard="x > 0.5 and (t > 1 or not N < 1)", actions={"z": "z / 2"}
+            ),
+            Transition("back", "b", "a", guard="age > 0.2 and sgn(v) < 0"),
+        ),
+        outputs={"F": "N * z + min(x, t)**2.5"},
+    )
+    contact = Contact("c", chart, {"mu": 0.3}, inputs={"N": "load + 1"})
+    step = compiled(tmp_path, Subject.of(contact, "c99", name="loaded"))
+    x, z, age, state, dt = 0.0, 0.0, 0.0, "a", 2.0**-6
+    for k in range(400):
+        t, v, N = k * dt, float(np.cos(3 * k * dt)), 1.5
+        if state == "a" and x > 0.5 and (t > 1 or not N < 1):
+            z, state, age = z / 2, "b", 0.0
+        elif state == "b" and age > 0.2 and v < 0:
+            state, age = "a", 0.0
+        F = N * z + np.power(max(min(x, t), 0.0), 2.5) if min(x, t) >= 0 else np.nan
+        assert step(v, 0.5, t, dt) == pytest.approx(F, rel=1e-14, nan_ok=True)
+        dz = v - z * abs(v) / (0.3 * max(N, 1)) if state == "a" else 0.0
+        z, x, age = z + dt * dz, x + dt * v, age + dt
+
+
+@needs_c
+def test_single_precision(tmp_path: Path) -> None:
+    given = case("gms-4-signed", 1)
+    double = compiled(tmp_path, Subject.of(given.model, "c99", name="d"))
+    single = compiled(tmp_path, Subject.of(given.model, "c99", name="s"), "", "-DS_REAL=float")
+    v = np.interp(np.arange(0.0, 1.0, STEP), given.t, given.v)
+    F = np.array([[double(u, STEP), single(u, STEP)] for u in v])
+    assert 0.0 < np.abs(F[:, 0] - F[:, 1]).max() < 1e-3
+
+
+def test_no_memory_but_the_struct() -> None:
+    text = plain_c(Subject.of(case("gms-16-signed", 0).model, "c99", name="g"))["g_plain.c"]
+    assert not re.search(r"malloc|^static (?!g_REAL|G_REAL)", text, re.MULTILINE)
+    assert text.count("static const") == text.count("static const G_REAL")
+
+
+@pytest.mark.parametrize(
+    ("parameter", "guard", "wrong"),
+    [
+        ("double", "z > 1", "parameter 'double'"),
+        ("k", "F > 1", "edge 'go': format 'c99' has no guards or assignments that read 'F'"),
+        ("k", "a > 1", "edge 'go': format 'c99' has no guards or assignments that read 'a'"),
+        ("stärke", "z > 1", "parameter 'stärke'"),
+    ],
+)
+def test_refused(parameter: str, guard: str, wrong: str) -> None:
+    chart = Chart(
+        "refused",
+        variables=("z",),
+        parameters=(parameter,),
+        states=(State("a", flow={"z": "v"}), State("b")),
+        transitions=(Transition("go", "a", "b", guard=guard),),
+        outputs={"F": "z"},
+    )
+    with pytest.raises(ParameterError, match=re.escape(wrong)):
+        plain_c(Subject.of(ChartModel(chart, {parameter: 1.0}), "c99"))
+
+
+def test_names_of_the_printer_give_way() -> None:
+    """A chart may use the names that the text would use: i, dt, F_i, friction, weight, stribeck."""
+    names = ("i", "dt", "F_i", "friction", "weight", "stribeck", "F_c")
+    chart = Chart(
+        "names",
+        inputs=("v", "s"),
+        variables=("z",),
+        parameters=names,
+        states=(State("a", flow={"z": "v - s * (" + " + ".join(names) + ")"}),),
+        outputs={"F": "z"},
+    )
+    stribeck = GMSParameters.paper("stick-slip").stribeck
+    model = ChartModel(chart, dict.fromkeys(names, 1.0), n=2, stribeck=stribeck)
+    text = plain_c(Subject.of(model, "c99", name="n"))["n_plain.c"]
+    assert "for (int i2 = 0; i2 < 2; i2++)" in text
+    assert "const N_REAL model_stribeck = model_F_c + (F_s - model_F_c)" in text
+
+
+def test_a_published_law_is_another_text() -> None:
+    parameters = GMSParameters.paper("stick-slip")
+    texts = {
+        law: plain_c(Subject.of(GMS(parameters, law=law), "c99", name="g"))["g_plain.c"]
+        for law in ("signed", "published")
+    }
+    assert "dz = C[i] * (g_plain_sgn(v) - z / s);" in texts["signed"]
+    assert "dz = g_plain_sgn(v) * C[i] * (1.0 - z / s);" in texts["published"]
