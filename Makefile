@@ -122,8 +122,9 @@ soak: $(VENV)/dev.stamp
 	$(RUN)/python -m tests.soak --minutes $(SOAK_MINUTES)
 
 # The programs that run the exports; without one of them its checks are skipped, and it is named.
-FOREIGN_PROGRAMS := gcc clang octave-cli node npm
-FOREIGN_PACKAGES := gcc clang octave nodejs npm
+FOREIGN_PROGRAMS := gcc g++ clang octave-cli node npm plantuml pdflatex pdftotext chromium git autoconf automake flex bison
+FOREIGN_PACKAGES := gcc g++ clang octave nodejs npm plantuml texlive-latex-recommended texlive-pictures poppler-utils \
+    chromium git autoconf automake flex bison
 
 # One check after the other: each writes its rows of tests/foreign/exports.json at the end.
 foreign: $(VENV)/foreign.stamp

@@ -36,13 +36,13 @@ def unrun(formats: Iterable[str], known: Sequence[Sequence[str]]) -> list[str]:
 def table(formats: Iterable[str], known: Sequence[Sequence[str]]) -> str:
     """Return the table as Markdown, and below it the formats without a row."""
     lines = [f"| {' | '.join(HEADS)} |", "|---|---|---|---|"]
-    lines += [
-        f"| `{form}` | {' | '.join(each.replace('|', BAR) for each in cells)} |"
-        for form, *cells in known
-    ]
-    if missing := unrun(formats, known):
-        names = ", ".join(f"`{each}`" for each in missing)
-        lines += ["", f"Not run by any tool, and therefore not supported: {names}."]
+    names = {each: f"`{each}`" for each in formats}  # the others are pictures
+    for row in known:
+        form, *cells = (each.replace("|", BAR) for each in row)
+        lines.append(f"| {names.get(form, form)} | {' | '.join(cells)} |")
+    if missing := unrun(names, known):
+        listed = ", ".join(names[each] for each in missing)
+        lines += ["", f"Not run by any tool, and therefore not supported: {listed}."]
     return "\n".join(lines) + "\n"
 
 

@@ -10,6 +10,7 @@ from types import ModuleType
 import pytest
 
 from gms_fsm.exporters import EXPORTERS
+from plots.formats import FORMATS
 from tests.helpers import ROOT
 from tests.scenario_files import CommandLine
 
@@ -35,8 +36,9 @@ def test_page_and_file_agree(script: ModuleType) -> None:
 
 
 def test_rows_are_of_formats_and_complete(script: ModuleType) -> None:
+    pictures = {each.kind for each in FORMATS}
     for form, tool, what, result in script.rows():
-        assert form in EXPORTERS
+        assert form in {*EXPORTERS, *pictures}
         assert re.search(r"\d", tool), f"{tool}: its version is missing"
         assert what
         assert result
