@@ -18,3 +18,19 @@ collect_ignore += [
     for path in (f"gms_fsm/adapters/{name}.py", f"tests/foreign/check_{name}.py")
     if not importlib.util.find_spec(name)
 ]
+# Foreign tools that read exports (in dev or foreign).
+collect_ignore += [
+    path
+    for name, paths in {
+        "rumoca": ["tests/exporters/rumoca_runs.py", "tests/foreign/check_export_modelica.py"],
+        "pymoca": ["tests/foreign/check_export_modelica.py"],
+        "blark": ["tests/foreign/check_export_st.py"],
+        "fmpy": [
+            "tests/exporters/fmus.py",
+            "tests/exporters/test_fmus_run_in_fmpy.py",
+            "tests/foreign/check_export_fmu.py",
+        ],
+    }.items()
+    if not importlib.util.find_spec(name)
+    for path in paths
+]

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from string import Template
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,17 @@ from integrators.machine_code.tree import Local
 from integrators.machine_code.values import Number
 from integrators.stepping import FULL_LOG, RESUMED, SWITCHES, step_to
 
-__all__ = ["WORDS", "Engine", "engine_of", "filled"]
+__all__ = [
+    "PLACES",
+    "TEMPLATES",
+    "WORDS",
+    "Engine",
+    "check_entries",
+    "curves_of",
+    "engine_of",
+    "filled",
+]
+__all__ += ["image_of", "number", "safe"]
 
 FIELDS = ("t", "switches", "logged", "word")  # of the struct
 TEMPLATES = Path(__file__).parent / "_templates"
@@ -96,7 +107,7 @@ def engine_of(subject: Subject) -> Engine:
         If a name cannot be one in C, or a default state is entered with what is not known yet.
     """
     start, alone = subject.start, not isinstance(subject.given, System)
-    _check_entries(start)
+    check_entries(start)
     for each in subject.inputs:
         identifier(each, WORDS, f"input {each!r}")
     states: dict[str, int] = {}
@@ -116,8 +127,19 @@ def engine_of(subject: Subject) -> Engine:
     return replace(made, header=text.header(), source=text.source())
 
 
-def _check_entries(start: Start) -> None:
-    """Refuse initial values that depend on the inputs of the first call."""
+def check_entries(start: Start) -> None:
+    """Refuse initial values that depend on the inputs of the first call.
+
+    Parameters
+    ----------
+    start : Start
+        What is exported.
+
+    Raises
+    ------
+    ParameterError
+        Naming the contact and the variable.
+    """
     for contact in start.system.contacts:
         chart = contact.chart
         given = {*chart.inputs, *chart.velocities, *chart.declared} - {*chart.variables}
@@ -163,7 +185,7 @@ class _Text:
             "engine.h",
             name=name,
             guard=f"{name.upper()}_H",
-            title=_safe(self.title),
+            title=safe(self.title),
             version=__version__,
             inputs=", ".join(made.inputs) or "none",
             fields="\n".join(fields),
@@ -183,7 +205,7 @@ class _Text:
     def source(self) -> str:
         """Return the source."""
         name, made, place = self.name, self.made, self.layout.offset
-        counts, curves = place("sample.counts"), self._curves()
+        counts, curves = place("sample.counts"), curves_of(self.start, self.layout)
         given = [
             f"    w[{place('sample.inputs') + 2 * k + j}].f = {each}{j};"
             for k, each in enumerate(made.inputs)
@@ -202,12 +224,12 @@ class _Text:
         return filled(
             "engine.c",
             name=name,
-            title=_safe(self.title),
+            title=safe(self.title),
             version=__version__,
             engine=self._translated(bool(curves)),
             clock=place("buffers.now.clock"),
             shown=self._shown(),
-            image=self._image(),
+            image=image_of(self.layout, self.arguments),
             lines=made.lines,
             names="".join(f"{each}0, {each}1, " for each in made.inputs),
             unless_numbers="".join(
@@ -242,7 +264,7 @@ class _Text:
 
     def _word(self, each: Quantity) -> int:
         """Return the first word of a quantity."""
-        return self.layout.offset(_PLACES[each.place]) + each.index
+        return self.layout.offset(PLACES[each.place]) + each.index
 
     def _shown(self) -> str:
         lines = []
@@ -255,25 +277,6 @@ class _Text:
                 lines.append(f"    {loop}\n        s->{each.name}[k] = w[{first} + k].{member};")
         return "\n".join(lines)
 
-    def _image(self) -> str:
-        """Return assignments of all words that are not zero at the start."""
-        block = Block(self.layout, self.arguments)
-        block.update(block.contents)
-        kinds = self.layout.kinds()
-        names = {offset: name for name, offset in self.layout.offsets.items()}
-        lines = []
-        for k in np.flatnonzero(block.words).tolist():
-            note = f" /* {names[k]} */" if k in names else ""
-            if kinds[k] == "f":
-                value = _number(float(block.words[k : k + 1].view(np.float64)[0]))
-                lines.append(f"    w[{k}].f = {value};{note}")
-            elif kinds[k] == "i":
-                lines.append(f"    w[{k}].i = {int(block.words[k])};{note}")
-            else:
-                truths = block.words[k : k + 1].view(np.bool_)
-                lines += [f"    w[{k}].b[{j}] = true;{note}" for j in np.flatnonzero(truths)]
-        return "\n".join(lines)
-
     def _spans(self) -> list[tuple[int, int]]:
         """Return where parameters are: first word and length, joined where they touch."""
         spans: list[tuple[int, int]] = []
@@ -284,24 +287,69 @@ class _Text:
                 spans.append((first, length))
         return spans
 
-    def _curves(self) -> str:
-        """Return the lines that compute what depends on the numbers of Stribeck curves."""
-        shared, _ = numbers_of(self.start.system)
-        first, lines = self.layout.offset(_PLACES["shared"]), []
-        where = {label: f"w[{first + k}].f" for k, label in enumerate(shared)}
-        for contact in self.start.system.contacts:
-            curve = f"{contact.name}.curve "
-            if f"{curve}v dip" in where:
-                F_c, F_s, v_s = (where[curve + each] for each in ("F_c", "F_s", "v_s"))
-                delta = where.get(f"{curve}delta", repr(GAUSSIAN))
-                lines.append(f"    {where[f'{curve}v dip']} = dip({v_s}, {delta});\n")
-                lines.append(
-                    f"    {where[f'{curve}v flat']} = flat({F_c}, {F_s}, {v_s}, {delta});\n"
-                )
-        return "".join(lines)
+
+def image_of(layout: Layout, arguments: Any) -> str:
+    """Return C text that sets all words of a block that are not zero at the start.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of the block, which the text calls ``w``.
+    arguments : named tuple
+        Its contents.
+
+    Returns
+    -------
+    str
+        One assignment a line.
+    """
+    block = Block(layout, arguments)
+    block.update(block.contents)
+    kinds = layout.kinds()
+    names = {offset: name for name, offset in layout.offsets.items()}
+    lines = []
+    for k in np.flatnonzero(block.words).tolist():
+        note = f" /* {names[k]} */" if k in names else ""
+        if kinds[k] == "f":
+            value = number(float(block.words[k : k + 1].view(np.float64)[0]))
+            lines.append(f"    w[{k}].f = {value};{note}")
+        elif kinds[k] == "i":
+            lines.append(f"    w[{k}].i = {int(block.words[k])};{note}")
+        else:
+            truths = block.words[k : k + 1].view(np.bool_)
+            lines += [f"    w[{k}].b[{j}] = true;{note}" for j in np.flatnonzero(truths)]
+    return "\n".join(lines)
 
 
-_PLACES: Mapping[str, str] = {
+def curves_of(start: Start, layout: Layout) -> str:
+    """Return C text that computes what depends on the numbers of Stribeck curves.
+
+    Parameters
+    ----------
+    start : Start
+        What is exported.
+    layout : Layout
+        Of the block, which the text calls ``w``.
+
+    Returns
+    -------
+    str
+        Calls of ``dip`` and ``flat``; empty if there is no curve.
+    """
+    shared, _ = numbers_of(start.system)
+    first, lines = layout.offset(PLACES["shared"]), []
+    where = {label: f"w[{first + k}].f" for k, label in enumerate(shared)}
+    for contact in start.system.contacts:
+        curve = f"{contact.name}.curve "
+        if f"{curve}v dip" in where:
+            F_c, F_s, v_s = (where[curve + each] for each in ("F_c", "F_s", "v_s"))
+            delta = where.get(f"{curve}delta", repr(GAUSSIAN))
+            lines.append(f"    {where[f'{curve}v dip']} = dip({v_s}, {delta});\n")
+            lines.append(f"    {where[f'{curve}v flat']} = flat({F_c}, {F_s}, {v_s}, {delta});\n")
+    return "".join(lines)
+
+
+PLACES: Mapping[str, str] = {
     "y": "buffers.now.y",
     "mode": "buffers.now.mode",
     "seen": "sample.seen",
@@ -353,11 +401,22 @@ def _field(each: Quantity, kind: str) -> str:
 
 def _comment(each: Quantity) -> str:
     text = ", ".join(part for part in (each.unit, each.meaning) if part)
-    return f" /* {_safe(text)} */" if text else ""
+    return f" /* {safe(text)} */" if text else ""
 
 
-def _safe(text: str) -> str:
-    """Return a text that does not end a comment."""
+def safe(text: str) -> str:
+    """Return a text that does not end a comment.
+
+    Parameters
+    ----------
+    text : str
+        For a comment.
+
+    Returns
+    -------
+    str
+        In one line.
+    """
     return text.replace("*/", "* /").replace("/*", "/ *").replace("\n", " ")
 
 
@@ -368,7 +427,19 @@ def _closed(lines: Sequence[str]) -> str:
     return "\n".join([*before, code.rstrip(",") + mark + comment])
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
+    """Return a number in C.
+
+    Parameters
+    ----------
+    value : float
+        Any.
+
+    Returns
+    -------
+    str
+        To the last bit.
+    """
     if value != value:
         return "NAN"
     if value in (float("inf"), float("-inf")):

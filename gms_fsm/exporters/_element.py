@@ -15,24 +15,29 @@ from typing import cast
 
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._element_parts import (
+    Constant,
+    Expression,
+    Leaving,
+    Let,
+    State,
+    Variable,
+)
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import (
     Call,
     Comparison,
-    Condition,
     Name,
     Value,
-    comparisons,
     names_in,
     renamed,
-    split,
 )
 from gms_fsm.language._normal import renamed_in
 from gms_fsm.lowering._plan import Computed, Plan, RoughCall, both_sides, plan_of
 from gms_fsm.systems._assembly import Assembly, Bank, Edge, assembled, of
 
-__all__ = ["Constant", "Element", "Expression", "Leaving", "Let", "State", "Variable"]
+__all__ = ["Element"]
 
 SUM = "F"  # what the sum over elements is called in `Element.total`
 MODEL = {  # what a model adds to its chart: name here, and its description
@@ -41,161 +46,6 @@ MODEL = {  # what a model adds to its chart: name here, and its description
     "model sigma_2": ("sigma_2", SIGMA_2),
     **{f"curve {each.name}": (each.name, each) for each in STRIBECK},
 }
-
-
-@dataclass(frozen=True)
-class Constant:
-    """A number, or one for each of several elements.
-
-    Parameters
-    ----------
-    name : str
-        In the text.
-    value : float or tuple of float
-        The number or the numbers.
-    about : str
-        Unit and meaning, for a comment.
-    """
-
-    name: str
-    value: float | tuple[float, ...]
-    about: str = ""
-
-
-@dataclass(frozen=True)
-class Expression:
-    """A value, in two forms.
-
-    Parameters
-    ----------
-    tree : Value
-        With corners and jumps where they are.
-    smooth : Value
-        With names in place of calls that have a corner or a jump.
-    calls : tuple of RoughCall
-        What these names are, in order.
-    """
-
-    tree: Value
-    smooth: Value
-    calls: tuple[RoughCall, ...] = ()
-
-    @property
-    def names(self) -> frozenset[str]:
-        """What it reads."""
-        return names_in(self.tree)
-
-
-@dataclass(frozen=True)
-class Let:
-    """A quantity computed from others.
-
-    Parameters
-    ----------
-    name : str
-        In the text.
-    value : Expression
-        What it is.
-    per_element : bool
-        Whether each element has its own.
-    moves : bool
-        Whether it is computed from variables, which actions change.
-    about : str
-        For a comment.
-    """
-
-    name: str
-    value: Expression
-    per_element: bool
-    moves: bool
-    about: str = ""
-
-
-@dataclass(frozen=True)
-class Variable:
-    """A continuous state of an element.
-
-    Parameters
-    ----------
-    name, rate : str
-        Of the variable, and of its derivative.
-    start : tuple of float
-        Initial values.
-    about : str
-        For a comment.
-    """
-
-    name: str
-    rate: str
-    start: tuple[float, ...]
-    about: str = ""
-
-
-@dataclass(frozen=True)
-class Leaving:
-    """An edge that leaves a state.
-
-    Parameters
-    ----------
-    name : str
-        Of the edge.
-    number : int
-        Among all edges, from 0.
-    target : int
-        Index of the state it enters.
-    guard : Condition
-        When it is taken.
-    steps : tuple of (str, Value)
-        Assignments to variables, in this order; each sees the results before it.
-    """
-
-    name: str
-    number: int
-    target: int
-    guard: Condition
-    steps: tuple[tuple[str, Value], ...]
-
-    @property
-    def comparisons(self) -> tuple[Comparison, ...]:
-        """The comparisons that its guard is made of."""
-        return comparisons(split(self.guard))
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """A state of an element.
-
-    Parameters
-    ----------
-    name : str
-        As in the chart.
-    rates : mapping of str to Expression
-        By variable.
-    force : Expression
-        Of the element; it may read the rates.
-    edges : tuple of Leaving
-        Highest priority first.
-    corners : tuple of Value
-        Where a rate or the force has a corner or a jump: where one of these is 0.
-    """
-
-    name: str
-    rates: Mapping[str, Expression]
-    force: Expression
-    edges: tuple[Leaving, ...]
-    corners: tuple[Value, ...]
-
-    @property
-    def flow_names(self) -> frozenset[str]:
-        """What its rates and its force read."""
-        return frozenset[str]().union(*(each.names for each in (*self.rates.values(), self.force)))
-
-    @property
-    def guard_names(self) -> frozenset[str]:
-        """What its guards and the assignments of its edges read."""
-        found = [names_in(edge.guard) for edge in self.edges]
-        found += [names_in(tree) for edge in self.edges for _, tree in edge.steps]
-        return frozenset[str]().union(*found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,7 +143,7 @@ class Element:
         contact = subject.contact  # refuses a system, a chart without numbers, locks
         read = assembled(subject.start.system)
         (bank,) = read.banks
-        _refuse_feedback(bank, f"chart {contact.chart.name!r}", subject.format)
+        _refuse_feedback(bank, f"chart {contact.chart.name!r}")
         every = frozenset(words)
         return _Reader(subject, read, bank, _names(read, bank, every, cases), time, every).element()
 
@@ -346,13 +196,34 @@ class Element:
         return before, [[each for each in row if each.name not in several] for row in wanted]
 
     @property
-    def own(self) -> frozenset[str]:
-        """Names with one value per element: variables, rates, numbers and lets."""
-        found = {each.name for each in self.constants if isinstance(each.value, tuple)}
-        found |= {each.name for each in self.lets if each.per_element}
-        for each in self.variables:
-            found |= {each.name, each.rate}
-        return frozenset(found)
+    def names(self) -> list[str]:
+        """Names of its numbers, of what is computed, and of its variables."""
+        found = [each.name for each in self.constants]
+        found += [each.name for each in self.lets]
+        return found + [each.name for each in self.variables]
+
+    def check_name(self, name: str, *, cases: bool = True) -> None:
+        """Refuse a name of what is defined, if the friction has a quantity of that name.
+
+        Parameters
+        ----------
+        name : str
+            Of the files.
+        cases : bool
+            Whether the language tells k from K.
+
+        Raises
+        ------
+        ParameterError
+            Naming it.
+        """
+        found = [each for each, _ in self.inputs] + [self.position, *self.names]
+        if name in found or (not cases and name.lower() in [each.lower() for each in found]):
+            raise ParameterError(
+                "a quantity of the friction has this name",
+                place=f"name {name!r}",
+                advice='give another one, for example name="friction" (--name friction)',
+            )
 
     def free(self, name: str) -> str:
         """Return a name for what a format needs besides; it gives way to those in use.
@@ -391,17 +262,17 @@ def _numbered(name: str) -> Iterator[str]:
 
 
 # --------------------------------------------------------------------------- refusals and names
-def _refuse_feedback(bank: Bank, place: str, form: str) -> None:
+def _refuse_feedback(bank: Bank, place: str) -> None:
     """Refuse guards and assignments that read the contact's force or acceleration."""
     late = {*bank.forces, *bank.rates}
     for edge in bank.edges:
         trees = [edge.guard, *(tree for _, tree in edge.steps)]
         for name in sorted(late & frozenset[str]().union(*map(names_in, trees))):
             raise ParameterError(
-                f"format {form!r} has no guards or assignments that read "
-                f"{name.rsplit('.', 1)[-1].split()[-1]!r}",
+                f"it reads {name.rsplit('.', 1)[-1].split()[-1]!r} of the contact, which a text of "
+                "one friction knows only after its guards",
                 place=f"{place}, edge {edge.name!r}",
-                advice="write the guard over variables and v, or choose the format 'c99'",
+                advice="write it over variables and v, or hand over the engine (format 'c99')",
             )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from gms_fsm.exporters._element import Constant, Element
+from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element_parts import Constant
 from gms_fsm.exporters._notation import Notation
 from gms_fsm.exporters._plain_form import (
     ByState,

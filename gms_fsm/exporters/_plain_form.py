@@ -10,8 +10,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from gms_fsm.exporters._element import Element, Leaving, Let
-from gms_fsm.language import Binary, Name, Node, Value, names_in
+from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element_parts import Leaving, Let
+from gms_fsm.language import Binary, Name, Node, Value
 
 __all__ = ["ByState", "Declare", "Enter", "Guards", "Plain", "Set", "Statement", "plain_form"]
 
@@ -73,6 +74,8 @@ class Plain:
         For each element, in this order.
     updates : tuple of Set
         Each variable after the step.
+    trees : tuple of Node
+        All that is computed.
     """
 
     element: Element
@@ -84,11 +87,6 @@ class Plain:
     flows: tuple[Statement, ...]
     updates: tuple[Set, ...]
     trees: tuple[Node, ...] = field(repr=False)
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """Every name that is read."""
-        return frozenset[str]().union(*map(names_in, self.trees))
 
 
 def plain_form(element: Element, dt: str = "dt") -> Plain:
@@ -124,11 +122,11 @@ def plain_form(element: Element, dt: str = "dt") -> Plain:
     guards: list[Statement] = [_let(each) for each in steady]
     first, inside = element.placed(guard_reads, moves=True)
     guards += map(_let, first)
-    branches = tuple(
-        (*first, Guards(tuple((edge, _taken(edge)) for edge in state.edges))) if state.edges else ()
-        for state, first in zip(states, inside, strict=True)
-    )
-    guards += [ByState(branches)] if any(branches) else []
+    branches: list[tuple[Statement, ...]] = []
+    for state, lets in zip(states, inside, strict=True):
+        chain = Guards(tuple((edge, _taken(edge)) for edge in state.edges))
+        branches.append((*map(_let, lets), chain) if state.edges else ())
+    guards += [ByState(tuple(branches))] if any(branches) else []
     first, inside = element.placed(flow_reads, moves=True)
     same = len({state.force.tree for state in states}) == 1
     rates = tuple(each.rate for each in element.variables)

@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._element import Constant, Element
+from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element_parts import Constant
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._notation import Notation
 from gms_fsm.exporters._plain_form import (
@@ -19,6 +20,7 @@ from gms_fsm.exporters._plain_form import (
     Statement,
     plain_form,
 )
+from gms_fsm.exporters._readme import about_friction
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import Name, Node
@@ -124,6 +126,7 @@ class _Printer:
         identifier(name.upper(), WORDS, f"name {name!r}")
         self.name, self.element = name, Element.of(subject, WORDS, cases=False)
         element = self.element
+        element.check_name(name, cases=False)
         self.force = element.free("force")  # F would be the same as a chart's f
         self.form: Plain = plain_form(element, "cycle")
         self.notation = Notation(
@@ -147,7 +150,7 @@ class _Printer:
         self.texts = {each: f"{each}{self.at}" for each in numbers} | self.now
         self.texts[self.form.force] = self.force
         self.states = [element.free(f"STATE_{each.name.upper()}") for each in element.states]
-        names = [*self.names(), *(each for each, _ in element.inputs)]
+        names = [*element.names, *self.states, *(each for each, _ in element.inputs), name]
         for each in names:
             if "__" in each or each.endswith("_"):
                 raise ParameterError(
@@ -155,11 +158,6 @@ class _Printer:
                     place=f"chart {subject.title!r}, name {each!r}",
                     advice="give it another name",
                 )
-
-    def names(self) -> list[str]:
-        """Return the names of the chart that stand in the text."""
-        element = self.element
-        return [each.name for each in (*element.constants, *element.lets, *element.variables)]
 
     # ------------------------------------------------------------------ the text
     def text(self) -> str:
@@ -281,11 +279,6 @@ class _Printer:
     def readme(self) -> str:
         name, element = self.name, self.element
         inputs = "".join(f", {each} := ..." for each, _ in element.inputs[1:])
-        about = "".join(f"- {each}: {text}\n" for each, text in element.inputs if text)
-        numbers = "".join(
-            f"- {each.name} = {_shown(each)}{f' ({each.about})' if each.about else ''}\n"
-            for each in element.constants
-        )
         sgn = f" and the function {name}_sgn" if f"{name}_sgn(" in self.text() else ""
         return f"""\
 # {element.title} as structured text (IEC 61131-3)
@@ -301,35 +294,22 @@ a task with a fixed interval:
     friction(v := velocity{inputs}, {self.form.dt} := 0.001);
     force := friction.{self.force};
 
+The compiler matiec 0.1 (`iec2c`) has translated it, and the result has run; blark has parsed it.
+No PLC has run it.
+
 ## What it computes
 
-{element.title}, {element.n} element{"s" if element.n > 1 else ""}{_reference(element)}
+{about_friction(element)}
 Each call looks at every guard once, gives the force, and takes one explicit Euler step of length
-{self.form.dt} with this velocity. These are the numbers of
+{self.form.dt} [s] with this velocity. These are the numbers of
 simulate(model, Prescribed(record), t_end, method="euler", step=..., events="step").
 
-Inputs:
-
-{about}- {self.form.dt}: s: time since the last call
-
-Numbers:
-
-{numbers}
 ## What it does not do
 
 Switches are seen at the next call, not where they happen, so the result is of first order in the
 cycle time. A velocity that passes through a narrow guard between two calls is not noticed.
 AND and OR may evaluate both sides.
 """
-
-
-def _reference(element: Element) -> str:
-    return f", {element.reference}.\n" if element.reference else ".\n"
-
-
-def _shown(constant: Constant) -> str:
-    value = constant.value
-    return ", ".join(map(repr, value)) if isinstance(value, tuple) else repr(value)
 
 
 def _assigned(statement: Statement) -> Iterator[str]:

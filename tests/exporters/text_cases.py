@@ -7,7 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm import GMS, ChartModel, GMSParameters, Prescribed, Stribeck, Trace, simulate
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    Contact,
+    GMSParameters,
+    Prescribed,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    simulate,
+)
 from gms_fsm.charts.registry import entry
 from gms_fsm.systems.models import demonstration
 
@@ -59,7 +71,10 @@ def _gms(n: int, law: Any, rng: np.random.Generator) -> GMS:
 def _varied(name: str, rng: np.random.Generator) -> ChartModel:
     """Return a chart with the numbers of its demonstration, each changed by up to a tenth."""
     model = demonstration(entry(name))
-    values = {key: np.multiply(value, rng.uniform(0.9, 1.1)) for key, value in model.values.items()}
+    values = {
+        key: np.multiply(value, rng.uniform(0.9, 1.1, np.shape(value)))
+        for key, value in model.values.items()
+    }
     return ChartModel(
         model.chart,
         values,
@@ -68,3 +83,30 @@ def _varied(name: str, rng: np.random.Generator) -> ChartModel:
         stribeck=model.stribeck,
         sigma_2=model.sigma_2,
     )
+
+
+def loaded(load: str = "load") -> Contact:
+    """Return a friction that reads the time, its position and a further input, with actions."""
+    chart = Chart(
+        "loaded",
+        inputs=("v", "x", "t", "N"),
+        variables=("z",),
+        parameters=("mu",),
+        let={"big": "max(N, 1)", "rel": "z / (mu * big)"},
+        states=(
+            State("a", flow={"z": "v - abs(v) * rel"}),
+            State("b", entry={"z": "z / 2"}, flow={"z": "-3 * z + min(t, 0.4)"}),
+        ),
+        transitions=(
+            Transition(
+                "go",
+                "a",
+                "b",
+                guard="x > 0.05 and (t > 0.3 or not N < 1)",
+                actions={"z": "z + 0.01 * sgn(x)"},
+            ),
+            Transition("back", "b", "a", guard="age > 0.2 and v < 0"),
+        ),
+        outputs={"F": "N * z + 0.1 * dz + x**3"},
+    )
+    return Contact("contact", chart, {"mu": 0.3}, inputs={"N": f"{load} + 1"})

@@ -1,0 +1,225 @@
+"""The C sources of an FMU: the engine, translated, and what the fixed sources must know of it.
+
+The rules are those of `integrators.stepping` (Co-Simulation) and `integrators.exchange` (Model
+Exchange), which both run `integrators.loop` on one block of memory; there is no rule here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from gms_fsm._version import __version__
+from gms_fsm.charts.stribeck import dip_of, flat_of
+from gms_fsm.exporters._c import PLACES, TEMPLATES, curves_of, filled, image_of, number, safe
+from gms_fsm.exporters._fmu_variables import Variable, indicators_of, nominals_of, types_of
+from gms_fsm.exporters._subject import Subject
+from gms_fsm.run._joint import FAILURES
+from gms_fsm.run._stepper import arguments_of
+from gms_fsm.run.start import clocks_of
+from gms_fsm.systems.system import System
+from integrators import exchange, stepping
+from integrators.compiled import INLINE, is_known
+from integrators.exchange import Exchange
+from integrators.machine_code.c99 import c99_text
+from integrators.machine_code.layout import Layout
+from integrators.machine_code.translate import Translator
+from integrators.machine_code.tree import Local
+from integrators.machine_code.values import Number, Record, Value
+
+__all__ = ["Both", "Model", "both_of"]
+
+ENTRIES: Mapping[str, tuple[Any, str]] = {
+    "step": (stepping.step_to, "functions machines buffers sample"),
+    "restart": (exchange.restart, "buffers sample.clocks exchange"),
+    "settle": (exchange.settle, "functions machines buffers sample.clocks exchange"),
+    "slope": (exchange.slope, "functions buffers exchange"),
+    "indicate": (exchange.indicate, "functions buffers exchange"),
+    "changed": (exchange.changed, "functions buffers exchange"),
+    "observe": (exchange.observe, "functions machines buffers exchange"),
+}
+# Further names of the C text.
+OWN = ("IN_BLOCK", "INPUT", "SEEN", "INDICATOR", "STATE", "TIME", "place", "variable", "word")
+
+
+class Both(NamedTuple):
+    """The arguments of all entries."""
+
+    functions: Any
+    machines: Any
+    buffers: Any
+    sample: Any
+    exchange: Exchange
+
+
+class Model:
+    """The engine of an FMU.
+
+    Parameters
+    ----------
+    subject : Subject
+        A friction or a system.
+    variables : sequence of Variable
+        Of the FMU.
+    exchange : bool
+        Whether there is Model Exchange.
+    """
+
+    def __init__(self, subject: Subject, variables: Sequence[Variable], *, exchange: bool) -> None:
+        self.subject, self.variables, self.exchange = subject, variables, exchange
+        self.arguments = both_of(subject)
+        self.layout = Layout(self.arguments, is_known)
+
+    @property
+    def nominals(self) -> dict[int, float]:
+        """Scales of the continuous states, by value reference."""
+        scales = nominals_of(self.subject.start)
+        return {
+            k: scales[each.index] for k, each in enumerate(self.variables) if each.continuous_state
+        }
+
+    def sources(self, version: int, token: str) -> dict[str, str]:
+        """Return the contents of the folder ``sources``.
+
+        Parameters
+        ----------
+        version : {2, 3}
+            Of FMI.
+        token : str
+            GUID or instantiation token.
+
+        Returns
+        -------
+        dict of str to str
+            By file name; those to be compiled end in ``.c``.
+        """
+        return {
+            f"fmi{version}.c": (TEMPLATES / f"fmi{version}.c").read_text(encoding="utf-8"),
+            f"{self.subject.name}_engine.c": self.engine(),
+            "fmu_core.h": (TEMPLATES / "fmu_core.h").read_text(encoding="utf-8"),
+            "model.h": self.header(token),
+        }
+
+    # ------------------------------------------------------------------ engine
+    def engine(self) -> str:
+        """Return the functions on the block of memory, and its contents at the start."""
+        name, translator = self.subject.name, Translator(INLINE)
+        fields, curves = self.layout.value.fields, curves_of(self.subject.start, self.layout)
+        for each, (function, names) in ENTRIES.items():
+            translator.entry(
+                f"fmu_{each}", function, [_part(fields, field) for field in names.split()]
+            )
+        if curves:
+            for each, function, count in (("dip", dip_of, 2), ("flat", flat_of, 4)):
+                numbers = [Number(Local("f", letter)) for letter in "abcd"[:count]]
+                translator.entry(each, function, numbers)
+        taken = [f"{name}_{each}" for each in (*ENTRIES, "start", "derive")]
+        return filled(
+            "fmu_engine.c",
+            name=name,
+            title=safe(self.subject.title),
+            version=__version__,
+            engine=c99_text(translator.module, [*taken, *self._constants(), *OWN], hidden=True),
+            words=self.layout.words,
+            image=image_of(self.layout, self.arguments),
+            curves=curves,
+        )
+
+    # ------------------------------------------------------------------ model.h
+    def header(self, token: str) -> str:
+        """Return what the fixed sources must know: names, places in the block, variables."""
+        constants = self._constants()
+        counts = {kind: len(names) for kind, names in types_of(self.subject.start).items()}
+        rows = []
+        for each in self.variables:
+            offset = each.index
+            if each.array:
+                offset += self.layout.offset(PLACES[each.array])
+            elif each.place == "COUNT":
+                offset = constants["SWITCHED"]
+            settable = counts[each.kind] if each.kind else int(bool(each.array))
+            rows.append(f"    {{{each.place}, {settable}, {offset}}}, /* {each.name} */")
+        reasons = [f'    case {code}: return "{reason}";' for code, (_, reason) in FAILURES.items()]
+        places = [each.index + constants["Y"] for each in self.variables if each.continuous_state]
+        return filled(
+            "model.h",
+            name=self.subject.name,
+            title=safe(self.subject.title),
+            token=token,
+            constants="\n".join(f"#define {key} {value}" for key, value in constants.items()),
+            variables="\n".join(rows),
+            places=", ".join(map(str, places)) or "0",
+            nominals=", ".join(map(number, self.nominals.values())) or "0",
+            reasons="\n".join(reasons),
+        )
+
+    def _constants(self) -> dict[str, int]:
+        """Return sizes, and places in the block."""
+        place = self.layout.offset
+        return {
+            "INPUTS": len(self.subject.inputs),
+            "WORDS": self.layout.words,
+            "VARIABLES": len(self.variables),
+            "STATES": len(self.nominals),
+            "INDICATORS": len(self.arguments.exchange.indicators),
+            "HAS_EXCHANGE": int(self.exchange),
+            "CLOCK": place("buffers.now.clock"),
+            "FOREIGN": place("buffers.plan.foreign"),
+            "TABLES": place("functions.p.2"),
+            "Y": place("buffers.now.y"),
+            "OBSERVED": place("exchange.seen"),
+            "SLOPE": place("exchange.slope"),
+            "INDICATORS_AT": place("exchange.indicators"),
+            "SWITCHED": place("exchange.counts") + exchange.SWITCHES,
+            "MOVED": place("exchange.counts") + exchange.MOVED,
+            "NEXT": place("exchange.next"),
+            "SAMPLE_END": place("sample.end"),
+            "SAMPLE_INPUTS": place("sample.inputs"),
+            "SAMPLE_SWITCHES": place("sample.counts") + stepping.SWITCHES,
+            "SAMPLE_RESUMED": place("sample.counts") + stepping.RESUMED,
+            "FULL_LOG": stepping.FULL_LOG,
+        }
+
+
+def _part(fields: Mapping[str, Value], name: str) -> Value:
+    """Return a field, or a field of it."""
+    first, _, rest = name.partition(".")
+    found = fields[first]
+    if not rest:
+        return found
+    assert isinstance(found, Record)
+    return _part(found.fields, rest)
+
+
+def both_of(subject: Subject) -> Both:
+    """Return the arguments of all entries, made of lists.
+
+    Parameters
+    ----------
+    subject : Subject
+        A friction or a system.
+
+    Returns
+    -------
+    Both
+        At the start, for Co-Simulation.
+    """
+    start, alone = subject.start, not isinstance(subject.given, System)
+    functions, machines, buffers, sample = arguments_of(start)
+    size, relations = len(buffers.now.y), len(buffers.relations.watch)
+    indicators = indicators_of(start, alone)
+    assert len(indicators) == relations
+    made = Exchange(
+        counts=[0, 0],
+        next=[math.inf],
+        slope=[0.0] * size,
+        seen=[0.0] * len(sample.seen),
+        margins=[0.0] * relations,
+        indicators=[1.0] * relations,
+        shift=[each.shift for each in indicators],
+        before=[0.0] * size,
+        signs=[0.0] * len(buffers.now.held),
+        offset=[offset for _, _, offset in clocks_of(start.system)],
+    )
+    return Both(functions, machines, buffers, sample, made)

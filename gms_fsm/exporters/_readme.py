@@ -1,0 +1,53 @@
+"""What the README of every text format says about a friction."""
+
+from __future__ import annotations
+
+from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element_parts import Constant
+
+__all__ = ["about_friction"]
+
+
+def about_friction(element: Element) -> str:
+    """Return the model, its inputs, its numbers and its states, as Markdown.
+
+    Parameters
+    ----------
+    element : Element
+        The friction.
+
+    Returns
+    -------
+    str
+        Lines, with a line break at the end.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> from gms_fsm.exporters._subject import Subject
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> made = Element.of(Subject.of(model, "st"), ())
+    >>> print(about_friction(made).splitlines()[0])
+    GMS element, signed law, 4 elements (arXiv 2512.03049 (2025)).
+    """
+    count = f"{element.n} element{'s' if element.n > 1 else ''}"
+    source = f" ({element.reference})" if element.reference else ""
+    lines = [f"{element.title}, {count}{source}."]
+    lines += ["", "Inputs:", ""]
+    lines += [f"- {name}{_described(about)}" for name, about in element.inputs]
+    lines += ["", "Numbers:", ""]
+    lines += [
+        f"- {each.name} = {_shown(each)}{_described(each.about)}" for each in element.constants
+    ]
+    if len(element.states) > 1:
+        lines += ["", f"States: {', '.join(each.name for each in element.states)}."]
+    return "\n".join(lines) + "\n"
+
+
+def _shown(constant: Constant) -> str:
+    value = constant.value
+    return ", ".join(map(repr, value)) if isinstance(value, tuple) else repr(value)
+
+
+def _described(about: str) -> str:
+    return f" ({about})" if about else ""

@@ -1,0 +1,230 @@
+"""A run whose steps somebody else takes, who asks for slopes and margins and goes to the events.
+
+The caller sets the time and the state in the buffers. `settle` brings the states of the machines up
+to date and freezes them; until the next call of `settle` everything is smooth. A margin that leads
+to an event is given as an indicator, which is zero a little behind the crossing: at its root the
+comparison has really changed, so the caller need not step past it.
+
+The machines are run by the same loop as always (`integrators.loop`), as for a foreign solver.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from integrators.advance import CROSSED, REACHED
+from integrators.crossings import any_changed, listed
+from integrators.loop import (
+    ACTIVE,
+    ADVANCE,
+    AFTER,
+    ARC,
+    FIRED,
+    FIRING,
+    JUMP,
+    PHASE,
+    ROWS,
+    SLID,
+    START,
+    STATUS,
+    STOPPED,
+    Buffers,
+    Machines,
+    run_to_event,
+)
+from integrators.sliding import Functions, Held, flow_on, look, margins_on
+from integrators.step_size import INFINITY
+from integrators.stepping import Clocks, next_tick
+from integrators.steps import LATEST, Motion, T, Vector
+
+__all__ = ["MOVED", "SWITCHES", "Exchange", "changed", "indicate", "observe", "restart", "settle"]
+__all__ += ["slope"]
+
+# Indices into Exchange.counts: switches since the start; whether the last `settle` moved the state.
+SWITCHES, MOVED = range(2)
+SOON = 1e-9  # of its time: a tick that is not farther away is now
+
+
+class Exchange(NamedTuple):
+    """What the caller is given besides the buffers."""
+
+    counts: list[int]  # see the indices above
+    next: Vector  # [time of the next tick, infinity if there is none]
+    slope: Vector  # dy/dt, shape (m,)
+    seen: Vector  # observed values
+    margins: Vector  # left - right of each comparison, 0 if it is not watched, shape (r,)
+    indicators: Vector  # 1 for a comparison that is not watched, shape (r,)
+    shift: Vector  # how far behind the crossing each indicator is zero, shape (r,)
+    before: Vector  # scratch space: the state before `settle`
+    signs: Vector  # scratch space: held signs
+    offset: Vector  # of each clock its first tick after the start, s
+
+
+def restart(b: Buffers, clocks: Clocks, x: Exchange) -> None:
+    """Begin at the time that is in the buffers now, which had another one.
+
+    Parameters
+    ----------
+    b : Buffers
+        Before the first call of `settle`.
+    clocks : Clocks
+        Set to the new start.
+    x : Exchange
+        With the offsets of the clocks.
+    """
+    clock, plan = b.now.clock, b.plan
+    for i in range(len(x.offset)):
+        clocks.start[i] = clock[T] + x.offset[i]
+        clocks.made[i] = 0
+    for _k in range(len(plan.jumps)):
+        next_tick(plan, clocks)
+
+
+def settle(
+    functions: Functions, machines: Machines, b: Buffers, clocks: Clocks, x: Exchange
+) -> int:
+    """Take all enabled edges at an event, until none is; then freeze states and signs.
+
+    Parameters
+    ----------
+    functions, machines
+        The system.
+    b : Buffers
+        Their plan has a foreign solver and no end; time and state are those of the event.
+    clocks : Clocks
+        What ticks, as in `integrators.stepping`.
+    x : Exchange
+        Its counts, and the time of the next tick, are filled.
+
+    Returns
+    -------
+    int
+        0, or an error as in `run_to_event`.
+    """
+    now, counts, plan = b.now, b.memory.counts, b.plan
+    clock = now.clock
+    for j in range(len(now.y)):
+        x.before[j] = now.y[j]
+    clock[LATEST] = abs(clock[T])
+    due = False
+    if counts[PHASE] == ARC:  # what crossed is counted, as after a step of ours
+        if len(plan.jumps) > 0:
+            tick = plan.jumps[counts[JUMP]]
+            due = tick - clock[T] <= SOON * abs(tick)
+        if due:  # what crossed comes first
+            clock[T] = plan.before_jumps[counts[JUMP]]
+        counts[STATUS] = CROSSED
+        counts[PHASE] = AFTER
+    error = _quiet(functions, machines, b, clocks, x)
+    if due and error == 0:
+        counts[STATUS] = REACHED
+        counts[PHASE] = AFTER
+        error = _quiet(functions, machines, b, clocks, x)
+    x.next[0] = plan.jumps[counts[JUMP]] if len(plan.jumps) > 0 else INFINITY
+    x.counts[MOVED] = 0
+    for j in range(len(now.y)):
+        if now.y[j] != x.before[j]:
+            x.counts[MOVED] = 1
+    return error
+
+
+def _quiet(
+    functions: Functions, machines: Machines, b: Buffers, clocks: Clocks, x: Exchange
+) -> int:
+    """Run the loop until a solver would have to go on."""
+    counts, plan, clock = b.memory.counts, b.plan, b.now.clock
+    motion = Motion(flow_on, margins_on, Held(functions, b.now.held, b.sliding))
+    event = ROWS
+    while event != ADVANCE:
+        event = run_to_event(functions, machines, motion, b, 1)
+        if len(plan.jumps) > 0 and plan.jumps[1] <= clock[T]:
+            next_tick(plan, clocks)
+            counts[JUMP] = 0
+        if event == FIRED:
+            x.counts[SWITCHES] += 1
+        elif event not in (FIRING, STOPPED, SLID, ROWS, ADVANCE):
+            return event
+    return 0
+
+
+def slope(functions: Functions, b: Buffers, x: Exchange) -> None:
+    """Fill dy/dt with states and signs as of the last `settle`; before the first, with live signs.
+
+    Parameters
+    ----------
+    functions : Functions
+        The system.
+    b : Buffers
+        With the time and the state in question.
+    x : Exchange
+        Its slope is filled.
+    """
+    now = b.now
+    if b.memory.counts[PHASE] == START:
+        functions.arm(now.clock[T], now.y, now.mode, functions.p, now.held, b.sliding.watch)
+    flow_on(now.clock[T], now.y, now.mode, now.held, Held(functions, now.held, b.sliding), x.slope)
+
+
+def indicate(functions: Functions, b: Buffers, x: Exchange) -> None:
+    """Fill the margins and the event indicators.
+
+    Parameters
+    ----------
+    functions : Functions
+        The system.
+    b : Buffers
+        With the time and the state in question.
+    x : Exchange
+        Its margins and indicators are filled.
+    """
+    now, watch, truth = b.now, b.relations.watch, b.relations.truth
+    for r in range(len(watch)):
+        x.margins[r] = 0.0
+    on = Held(functions, now.held, b.sliding)
+    margins_on(now.clock[T], now.y, now.mode, on, watch, x.margins)
+    for r in range(len(watch)):
+        if watch[r] == 0:
+            x.indicators[r] = 1.0
+        elif truth[r]:
+            x.indicators[r] = x.margins[r] + x.shift[r]
+        else:
+            x.indicators[r] = x.margins[r] - x.shift[r]
+
+
+def changed(functions: Functions, b: Buffers, x: Exchange) -> int:
+    """Return 1 if a watched comparison has changed since the last `settle`, else 0.
+
+    Parameters
+    ----------
+    functions, b, x
+        As in `indicate`.
+
+    Returns
+    -------
+    int
+        Whether `settle` is due.
+    """
+    indicate(functions, b, x)
+    w = listed(b.relations, b.memory.counts[ACTIVE])
+    return 1 if any_changed(w, x.margins) else 0
+
+
+def observe(functions: Functions, machines: Machines, b: Buffers, x: Exchange) -> None:
+    """Fill the observed values; the frozen signs stay as they are, whatever the state is.
+
+    Parameters
+    ----------
+    functions, machines
+        The system.
+    b : Buffers
+        With the time and the state in question.
+    x : Exchange
+        Its observed values are filled.
+    """
+    now = b.now
+    for k in range(len(now.held)):
+        x.signs[k] = now.held[k]
+    on = Held(functions, now.held, b.sliding)
+    look(machines.observe, on, now.clock[T], now.y, now.mode, x.seen)
+    for k in range(len(now.held)):
+        now.held[k] = x.signs[k]

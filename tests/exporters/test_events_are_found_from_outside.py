@@ -1,0 +1,166 @@
+"""Claim: whoever integrates from outside and goes to the roots of the indicators sees all switches.
+
+At such a root the comparison has really changed. The importer here is the simplest one: steps of
+the classical Runge-Kutta method, and bisection in time where an indicator changes its sign.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import GMS, Body, Contact, GMSParameters, System, simulate
+from gms_fsm.app.scenario import load_system
+from gms_fsm.charts.karnopp import KARNOPP
+from gms_fsm.exporters import Subject
+from gms_fsm.exporters._fmu_model import Both, both_of
+from gms_fsm.systems.models import ChartModel
+from integrators import exchange
+from integrators.exchange import MOVED, SWITCHES
+from integrators.steps import T
+
+PAPER = GMS(GMSParameters.paper("stick-slip"), law="signed")
+KARNOPP_VALUES = {"F_c": 1.0, "F_s": 1.5, "sigma_2": 0.4, "D": 1e-4}
+OPEN_LOOP = System(
+    "open loop",
+    bodies=(Body("body", velocity="v"),),
+    contacts=(Contact("friction", PAPER, v="v"),),
+    signals={"v": "0.2 * sin(2 * pi * t / 20)"},
+)
+MASS = System(
+    "mass",
+    bodies=(Body("mass", inertia="1.0", force="3 * sin(1.5 * t)", x="x", v="v"),),
+    contacts=(Contact("pad", ChartModel(KARNOPP, KARNOPP_VALUES), v="v"),),
+)
+# The mass rests where sgn(v) pushes back from both sides: it slides along v = 0.
+SLIDING = System(
+    "mass",
+    bodies=(Body("mass", inertia="1.0", force="3 * sin(1.5 * t) - sgn(v)", x="x", v="v"),),
+    contacts=(Contact("friction", PAPER, v="v"),),
+)
+
+
+def servo() -> System:
+    """Return the servo of the scenarios, whose controller is sampled."""
+    return load_system(Path(__file__).parents[2] / "scenarios" / "servo.toml")
+
+
+class Importer:
+    """Integrates from outside."""
+
+    def __init__(self, both: Both) -> None:
+        plan = both.buffers.plan._replace(foreign=True)
+        b = both.buffers._replace(plan=plan)
+        self.functions, self.machines, self.b = both.functions, both.machines, b
+        self.clocks, self.x = both.sample.clocks, both.exchange
+        self.roots = 0
+
+    def go_to(self, t: float, y: list[float]) -> None:
+        """Set time and state."""
+        self.b.now.clock[T] = t
+        self.b.now.y[:] = y
+
+    def settle(self) -> None:
+        """Handle an event."""
+        before = list(self.b.now.y)
+        x = self.x
+        assert exchange.settle(self.functions, self.machines, self.b, self.clocks, x) == 0
+        assert x.counts[MOVED] == (before != list(self.b.now.y))
+
+    def slope(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Return dy/dt."""
+        self.go_to(t, y.tolist())
+        exchange.slope(self.functions, self.b, self.x)
+        return np.array(self.x.slope)
+
+    def step(self, t: float, y: np.ndarray, h: float) -> np.ndarray:
+        """Return the state after a step."""
+        a = self.slope(t, y)
+        b = self.slope(t + h / 2, y + h / 2 * a)
+        c = self.slope(t + h / 2, y + h / 2 * b)
+        d = self.slope(t + h, y + h * c)
+        return y + h / 6 * (a + 2 * b + 2 * c + d)
+
+    def indicators(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Return the event indicators."""
+        self.go_to(t, y.tolist())
+        exchange.indicate(self.functions, self.b, self.x)
+        return np.array(self.x.indicators)
+
+    def run(self, end: float, h: float) -> None:
+        """Integrate."""
+        t = self.b.now.clock[T]
+        self.settle()
+        while t < end:
+            y = np.array(self.b.now.y)
+            stop = min(t + h, end, self.x.next[0])
+            before = self.indicators(t, y)
+            y_new = self.step(t, y, stop - t)
+            crossed = before * self.indicators(stop, y_new) <= 0.0
+            if crossed.any():
+                low, high = t, stop
+                while (middle := 0.5 * (low + high)) not in (low, high):
+                    y_middle = self.step(t, y, middle - t)
+                    if (before * self.indicators(middle, y_middle) <= 0.0).any():
+                        high = middle
+                    else:
+                        low = middle
+                stop, y_new = high, self.step(t, y, high - t)
+                self.go_to(stop, y_new.tolist())
+                assert exchange.changed(self.functions, self.b, self.x) == 1
+                self.roots += 1
+            self.go_to(stop, y_new.tolist())
+            if crossed.any() or stop >= self.x.next[0]:
+                self.settle()
+            t = stop
+
+
+CASES: dict[str, tuple[Callable[[], System], float, float]] = {
+    "open loop": (lambda: OPEN_LOOP, 20.0, 0.02),
+    "Karnopp": (lambda: MASS, 6.0, 5e-3),
+    "sliding": (lambda: SLIDING, 4.0, 5e-3),
+    "servo": (servo, 0.0495, 2e-5),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_all_switches_are_seen(name: str) -> None:
+    make, end, h = CASES[name]
+    system = make()
+    importer = Importer(both_of(Subject.of(system, "fmu2")))
+    importer.run(end, h)
+    trace = simulate(system, end, engine="ifelse", rtol=1e-9)
+    assert importer.x.counts[SWITCHES] == len(trace.transitions) > 2
+    assert (name == "sliding") == (len(trace.sliding) > 0)
+    y = trace.rows.y[-1]
+    assert importer.roots > 0
+    np.testing.assert_allclose(importer.b.now.y, y, rtol=1e-4, atol=1e-5 * np.abs(y).max())
+
+
+def test_looking_changes_no_frozen_sign() -> None:
+    importer = Importer(both_of(Subject.of(SLIDING, "fmu2")))
+    importer.run(2.0, 5e-3)
+    held, y = list(importer.b.now.held), list(importer.b.now.y)
+    v = importer.b.now.y
+    for sign in (1.0, -1.0):  # an importer tries states far beyond a crossing
+        importer.go_to(2.0, [sign * (abs(u) + 1.0) for u in y])
+        arguments: Any = importer.functions, importer.machines, importer.b, importer.x
+        exchange.observe(*arguments)
+        assert list(importer.b.now.held) == held
+    importer.go_to(2.0, y)
+    assert v is importer.b.now.y
+
+
+def test_another_start_moves_the_ticks() -> None:
+    both = both_of(Subject.of(servo(), "fmu2"))
+    importer = Importer(both)
+    importer.go_to(3.0, list(importer.b.now.y))
+    exchange.restart(importer.b, importer.clocks, importer.x)
+    importer.settle()
+    assert importer.x.next[0] == 3.0 + 1e-3
+    assert math.isclose(importer.b.now.clock[T], 3.0)
