@@ -12,7 +12,7 @@
 #   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
 #                reference, 500 systems in all engines; SOAK_MINUTES=10 for each fuzzer
 #   make foreign the widget, driven in JupyterLab and marimo by their own user interfaces, in Chromium,
-#                and whole runs of friction in other simulators
+#                whole runs of friction in other simulators, and the exports in the tools they are for
 #   make gallery the pictures in docs/images, shown in docs/gallery.md, and the pages in docs/zoo
 #   make docs    the documentation -> folder site/, which can be opened from disk
 #   make wheel   a wheel -> folder dist/, installed and tested outside the checkout
@@ -24,6 +24,15 @@ RUN := $(VENV)/bin
 SOAK_MINUTES ?= 10
 OLD ?= main
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
+# Byte code is kept: tests start hundreds of processes.
+unexport PYTHONDONTWRITEBYTECODE
+comma := ,
+# uv installs in a fraction of pip's time; where it cannot (an index of one's own, say), pip does.
+define install
+$(1)/bin/python -m pip --disable-pip-version-check --quiet install uv
+$(1)/bin/uv pip install --quiet --compile-bytecode --python $(1)/bin/python -e "$(2)" || \
+	$(1)/bin/python -m pip --disable-pip-version-check --quiet install -e "$(2)"
+endef
 
 .PHONY: help paper test quick coverage lint core lowest bench regressions soak foreign gallery docs wheel clean
 .DEFAULT_GOAL := test
@@ -33,23 +42,23 @@ $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/all.stamp: pyproject.toml | $(VENV)/bin/python
-	$(PIP) install -e ".[all]"
+	$(call install,$(VENV),.[all])
 	@touch $@
 
 $(VENV)/dev.stamp: pyproject.toml | $(VENV)/bin/python
-	$(PIP) install -e ".[dev]"
+	$(call install,$(VENV),.[dev])
 	@touch $@ $(VENV)/all.stamp $(VENV)/docs.stamp
 
 $(VENV)/docs.stamp: pyproject.toml | $(VENV)/bin/python
-	$(PIP) install -e ".[docs]"
+	$(call install,$(VENV),.[docs])
 	@touch $@ $(VENV)/all.stamp
 
 $(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python
-	$(PIP) install -e ".[dev,bench]"
+	$(call install,$(VENV),.[dev$(comma)bench])
 	@touch $@ $(VENV)/dev.stamp
 
 $(VENV)/foreign.stamp: pyproject.toml | $(VENV)/bin/python
-	$(PIP) install -e ".[dev,foreign]"
+	$(call install,$(VENV),.[dev$(comma)foreign])
 	@touch $@ $(VENV)/dev.stamp
 
 help:
@@ -57,7 +66,7 @@ help:
 
 .venv-core/stamp: pyproject.toml
 	$(PYTHON) -m venv .venv-core
-	.venv-core/bin/python -m pip --disable-pip-version-check --quiet install -e ".[test]"
+	$(call install,.venv-core,.[test])
 	@touch $@
 
 # The lowest versions have wheels only for the lowest Python; uv selects them.
@@ -112,8 +121,22 @@ regressions: $(VENV)/bench.stamp
 soak: $(VENV)/dev.stamp
 	$(RUN)/python -m tests.soak --minutes $(SOAK_MINUTES)
 
+# The programs that run the exports; without one of them its checks are skipped, and it is named.
+FOREIGN_PROGRAMS := gcc g++ clang octave-cli node npm plantuml pdflatex pdftotext chromium git autoconf automake flex bison
+FOREIGN_PACKAGES := gcc g++ clang octave nodejs npm plantuml texlive-latex-recommended texlive-pictures poppler-utils \
+    chromium git autoconf automake flex bison
+
+# One check after the other: each writes its rows of tests/foreign/exports.json at the end.
 foreign: $(VENV)/foreign.stamp
+	@for program in $(FOREIGN_PROGRAMS); do command -v $$program >/dev/null || missing="$$missing $$program"; done; \
+	if [ -n "$$missing" ] && command -v apt-get >/dev/null && [ "$$(id -u)" = 0 ]; then \
+	    apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $(FOREIGN_PACKAGES) >/dev/null; \
+	fi; \
+	for program in $(FOREIGN_PROGRAMS); do \
+	    command -v $$program >/dev/null || echo "make foreign: $$program is not installed; what needs it is not run"; \
+	done
 	$(RUN)/python -m pytest tests/foreign/check_*.py
+	$(RUN)/python docs/make_exports.py
 	$(RUN)/python -m tests.foreign
 
 gallery: $(VENV)/dev.stamp

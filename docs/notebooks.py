@@ -38,6 +38,9 @@ OTHERS = "IPython|ipykernel|ipywidgets|jupyter|matplotlib_inline|tornado|traitle
 STRICT = f"""import warnings
 warnings.simplefilter("error")
 warnings.filterwarnings("ignore", module=".*({OTHERS})")"""
+# The lessons' pages show sliders, so ipywidgets is there; nothing else of the extra docs is.
+HIDDEN = ("furo", "latex2mathml", "myst_parser", "nbformat", "sphinx")
+WITHOUT_DOCS = f"import sys\nsys.modules.update(dict.fromkeys({HIDDEN!r}))  # as if not installed"
 VIEW = "application/vnd.jupyter.widget-view+json"
 SLIDER_NOTE = "*The notebook has a slider; this page shows its initial picture.*"
 
@@ -217,7 +220,9 @@ def write_all(folder: Path) -> None:
             continue
         for old in folder.glob(f"{name}_*.png"):
             old.unlink()
-        markdown, pictures = page(executed(text, folder), name, LESSONS[number].TITLE)
+        markdown, pictures = page(
+            executed(text, folder, f"{WITHOUT_DOCS}\n{STRICT}"), name, LESSONS[number].TITLE
+        )
         for file, data in pictures.items():
             (folder / file).write_bytes(data)
         (folder / f"{name}.md").write_text(markdown, encoding="utf-8")

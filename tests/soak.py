@@ -2,9 +2,9 @@
 
 The three fuzz bodies for the given number of minutes each, 200 kills at random moments, a run of a
 million transitions, new random runs of tests/physics/test_hard_random_runs.py and of
-tests/trials.py, and new systems of tests/random_systems.py in all engines. Each part runs in
-separate processes, with limits on memory and time; findings are printed with the command that
-repeats them, and the exit code is then 1.
+tests/trials.py, new records to step along, and new systems of tests/random_systems.py in all
+engines. Each part runs in separate processes, with limits on memory and time; findings are printed
+with the command that repeats them, and the exit code is then 1.
 """
 
 from __future__ import annotations
@@ -248,6 +248,20 @@ def trials(seed: int, count: int) -> bool:
     return done.returncode == 0
 
 
+def stepping(seed: int, count: int) -> bool:
+    """Compare stepping with `simulate` on new random records; the child prints what differs."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.run.test_stepping_equals_simulate", str(seed), str(count)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    good = done.returncode == 0 and f"0 of {count} differ" in done.stdout
+    print(f"{'' if good else 'FINDING '}stepping: {done.stdout}", end="", flush=True)
+    return good
+
+
 def systems(seed: int, count: int) -> bool:
     """Compare new random systems in all engines; the child prints those that differ."""
     with tempfile.TemporaryDirectory() as folder:  # for machine code that is not needed again
@@ -275,7 +289,8 @@ def systems(seed: int, count: int) -> bool:
 # --------------------------------------------------------------------------- all parts
 def main() -> None:
     """Run the requested parts; exit with 1 if there were findings."""
-    parts = ("expression", "scenario", "trace", "kill", "million", "runs", "trials", "systems")
+    parts = ("expression", "scenario", "trace", "kill", "million", "runs", "trials")
+    parts += ("stepping", "systems")
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0, help="for each of the three")
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(10**9))
@@ -283,6 +298,7 @@ def main() -> None:
     parser.add_argument("--examples", type=int, default=300, help="of each kind of random run")
     parser.add_argument("--transitions", type=int, default=1_000_000)
     parser.add_argument("--trials", type=int, default=2000, help="random runs to judge")
+    parser.add_argument("--records", type=int, default=1000, help="random records to step along")
     parser.add_argument("--systems", type=int, default=500, help="random systems to compare")
     parser.add_argument("--only", choices=parts, action="append")
     parser.add_argument("--input", type=int, help="repeat this input of the one part given")
@@ -309,6 +325,7 @@ def main() -> None:
         "million": lambda: million(given.transitions),
         "runs": lambda: random_runs(given.seed, given.examples),
         "trials": lambda: trials(given.seed, given.trials),
+        "stepping": lambda: stepping(given.seed, given.records),
         "systems": lambda: systems(given.seed, given.systems),
     }
     good = [work[part]() for part in given.only or parts]

@@ -11,7 +11,7 @@ from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import slug
-from gms_fsm.run._steppable import alone, start_of, start_of_system
+from gms_fsm.run._steppable import alone, begin, start_of, start_of_system
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
@@ -80,6 +80,10 @@ class Subject:
         title = what.chart.name if isinstance(what, Contact) else what.name
         chosen = name or slug(title, f"{kind} {title!r}")
         used = Settings() if settings is None else settings
+        checked_kind("settings", used, Settings, "Settings(...)")
+        if initial is not None:
+            checked_kind("initial", initial, Mapping, "a mapping")
+        begin(t_start)
         return cls(chosen, title, format, what, initial, t_start, used)
 
     @property

@@ -6,6 +6,7 @@ import csv
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -24,20 +25,41 @@ from gms_fsm.app.paper.held import (
 from gms_fsm.app.paper.writing import claims_text, write
 from gms_fsm.errors import OutputError
 from gms_fsm.traces.failures import SimulationError
+from tests.helpers import ROOT
+from tests.page_blocks import Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write the whole reproduction once."""
+    """Run the command of docs/paper.md, which writes the whole reproduction, once."""
     pytest.importorskip("matplotlib", reason="the figures need the extra 'plots'")
     pytest.importorskip("pygraphviz", reason="the charts need Graphviz, extra 'render'")
-    place = tmp_path_factory.mktemp("paper")
+    place = tmp_path_factory.mktemp("page")
     seen: dict[str, list[float]] = {}
-    files = write(place, progress=lambda name, done: seen.setdefault(name, []).append(done))
-    assert files[0] == place / "claims.md"
-    assert all(path.is_file() for path in files)
+    files: list[Path] = []
+
+    def watched(folder: Path, force: str, velocity: str, progress: Any) -> list[Path]:
+        def both(name: str, done: float) -> None:
+            seen.setdefault(name, []).append(done)
+            progress(name, done)
+
+        files.extend(write(folder, force, velocity, both))
+        return files
+
+    text = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+    (block,) = blocks_of(text)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(place)
+        patch.setattr("gms_fsm.app.paper.writing.write", watched)
+        patch.setattr("warnings.showwarning", None)  # the command line sets its own
+        ((_, shown, said, went_well),) = Page("docs/paper.md").console(block)
+    assert went_well, said
+    assert agrees(shown, said)
+    place /= "paper"
+    assert files[0] == Path("paper/claims.md")
+    assert all((place.parent / path).is_file() for path in files)
     for name, steps in seen.items():  # a bar must not run backward, and must end
         assert steps == sorted(steps), name
         assert steps[-1] == pytest.approx(1.0), name

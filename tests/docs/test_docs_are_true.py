@@ -26,6 +26,7 @@ PAGES = [
     path
     for path in [*sorted((ROOT / "docs").rglob("*.md")), ROOT / "CONTRIBUTING.md"]
     if not path.name.startswith("lesson_")  # made from the lessons and run as notebooks
+    and path.name != "paper.md"  # run in tests/app/test_paper_reproduction.py
 ]
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
 EXTRAS = set(

@@ -12,6 +12,7 @@ import pytest
 
 from gms_fsm.app.lessons import LESSONS
 from tests.docs.conftest import Built
+from tests.helpers import ROOT
 
 pytestmark = pytest.mark.slow
 
@@ -89,6 +90,18 @@ def test_the_strict_build_passes_and_pages_load_nothing_external(built: Built) -
         text = style.read_text(encoding="utf-8")
         loaded = re.findall(r"(?:url\(|@import\s+)[\"']?([^\"')\s;]+)", text)
         assert not [address for address in loaded if outside(address)], style.name
+
+
+@pytest.mark.parametrize("number", LESSONS)
+def test_a_lesson_is_run_and_its_predictions_are_answered(built: Built, number: int) -> None:
+    assert built.code == 0, built.said
+    folder = ROOT / "docs" / "lessons"  # made by the build
+    text = (folder / f"lesson_{number}.ipynb").read_text(encoding="utf-8")
+    page = (folder / f"lesson_{number}.md").read_text(encoding="utf-8")
+    asked = text.count('"reveal(')
+    assert asked >= 2
+    assert page.count("You predicted nothing. Measured: ") == asked
+    assert len(list(folder.glob(f"lesson_{number}_*.png"))) == 1 + text.count('"vary(')
 
 
 def _leads_somewhere(page: Path, link: str, pages: dict[Path, Links]) -> None:

@@ -377,7 +377,7 @@ def test_machines_and_ifelse_agree_on_random_charts(
 
 
 @pytest.mark.skipif(not HAS_FAST, reason="needs the extra fast")
-@hard(60)
+@hard(20)  # most are compiled
 @given(banks(), ramps(jumps=True), options(), st.booleans())
 def test_compiled_agrees_on_random_banks(
     model: GMS, corners: Any, given: dict[str, Any], pushed: bool

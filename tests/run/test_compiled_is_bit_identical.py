@@ -318,7 +318,7 @@ def test_random_corners_and_jumps(gaps: list[float], values: list[float], held: 
 # --------------------------------------------------------------------------- parameters
 @st.composite
 def _banks(draw: st.DrawFn) -> GMS:
-    n = draw(st.integers(1, 12))
+    n = draw(st.sampled_from([2, 5]))  # each is compiled; the others are below
 
     def numbers(low: float, high: float) -> list[float]:
         return draw(st.lists(st.floats(low, high), min_size=n, max_size=n))
@@ -340,7 +340,7 @@ METHODS = st.sampled_from(["dp45", "bs23", "rk4", "heun", "euler"])
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=24, deadline=None, derandomize=True)
 @given(_banks(), METHODS, st.floats(0.05, 1.0), st.sampled_from(["located", "step"]))
 def test_random_banks_open_loop(model: GMS, method: str, level: float, events: str) -> None:
     ramps = [(0.0, 0.0), (1.0, level), (2.0, -level), (2.0, level), (3.0, -0.5 * level)]
@@ -353,7 +353,7 @@ def test_random_banks_open_loop(model: GMS, method: str, level: float, events: s
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=16, deadline=None, derandomize=True)
 @given(_banks(), METHODS, st.floats(0.5, 5.0), st.sampled_from(["all", "end"]))
 def test_random_banks_closed_loop(model: GMS, method: str, stiffness: float, output: str) -> None:
     """The published law slides occasionally: both engines alike."""

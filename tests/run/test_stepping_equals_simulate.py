@@ -16,7 +16,7 @@ from gms_fsm.errors import GMSError
 from tests.helpers import FASTEST
 from tests.run.stepping_cases import friction, record
 
-CASES = 200
+CASES = 60  # make soak takes 1,000
 ENGINES = ("compiled", "ifelse") if FASTEST == "compiled" else ("ifelse",)
 
 
@@ -61,12 +61,12 @@ def differences(seed: int, index: int) -> tuple[str, int]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("part", range(2))
 def test_random_records(part: int) -> None:
-    found = {k: differences(1, k) for k in range(part, CASES, 4)}
+    found = {k: differences(1, k) for k in range(part, CASES, 2)}
     wrong = {k: text for k, (text, _) in found.items() if text}
     assert not wrong, f"python -m tests.run.test_stepping_equals_simulate 1 {CASES}: {wrong}"
-    assert sum(count for _, count in found.values()) > 500
+    assert sum(count for _, count in found.values()) > 300
 
 
 def main() -> None:

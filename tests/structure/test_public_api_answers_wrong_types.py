@@ -136,6 +136,8 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "System": {"name": "one mass", "bodies": (BODY,), "contacts": (CONTACT,), "signals": {}}
         | {"numbers": {}, "flow": {}, "sampled": ()},
         "Transition": edge,
+        "export": {"system": MODEL, "format": "c99", "folder": tmp / "c99", "name": "friction"}
+        | {"initial": None, "t_start": 0.0, "settings": None},
         "measure_phenomena": {"models": ["stiction"], "phenomena": ["stick-slip"]}
         | {"bench": None, "progress": None},
         "prove": {"chart": CHART, "domain": None},
