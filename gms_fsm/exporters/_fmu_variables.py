@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from gms_fsm.exporters._c import WORDS
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import Binary, comparisons, names_in, split
@@ -127,7 +128,7 @@ def variables_of(subject: Subject, *, exchange: bool) -> tuple[Variable, ...]:
             meaning="edges taken since the start",
         )
     )
-    for quantity in parameters_of(start, alone, ()):
+    for quantity in parameters_of(start, alone, WORDS):
         found += _parameter(quantity, alone)
     if exchange:
         found += [
@@ -168,7 +169,7 @@ def _shown(subject: Subject, alone: bool) -> Iterator[Variable]:
     start = subject.start
     layout, system = start.program.layout, start.system
     held = {name for each in system.sampled for name in each.updates}
-    for each in outputs_of(start, alone, ()):
+    for each in outputs_of(start, alone, WORDS):
         shared = each.length is None
         # Of one friction the force is wanted; of a system also how its bodies move.
         wanted = shared and (each.place == "seen" or (each.place == "y" and not alone))

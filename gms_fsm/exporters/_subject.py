@@ -93,10 +93,17 @@ class Subject:
         Raises
         ------
         ParameterError
-            If it is a system.
+            If it is a system, or initial values are given.
         """
         if isinstance(self.given, System):
             raise self._refused_system("a chart")
+        if self.initial:
+            raise ParameterError(
+                f"format {self.format!r} begins in the chart's default state, with zeros",
+                place="initial",
+                value=self.initial,
+                advice="leave it out",
+            )
         return self.given if isinstance(self.given, Chart) else self.given.chart
 
     @property
@@ -137,7 +144,7 @@ class Subject:
             raise ParameterError(
                 f"format {self.format!r} needs numbers",
                 place=f"chart {self.given.name!r}",
-                advice="give a model, for example ChartModel(chart, values)",
+                advice="give a model, for example ChartModel(chart, values), or a scenario file",
             )
         assert isinstance(self.given, Contact)
         return self.given

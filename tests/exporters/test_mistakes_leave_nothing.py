@@ -177,6 +177,8 @@ def test_a_word_of_the_language_as_chart_or_parameter(form: str, tmp_path: Path)
     for word in words:
         if word.islower():  # names are made in lower case
             assert repr(word) in refused(tmp_path, friction(word), form, tmp_path / "out")
+        if form == "transitions":  # its words are modules, which files may not be called after
+            continue
         given = friction(parameter=word)
         assert word in refused(tmp_path, given, form, tmp_path / "out", name="it")
     assert words or not re.search(r"c99|fmu|matlab|modelica|st$", form)
