@@ -43,6 +43,8 @@ ALLOWED = {
     },
     "gms_fsm/app/records.py": {"kept[:first]"},  # rows of a measured record
     "gms_fsm/lowering/_pulses.py": {"rests[first:last]"},  # samples of a signal
+    # In the vector of the MATLAB text, which has its own layout.
+    "gms_fsm/exporters/matlab.py": {"first + n", "n * len(order) + 1"},
     "plots/_elements.py": {  # lengths on paper
         "ROW * n + 0.15",
         "ROW * n + 0.3",
