@@ -119,7 +119,7 @@ def test_states_of_any_name_compile(compiler: str, tmp_path: Path) -> None:
     """States h and H, stick and Stick; a parameter named as the header's guard would be."""
     if shutil.which(compiler) is None:
         pytest.skip(f"{compiler} is not installed")
-    states = ("h", "H", "stick", "Stick", "s")
+    states = ("h", "H", "stick", "Stick", "H_2")
     chart = Chart(
         "names",
         variables=("z",),
