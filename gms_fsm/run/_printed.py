@@ -150,9 +150,10 @@ def _agree(coarse, fine):
 
 
 def _apart(coarse, fine):
-    """Return the largest difference of the last states, as a part of each number's largest value."""
-    (_, _, y, _), (_, _, y_2, size) = coarse, fine
-    return max([abs(u - w) / most for u, w, most in zip(y, y_2, size) if u != w], default=0.0)
+    """Return the largest difference of the last states, each relative to its largest value."""
+    (_, _, y, size), (_, _, y_2, size_2) = coarse, fine
+    pairs = zip(y, y_2, map(max, size, size_2))
+    return max([abs(u - w) / most for u, w, most in pairs if u != w], default=0.0)
 
 
 def _difference(coarse, fine, steps):
