@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
@@ -240,6 +240,21 @@ class Element:
         """
         return next(each for each in _numbered(name) if each.lower() not in self.taken)
 
+    def reserved(self, *names: str) -> Element:
+        """Return the same friction with further names in use, to which those of `free` give way.
+
+        Parameters
+        ----------
+        *names : str
+            What a format has defined.
+
+        Returns
+        -------
+        Element
+            A copy.
+        """
+        return replace(self, taken=self.taken | {name.lower() for name in names})
+
 
 def _needed(lets: Iterable[Let], names: Iterable[str]) -> tuple[Let, ...]:
     """Return the quantities that names are computed from, in order."""
@@ -309,8 +324,17 @@ def _names(read: Assembly, bank: Bank, words: Iterable[str], cases: bool) -> Map
                 advice="rename one of them",
             )
         owner[same] = f"{kind} {name!r}"
+    states: dict[str, str] = {}
     for state in chart.states:
-        identifier(state.name, (), f"{place}, state {state.name!r}")
+        here = f"{place}, state {state.name!r}"
+        same = identifier(state.name if cases else state.name.upper(), (), here)
+        if same in states:
+            raise ParameterError(
+                f"the format's language has one name for it and for state {states[same]!r}",
+                place=here,
+                advice="rename one of them",
+            )
+        states[same] = state.name
     for edge in chart.transitions:
         identifier(edge.name, (), f"{place}, edge {edge.name!r}")
     names = {inside: name for inside, (_, name) in kinds.items()}
@@ -344,17 +368,18 @@ class _Reader:
         self.names[self.force] = SUM
         taken = {each.lower() for each in self.names.values()}
         for call in self.rough_calls():  # sgn_v, abs_z: they have names in the plan
-            self.names.setdefault(
-                call.name, next(e for e in _numbered(call.name) if e.lower() not in taken)
-            )
+            if call.name not in self.names:
+                new = next(e for e in _numbered(call.name) if e.lower() not in taken)
+                taken.add(new.lower())
+                self.names[call.name] = new
         self.new = {inside: Name(short) for inside, short in self.names.items()}
 
     def rough_calls(self) -> Iterator[RoughCall]:
         """Return all calls with a corner or a jump."""
         (bank,) = self.plan.banks
         found = [*self.plan.definitions.values(), *bank.totals.values()]
-        found += [each for state in bank.states for each in (*state.rates.values(),)]
-        found += [each for state in bank.states for each in (*state.forces.values(),)]
+        found += [each for state in bank.states for each in state.rates.values()]
+        found += [each for state in bank.states for each in state.forces.values()]
         return (call for each in found for call in each.calls)
 
     # ------------------------------------------------------------------ translation

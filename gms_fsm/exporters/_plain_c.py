@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._element import Element
 from gms_fsm.exporters._element_parts import Constant
 from gms_fsm.exporters._notation import Notation
@@ -44,9 +45,9 @@ C_WORDS = frozenset(
 )
 LIBRARY = {name: f"{name}({{0}})" for name in FUNCTIONS if name not in ("sgn", "min", "max")}
 HELPERS = {
-    "sgn": "(REAL u)\n{\n    return u > 0.0 ? 1.0 : u < 0.0 ? -1.0 : 0.0;\n}",
-    "min": "(REAL a, REAL b)\n{\n    return b < a ? b : a;\n}",
-    "max": "(REAL a, REAL b)\n{\n    return b > a ? b : a;\n}",
+    "sgn": "(double u)\n{\n    return u > 0.0 ? 1.0 : u < 0.0 ? -1.0 : 0.0;\n}",
+    "min": "(double a, double b)\n{\n    return b < a ? b : a;\n}",
+    "max": "(double a, double b)\n{\n    return b > a ? b : a;\n}",
 }
 
 
@@ -109,7 +110,7 @@ friction law calls its functions. Compile it with any C99 compiler, for example
 
 With these options the numbers are those of
 simulate(model, Prescribed(record), t_end, method="euler", step=dt, events="step"), to the last bit.
--D{name.upper()}_REAL=float computes in single precision.
+All of them are double.
 
 What it does not do: switches are seen at the next step, not where they happen, so the result is of
 first order in dt; a velocity that passes through a narrow guard between two steps is not noticed.
@@ -123,8 +124,8 @@ class _Printer:
         words = {*C_WORDS, *LIBRARY, "fabs"}
         self.element = Element.of(subject, words)
         self.form: Plain = plain_form(self.element)
-        self.name, self.big = f"{subject.name}_plain", subject.name.upper()
-        self.real = f"{self.big}_REAL"
+        self.name = f"{subject.name}_plain"
+        self.refuse_own_names()
         helpers = {
             name: f"{self.name}_{name}({{0}}{', {1}' * (name != 'sgn')})" for name in HELPERS
         }
@@ -142,19 +143,30 @@ class _Printer:
         if element.position:
             self.texts[element.position] = f"{self.me}->{element.position}"
 
+    def refuse_own_names(self) -> None:
+        """Refuse a quantity that would hide what the text defines."""
+        for name in (*(each for each, _ in self.element.inputs), *self.element.names):
+            if name == self.name or name.startswith(f"{self.name}_"):
+                raise ParameterError(
+                    f"names that begin with {self.name!r} are those of the text itself",
+                    place=f"chart {self.element.title!r}, name {name!r}",
+                    advice="give it another name, or the files (--name)",
+                )
+
     def state(self, index: int) -> str:
-        return f"{self.name.upper()}_{self.element.states[index].name.upper()}"
+        # As written: stick and Stick are two states.
+        return f"{self.name}_state_{self.element.states[index].name}"
 
     # ------------------------------------------------------------------ the header
     def header(self) -> str:
-        element, guard = self.element, f"{self.name.upper()}_H"
+        element, guard = self.element, self.element.free(f"{self.name.upper()}_H")
         several = len(element.states) > 1
         names = [self.state(index) for index in range(len(element.states))]
         size = f"[{element.n}]" if self.i else ""
-        fields = [f"    {self.real} {each.name}{size};{_note(each.about)}"
+        fields = [f"    double {each.name}{size};{_note(each.about)}"
                   for each in element.variables]  # fmt: skip
         if element.position:
-            fields.append(f"    {self.real} {element.position};  /* m: position */")
+            fields.append(f"    double {element.position};  /* m: position */")
         if several:
             fields.append(f"    enum {self.name}_state state{size};")
         lines = [
@@ -162,8 +174,8 @@ class _Printer:
             f"#ifndef {guard}",
             f"#define {guard}",
             "",
-            f"#ifndef {self.real}",
-            f"#define {self.real} double",
+            "#ifdef __cplusplus",
+            'extern "C" {',
             "#endif",
             "",
         ]
@@ -179,14 +191,17 @@ class _Printer:
             "/* One step: the force at its beginning [N]. */",
             f"{self.signature()};",
             "",
+            "#ifdef __cplusplus",
+            "}",
+            "#endif",
             "#endif",
         ]
         return "\n".join(lines) + "\n"
 
     def signature(self) -> str:
         inputs = [name for name, _ in self.element.inputs]
-        arguments = ", ".join(f"{self.real} {name}" for name in (*inputs, self.form.dt))
-        return f"{self.real} {self.name}_step({self.name} *{self.me}, {arguments})"
+        arguments = ", ".join(f"double {name}" for name in (*inputs, self.form.dt))
+        return f"double {self.name}_step({self.name} *{self.me}, {arguments})"
 
     # ------------------------------------------------------------------ the code
     def code(self) -> str:
@@ -204,8 +219,7 @@ class _Printer:
         lines += [f'#include "{self.name}.h"']
         for name, helper in HELPERS.items():
             if f"{self.name}_{name}(" in text:
-                made = helper.replace("REAL", self.real)
-                lines += ["", f"static {self.real} {self.name}_{name}{made}"]
+                lines += ["", f"static double {self.name}_{name}{helper}"]
         return "\n".join([*lines, "", *start, "", *body]) + "\n"
 
     def start(self) -> list[str]:
@@ -225,16 +239,16 @@ class _Printer:
         return [f"void {self.name}_start({self.name} *{self.me})", "{", *lines, "}"]
 
     def step(self) -> list[str]:
-        element, form, real = self.element, self.form, self.real
+        element, form = self.element, self.form
         elements = [*self.statements(form.guards), *self.statements(form.flows)]
-        loads = [f"{real} {each.name} = {self.me}->{each.name}{self.at};"
+        loads = [f"double {each.name} = {self.me}->{each.name}{self.at};"
                  for each in element.variables]  # fmt: skip
         stores = [
             f"{self.me}->{each.name}{self.at} = {self.spell(each.tree)};" for each in form.updates
         ]
         inner = [*loads, *elements, f"{form.force} += {form.part};", *stores]
         body = [*map(self.constant, element.constants)]
-        body += [f"{real} {form.force} = 0.0;", "", *self.statements(form.shared)]
+        body += [f"double {form.force} = 0.0;", "", *self.statements(form.shared)]
         if self.i:
             body += [f"for (int {self.i} = 0; {self.i} < {element.n}; {self.i}++) {{"]
             body += [*_indented(inner), "}"]
@@ -262,7 +276,7 @@ class _Printer:
             text = f"{constant.name}[{len(value)}] = {{{numbers}}}"
         else:
             text = f"{constant.name} = {number(value)}"
-        return f"static const {self.real} {text};{_note(constant.about)}"
+        return f"static const double {text};{_note(constant.about)}"
 
     # ------------------------------------------------------------------ statements
     def spell(self, tree: Node) -> str:
@@ -274,21 +288,18 @@ class _Printer:
     def statement(self, statement: Statement) -> Iterator[str]:
         match statement:
             case Set(name, tree, note, new):
-                kind = f"const {self.real} " if new else ""
+                kind = "const double " if new else ""
                 yield f"{kind}{name} = {self.spell(tree)};{_note(note)}"
             case Declare(names):
                 if names:
-                    yield f"{self.real} {', '.join(names)};"
+                    yield f"double {', '.join(names)};"
             case Enter(state):
                 yield f"{self.me}->state{self.at} = {self.state(state)};"
             case Guards(edges):
                 word = "if"
                 for edge, taken in edges:
                     yield f"{word} ({self.spell(edge.guard)}) {{  /* {edge.name} */"
-                    moved = self.statements(taken)
-                    # A chart of one state has no field for it.
-                    several = len(self.element.states) > 1
-                    yield from _indented(moved if several else moved[:-1])
+                    yield from _indented(self.statements(taken))
                     word = "} else if"
                 yield "}"
             case ByState(branches):

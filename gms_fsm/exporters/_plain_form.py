@@ -36,7 +36,7 @@ class Declare:
 
 @dataclass(frozen=True)
 class Enter:
-    """The element's next state."""
+    """The element's next state; a friction of one state has none of these."""
 
     state: int
 
@@ -124,7 +124,7 @@ def plain_form(element: Element, dt: str = "dt") -> Plain:
     guards += map(_let, first)
     branches: list[tuple[Statement, ...]] = []
     for state, lets in zip(states, inside, strict=True):
-        chain = Guards(tuple((edge, _taken(edge)) for edge in state.edges))
+        chain = Guards(tuple((edge, _taken(edge, len(states) > 1)) for edge in state.edges))
         branches.append((*map(_let, lets), chain) if state.edges else ())
     guards += [ByState(tuple(branches))] if any(branches) else []
     first, inside = element.placed(flow_reads, moves=True)
@@ -165,8 +165,9 @@ def _after(name: str, dt: str, rate: Value) -> Value:
     return Binary("+", Name(name), Binary("*", Name(dt), rate))
 
 
-def _taken(edge: Leaving) -> tuple[Statement, ...]:
-    return (*(Set(name, tree) for name, tree in edge.steps), Enter(edge.target))
+def _taken(edge: Leaving, several: bool) -> tuple[Statement, ...]:
+    steps = tuple(Set(name, tree) for name, tree in edge.steps)
+    return (*steps, Enter(edge.target)) if several else steps
 
 
 def _trees(element: Element) -> Iterable[Node]:

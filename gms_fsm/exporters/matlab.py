@@ -8,12 +8,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._element import Element
 from gms_fsm.exporters._element_parts import Expression, Let, State
+from gms_fsm.exporters._names import LONGEST
 from gms_fsm.exporters._notation import Notation
 from gms_fsm.exporters._readme import about_friction
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import Node, Relation, names_in
 from gms_fsm.lowering._plan import RoughCall, both_sides
+from gms_fsm.lowering.scales import SHARE, scales_of
 
 __all__ = ["WORDS", "matlab"]
 
@@ -27,8 +29,8 @@ WORDS = frozenset(
         do endclassdef endenumeration endevents endfor endfunction endif endmethods endparfor
         endproperties endspmd endswitch endwhile end_try_catch end_unwind_protect until
         unwind_protect unwind_protect_cleanup
-        abs asinh atan cos eps error exp false find log max min numel pi power sign sin sqrt struct
-        tanh true zeros
+        abs all asinh atan cos eps error exp false find log max min numel pi power sign sin sqrt
+        struct tanh true zeros
         """,
     )
 )
@@ -42,6 +44,7 @@ NOTATION = Notation(
     {**NAMES, "sgn": "sign({0})", "min": "min({0}, {1})", "max": "max({0}, {1})"},
     "power({0}, {1})",
 )
+FIELDS = ("longest_step", "tolerance", "edges")
 MAIN = """\
 function [s, F] = @(s, v0, v1, dt{arguments})
 %@  {title}
@@ -52,8 +55,8 @@ function [s, F] = @(s, v0, v1, dt{arguments})
 %   If v0 is not the last v1, the velocity jumps.{inputs}
 %
 %   s.log has a row for every switch: time [s], element, edge; s.edges has their names.
-%   s.longest_step is that of the Runge-Kutta method [s]. It is Inf at first: one step in
-%   each call, unless there is a switch in it.
+%   Each step is compared with two of half its length, and halved until they agree to
+%   s.tolerance (1e-9, relative). No step is longer than s.longest_step [s], Inf at first.
 p = @_numbers();
 if nargin == 0
     s = @_begin();
@@ -61,7 +64,9 @@ if nargin == 0
 end
 u = struct('t', s.t, 'dt', dt, {lines});
 y = [{pack}];
+sizes = [{sizes}];  % below these, errors are absolute
 tau = 0;
+next = dt;
 [y, s] = @_switch(y, s, u, tau, p);
 arcs = 0;
 fresh = true;
@@ -71,8 +76,21 @@ while tau < dt
         before = @_compare(y, u, tau, s.state, p);
         fresh = false;
     end
-    h = min(s.longest_step, dt - tau);
-    y_new = @_step(y, u, tau, h, s.state, held, p);
+    % The Stribeck curve is narrow: the velocity changes by half of itself or of the curve's.
+    v = @_line([v0, v1], u, tau);
+    h = min([s.longest_step, next, dt - tau, max(abs(v), {speed}) / 2 * dt / abs(v1 - v0)]);
+    [y_new, apart] = @_step(y, u, tau, h, s.state, held, p);
+    while ~@_accurate(apart, y, y_new, sizes, s.tolerance)
+        if h <= eps(abs(s.t) + dt)
+            error('@:step', 'no step is short enough at t = %g s', s.t + tau);
+        end
+        h = h / 2;
+        [y_new, apart] = @_step(y, u, tau, h, s.state, held, p);
+    end
+    next = h;
+    if @_accurate(apart, y, y_new, sizes, s.tolerance / 32)
+        next = 2 * h;
+    end
     if any(@_compare(y_new, u, tau + h, s.state, p) ~= before)
         % Bisection; the right end, where the comparison has changed on raw values.
         low = 0;
@@ -81,10 +99,14 @@ while tau < dt
             y_middle = @_step(y, u, tau, middle, s.state, held, p);
             if any(@_compare(y_middle, u, tau + middle, s.state, p) ~= before)
                 h = middle;
-                y_new = y_middle;
             else
                 low = middle;
             end
+        end
+        [y_new, apart] = @_step(y, u, tau, h, s.state, held, p);
+        if ~@_accurate(apart, y, y_new, sizes, s.tolerance)
+            next = h / 2;  % the long step had missed what is narrow, such as a Stribeck peak
+            continue
         end
         fresh = true;
         arcs = arcs + 1;
@@ -122,8 +144,21 @@ end
 error('@:livelock', 'no end of switching at t = %g s', u.t + tau);
 end
 
-function y = @_step(y, u, tau, h, state, held, p)
-% One step of the classical Runge-Kutta method, states and signs held.
+function [y_new, apart] = @_step(y, u, tau, h, state, held, p)
+% Two steps of half the length, states and signs held; and how far one step is from them.
+whole = @_runge_kutta(y, u, tau, h, state, held, p);
+y_new = @_runge_kutta(y, u, tau, h / 2, state, held, p);
+y_new = @_runge_kutta(y_new, u, tau + h / 2, h / 2, state, held, p);
+apart = abs(y_new - whole);
+end
+
+function yes = @_accurate(apart, y, y_new, sizes, tolerance)
+% Whether a step is as near to two of half its length as the tolerance asks; not if it is NaN.
+yes = all(apart <= tolerance * (max(abs(y), abs(y_new)) + sizes));
+end
+
+function y = @_runge_kutta(y, u, tau, h, state, held, p)
+% One step of the classical Runge-Kutta method.
 k1 = @_flow(y, u, tau, state, held, p);
 k2 = @_flow(y + h / 2 * k1, u, tau + h / 2, state, held, p);
 k3 = @_flow(y + h / 2 * k2, u, tau + h / 2, state, held, p);
@@ -180,6 +215,7 @@ class _Printer:
         self.element = Element.of(subject, WORDS, time=False)
         element, free = self.element, self.element.free
         self.part, self.t_start = free("F_i"), subject.t_start
+        self.scales = scales_of(subject.contact)
         self.y, self.u, self.tau, self.p, self.i = map(free, ("y", "u", "tau", "p", "i"))
         self.state, self.held, self.found = map(free, ("state", "held", "found"))
         self.edge, self.dy = map(free, ("edge", "dy"))
@@ -209,7 +245,7 @@ class _Printer:
             f"\n%   {name}0 and {name}1 are the input {name} at both ends." for name in inputs[1:]
         )
         for each in vectors:
-            if each in ("edges", "longest_step"):
+            if each in FIELDS:
                 raise ParameterError(
                     "it is a field of the function's own",
                     place=f"chart {element.title!r}, variable {each!r}",
@@ -221,6 +257,8 @@ class _Printer:
             inputs=about,
             lines=", ".join(f"'{name}', [{name}0, {name}1]" for name in inputs),
             pack="; ".join(f"s.{name}" for name in vectors),
+            speed=repr(self.scales.v) if self.scales.v else "Inf",
+            sizes="; ".join(map(repr, self.sizes())),
             unpack="\n".join(unpack),
         )
         parts = [
@@ -242,7 +280,26 @@ class _Printer:
             self.numbers(),
             self.begin(),
         ]
-        return "\n".join(parts).replace("@", self.name)
+        text = "\n".join(parts)
+        suffix = max(re.findall(r"@(_\w+)", text), key=len)
+        if len(self.name + suffix) > LONGEST:
+            raise ParameterError(
+                f"it has more than {LONGEST - len(suffix)} characters: MATLAB's names have at most "
+                f"{LONGEST}, and there will be a function {self.name + suffix!r}",
+                place=f"name {self.name!r}",
+                advice='give a shorter one, for example name="friction" (--name friction)',
+            )
+        return text.replace("@", self.name)
+
+    def sizes(self) -> list[float]:
+        """Return for each component of the vector below which size its error is absolute."""
+        element = self.element
+        found = [
+            SHARE * size
+            for each in element.variables
+            for size in self.scales.variables.get(each.name, (0.0,) * element.n)
+        ]
+        return [*found, SHARE * self.scales.x] if element.position else found
 
     def given(self, *more: str) -> str:
         held = [self.held] if more else []
@@ -475,7 +532,7 @@ class _Printer:
 
     def begin(self) -> str:
         element, start = self.element, repr(self.t_start)
-        lines = [f"s = struct('t', {start}, 'longest_step', Inf);"]
+        lines = [f"s = struct('t', {start}, 'longest_step', Inf, 'tolerance', 1e-9);"]
         for each in element.variables:
             lines.append(
                 f"s.{each.name} = [{'; '.join(map(repr, each.start))}];{_note(each.about)}"
@@ -507,7 +564,6 @@ class _Printer:
 In MATLAB or Octave, in this folder:
 
     s = {name}();                          % at the beginning
-    s.longest_step = 1e-3;                 % s
     [s, F] = {name}(s, v0, v1, dt{further});  % force at the end of dt [N]
     s.log                                  % rows of time, element, edge
     s.edges(s.log(:, 3))                   % names of the edges
@@ -519,14 +575,17 @@ or in a shell: `octave-cli --eval "s = {name}(); [s, F] = {name}(s, 0, 0.1, 0.01
 
 {about_friction(self.element)}
 In each call the inputs are straight lines. Between switches the flow is integrated by the
-classical Runge-Kutta method with states and signs held. A step in which a comparison of a guard
-changes is cut there by bisection; then edges are taken until no guard is true.
+classical Runge-Kutta method with states and signs held. Each step is compared with two of half its
+length, and halved until they agree to `s.tolerance` (1e-9) of each variable; close to zero, of a
+tenth of its scale in the model. In a step the velocity changes by at most half of itself, or of
+the model's velocity scale. A step in which a comparison of a guard changes is cut there by
+bisection; then edges are taken until no guard is true.
 
 ## What it does not do
 
-The steps are fixed, so `s.longest_step` decides the error; compare with half of it. A comparison
-that changes twice within one step is not noticed. Motion that slides along a surface on which a
-sign changes (Filippov) ends in an error.
+A comparison that changes twice within one step is not noticed; `s.longest_step` (Inf at first)
+limits the steps [s]. The method is explicit, so a stiff flow costs many short steps. Motion that
+slides along a surface on which a sign changes (Filippov) ends in an error.
 """
 
 

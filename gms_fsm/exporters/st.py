@@ -124,11 +124,13 @@ class _Printer:
     def __init__(self, subject: Subject) -> None:
         name = subject.name
         identifier(name.upper(), WORDS, f"name {name!r}")
-        self.name, self.element = name, Element.of(subject, WORDS, cases=False)
-        element = self.element
-        element.check_name(name, cases=False)
-        self.force = element.free("force")  # F would be the same as a chart's f
+        self.name, element = name, Element.of(subject, WORDS, cases=False)
+        for each in (name, f"{name}_sgn"):
+            element.check_name(each, cases=False)
+        element = element.reserved(name, f"{name}_sgn")
         self.form: Plain = plain_form(element, "cycle")
+        self.element = element.reserved(self.form.dt, self.form.part)
+        self.force = self.take("force")  # F would be the same as a chart's f
         self.notation = Notation(
             " AND ",
             " OR ",
@@ -140,16 +142,17 @@ class _Printer:
         for tree in self.form.trees:
             self.notation.check(tree, f"chart {subject.title!r}", "structured text")
         # One element needs no arrays and no loop.
-        self.i = element.free("i") if element.n > 1 else ""
+        self.i = self.take("i") if element.n > 1 else ""
         self.at = f"[{self.i}]" if self.i else ""
         self.now = {
-            each.name: element.free(f"{each.name}_i") if self.i else each.name
+            each.name: self.take(f"{each.name}_i") if self.i else each.name
             for each in element.variables
         }
         numbers = {c.name for c in element.constants if isinstance(c.value, tuple)}
         self.texts = {each: f"{each}{self.at}" for each in numbers} | self.now
         self.texts[self.form.force] = self.force
-        self.states = [element.free(f"STATE_{each.name.upper()}") for each in element.states]
+        self.state = self.take("state")
+        self.states = [self.take(f"STATE_{each.name.upper()}") for each in element.states]
         names = [*element.names, *self.states, *(each for each, _ in element.inputs), name]
         for each in names:
             if "__" in each or each.endswith("_"):
@@ -158,6 +161,12 @@ class _Printer:
                     place=f"chart {subject.title!r}, name {each!r}",
                     advice="give it another name",
                 )
+
+    def take(self, name: str) -> str:
+        """Return a name that nothing else has, and is not given again."""
+        new = self.element.free(name)
+        self.element = self.element.reserved(new)
+        return new
 
     # ------------------------------------------------------------------ the text
     def text(self) -> str:
@@ -207,7 +216,7 @@ class _Printer:
             start = self.notation.number(element.position_start)
             yield f"{element.position} : LREAL := {start};  (* m: position *)"
         if len(element.states) > 1:
-            yield f"state : {self.array('INT', element.start)};"
+            yield f"{self.state} : {self.array('INT', element.start)};"
 
     def locals(self) -> Iterator[str]:
         """Declare what is computed in every call."""
@@ -250,8 +259,7 @@ class _Printer:
             case Set(name, tree, note):
                 yield f"{self.texts.get(name, name)} := {self.spell(tree)};{_note(note)}"
             case Enter(state):
-                if len(self.element.states) > 1:
-                    yield f"state{self.at} := {self.states[state]};"
+                yield f"{self.state}{self.at} := {self.states[state]};"
             case Guards(edges):
                 word = "IF"
                 for edge, taken in edges:
@@ -269,7 +277,7 @@ class _Printer:
         word, last = "IF", len(branches) - 1
         for index, branch in enumerate(branches):
             name = self.states[index]
-            test = f"{word} state{self.at} = {name} THEN"
+            test = f"{word} {self.state}{self.at} = {name} THEN"
             yield f"ELSE{_note(name)}" if index == last else test
             yield from _indented(self.statements(branch) or [";"])
             word = "ELSIF"

@@ -18,7 +18,7 @@ file = fopen('lines.bin');
 lines = fread(file, [{width}, Inf], 'double').';
 fclose(file);
 s = friction();
-s.longest_step = {step!r};
+s.longest_step = {step};
 forces = zeros(rows(lines), 1);
 for k = 1:rows(lines)
     one = num2cell(lines(k, :));
@@ -51,7 +51,7 @@ def ran_in_octave(
     for name, text in matlab(Subject.of(model, "matlab", name="friction")).items():
         (folder / name).write_text(text, encoding="utf-8")
     (folder / "lines.bin").write_bytes(np.ascontiguousarray(lines, dtype=float).tobytes())
-    driver = DRIVER.format(width=lines.shape[1], step=step)
+    driver = DRIVER.format(width=lines.shape[1], step=repr(step).title())
     (folder / "driver.m").write_text(driver, encoding="utf-8")
     command = [OCTAVE, "--norc", "--quiet", "driver.m"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)

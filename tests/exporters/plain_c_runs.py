@@ -21,25 +21,22 @@ STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-
 needs_c = pytest.mark.skipif(not COMPILERS, reason="no C compiler")
 
 
-def compiled(
-    folder: Path, subject: Subject, compiler: str = "", *more: str
-) -> Callable[..., float]:
+def compiled(folder: Path, subject: Subject, compiler: str = "") -> Callable[..., float]:
     """Return the step of a friction that has begun, as a function of its inputs and dt."""
     files = plain_c(subject)
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
     source, library = folder / f"{subject.name}_plain.c", folder / f"{subject.name}.so"
-    command = [compiler or COMPILERS[0], *STRICT, *more, "-shared", "-fPIC", str(source), "-lm"]
+    command = [compiler or COMPILERS[0], *STRICT, "-shared", "-fPIC", str(source), "-lm"]
     done = subprocess.run(
         [*command, "-o", str(library)], capture_output=True, text=True, check=False
     )
     assert not done.returncode, done.stderr
     loaded = ctypes.CDLL(str(library))
     step, memory = loaded[f"{subject.name}_plain_step"], ctypes.create_string_buffer(65536)
-    kind = ctypes.c_float if more else ctypes.c_double
-    step.restype = kind
+    step.restype = ctypes.c_double
     loaded[f"{subject.name}_plain_start"](memory)
-    return lambda *inputs: float(step(memory, *map(kind, inputs)))
+    return lambda *inputs: float(step(memory, *map(ctypes.c_double, inputs)))
 
 
 def compared(name: str, seed: int, compiler: str, folder: Path) -> tuple[int, int]:

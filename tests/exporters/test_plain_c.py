@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +15,7 @@ from gms_fsm import GMS, Chart, ChartModel, Contact, GMSParameters, State, Trans
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._plain_c import plain_c
 from gms_fsm.exporters._subject import Subject
-from tests.exporters.plain_c_runs import COMPILERS, STEP, compared, compiled, needs_c
+from tests.exporters.plain_c_runs import COMPILERS, compared, compiled, needs_c
 from tests.exporters.text_cases import case
 
 
@@ -54,20 +57,10 @@ def test_further_inputs_position_and_time(tmp_path: Path) -> None:
         z, x, age = z + dt * dz, x + dt * v, age + dt
 
 
-@needs_c
-def test_single_precision(tmp_path: Path) -> None:
-    given = case("gms-4-signed", 1)
-    double = compiled(tmp_path, Subject.of(given.model, "c99", name="d"))
-    single = compiled(tmp_path, Subject.of(given.model, "c99", name="s"), "", "-DS_REAL=float")
-    v = np.interp(np.arange(0.0, 1.0, STEP), given.t, given.v)
-    F = np.array([[double(u, STEP), single(u, STEP)] for u in v])
-    assert 0.0 < np.abs(F[:, 0] - F[:, 1]).max() < 1e-3
-
-
 def test_no_memory_but_the_struct() -> None:
     text = plain_c(Subject.of(case("gms-16-signed", 0).model, "c99", name="g"))["g_plain.c"]
-    assert not re.search(r"malloc|^static (?!g_REAL|G_REAL)", text, re.MULTILINE)
-    assert text.count("static const") == text.count("static const G_REAL")
+    assert not re.search(r"malloc|^static (?!double)", text, re.MULTILINE)
+    assert text.count("static const") == text.count("static const double")
 
 
 @pytest.mark.parametrize(
@@ -107,7 +100,7 @@ def test_names_of_the_printer_give_way() -> None:
     model = ChartModel(chart, dict.fromkeys(names, 1.0), n=2, stribeck=stribeck)
     text = plain_c(Subject.of(model, "c99", name="n"))["n_plain.c"]
     assert "for (int i2 = 0; i2 < 2; i2++)" in text
-    assert "const N_REAL model_stribeck = model_F_c + (F_s - model_F_c)" in text
+    assert "const double model_stribeck = model_F_c + (F_s - model_F_c)" in text
 
 
 def test_a_published_law_is_another_text() -> None:
@@ -118,3 +111,66 @@ def test_a_published_law_is_another_text() -> None:
     }
     assert "dz = C[i] * (g_plain_sgn(v) - z / s);" in texts["signed"]
     assert "dz = g_plain_sgn(v) * C[i] * (1.0 - z / s);" in texts["published"]
+
+
+@needs_c
+@pytest.mark.parametrize("compiler", ["gcc", "clang", "g++"])
+def test_states_of_any_name_compile(compiler: str, tmp_path: Path) -> None:
+    """States h and H, stick and Stick; a parameter named as the header's guard would be."""
+    if shutil.which(compiler) is None:
+        pytest.skip(f"{compiler} is not installed")
+    states = ("h", "H", "stick", "Stick", "s")
+    chart = Chart(
+        "names",
+        variables=("z",),
+        parameters=("IT_PLAIN_H",),
+        states=tuple(State(name, flow={"z": "v"}) for name in states),
+        transitions=tuple(
+            Transition(f"e{k}", one, two, guard=f"z > {k}")
+            for k, (one, two) in enumerate(itertools.pairwise(states))
+        ),
+        outputs={"F": "IT_PLAIN_H * z"},
+    )
+    subject = Subject.of(ChartModel(chart, {"IT_PLAIN_H": 2.0}), "c99", name="it")
+    for name, text in plain_c(subject).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    if compiler == "g++":  # the header only, twice: it names functions of C
+        main = '#include "it_plain.h"\n#include "it_plain.h"\n'
+        main += "int main() { it_plain f; it_plain_start(&f); return it_plain_step(&f, 1, 1) > 0; }"
+        (tmp_path / "main.cc").write_text(main)
+        source = ["gcc", "-std=c99", "-c", "it_plain.c", "-o", "it_plain.o"]
+        for command in (source, ["g++", "-Wall", "-Werror", "main.cc", "it_plain.o"]):
+            subprocess.run(command, cwd=tmp_path, check=True)
+    else:
+        step = compiled(tmp_path, subject, compiler)
+        assert [step(1.0, 1.0) for _ in range(4)] == [0.0, 2.0, 4.0, 6.0]
+
+
+def test_names_of_the_text_itself_are_refused() -> None:
+    chart = Chart(
+        "own",
+        variables=("z",),
+        parameters=("it_plain_sgn",),
+        states=(State("a", flow={"z": "sgn(v)"}),),
+        outputs={"F": "it_plain_sgn * z"},
+    )
+    model = ChartModel(chart, {"it_plain_sgn": 1.0})
+    with pytest.raises(ParameterError, match=r"name 'it_plain_sgn'.*the text itself"):
+        plain_c(Subject.of(model, "c99", name="it"))
+    assert plain_c(Subject.of(model, "c99", name="other"))
+
+
+@needs_c
+def test_one_state_needs_no_field(tmp_path: Path) -> None:
+    """An edge of a chart of one state takes its actions, and nothing else."""
+    chart = Chart(
+        "reset",
+        variables=("z",),
+        states=(State("a", flow={"z": "v"}),),
+        transitions=(Transition("back", "a", "a", guard="z >= 2", actions={"z": "0"}),),
+        outputs={"F": "z"},
+    )
+    subject = Subject.of(ChartModel(chart, {}), "c99", name="reset")
+    step = compiled(tmp_path, subject)
+    assert [step(1.0, 1.0) for _ in range(5)] == [0.0, 1.0, 0.0, 1.0, 0.0]
+    assert "state" not in plain_c(subject)["reset_plain.h"]

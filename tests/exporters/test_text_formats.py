@@ -6,11 +6,14 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from gms_fsm import Chart, ChartModel, State, Transition, export
+from gms_fsm import Chart, ChartModel, FrictionState, State, Transition, export
+from gms_fsm.charts.registry import entry
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters import EXPORTERS, Subject
+from gms_fsm.systems.models import demonstration
 from tests.exporters.text_cases import NAMES, case
 
 FORMATS = ("matlab", "modelica", "st")
@@ -110,3 +113,50 @@ def test_names_that_structured_text_cannot_have(name: str, wrong: str, tmp_path:
 def test_a_name_of_the_friction_is_no_name_of_the_file(form: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="a quantity of the friction has this name"):
         export(one_state(), form, tmp_path / "out", name="k")
+
+
+def test_structured_text_has_no_case(tmp_path: Path) -> None:
+    """States that differ in capitals only are refused; names of the text give way to each other."""
+    for other, wrong in (("A", "state 'A'.*one name for it and for state 'a'"), ("X2", None)):
+        chart = Chart(
+            "cases",
+            variables=("f", "State"),
+            parameters=("STATE_X", "force", "F_i2"),
+            states=tuple(State(each, flow={"f": "v"}) for each in ("a", "X", other)),
+            outputs={"F": "STATE_X * f + force * State + F_i2"},
+        )
+        model = ChartModel(chart, {"STATE_X": 1.0, "force": 2.0, "F_i2": 3.0}, n=2)
+        if wrong is not None:
+            with pytest.raises(ParameterError, match=wrong):
+                export(model, "st", tmp_path / "out", name="cycle")
+            assert not (tmp_path / "out").exists()
+            export(model, "matlab", tmp_path / "m", name="cycle")
+            continue
+        export(model, "st", tmp_path / "out", name="cycle")
+        text = (tmp_path / "out" / "cycle.st").read_text(encoding="utf-8")
+        names = [each.upper() for each in re.findall(r"^ +(\w+) : ", text, re.MULTILINE)]
+        names.append("CYCLE")
+        assert len({*names}) == len(names), names
+
+
+def test_matlab_keeps_names_below_its_limit(tmp_path: Path) -> None:
+    longest = 63 - len("_runge_kutta")
+    (path, *_) = export(one_state(), "matlab", tmp_path / "out", name="k" * longest)
+    names = re.findall(r"^function .*?(k{9}\w*)", path.read_text(encoding="utf-8"), re.MULTILINE)
+    assert max(map(len, names)) == 63
+    with pytest.raises(ParameterError, match=f"more than {longest} characters"):
+        export(one_state(), "matlab", tmp_path / "no", name="k" * (longest + 1))
+    assert not (tmp_path / "no").exists()
+
+
+def test_octave_holds_its_tolerance_on_a_stiff_flow(tmp_path: Path) -> None:
+    """By default, in calls many relaxation times long, through the narrow Stribeck curve."""
+    octave = pytest.importorskip("tests.exporters.octave")
+    if octave.OCTAVE is None:
+        pytest.skip("octave-cli is not installed")
+    model = demonstration(entry("lugre"))
+    lines = np.array([[0.0, 0.1, 0.01], [0.1, -0.1, 0.05], [-0.1, 0.0, 0.05]])
+    forces, _ = octave.ran_in_octave(tmp_path, model, lines, np.inf)
+    friction = FrictionState(model, rtol=1e-12)
+    exact = [friction.advance(*line) for line in lines.tolist()]
+    assert forces.tolist() == pytest.approx(exact, rel=1e-6)
