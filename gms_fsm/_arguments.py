@@ -49,7 +49,7 @@ def checked_kind(name: str, value: Any, kind: type | tuple[type, ...], wanted: s
 
 
 def checked_path(name: str, value: Any) -> Path:
-    """Return a path; raise a `ParameterError` for anything else.
+    """Return a path; raise a `ParameterError` for anything else, and for what names no file.
 
     Parameters
     ----------
@@ -62,8 +62,24 @@ def checked_path(name: str, value: Any) -> Path:
     -------
     Path
         The path.
+
+    Examples
+    --------
+    >>> checked_path("folder", "")
+    Traceback (most recent call last):
+    gms_fsm.errors.ParameterError: folder is ''; it is empty; write "." for the working directory
     """
-    return Path(checked_kind(name, value, (str, os.PathLike), "a path, as a text or a Path"))
+    checked_kind(name, value, (str, os.PathLike), "a path, as a text or a Path")
+    text = os.fsdecode(value)
+    if not text:
+        raise ParameterError(
+            "it is empty", place=name, value=value, advice='write "." for the working directory'
+        )
+    if "\0" in text:
+        raise ParameterError(
+            "it contains a null byte", place=name, value=value, advice="leave that character out"
+        )
+    return Path(text)
 
 
 def checked_integer(

@@ -77,6 +77,11 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
     gms_fsm.errors.OutputError: .../summary.md: already exists and was not written by gms-fsm...
     """
     folder = Path(path)
+    if "\0" in str(folder):
+        raise OutputError(
+            f"cannot create the folder {str(folder)!r}: it contains a null byte",
+            advice="choose another folder",
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -58,6 +58,8 @@ def export_command(
             "no format is given", place="--to", advice=f"give one of {', '.join(EXPORTERS)}"
         )
     given, default, more = _given(name, law, contact)
+    if to in EXPORTERS:
+        more = {each: value for each, value in more.items() if each in EXPORTERS[to].takes}
     chosen = called or default
     folder = Path(f"{chosen or 'friction'}-{to}") if output is None else output
     for path in export(given, to, folder, name=chosen, **more):
@@ -83,11 +85,21 @@ def _given(
         return demonstration(found, law), found.name.replace("-", "_"), {}
     if own.system is None:
         return own.only_chart(contact), "", {}
-    if contact:
-        return own.system.contact(contact), contact, {}
-    if "run" not in parsed(own.path):
-        return own.system, own.path.stem, {}
-    run = load_scenario(own.path).arguments
-    used = {each: run[each] for each in SETTINGS if each in run}
-    more = {"settings": Settings(**used), "t_start": run["t_start"], "initial": run.get("initial")}
-    return own.system, own.path.stem, more
+    more: dict[str, Any] = {}
+    if "run" in parsed(own.path):
+        run = load_scenario(own.path).arguments
+        used = {each: run[each] for each in SETTINGS if each in run}
+        more = {"settings": Settings(**used), "t_start": run["t_start"]}
+        more["initial"] = run.get("initial") or {}
+    if not contact:
+        return own.system, own.path.stem, more
+    if "initial" in more:
+        more["initial"] = _of_contact(own.system.contact(contact), more["initial"])
+    return own.system.contact(contact), contact, more
+
+
+def _of_contact(contact: Contact, initial: dict[str, Any]) -> dict[str, Any]:
+    """Return the initial values of a contact, by its own names."""
+    names = {*contact.chart.variables, "states"}
+    plain = {name.removeprefix(f"{contact.name}."): value for name, value in initial.items()}
+    return {name: value for name, value in plain.items() if name in names}

@@ -37,6 +37,7 @@ from integrators.stepping import FULL_LOG, RESUMED, SWITCHES, step_to
 
 __all__ = [
     "PLACES",
+    "TAKES",
     "TEMPLATES",
     "WORDS",
     "Engine",
@@ -44,11 +45,14 @@ __all__ = [
     "curves_of",
     "engine_of",
     "filled",
+    "image_of",
+    "number",
+    "safe",
 ]
-__all__ += ["image_of", "number", "safe"]
 
 FIELDS = ("t", "switches", "logged", "word")  # of the struct
 TEMPLATES = Path(__file__).parent / "_templates"
+TAKES = ("initial", "t_start", "settings")  # what the engine uses
 WORDS = C_WORDS | {*FIELDS, "INFINITY", "NAN", "NULL"}
 BAD_ARGUMENT = -1
 

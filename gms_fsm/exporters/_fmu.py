@@ -39,11 +39,16 @@ _SYSTEMS = {  # by operating system: folders of FMI 2, system of FMI 3, ending
 }
 _MACHINES = {"x86_64": "x86_64", "AMD64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
 HELD = {
-    2: "Give input derivatives (`fmi2SetRealInputDerivatives`): inputs are then straight lines "
-    "during a step. Without them they are held.",
-    3: "Inputs are straight lines during a step if the importer sets them, for the end of the "
-    "step, in the intermediate update callback that the FMU makes before each step. Otherwise they "
-    "are held.",
+    2: """\
+Give input derivatives (`fmi2SetRealInputDerivatives`): inputs are then straight lines during a
+step. Without them they are held.""",
+    3: """\
+Inputs are straight lines during a step if the importer sets them, for the end of the step, in the
+intermediate update callback that the FMU makes before each step. Otherwise they are held.""",
+}
+ONLY_HELD = {
+    2: "`fmpy simulate` holds inputs (with `set_input_derivatives=True`, FMPy 0.3.32 stops).",
+    3: "`fmpy simulate` holds inputs.",
 }
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of all files: the same model gives the same bytes
 NO_EXCHANGE = """\
@@ -184,7 +189,12 @@ def fmu(
     files["documentation/index.html"] = _page(subject.title, readme)
     folder = "documentation" if version == 2 else "documentation/licenses"
     files[f"{folder}/license.txt"] = LICENCE
-    return {f"{subject.name}.fmu": _archive(files), f"README-fmu{version}.md": readme}
+    return {_file(subject.name, version): _archive(files), f"README-fmu{version}.md": readme}
+
+
+def _file(name: str, version: int) -> str:
+    """Return the archive's name: those of both versions can be in one folder."""
+    return f"{name}_fmi{version}.fmu"
 
 
 def _archive(files: Mapping[str, str | bytes]) -> bytes:
@@ -305,6 +315,7 @@ def _readme(subject: Subject, described: Described, version: int, why: str) -> s
         version=version,
         writer=__version__,
         name=described.name,
+        file=_file(described.name, version),
         what="friction whose velocity is an input" if alone else "a whole system",
         kinds="Model Exchange and Co-Simulation" if described.exchange else "Co-Simulation",
         charts=", ".join(charts),
@@ -318,8 +329,25 @@ def _readme(subject: Subject, described: Described, version: int, why: str) -> s
         inputs=f"Inputs:\n\n{inputs}" if inputs else "There are no inputs.",
         outputs=f"Outputs:\n\n{outputs}",
         rtol=f"{described.rtol:g}",
-        held=HELD[version],
+        held=_held(subject, described, version),
     )
+
+
+def _held(subject: Subject, described: Described, version: int) -> str:
+    """Return what inputs are during a step, the danger in it, and a loop that avoids it."""
+    inputs = [each.name for each in described.variables if each.causality == "input"]
+    if not inputs:
+        return ""
+    file = _file(described.name, version)
+    loop = filled(
+        f"fmi{version}_loop.md",
+        file=file,
+        name=described.name,
+        input=inputs[0],
+        output=described.variables[described.outputs[0]].name,
+        start=repr(subject.t_start),
+    )
+    return filled("fmu_inputs.md", held=HELD[version], only_held=ONLY_HELD[version], loop=loop)
 
 
 def _line(each: Variable) -> str:

@@ -174,13 +174,18 @@ def _plain(label: str, alone: bool) -> str:
     return re.sub(r"\W+", "_", name)
 
 
+def _said(label: str) -> str:
+    """Return what the user calls it."""
+    return label.removeprefix("friction.")
+
+
 def _check(names: list[str], labels: list[str], words: Iterable[str]) -> None:
     """Refuse names that C cannot have, and equal ones."""
     for name, label in zip(names, labels, strict=True):
-        identifier(name, words, f"name {label!r}")
+        identifier(name, words, f"name {_said(label)!r}")
         if names.count(name) > 1:
             raise ParameterError(
                 f"two quantities would be called {name!r}",
-                place=f"name {label!r}",
+                place=f"name {_said(label)!r}",
                 advice="give one of them another name",
             )

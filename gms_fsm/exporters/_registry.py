@@ -37,12 +37,15 @@ class Exporter:
         refuses what the format cannot express with a `ParameterError`, and writes nothing.
     words : iterable of str
         Words of the language, which no exported name may be.
+    takes : tuple of str
+        Which of ``initial``, ``t_start`` and ``settings`` it uses; others are refused.
     """
 
     name: str
     title: str
     write: Callable[[Subject], Files]
     words: Iterable[str] = ()
+    takes: tuple[str, ...] = ("initial", "t_start")
 
 
 EXPORTERS: dict[str, Exporter] = {}
@@ -106,7 +109,7 @@ def export(
     t_start : float
         s: when it starts.
     settings : Settings, optional
-        Method and tolerances, for the formats that integrate.
+        Method and tolerances, for the formats that contain the engine: c99, fmu2 and fmu3.
 
     Returns
     -------
@@ -143,6 +146,15 @@ def export(
         system, format, name=name, initial=initial, t_start=t_start, settings=settings
     )
     identifier(subject.name, exporter.words, f"name {subject.name!r}")
+    for each, unused in (
+        ("initial", not initial),
+        ("t_start", t_start == 0.0),
+        ("settings", settings is None),
+    ):
+        if not unused and each not in exporter.takes:
+            raise ParameterError(
+                f"format {format!r} does not use it", place=each, advice="leave it out"
+            )
     files = exporter.write(subject)
     output_folder(where, files)
     write_together({where / each: _writer(content) for each, content in files.items()})

@@ -93,17 +93,10 @@ class Subject:
         Raises
         ------
         ParameterError
-            If it is a system, or initial values are given.
+            If it is a system.
         """
         if isinstance(self.given, System):
             raise self._refused_system("a chart")
-        if self.initial:
-            raise ParameterError(
-                f"format {self.format!r} begins in the chart's default state, with zeros",
-                place="initial",
-                value=self.initial,
-                advice="leave it out",
-            )
         return self.given if isinstance(self.given, Chart) else self.given.chart
 
     @property
@@ -131,7 +124,8 @@ class Subject:
         """
         if isinstance(self.given, System):
             return start_of_system(self.given, self.t_start, self.initial, self.settings)
-        return start_of(self._with_numbers(), self.t_start, self.initial, self.settings.rtol)
+        given, settings = self._with_numbers(), self.settings
+        return start_of(given, self.t_start, self.initial, settings.rtol, settings=settings)
 
     @functools.cached_property
     def inputs(self) -> tuple[str, ...]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._c import WORDS, Engine, engine_of, filled
+from gms_fsm.exporters._c import TAKES, WORDS, Engine, engine_of, filled
+from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._plain_c import plain_c, plain_c_notes
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
@@ -52,6 +55,8 @@ def _plain(subject: Subject) -> tuple[dict[str, str], str]:
     """Return the files of the plain form, if there can be one, and what the README says of it."""
     if isinstance(subject.given, System):
         return {}, ""
+    for name in subject.chart.let:
+        identifier(name, WORDS, f"let {name!r}")
     try:
         return plain_c(subject), f"## The plain form\n\n{plain_c_notes(subject)}"
     except ParameterError as error:
@@ -72,7 +77,7 @@ def _main(made: Engine) -> str:
     before = "".join(f"    double u{k} = 0.0, w{k} = 0.0;\n" for k in names)
     read = "".join(
         f"        u{k} = w{k};\n"
-        f"        w{k} = strtod(end + (*end == ','), &end);\n"
+        f"        w{k} = number(&place, &read);\n"
         f"        if (row == 2)\n            u{k} = w{k};\n"
         for k in names
     )
@@ -85,32 +90,57 @@ def _main(made: Engine) -> str:
         before=before,
         read=read,
         pairs=pairs,
+        count=1 + len(made.inputs),
     )
 
 
 def _record(subject: Subject) -> str:
     """Return a record for the inputs: that of the system, or a sine chosen by us."""
     given = subject.given
+    t: FloatArray
     if isinstance(given, System):
-        signals = {name: given.signals[name] for name in subject.inputs}
-        records = {name: each for name, each in signals.items() if isinstance(each, Corners)}
-        if not records:
-            t = subject.t_start + 1e-3 * np.arange(SHOWN + 1)
-        else:
-            t = np.unique(np.concatenate([each.times for each in records.values()]))
-            t = t[t >= subject.t_start]
-        columns = {name: np.interp(t, each.times, each.values) for name, each in records.items()}
+        records = [each for each in given.signals.values() if isinstance(each, Corners)]
+        t, after = _rows(records, subject.t_start)
+        columns = {
+            name: _values(each, t, after)
+            for name, each in given.signals.items()
+            if isinstance(each, Corners)
+        }
     else:
         scales = scales_of(subject.start.system.contacts[0])
         sizes = [u for row in scales.variables.values() for u in row if u > 0.0]
         omega = 2.0 * math.pi / PERIOD
         speed = max(FAR * max(sizes, default=0.1) * omega, FAST * scales.speed)
-        t = subject.t_start + PERIOD * PERIODS / ROWS * np.arange(ROWS + 1)
+        t = np.linspace(subject.t_start, subject.t_start + PERIOD * PERIODS, ROWS + 1)
         columns = {name: np.zeros(t.size) for name in subject.inputs}
         columns["v"] = speed * np.sin(omega * t)
     lines = [",".join(("t", *columns))]
     rows = zip(t.tolist(), *(each.tolist() for each in columns.values()), strict=True)
     return "\n".join([*lines, *(",".join(map(repr, row)) for row in rows), ""])
+
+
+def _rows(records: list[Corners], t_start: float) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the times of a record, twice where something jumps, and which are after a jump."""
+    if not records:
+        t: FloatArray = np.linspace(t_start, t_start + 1e-3 * SHOWN, SHOWN + 1)
+        return t, np.ones(t.size, dtype=np.bool_)
+    times = np.unique(np.concatenate([each.times for each in records]))
+    times = np.unique([t_start, *times[times > t_start]])
+    jumps = {float(u) for each in records for u in each.jumps if u > t_start}
+    rows = [
+        (u, side) for u in times.tolist() for side in ((False, True) if u in jumps else (True,))
+    ]
+    return np.array([u for u, _ in rows]), np.array([side for _, side in rows])
+
+
+def _values(signal: Corners, t: FloatArray, after: NDArray[np.bool_]) -> FloatArray:
+    """Return the values of a signal, on either side of its jumps."""
+    times, values = signal.times, signal.values
+    left, right = np.searchsorted(times, t, "left"), np.searchsorted(times, t, "right") - 1
+    corner = (left <= right) & (right >= 0)
+    at = np.where(after, right, np.minimum(left, times.size - 1))
+    found: FloatArray = np.where(corner, values[at], np.interp(t, times, values))
+    return found
 
 
 def _readme(subject: Subject, made: Engine) -> str:
@@ -133,4 +163,4 @@ def _readme(subject: Subject, made: Engine) -> str:
     )
 
 
-register(Exporter("c99", "C99 with located switches, and the plain form", c99, WORDS))
+register(Exporter("c99", "C99 with located switches, and the plain form", c99, WORDS, TAKES))

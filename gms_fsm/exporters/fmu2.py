@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gms_fsm._version import __version__
-from gms_fsm.exporters._c import WORDS
+from gms_fsm.exporters._c import TAKES, WORDS
 from gms_fsm.exporters._fmu import Described, fmu, tag, units_of
 from gms_fsm.exporters._fmu_variables import Variable
 from gms_fsm.exporters._registry import Exporter, register
@@ -134,4 +134,4 @@ def _variable(it: Described, k: int, number: dict[int, int], units: object) -> s
     )
 
 
-register(Exporter("fmu2", "FMU of FMI 2.0: Model Exchange and Co-Simulation", fmu2, WORDS))
+register(Exporter("fmu2", "FMU of FMI 2.0: Model Exchange and Co-Simulation", fmu2, WORDS, TAKES))

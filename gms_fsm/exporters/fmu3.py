@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gms_fsm._version import __version__
-from gms_fsm.exporters._c import WORDS
+from gms_fsm.exporters._c import TAKES, WORDS
 from gms_fsm.exporters._fmu import FLAGS, Described, fmu, tag, units_of
 from gms_fsm.exporters._fmu_variables import Variable
 from gms_fsm.exporters._registry import Exporter, register
@@ -139,4 +139,4 @@ def _variable(it: Described, k: int, units: object) -> str:
     )
 
 
-register(Exporter("fmu3", "FMU of FMI 3.0: Model Exchange and Co-Simulation", fmu3, WORDS))
+register(Exporter("fmu3", "FMU of FMI 3.0: Model Exchange and Co-Simulation", fmu3, WORDS, TAKES))

@@ -246,4 +246,4 @@ def _one_line(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-register(Exporter("scxml", "W3C SCXML document of an element", _write, WORDS))
+register(Exporter("scxml", "W3C SCXML document of an element", _write, WORDS, takes=()))

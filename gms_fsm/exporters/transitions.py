@@ -416,4 +416,4 @@ def _one_line(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-register(Exporter("transitions", "Python for the package transitions", _write, WORDS))
+register(Exporter("transitions", "Python for the package transitions", _write, WORDS, takes=()))

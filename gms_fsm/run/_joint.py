@@ -52,6 +52,7 @@ __all__ = [
 ]
 
 Line = tuple[float, float]  # an input at the start and at the end of a sample
+ARGUMENTS = ("self", "v0", "v1", "dt")  # of `FrictionState.advance`
 # What the loop keeps only between two events at one time.
 TEMPORARY = ("cursor", "edges", "due")
 MOST = sys.float_info.max  # stands for infinity in arrays
@@ -124,6 +125,12 @@ class Joint:
         (self._bank,) = start.program.layout.banks
         self._chart = start.system.contacts[0].chart
         self.inputs = tuple(start.system.signals)[1:]
+        if taken := [name for name in self.inputs if name in ARGUMENTS]:
+            raise ParameterError(
+                f"its texts name {taken[0]!r}, which is an argument of advance",
+                place=f"contact {start.system.contacts[0].name!r}",
+                advice="give it another name",
+            )
         # Views: an item of a memoryview is written in half the time of one of an array.
         sample = stepper.sample
         self._end, self.force = _view(sample.end), _view(sample.force)

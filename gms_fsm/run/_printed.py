@@ -144,10 +144,30 @@ def _agree(coarse, fine):
     """Return whether two runs have the same switches, and ends alike to a hundredth."""
     if coarse is None or fine is None:
         return False
-    (switches, t, y, size), (switches_2, t_2, y_2, size_2) = coarse, fine
-    if [each[1:] for each in switches] != [each[1:] for each in switches_2]:
+    if [each[1:] for each in coarse[0]] != [each[1:] for each in fine[0]]:
         return False
-    return all(abs(u - w) <= 0.01 * most for u, w, most in zip(y, y_2, size_2))
+    return _apart(coarse, fine) <= 0.01
+
+
+def _apart(coarse, fine):
+    """Return the largest difference of the last states, each relative to its largest value."""
+    (_, _, y, size), (_, _, y_2, size_2) = coarse, fine
+    pairs = zip(y, y_2, map(max, size, size_2))
+    return max([abs(u - w) / most for u, w, most in pairs if u != w], default=0.0)
+
+
+def _difference(coarse, fine, steps):
+    """Say how far a run is from one with fewer steps."""
+    if coarse is None:
+        return f"{steps} steps are too few to compare it with"
+    ours, others = fine[0], coarse[0]
+    same = 0
+    while same < min(len(ours), len(others)) and ours[same][1:] == others[same][1:]:
+        same += 1
+    if same == len(ours) == len(others):
+        end = f"its end differs by {100 * _apart(coarse, fine):.2g} % of the largest values"
+        return f"a run of {steps} steps has the same switches, and {end}"
+    return f"a run of {steps} steps has {len(others)}, of which the first {same} are the same"
 
 
 def _main():
@@ -166,8 +186,8 @@ def _main():
             steps, before = 2 * steps, found
             found = _tried(t_end, steps)
         said = "; twice the step gives the same"
-        if not _agree(before, found):
-            said = "; half as many steps give another result: take more steps, or an earlier end"
+        if found is not None and not _agree(before, found):
+            said = "; " + _difference(before, found, steps // 2)
     if found is None:
         sys.exit(f"not finite: take more than {steps} steps to t = {t_end!r} s, or an earlier end")
     switches, t, y, size = found

@@ -23,7 +23,6 @@ __all__ = ["alone", "begin", "other_inputs", "start_of", "start_of_system"]
 
 WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*")  # not the exponent of a number
 GIVEN = ("t", "x", "v")  # what a contact knows by itself: x is the integral of v
-ARGUMENTS = ("self", "v0", "v1", "dt")  # of `FrictionState.advance`
 
 
 def start_of(
@@ -32,6 +31,7 @@ def start_of(
     initial: Mapping[str, Any] | None,
     rtol: float,
     values: Mapping[str, float] | None = None,
+    settings: Settings | None = None,
 ) -> Start:
     """Return a friction model or a contact, moved by a velocity that is a straight line.
 
@@ -47,6 +47,8 @@ def start_of(
         Relative tolerance.
     values : mapping of str to float, optional
         The velocity and the other inputs at t; 0 if omitted.
+    settings : Settings, optional
+        Method and tolerances; the default method with rtol if omitted.
 
     Returns
     -------
@@ -61,12 +63,6 @@ def start_of(
     contact = alone(given)
     t, end = begin(t)
     others = other_inputs(contact)
-    if taken := [name for name in others if name in ARGUMENTS]:
-        raise ParameterError(
-            f"its texts name {taken[0]!r}, which is an argument of advance",
-            place=f"contact {contact.name!r}",
-            advice="give it another name",
-        )
     now = {} if values is None else values
     signals = {
         name: Corners(np.array([t, end]), np.full(2, now.get(name, 0.0)), held=True)
@@ -78,8 +74,8 @@ def start_of(
         contacts=(contact,),
         signals=signals,
     )
-    settings = Settings(rtol=rtol, engine="ifelse", output="end")
-    return Start.of(system, None, end, settings, t_start=t, initial=initial)
+    chosen = Settings(rtol=rtol) if settings is None else settings
+    return Start.of(system, None, end, _usable(chosen, "located"), t_start=t, initial=initial)
 
 
 def start_of_system(
@@ -120,15 +116,20 @@ def start_of_system(
         if isinstance(signal, Corners):
             value = float(np.interp(t, signal.times, signal.values))
             signals[name] = Corners(np.array([t, end]), np.full(2, value), held=True)
-    if not isinstance(settings.method, str) or settings.events == "step":
+    moved = dataclasses.replace(system, signals=signals)
+    chosen = _usable(settings, "located", "held")  # held events are periods of contacts
+    return Start.of(moved, None, end, chosen, t_start=t, initial=initial)
+
+
+def _usable(settings: Settings, *events: str) -> Settings:
+    """Return settings for stepping, or refuse."""
+    if not isinstance(settings.method, str) or settings.events not in events:
         raise ParameterError(
             "only the methods of gms-fsm that locate switches can be handed over",
             place="settings",
             advice='leave method and events out, or choose method="dp45"',
         )
-    chosen = dataclasses.replace(settings, engine="ifelse", output="end", t_eval=None)
-    moved = dataclasses.replace(system, signals=signals)
-    return Start.of(moved, None, end, chosen, t_start=t, initial=initial)
+    return dataclasses.replace(settings, engine="ifelse", output="end", t_eval=None)
 
 
 def begin(t: object) -> tuple[float, float]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,3 +31,33 @@ def test_the_paper_s_loop(form: str, tmp_path: Path) -> None:
     force = slave.run(t, ["F"], v=v)[:, 0]
     assert slave.count("switches") == len(trace.transitions) == 48
     np.testing.assert_array_equal(force[:-1], trace.F[1:-1])
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_the_loop_of_the_readme(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written(PAPER, form, tmp_path, name="gms")
+    text = (tmp_path / f"README-{form}.md").read_text(encoding="utf-8")
+    found = re.search(r"^(?: {4}(?:from ctypes|import fmpy)\b.*\n)(?:(?: {4}.*)?\n)+", text, re.M)
+    assert found is not None, text
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(re.sub(r"^ {4}", "", found[0], flags=re.M), names)
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    t = np.arange(4) * 0.01
+    trace = simulate(PAPER, Prescribed((t, t)), t[-1], t_eval=t)
+    assert [float(at) for at, _ in rows] == pytest.approx(t[1:])
+    assert [float(force) for _, force in rows] == pytest.approx(trace.F[1:], rel=1e-9)
+
+
+def description(path: Path) -> str:
+    with zipfile.ZipFile(path) as files:
+        return files.read("modelDescription.xml").decode()
+
+
+def test_both_versions_fit_into_one_folder(tmp_path: Path) -> None:
+    paths = [written(PAPER, form, tmp_path, name="gms") for form in FORMATS]
+    assert [path.name for path in paths] == ["gms_fmi2.fmu", "gms_fmi3.fmu"]
+    assert [validate_fmu(str(path)) for path in paths] == [[], []]
+    assert all('modelIdentifier="gms"' in description(path) for path in paths)

@@ -26,6 +26,7 @@ from gms_fsm import (
     System,
     export,
 )
+from gms_fsm._files import output_folder
 from gms_fsm.exporters import EXPORTERS, Exporter, Subject, register
 from tests.scenario_files import CommandLine, one_message
 
@@ -123,6 +124,18 @@ def test_a_file_in_place_of_the_folder(form: str, tmp_path: Path) -> None:
     said = refused(tmp_path, GMS_MODEL, form, tmp_path / "out", kind=OutputError)
     assert "choose another folder" in said
     refused(tmp_path, GMS_MODEL, form, tmp_path / "out" / "below", kind=OutputError)
+
+
+@pytest.mark.parametrize(("folder", "advice"), [("", 'write "."'), ("a\0b", "leave that")])
+def test_a_text_that_names_no_folder(
+    folder: str, advice: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert advice in refused(tmp_path, GMS_MODEL, "c99", folder)
+    with pytest.raises(ParameterError, match=advice):
+        System.load(folder)
+    with pytest.raises(OutputError, match="cannot create the folder"):
+        output_folder(f"{tmp_path}/a\0b")
 
 
 @LINUX

@@ -6,6 +6,7 @@ With a number of steps given, they are those of `simulate` with Euler's method, 
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -82,6 +83,19 @@ def test_every_shipped_scenario(name: str, gms_fsm: CommandLine) -> None:
     end = load_scenario(ROOT / "scenarios" / f"{name}.toml").arguments["t_end"]
     *switches, last, _ = program(path, repr(float(end)), "4000")
     assert last == f"{len(switches)} switches in 4000 steps to t = {end:.6g} s"
+
+
+def test_what_has_not_settled_says_how_far_two_runs_differ(gms_fsm: CommandLine) -> None:
+    path = printed(gms_fsm, str(ROOT / "scenarios" / "pulled_mass.toml"))
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("steps < 128000", "steps < 4000"), encoding="utf-8")
+    *switches, last, _ = program(path)
+    assert re.fullmatch(
+        rf"{len(switches)} switches in 4000 steps to t = 60 s; a run of 2000 steps has "
+        r"(\d+, of which the first \d+ are the same"
+        r"|the same switches, and its end differs by [\d.e+]+ % of the largest values)",
+        last,
+    ), last
 
 
 def log_of(trace: Any) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { LONGEST = 4096 };
 
@@ -25,26 +26,44 @@ static void write_switches(const ${name}_state *s, FILE *file)
     }
 }
 
+/* Read the next number of a line; a comma or the end of the line must follow. */
+static double number(char **place, int *read)
+{
+    char *end;
+    const double value = strtod(*place, &end);
+    *read += end > *place && strchr(",\r\n", *end) != NULL;
+    *place = *end == ',' ? end + 1 : end;
+    return value;
+}
+
 int main(int argc, char **argv)
 {
     static char line[LONGEST];
     FILE *switches = argc > 1 ? fopen(argv[1], "w") : NULL;
     ${name}_state s;
     int code = ${name}_OK;
-    long row = 0;
+    long row = 1;
 $before    if (argc > 1 && !switches) {
         fprintf(stderr, "cannot write %s\n", argv[1]);
+        return 1;
+    }
+    if (!fgets(line, LONGEST, stdin) || strcspn(line, "\r\n") != strlen("$columns")
+        || strncmp(line, "$columns", strlen("$columns")) != 0) {
+        fprintf(stderr, "row 1: the columns must be $columns\n");
         return 1;
     }
     ${name}_init(&s);
     printf("t,$heads\n");
     while (code == ${name}_OK && fgets(line, LONGEST, stdin)) {
-        char *end = line;
-        double t;
-        if (row++ == 0)
-            continue;
-        t = strtod(line, &end);
-$read        code = ${name}_advance_to(&s, ${pairs}t);
+        char *place = line;
+        int read = 0;
+        const double t = number(&place, &read);
+        row++;
+$read        if (read != $count || !strchr("\r\n", *place)) {
+            fprintf(stderr, "row %ld: it must have $count numbers\n", row);
+            return 1;
+        }
+        code = ${name}_advance_to(&s, ${pairs}t);
         if (code == ${name}_OK)
             write_row(&s);
         if (switches)
