@@ -56,7 +56,7 @@ function [s, F] = @(s, v0, v1, dt{arguments})
 %
 %   s.log has a row for every switch: time [s], element, edge; s.edges has their names.
 %   Each step is compared with two of half its length, and halved until they agree to
-%   s.tolerance (1e-9, relative). No step is longer than s.longest_step [s], Inf at first.
+%   s.tolerance (1e-10, relative). No step is longer than s.longest_step [s], Inf at first.
 p = @_numbers();
 if nargin == 0
     s = @_begin();
@@ -532,7 +532,7 @@ class _Printer:
 
     def begin(self) -> str:
         element, start = self.element, repr(self.t_start)
-        lines = [f"s = struct('t', {start}, 'longest_step', Inf, 'tolerance', 1e-9);"]
+        lines = [f"s = struct('t', {start}, 'longest_step', Inf, 'tolerance', 1e-10);"]
         for each in element.variables:
             lines.append(
                 f"s.{each.name} = [{'; '.join(map(repr, each.start))}];{_note(each.about)}"
@@ -576,7 +576,7 @@ or in a shell: `octave-cli --eval "s = {name}(); [s, F] = {name}(s, 0, 0.1, 0.01
 {about_friction(self.element)}
 In each call the inputs are straight lines. Between switches the flow is integrated by the
 classical Runge-Kutta method with states and signs held. Each step is compared with two of half its
-length, and halved until they agree to `s.tolerance` (1e-9) of each variable; close to zero, of a
+length, and halved until they agree to `s.tolerance` (1e-10) of each variable; close to zero, of a
 tenth of its scale in the model. In a step the velocity changes by at most half of itself, or of
 the model's velocity scale. A step in which a comparison of a guard changes is cut there by
 bisection; then edges are taken until no guard is true.

@@ -37,7 +37,7 @@ def test_the_switches_and_the_force(
         switches += one[0]
         forces.append(one[1])
         late.append(one[2])
-    assert max(forces) < 1e-8
+    assert max(forces) < 1e-9
     ran(
         "matlab",
         octave,
