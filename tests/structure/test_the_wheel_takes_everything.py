@@ -31,6 +31,7 @@ def test_there_are_files_of_all_three() -> None:
         ".tcss",
         ".html",
         ".js",
+        ".m",
         ".md",
     }
 

@@ -1,1 +1,1 @@
-"""Texts with holes, which `string.Template` fills."""
+"""Texts with holes: `string.Template` fills them, and `str.format` those of MATLAB."""
