@@ -75,10 +75,6 @@ def checked_path(name: str, value: Any) -> Path:
         raise ParameterError(
             "it is empty", place=name, value=value, advice='write "." for the working directory'
         )
-    if "\0" in text:
-        raise ParameterError(
-            "it contains a null byte", place=name, value=value, advice="leave that character out"
-        )
     return Path(text)
 
 
