@@ -12,7 +12,6 @@ from typing import Any
 
 __all__ = ["Library", "compiled", "target_name"]
 
-SPEED_LEVEL = 3  # of LLVM's optimisation
 _lock = threading.RLock()  # LLVM's settings are those of the process
 
 
@@ -76,7 +75,7 @@ def compiled(text: str) -> bytes:
         module = llvm.parse_assembly(text)
         module.verify()
         machine = _machine()
-        options = llvm.create_pipeline_tuning_options(speed_level=SPEED_LEVEL)
+        options = llvm.create_pipeline_tuning_options(speed_level=3)
         # Short loops are not worth vectors.
         options.loop_vectorization = False
         options.slp_vectorization = False

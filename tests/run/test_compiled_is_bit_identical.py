@@ -65,8 +65,6 @@ pytest.importorskip("llvmlite", reason="needs the extra fast")
 from gms_fsm.lowering import _compiled as compiled
 from tests.helpers import ROOT
 
-pytestmark = pytest.mark.usefixtures("optimised")
-
 
 # --------------------------------------------------------------------------- comparing
 def _bits(name: str, a: np.ndarray, b: np.ndarray) -> None:

@@ -8,8 +8,6 @@ from gms_fsm import Body, Contact, System, simulate
 from tests.helpers import stick_slip
 from tests.systems_cases import CASES, same_system_bits
 
-pytestmark = pytest.mark.usefixtures("optimised")
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
