@@ -346,15 +346,9 @@ def code_command(
 
 def _start_of_file(own: OwnFile) -> Start:
     """Return the run of a scenario file, or ten seconds of a system."""
-    from gms_fsm._toml import parsed
-    from gms_fsm.app.scenario import kind_of, load_scenario
     from gms_fsm.run.start import Start
 
     assert own.system is not None
-    data = parsed(own.path)
-    if kind_of(data) == "system" and "run" not in data:
-        return Start.of(own.system, None, SECONDS)
-    given = load_scenario(own.path).arguments
-    return Start.of(
-        own.system, None, given["t_end"], t_start=given["t_start"], initial=given.get("initial")
-    )
+    given = own.run or {"t_start": 0.0, "t_end": SECONDS}
+    t_start, initial = given["t_start"], given.get("initial")
+    return Start.of(own.system, None, given["t_end"], t_start=t_start, initial=initial)

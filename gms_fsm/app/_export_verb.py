@@ -70,11 +70,9 @@ def _given(
     name: str, law: str, contact: str
 ) -> tuple[Chart | Model | Contact | System, str, dict[str, Any]]:
     """Return what is exported, its default name, and the settings of a scenario."""
-    from gms_fsm._toml import parsed
     from gms_fsm.app._catalogue import chosen
     from gms_fsm.app._chart_verbs import no_contact
     from gms_fsm.app._own_files import own_file
-    from gms_fsm.app.scenario import load_scenario
     from gms_fsm.run.settings import Settings
     from gms_fsm.systems.models import demonstration
 
@@ -86,8 +84,7 @@ def _given(
     if own.system is None:
         return own.only_chart(contact), "", {}
     more: dict[str, Any] = {}
-    if "run" in parsed(own.path):
-        run = load_scenario(own.path).arguments
+    if run := own.run:
         used = {each: run[each] for each in SETTINGS if each in run}
         more = {"settings": Settings(**used), "t_start": run["t_start"]}
         more["initial"] = run.get("initial") or {}

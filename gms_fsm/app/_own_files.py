@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,15 @@ class OwnFile:
     path: Path
     chart: Chart | None = None
     system: System | None = None
+
+    @functools.cached_property
+    def run(self) -> Mapping[str, Any]:
+        """The run of a scenario file, as arguments of `gms_fsm.simulate`; else empty."""
+        data = parsed(self.path)
+        kind = kind_of(data)
+        if kind == "rig" or (kind == "system" and "run" in data):
+            return load_scenario(self.path).arguments
+        return {}
 
     def charts(self, contact: str = "") -> dict[str, Chart]:
         """Return its charts.

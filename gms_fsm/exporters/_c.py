@@ -28,7 +28,7 @@ from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems._numbers import numbers_of
 from gms_fsm.systems.system import System
 from integrators.compiled import INLINE, is_known
-from integrators.machine_code.c99 import c99_text
+from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Block, Layout
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
@@ -46,7 +46,6 @@ __all__ = [
     "engine_of",
     "filled",
     "image_of",
-    "number",
     "safe",
 ]
 
@@ -315,7 +314,7 @@ def image_of(layout: Layout, arguments: Any) -> str:
     for k in np.flatnonzero(block.words).tolist():
         note = f" /* {names[k]} */" if k in names else ""
         if kinds[k] == "f":
-            value = number(float(block.words[k : k + 1].view(np.float64)[0]))
+            value = number_text(float(block.words[k : k + 1].view(np.float64)[0]))
             lines.append(f"    w[{k}].f = {value};{note}")
         elif kinds[k] == "i":
             lines.append(f"    w[{k}].i = {int(block.words[k])};{note}")
@@ -429,23 +428,3 @@ def _closed(lines: Sequence[str]) -> str:
     *before, last = lines
     code, mark, comment = last.partition(" /*")
     return "\n".join([*before, code.rstrip(",") + mark + comment])
-
-
-def number(value: float) -> str:
-    """Return a number in C.
-
-    Parameters
-    ----------
-    value : float
-        Any.
-
-    Returns
-    -------
-    str
-        To the last bit.
-    """
-    if value != value:
-        return "NAN"
-    if value in (float("inf"), float("-inf")):
-        return "INFINITY" if value > 0 else "-INFINITY"
-    return repr(value)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from gms_fsm._version import __version__
 from gms_fsm.charts.stribeck import dip_of, flat_of
-from gms_fsm.exporters._c import PLACES, TEMPLATES, curves_of, filled, image_of, number, safe
+from gms_fsm.exporters._c import PLACES, TEMPLATES, curves_of, filled, image_of, safe
 from gms_fsm.exporters._fmu_variables import Variable, indicators_of, nominals_of, types_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.run._joint import FAILURES
@@ -22,7 +22,7 @@ from gms_fsm.systems.system import System
 from integrators import exchange, stepping
 from integrators.compiled import INLINE, is_known
 from integrators.exchange import Exchange
-from integrators.machine_code.c99 import c99_text
+from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Layout
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
@@ -150,7 +150,7 @@ class Model:
             constants="\n".join(f"#define {key} {value}" for key, value in constants.items()),
             variables="\n".join(rows),
             places=", ".join(map(str, places)) or "0",
-            nominals=", ".join(map(number, self.nominals.values())) or "0",
+            nominals=", ".join(map(number_text, self.nominals.values())) or "0",
             reasons="\n".join(reasons),
         )
 

@@ -40,7 +40,7 @@ from integrators.machine_code.tree import (
     parts_of,
 )
 
-__all__ = ["c99_text"]
+__all__ = ["c99_text", "number_text"]
 
 _TYPES = {"f": "double", "i": "int64_t", "b": "bool", "p": "char *"}
 HEAD = """\
@@ -129,11 +129,28 @@ def _structure(kinds: str) -> str:
 
 
 def _table(table: Table) -> str:
-    entries = ", ".join(map(_float, table.values))
+    entries = ", ".join(map(number_text, table.values))
     return f"static const double {table.name}[] = {{{entries}}};"
 
 
-def _float(value: float) -> str:
+def number_text(value: float) -> str:
+    """Return a floating-point number in C.
+
+    Parameters
+    ----------
+    value : float
+        Any.
+
+    Returns
+    -------
+    str
+        To the last bit.
+
+    Examples
+    --------
+    >>> number_text(0.1), number_text(float("-inf"))
+    ('0.1', '-INFINITY')
+    """
     if value != value:
         return "NAN"
     if value in (float("inf"), float("-inf")):
@@ -304,7 +321,7 @@ class _Writer:
         """Write an expression; return also how tightly it binds."""
         match expr:
             case Const(kind="f", value=value):
-                text = _float(value)
+                text = number_text(value)
                 return text, _UNARY if text.startswith("-") else _WHOLE
             case Const(kind="b", value=value):
                 return ("true" if value else "false"), _WHOLE

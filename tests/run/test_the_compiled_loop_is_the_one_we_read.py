@@ -35,7 +35,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def engine(program, run):
         inside = integrators.compiled._longest(run) <= integrators.compiled.LONGEST_INSIDE
-        return SimpleNamespace(layout=Layout(run, integrators.compiled._is_known, inside=inside))
+        return SimpleNamespace(layout=Layout(run, integrators.compiled.is_known, inside=inside))
 
     def run(self, most_steps, *, pause):
         code = self.start.program.ieee
