@@ -191,13 +191,15 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         column = table[COLUMN * most + c]
         for j in range(size):
             dy[j] += sigma[c] * column[j]
-    for r in range(count):  # rounding errors normal to the surface: v itself does not move
+    # Nothing normal to the surface, not even by rounding: v itself does not move. Nor where sigma is
+    # clipped, beyond the end of the slide: a step may end there, and guards are read before its end.
+    for r in range(count):
         g = table[NORMAL * most + r]
         rate, square = g[size], 0.0
         for j in range(size):
             rate += g[j] * dy[j]
             square += g[j] * g[j]
-        if square > 0.0 and abs(sigma[r]) < BEYOND:
+        if square > 0.0:
             for j in range(size):
                 dy[j] -= g[j] * (rate / square)
 

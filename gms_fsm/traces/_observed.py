@@ -100,7 +100,8 @@ def _show_one_side(program: Program, rows: Rows, kept: range, table: FloatArray)
 
     These rows lie on the surface or a rounding error past it, so the sign computed from the state
     is not the held one: before a slide it is that of the preceding arc, after it that of the
-    following arc.
+    following arc. Where an edge fires at the same time, the row next to the slide belongs to no
+    arc, and is what the log has for that edge.
     """
     t, slid = rows.t, rows.mode[:, program.layout.slides]
     turns = np.flatnonzero((np.diff(slid, axis=0) != 0).any(axis=1) & (np.diff(t) == 0.0))
@@ -109,7 +110,8 @@ def _show_one_side(program: Program, rows: Rows, kept: range, table: FloatArray)
         change = np.diff(slid[turn : turn + 2], axis=0)[0]
         for row, other, joined in ((turn, before, 1), (turn + 1, after, -1)):
             changed = np.flatnonzero(change == joined)
-            if slid[row].any() or not changed.size or not 0 <= other < len(rows):
+            of_an_arc = abs(other - row) == 1 and 0 <= other < len(rows)
+            if slid[row].any() or not changed.size or not of_an_arc:
                 continue
             mode, signs = rows.mode[row].tolist(), program.live
             held = armed(program, float(t[other]), rows.y[other].tolist(), mode)
