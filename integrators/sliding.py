@@ -191,8 +191,8 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         column = table[COLUMN * most + c]
         for j in range(size):
             dy[j] += sigma[c] * column[j]
-    # Nothing normal to the surface, not even by rounding: v itself does not move. Nor where sigma is
-    # clipped, beyond the end of the slide: a step may end there, and guards are read before its end.
+    # Nothing normal to the surface, not even by rounding: v itself does not move. Nor where sigma
+    # is clipped, past the end of the slide: a step may end there, and guards are read before it.
     for r in range(count):
         g = table[NORMAL * most + r]
         rate, square = g[size], 0.0
