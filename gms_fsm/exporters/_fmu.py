@@ -189,7 +189,10 @@ def fmu(
     files["documentation/index.html"] = _page(subject.title, readme)
     folder = "documentation" if version == 2 else "documentation/licenses"
     files[f"{folder}/license.txt"] = LICENCE
-    return {_file(subject.name, version): _archive(files), f"README-fmu{version}.md": readme}
+    return {
+        _file(subject.name, version): _archive(files),
+        f"README-{subject.name}-fmu{version}.md": readme,
+    }
 
 
 def _file(name: str, version: int) -> str:

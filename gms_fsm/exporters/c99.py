@@ -47,7 +47,7 @@ def c99(subject: Subject) -> dict[str, str]:
         f"{name}.c": made.source,
         f"{name}_main.c": _main(made),
         f"{name}_record.csv": _record(subject),
-        "README-c99.md": f"{_readme(subject, made)}\n{notes}",
+        f"README-{name}-c99.md": f"{_readme(subject, made)}\n{notes}",
     }
 
 

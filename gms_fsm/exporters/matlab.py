@@ -59,7 +59,7 @@ def matlab(subject: Subject) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        ``<name>.m`` and ``README-matlab.md``.
+        ``<name>.m`` and ``README-<name>-matlab.md``.
 
     Raises
     ------
@@ -75,7 +75,10 @@ def matlab(subject: Subject) -> dict[str, str]:
     True
     """
     printer = _Printer(subject)
-    return {f"{subject.name}.m": printer.text(), "README-matlab.md": printer.readme()}
+    return {
+        f"{subject.name}.m": printer.text(),
+        f"README-{subject.name}-matlab.md": printer.readme(),
+    }
 
 
 class _Printer:

@@ -71,7 +71,7 @@ def modelica(subject: Subject) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        ``<name>.mo`` and ``README-modelica.md``.
+        ``<name>.mo`` and ``README-<name>-modelica.md``.
 
     Raises
     ------
@@ -87,7 +87,10 @@ def modelica(subject: Subject) -> dict[str, str]:
     True
     """
     printer = _Printer(subject)
-    return {f"{subject.name}.mo": printer.text(), "README-modelica.md": printer.readme()}
+    return {
+        f"{subject.name}.mo": printer.text(),
+        f"README-{subject.name}-modelica.md": printer.readme(),
+    }
 
 
 class _Printer:

@@ -52,7 +52,7 @@ def _write(subject: Subject) -> dict[str, str]:
         f"{name}_{i}.scxml" if len(numbers) > 1 else f"{name}.scxml": _document(name, chart, row)
         for i, row in enumerate(numbers, start=1)
     }
-    return {**files, "README-scxml.md": _readme([*files], chart, contact)}
+    return {**files, f"README-{name}-scxml.md": _readme([*files], chart, contact)}
 
 
 def _names(chart: Chart) -> list[str]:

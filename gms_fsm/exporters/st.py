@@ -99,7 +99,7 @@ def structured_text(subject: Subject) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        ``<name>.st`` and ``README-st.md``.
+        ``<name>.st`` and ``README-<name>-st.md``.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def structured_text(subject: Subject) -> dict[str, str]:
     True
     """
     printer = _Printer(subject)
-    return {f"{subject.name}.st": printer.text(), "README-st.md": printer.readme()}
+    return {f"{subject.name}.st": printer.text(), f"README-{subject.name}-st.md": printer.readme()}
 
 
 class _Printer:

@@ -51,7 +51,7 @@ def _write(subject: Subject) -> dict[str, str]:
     source = "\n".join(_program(chart, contact))
     return {
         f"{name}.py": _head(chart) + _imports(source) + source,
-        "README-transitions.md": _readme(name, chart, contact),
+        f"README-{name}-transitions.md": _readme(name, chart, contact),
     }
 
 

@@ -71,4 +71,4 @@ def test_each_format_has_a_section_whose_command_runs(name: str, gms_fsm: Comman
     (command,) = (command for command, form in COMMANDS if form == name)
     done = gms_fsm(*command.split())
     assert done.code == 0, done.err
-    assert f"gms-{name}/README-{name}.md" in done.out.splitlines()
+    assert f"gms-{name}/README-gms-{name}.md" in done.out.splitlines()

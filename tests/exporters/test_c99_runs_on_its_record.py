@@ -80,7 +80,7 @@ def test_settings_are_those_of_the_engine(tmp_path: Path) -> None:
         export(model, "c99", tmp_path, name="it", settings=settings)
         sources.add((tmp_path / "it.c").read_text())
         method = "rk4" if settings.step else "dp45"
-        assert f"Method {method}" in (tmp_path / "README-c99.md").read_text()
+        assert f"Method {method}" in (tmp_path / "README-it-c99.md").read_text()
     assert len(sources) == 3
     for wrong in (
         Settings(method="euler", step=1e-3, events="step"),

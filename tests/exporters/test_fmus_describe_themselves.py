@@ -66,7 +66,7 @@ def test_the_files(form: str, tmp_path: Path) -> None:
     assert ("sources/buildDescription.xml" in names) == (form == "fmu3")
     assert any(name.endswith("license.txt") for name in names)
     assert not [name for name in names if name.startswith("binaries/")]
-    readme = (tmp_path / f"README-{form}.md").read_text(encoding="utf-8")
+    readme = (tmp_path / f"README-it-{form}.md").read_text(encoding="utf-8")
     assert "There is no binary in it: no C compiler was found" in readme
     assert "Co-Simulation" in text
 
@@ -146,7 +146,7 @@ def test_a_chart_that_reads_the_acceleration_has_no_model_exchange(
     assert "<CoSimulation" in text
     assert "<ModelExchange" not in text
     assert "There is none: a chart reads how fast an input changes" in (
-        tmp_path / f"README-{form}.md"
+        tmp_path / f"README-it-{form}.md"
     ).read_text(encoding="utf-8")
 
 

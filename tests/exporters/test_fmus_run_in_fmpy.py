@@ -38,7 +38,7 @@ def test_the_loop_of_the_readme(
     form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     written(PAPER, form, tmp_path, name="gms")
-    text = (tmp_path / f"README-{form}.md").read_text(encoding="utf-8")
+    text = (tmp_path / f"README-gms-{form}.md").read_text(encoding="utf-8")
     found = re.search(r"^(?: {4}(?:from ctypes|import fmpy)\b.*\n)(?:(?: {4}.*)?\n)+", text, re.M)
     assert found is not None, text
     monkeypatch.chdir(tmp_path)

@@ -49,7 +49,7 @@ LINUX = pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no 
 def states(subject: Subject) -> dict[str, str]:
     names = "\n".join(each.name for each in subject.contact.chart.states)
     assert subject.start.system.contacts  # with its initial values, which are then checked
-    return {f"{subject.name}.txt": names, "README-states.md": "One name per line.\n"}
+    return {f"{subject.name}.txt": names, "README-it-states.md": "One name per line.\n"}
 
 
 @pytest.fixture(autouse=True)
@@ -110,7 +110,7 @@ def words_for_charts(form: str) -> list[str]:
 @pytest.mark.parametrize("form", FORMATS)
 def test_without_a_mistake_the_readme_is_among_the_files(form: str, tmp_path: Path) -> None:
     files = export(GMS_MODEL, form, tmp_path / "out", name="it")
-    assert tmp_path / "out" / f"README-{form}.md" in files
+    assert tmp_path / "out" / f"README-it-{form}.md" in files
     assert all(path.parent == tmp_path / "out" and path.stat().st_size for path in files)
     again = {path: path.read_bytes() for path in files}
     assert export(GMS_MODEL, form, tmp_path / "out", name="it") == files  # ours, so replaced
@@ -155,8 +155,10 @@ def test_a_file_that_is_not_ours(form: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_folder_in_place_of_a_file(form: str, tmp_path: Path) -> None:
-    (tmp_path / f"README-{form}.md").mkdir()
-    assert "a folder is there" in refused(tmp_path, GMS_MODEL, form, tmp_path, kind=OutputError)
+    (tmp_path / f"README-it-{form}.md").mkdir()
+    assert "a folder is there" in refused(
+        tmp_path, GMS_MODEL, form, tmp_path, name="it", kind=OutputError
+    )
 
 
 @pytest.mark.parametrize("form", ["", "c", "C99", "../c99", 3, None, ["c99"]])

@@ -32,7 +32,7 @@ def test_the_gms_element(tmp_path: Path) -> None:
 def test_the_readme_is_a_program(tmp_path: Path) -> None:
     pytest.importorskip("statemachine", reason="needs python-statemachine")
     export(model("seven-parameter"), "scxml", tmp_path, name="own")
-    text = (tmp_path / "README-scxml.md").read_text(encoding="utf-8")
+    text = (tmp_path / "README-own-scxml.md").read_text(encoding="utf-8")
     block = text.partition("    pip install")[2].partition("\n\n")[2].partition("What it does")[0]
     said: list[Any] = []
     program = "\n".join(line.removeprefix("    ") for line in block.splitlines())
@@ -82,6 +82,6 @@ def test_what_cannot_be_written_is_named(given: Chart, said: str, tmp_path: Path
 
 def test_names_that_a_tool_keeps_for_itself_are_in_the_readme(tmp_path: Path) -> None:
     export(chart(parameters=("model",)), "scxml", tmp_path, name="own")
-    text = (tmp_path / "README-scxml.md").read_text(encoding="utf-8")
+    text = (tmp_path / "README-own-scxml.md").read_text(encoding="utf-8")
     assert "python-statemachine keeps the names model for itself" in text
     assert "set every <data> without expr" in text

@@ -66,7 +66,7 @@ def test_all_files_are_flat_and_have_a_readme(form: str, tmp_path: Path) -> None
     for name in NAMES:
         for path in export(case(name, 0).model, form, tmp_path / name, name="friction"):
             assert path.parent == tmp_path / name
-        text = (tmp_path / name / f"README-{form}.md").read_text(encoding="utf-8")
+        text = (tmp_path / name / f"README-friction-{form}.md").read_text(encoding="utf-8")
         assert "## How to run it" in text
         assert "## What it does not do" in text
 

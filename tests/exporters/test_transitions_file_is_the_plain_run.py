@@ -182,7 +182,7 @@ def test_a_chart_without_numbers_asks_for_them(tmp_path: Path) -> None:
 
 def test_the_readme_says_how_to_run_it(tmp_path: Path) -> None:
     export(stick_slip("signed"), "transitions", tmp_path, name="own")
-    text = (tmp_path / "README-transitions.md").read_text(encoding="utf-8")
+    text = (tmp_path / "README-own-transitions.md").read_text(encoding="utf-8")
     for wanted in ("python own.py", "States: stick, slip", "not located", "k, sigma, C, v_c"):
         assert wanted in text
 

@@ -5,7 +5,6 @@ With a number of steps given, they are those of `simulate` with Euler's method, 
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
@@ -20,6 +19,7 @@ from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts.registry import registered
 from gms_fsm.systems.models import demonstration
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Slider
+from tests.app.test_scenarios_run import data_folder
 from tests.helpers import ROOT
 from tests.scenario_files import CommandLine
 
@@ -29,6 +29,7 @@ LAWS = {
     "-".join(filter(None, (each.name, law))): (each.name, law)
     for each in registered().values()
     for law in each.laws or ("",)
+    if len(each.chart(law).velocities) == 1  # one with two runs in a system file only
 }
 
 
@@ -61,8 +62,6 @@ def slow_unless_fast(names: list[str]) -> list[Any]:
 def test_every_included_chart(name: str, gms_fsm: CommandLine) -> None:
     entry, law = LAWS[name]
     chart = registered()[entry].chart(law)
-    if len(chart.velocities) > 1:
-        pytest.skip("a chart with two velocities runs in a system file only")
     more = ["--law", law] if law else []
     more += ["--rig", "slider"] if chart.locks or chart.sets_velocity else []
     *switches, last, values = program(printed(gms_fsm, entry, *more))
@@ -73,12 +72,11 @@ def test_every_included_chart(name: str, gms_fsm: CommandLine) -> None:
 
 
 @pytest.mark.parametrize("name", slow_unless_fast([path.stem for path in SCENARIOS]))
-def test_every_shipped_scenario(name: str, gms_fsm: CommandLine) -> None:
+def test_every_shipped_scenario(
+    name: str, gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
     if name == "tribometer":
-        data = os.environ.get("GMS_FSM_DATA")
-        if data is None:
-            pytest.skip("the record is not part of the repository; set GMS_FSM_DATA")
-        assert Path(data).is_dir()
+        monkeypatch.setenv("GMS_FSM_DATA", str(data_folder()))
     path = printed(gms_fsm, str(ROOT / "scenarios" / f"{name}.toml"))
     end = load_scenario(ROOT / "scenarios" / f"{name}.toml").arguments["t_end"]
     *switches, last, _ = program(path, repr(float(end)), "4000")
