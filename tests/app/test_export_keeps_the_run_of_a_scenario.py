@@ -28,7 +28,8 @@ def test_a_contact_has_the_tolerance_of_its_scenario(gms_fsm: CommandLine) -> No
     Path("servo.toml").write_text(text.replace("[run]", "[run]\nrtol = 1e-3"))
     for more in ((), ("--contact", "bearing")):
         assert gms_fsm("export", "servo.toml", "--to", "c99", "-o", "out", *more).code == 0
-        readme = Path("out/README-c99.md").read_text()
+        name = "bearing" if more else "servo"
+        readme = Path(f"out/README-{name}-c99.md").read_text()
         assert re.search(r"relative tolerance 0\.001\.", readme)
     # A format without the engine has no use for it.
     assert gms_fsm("export", "servo.toml", "--contact", "bearing", "--to", "st").code == 0
