@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from gms_fsm import Record
 from gms_fsm.app.cli import main
+from gms_fsm.records.record import Column
 
 OPEN_LOOP = """\
 title = "open loop"
@@ -70,6 +73,12 @@ def sine_table(rows: int = 60) -> str:
     """Return a valid record for MEASURED: time in s, position in mm, force in N."""
     t = np.round(np.arange(rows) * 0.01, 2)
     return table(["t", "x", "F"], t, np.sin(6 * t).round(6), np.cos(6 * t).round(4))
+
+
+def read_table(path: Path, columns: Mapping[str, Column], where: str = "") -> Record:
+    """Read the columns of a table, and no others."""
+    none: dict[str, Any] = {"position": None, "force": None}
+    return Record.from_csv(path, **none | dict(columns), where=where)
 
 
 @dataclass(frozen=True)
