@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -14,6 +15,9 @@ import pytest
 from gms_fsm import Record
 from gms_fsm.app.cli import main
 from gms_fsm.records.record import Column
+from tests.helpers import ROOT
+
+PUBLIC_RECORD = "reciprocating_friction.tsv"
 
 OPEN_LOOP = """\
 title = "open loop"
@@ -61,6 +65,15 @@ force = { column = "F", unit = "N" }
 [output]
 figures = []
 """
+
+
+def data_folder(file: str = PUBLIC_RECORD) -> Path:
+    """Return the folder of the public records, or skip."""
+    named = os.environ.get("GMS_FSM_DATA")
+    for folder in ([Path(named)] if named else []) + [ROOT.parent / "shared" / "data"]:
+        if (folder / file).is_file():
+            return folder
+    pytest.skip(f"{file} is neither in GMS_FSM_DATA nor in ../shared/data")
 
 
 def table(columns: Iterable[str], *values: np.ndarray) -> str:

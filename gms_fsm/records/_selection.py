@@ -27,7 +27,7 @@ GAP = 5.0  # time steps longer than this many median steps are reported
 MISSING = ("error", "drop", "interpolate")
 Rows: TypeAlias = NDArray[np.int64]
 Chosen: TypeAlias = NDArray[np.bool_]
-DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
+DECIMAL = re.compile(r"\s*[-+]?\d*([.,])\d+([eE][-+]?\d+)?\s*")
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def selected(
     chosen = _chosen(origin, values, where, rows.size)
     if not chosen.any():
         if words:
-            _check_commas(origin, words)
+            _check_separator(origin, words)
         raise origin.error(f"no row satisfies where = {shown(where)}", "choose another condition")
     part = _from_first_to_last(origin, Part(values, chosen, rows, []), words, where)
     part = _without_gaps(origin, part, words, missing)
@@ -268,7 +268,7 @@ def _check_words(origin: Origin, part: Part, words: Words, missing: str) -> None
         wrong = {place: text for place, text in wrong.items() if text.strip()}
     if not wrong:
         return
-    _check_commas(origin, wrong)
+    _check_separator(origin, wrong)
     row, quantity = min(wrong, key=lambda place: place[0])
     text = wrong[row, quantity]
     advice = "correct it, or exclude the row with where = ..., a condition that is false there"
@@ -279,13 +279,17 @@ def _check_words(origin: Origin, part: Part, words: Words, missing: str) -> None
     )
 
 
-def _check_commas(origin: Origin, words: Words) -> None:
+def _check_separator(origin: Origin, words: Words) -> None:
+    """Refuse a first word that is a number with the other decimal separator."""
     row, quantity = min(words, key=lambda place: place[0])
-    if DECIMAL_COMMA.fullmatch(words[row, quantity]):
+    found = DECIMAL.fullmatch(words[row, quantity])
+    if found is not None:
+        what, advice = "a decimal comma", 'give decimal = ","'
+        if found.group(1) == ".":
+            what, advice = 'a decimal point, but decimal = ","', "leave that option out"
         raise origin.error(
-            f"{origin.cells(quantity, np.array([row]))}: {shown(words[row, quantity])} has a "
-            "decimal comma",
-            'give decimal = ","',
+            f"{origin.cells(quantity, np.array([row]))}: {shown(words[row, quantity])} has {what}",
+            advice,
         )
 
 

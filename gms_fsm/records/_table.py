@@ -317,7 +317,7 @@ def _readings(number: int, line: str, form: TextFormat) -> Iterator[_Head]:
     texts = [line]
     if form.commented(line):
         mark = max((m for m in form.comment if line.lstrip().startswith(m)), key=len)
-        texts.append(line.lstrip().removeprefix(mark))
+        texts.insert(0, line.lstrip().removeprefix(mark))
     for text in texts:
         likely = sorted(DELIMITERS, key=lambda each: each == " " or -text.count(each))
         for delimiter in [form.delimiter] if form.delimiter else likely:
