@@ -325,8 +325,8 @@ def _check_order(origin: Origin, part: Part) -> None:
 def _check_size(origin: Origin, part: Part) -> None:
     if part.rows.size < FEWEST:
         raise origin.error(
-            f"only {part.rows.size} rows are selected",
-            f"at least {FEWEST} are needed (rows are selected with where = ...)",
+            f"only {part.rows.size} rows are used",
+            f"at least {FEWEST} are needed (rows are selected with where = ... and missing = ...)",
         )
 
 

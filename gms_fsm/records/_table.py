@@ -321,31 +321,32 @@ def _readings(number: int, line: str, form: TextFormat) -> Iterator[_Head]:
     for text in texts:
         likely = sorted(DELIMITERS, key=lambda each: each == " " or -text.count(each))
         for delimiter in [form.delimiter] if form.delimiter else likely:
-            names = next(form.cells([text], delimiter), [])
-            yield _Head(number, [name.strip() for name in names], delimiter)
+            names = [name.strip() for name in next(form.cells([text], delimiter), [])]
+            while names and not names[-1]:  # a separator at the end
+                names.pop()
+            yield _Head(number, names, delimiter)
 
 
 def _places(path: Path, head: _Head, columns: Mapping[str, Column]) -> dict[str, int]:
-    places = {}
     for quantity, column in columns.items():
         if head.names.count(column.name) != 1:
             what = "no column" if column.name not in head.names else "several columns"
+            or_none = "" if quantity == "time" else " or None"
             advice = (
-                f"name the right one: {quantity} = {{ column = ..., unit = ... }} in a file, "
-                f"{quantity}=(name, unit) in Python"
+                f"name the right one: {quantity} = {{ column = ..., unit = ... }} in a scenario, "
+                f"{quantity}=(name, unit){or_none} in Python"
             )
-            if quantity != "time":
-                advice += ", or none"
             if len(head.names) == 1:
                 advice = "if these are several columns, give their separator: delimiter = ..."
+            if not head.found(columns):
+                advice += "; if the names are in another row, give its number: header = ..."
             raise RecordError(
                 f"{what} {shown(column.name)} (for {quantity})",
                 place=str(path),
-                advice=f"columns: {cut(', '.join(map(repr, head.names)), 1000)} (row {head.row}; "
-                f"if the names are in another row, give it: header = ...); {advice}",
+                advice=f"columns in row {head.row}: "
+                f"{cut(', '.join(map(repr, head.names)), 1000)}; {advice}",
             )
-        places[quantity] = head.names.index(column.name)
-    return places
+    return {quantity: head.names.index(column.name) for quantity, column in columns.items()}
 
 
 # --------------------------------------------------------------------------- rows
@@ -362,6 +363,7 @@ def _rows(
                 yield line
 
     rows = form.cells(counted(), head.delimiter)
+    last = empty = 0  # the last row with cells, and the first empty one below it
     while True:
         taken.clear()
         try:
@@ -374,10 +376,15 @@ def _rows(
             return
         number = min(taken)
         if not any(cell.strip() for cell in row):
-            raise RecordError(f"row {number} is empty", place=str(path), advice="remove it")
-        if len(row) != len(head.names):
+            empty = empty or number
+            continue
+        if empty and last:  # the table may end here, and another one begin
+            raise RecordError(f"row {empty} is empty", place=str(path), advice="remove it")
+        last, empty = number, 0
+        columns = len(head.names)
+        if len(row) < columns or any(cell.strip() for cell in row[columns:]):
             raise RecordError(
-                f"row {number} has {len(row)} cells, but the header has {len(head.names)}",
+                f"row {number} has {len(row)} cells, but the header has {columns}",
                 place=str(path),
                 advice="make them equal, or give the separator of the columns: delimiter = ...; "
                 'numbers with a decimal comma need another separator, and decimal = ","',

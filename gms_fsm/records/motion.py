@@ -102,7 +102,7 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         raise RecordError(
             "neither a position nor a velocity column is given",
             place=record.place,
-            advice="give one of them: position = { column = ..., unit = ... } in a file, "
+            advice="give one of them: position = { column = ..., unit = ... } in a scenario, "
             "position=(name, unit) in Python",
         )
     # The spline does not depend on the origin; subtracting the offset avoids cancellation.

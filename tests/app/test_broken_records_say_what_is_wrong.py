@@ -56,7 +56,7 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "a row that is too short": (row(5, "0.03,1"), ("row 5", "2 cells", "3", "delimiter = ")),
     "a row that is too long": (row(5, "0.03,1,2,3"), ("row 5", "4 cells", "3")),
     "an empty row": (row(5, ""), ("row 5", "empty")),
-    "an empty last row": (GOOD.encode() + b"\n", ("row 62", "empty")),
+    "an empty row between two tables": (GOOD.encode() + b"\n\n1,1,1\n", ("row 62", "empty")),
     "decimal commas": (
         GOOD.replace(",", ";").replace(".", ",").replace("t;", "t;", 1).encode(),
         ("row 2", "column 't'", "'0,0'", 'give decimal = ","'),

@@ -29,8 +29,8 @@ def test_the_table_itself_is_good(tmp_path: Path) -> None:
 
 def test_a_wrong_column(tmp_path: Path) -> None:
     said = refusal(tmp_path, force=("Kraft", "N"))
-    assert "rig.csv: no column 'Kraft' (for force); columns: 't_s', 'x_mm', 'F_N' (row 1" in said
-    assert "force=(name, unit) in Python, or none" in said
+    assert "rig.csv: no column 'Kraft' (for force); columns in row 1: 't_s', 'x_mm', 'F_N'" in said
+    assert "force=(name, unit) or None in Python" in said
 
 
 def test_decimal_commas_without_the_option(tmp_path: Path) -> None:

@@ -125,6 +125,18 @@ def test_a_contradicting_line_of_units_is_refused(tmp_path: Path, line: str, sai
     assert said in str(caught.value)
 
 
+def test_empty_lines_around_the_rows(tmp_path: Path) -> None:
+    head, rows = written().split("\n", 1)
+    check(read(tmp_path, f"\n{head}\n\n,,\n{rows}\n \n"))
+
+
+@pytest.mark.parametrize("places", ["head", "rows", "both"])
+def test_a_separator_at_the_end_of_lines(tmp_path: Path, places: str) -> None:
+    head, *rows = written(";").splitlines()
+    lines = [head + ";" * (places != "rows"), *(row + "; " * (places != "head") for row in rows)]
+    check(read(tmp_path, "\n".join(lines)))
+
+
 METADATA = ("Prüfstand 4", "", "Datum;2026-11-23;;", "Rate;100 Hz")
 
 
