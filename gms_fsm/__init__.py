@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from gms_fsm.phenomena.measure import Bench as Bench
     from gms_fsm.phenomena.measure import PhenomenaTable as PhenomenaTable
     from gms_fsm.phenomena.measure import measure_phenomena as measure_phenomena
+    from gms_fsm.records.record import Record as Record
     from gms_fsm.run.bank import FrictionBank as FrictionBank
     from gms_fsm.run.equations import FrictionEquations as FrictionEquations
     from gms_fsm.run.machines import Element as Element
@@ -89,6 +90,7 @@ _HOMES = {
     "inspection.prove": "Finding Report prove",
     "inspection.session": "Session",
     "phenomena.measure": "Bench PhenomenaTable measure_phenomena",
+    "records.record": "Record",
     "run.bank": "FrictionBank",
     "run.equations": "FrictionEquations",
     "run.machines": "Element ElementMachines",

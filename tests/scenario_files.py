@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from gms_fsm import Record
 from gms_fsm.app.cli import main
+from gms_fsm.records.record import Column
+from tests.helpers import ROOT
+
+PUBLIC_RECORD = "reciprocating_friction.tsv"
 
 OPEN_LOOP = """\
 title = "open loop"
@@ -60,6 +67,15 @@ figures = []
 """
 
 
+def data_folder(file: str = PUBLIC_RECORD) -> Path:
+    """Return the folder of the public records, or skip."""
+    named = os.environ.get("GMS_FSM_DATA")
+    for folder in ([Path(named)] if named else []) + [ROOT.parent / "shared" / "data"]:
+        if (folder / file).is_file():
+            return folder
+    pytest.skip(f"{file} is neither in GMS_FSM_DATA nor in ../shared/data")
+
+
 def table(columns: Iterable[str], *values: np.ndarray) -> str:
     """Return a CSV table."""
     rows = (",".join(repr(float(cell)) for cell in row) for row in zip(*values, strict=True))
@@ -70,6 +86,12 @@ def sine_table(rows: int = 60) -> str:
     """Return a valid record for MEASURED: time in s, position in mm, force in N."""
     t = np.round(np.arange(rows) * 0.01, 2)
     return table(["t", "x", "F"], t, np.sin(6 * t).round(6), np.cos(6 * t).round(4))
+
+
+def read_table(path: Path, columns: Mapping[str, Column], where: str = "") -> Record:
+    """Read the columns of a table, and no others."""
+    none: dict[str, Any] = {"position": None, "force": None}
+    return Record.from_csv(path, **none | dict(columns), where=where)
 
 
 @dataclass(frozen=True)

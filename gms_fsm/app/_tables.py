@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import scipy.integrate
@@ -20,7 +21,7 @@ from pydantic_core import CoreSchema, PydanticKnownError
 from pydantic_core.core_schema import literal_schema
 
 from gms_fsm._records import LIST, ONE, TABLE, TEXT, Table
-from gms_fsm.app.records import Column
+from gms_fsm.records.record import Column, Record
 from gms_fsm.run.settings import ENGINES, EVENTS, Settings
 from gms_fsm.systems._file import SystemFile
 from gms_fsm.systems._model_tables import ModelTable
@@ -57,39 +58,63 @@ class ColumnTable(Table):
         return Column(self.column, self.unit, self.sign)
 
 
-Delimiter = Literal["\t", ";", ",", "|", " "]
-
-
-class RecordTable(Table):
-    """A measured motion, optionally with the measured force."""
+class TextTable(Table):
+    """A text table, and how it is written; keys as in `gms_fsm.Record.from_csv`."""
 
     file: str = Field(description="CSV or TSV, in the folder of the scenario or in GMS_FSM_DATA")
     time: ColumnTable
+    where: str = Field(
+        "", description='condition for the rows to use, for example "normal > 4.5 N"'
+    )
+    missing: Literal["error", "drop", "interpolate"] = Field(
+        "error", description="what to do where a cell is empty or NaN"
+    )
+    delimiter: Literal["\t", ";", ",", "|", " "] | None = None
+    decimal: Literal[".", ","] = "."
+    comment: list[str] = Field(["#", "%"], description="what comment lines begin with")
+    header: int | None = Field(
+        None, ge=1, description="row of the column names; by default the first that has them"
+    )
+    encoding: str | None = Field(None, description='for example "cp1252"; by default UTF-8')
+
+    def read(self, path: Path, columns: Mapping[str, Column]) -> Record:
+        """Return the record with these columns and the time."""
+        given: dict[str, Any] = dict.fromkeys(("position", "velocity", "force", "normal"))
+        given |= columns
+        return Record.from_csv(
+            path,
+            time=self.time.build(),
+            where=self.where,
+            missing=self.missing,
+            delimiter=self.delimiter,
+            decimal=self.decimal,
+            comment=self.comment,
+            header=self.header,
+            encoding=self.encoding,
+            **given,
+        )
+
+
+class RecordTable(TextTable):
+    """A measured motion, optionally with the measured force."""
+
     position: ColumnTable | None = None
     velocity: ColumnTable | None = None
     force: ColumnTable | None = Field(None, description="measured friction, for comparison")
     normal: ColumnTable | None = Field(None, description="normal force")
-    where: str = Field(
-        "", description='condition for the rows to use, for example "normal > 4.5 N"'
-    )
     smoothing: float | None = Field(None, ge=0, description="time constant of the spline, s")
-    delimiter: Delimiter | None = None
 
     def columns(self) -> dict[str, Column]:
         """Return the given columns."""
-        names = ("time", "position", "velocity", "force", "normal")
+        names = ("position", "velocity", "force", "normal")
         tables = {name: getattr(self, name) for name in names}
         return {name: table.build() for name, table in tables.items() if table is not None}
 
 
-class SignalRecordTable(Table):
+class SignalRecordTable(TextTable):
     """One measured signal: a time column and a value column."""
 
-    file: str
-    time: ColumnTable
     value: ColumnTable
-    where: str = Field("", description='condition for the rows to use, for example "time > 0.5 s"')
-    delimiter: Delimiter | None = None
 
 
 def _signal_form(given: Any) -> str:

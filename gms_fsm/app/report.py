@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from gms_fsm._files import output_folder, refuse_input, write_whole
-from gms_fsm.app.records import Motion, Record
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
 from gms_fsm.inspection.notes import notes_on
 from gms_fsm.lowering.scales import Setting
+from gms_fsm.records.motion import Motion
+from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import Moment
 from gms_fsm.systems.models import GMS
 from gms_fsm.systems.system import Contact, System
@@ -138,7 +139,7 @@ def run_scenario(
     names += ["trace.csv", "trace.transitions.csv"] if output.csv else []
     folder = output_folder(folder, names)
     for name in names:
-        refuse_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
+        refuse_input(folder / name, *loaded.inputs)
     try:
         trace = loaded.simulate(
             progress=progress, checkpoint=folder / "run.checkpoint" if checkpoint else None
@@ -442,7 +443,7 @@ def _table(head: list[str], rows: list[list[str]]) -> list[str]:
 
 
 def _measurement(record: Record, motion: Motion, trace: Trace) -> list[str]:
-    lines = [f"## Comparison with the measurement ({plain(record.path.name)})", ""]
+    lines = [f"## Comparison with the measurement ({plain(Path(record.place).name)})", ""]
     comparison = compare(trace, record)
     if comparison is None:
         lines.append("- the record has no measured force to compare with")

@@ -27,9 +27,10 @@ from gms_fsm.app._tables import (
     SliderTable,
     SystemScenario,
 )
-from gms_fsm.app.records import Motion, Record, motion_of, read_record
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
+from gms_fsm.records.motion import Motion
+from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
@@ -77,6 +78,12 @@ class Loaded:
         """The title of the scenario; if it has none, the system's name or the file name."""
         name = self.path.stem if self.system is None else self.system.name
         return self.scenario.title or name
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The files that were read."""
+        measured = None if self.record is None else self.record.path
+        return (self.path,) if measured is None else (self.path, measured)
 
     @property
     def subject(self) -> tuple[Any, ...]:
@@ -300,10 +307,8 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
         case _:
             assert scenario.record is not None
             table = scenario.record
-            record = read_record(
-                find_file(path, table.file), table.columns(), table.where, table.delimiter
-            )
-            motion = motion_of(record, table.smoothing)
+            record = table.read(find_file(path, table.file), table.columns())
+            motion = record.motion(table.smoothing)
             rig = Prescribed(Corners(motion.time, motion.velocity, held=False))
             start = float(motion.time[0]) if start is None else start
             end = float(motion.time[-1]) if end is None else end
@@ -326,9 +331,8 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
     if isinstance(given, SignalRecordTable):
         file = find_file(path, given.file)
         # The value column is read as the quantity it represents, so that units are checked.
-        columns = {"time": given.time.build(), quantity: given.value.build()}
         try:
-            record = read_record(file, columns, given.where, given.delimiter)
+            record = given.read(file, {quantity: given.value.build()})
         except UnitError as error:
             raise ScenarioError.of(error).inside(key).inside(path) from None
         rows = record.chosen

@@ -134,7 +134,7 @@ def sweep_scenario(
     names = ["summary.md", "runs.csv", "sweep.npz"]
     folder = output_folder(folder, names)
     for name in names:
-        refuse_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
+        refuse_input(folder / name, *loaded.inputs)
     grid = np.meshgrid(*(each.values for each in axes), indexing="ij")
     parameters = {each.name: values.ravel() for each, values in zip(axes, grid, strict=True)}
     options: dict[str, Any] = dict(loaded.arguments)

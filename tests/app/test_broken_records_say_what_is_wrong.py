@@ -56,13 +56,13 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "a row that is too short": (row(5, "0.03,1"), ("row 5", "2 cells", "3", "delimiter = ")),
     "a row that is too long": (row(5, "0.03,1,2,3"), ("row 5", "4 cells", "3")),
     "an empty row": (row(5, ""), ("row 5", "empty")),
-    "an empty last row": (GOOD.encode() + b"\n", ("row 62", "empty")),
+    "an empty row between two tables": (GOOD.encode() + b"\n\n1,1,1\n", ("row 62", "empty")),
     "decimal commas": (
         GOOD.replace(",", ";").replace(".", ",").replace("t;", "t;", 1).encode(),
-        ("row 2", "column 't'", "'0,0'", "decimal point"),
+        ("row 2", "column 't'", "'0,0'", 'give decimal = ","'),
     ),
     "decimal commas between commas": (GOOD.replace(".", ",").encode(), ("row 2", "6 cells", "3")),
-    "a comment below": (GOOD.encode() + b"# the end\n", ("row 62", "1 cells", "3")),
+    "a remark below": (GOOD.encode() + b"the end\n", ("row 62", "1 cells", "3")),
     "a quote that never closes": (row(5, '"0.03,1,1'), ("row 5",)),
     "a quote that never closes, and a long file": (
         row(5, '"0.03,1,1') + b"0,0,0\n" * 50_000,
@@ -83,16 +83,20 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
         b"t,pos,F\n0,0,0\n1,1,1\n",
         ("no column 'x'", "'t', 'pos', 'F'", "position = {"),
     ),
-    "columns divided by |": (
-        GOOD.replace(",", "|").encode(),
-        ("no column 't'", "'t|x|F'", "delimiter = "),
+    "columns divided by /": (
+        GOOD.replace(",", "/").encode(),
+        ("no column 't'", "'t/x/F'", "delimiter = "),
     ),
     "a column twice": (b"t,x,F,x\n0,0,0,0\n1,1,1,1\n", ("several columns 'x'",)),
     "no head line": (GOOD.partition("\n")[2].encode(), ("no column 't'", "'0.0'")),
-    "units in the second line": (row(2, "s,mm,N"), ("row 2", "column 't'", "'s'", "number")),
+    "units that contradict the scenario": (
+        row(2, "[ms],[mm],[N]"),
+        ("row 2", "'ms'", "column 't'", "time is read in 's'"),
+    ),
+    "words in the second line": (row(2, "a,b,c"), ("row 2", "column 't'", "'a'", "number")),
     # sizes
-    "an empty file": (b"", ("line 1 is empty", "column names")),
-    "an empty first line": (b"\n" + GOOD.encode(), ("line 1 is empty", "column names")),
+    "an empty file": (b"", ("the file is empty", "column names")),
+    "empty lines only": (b"\n \n", ("the file is empty", "column names")),
     "a head line only": (b"t,x,F\n", ("0 row(s)", "at least")),
     "one row": (b"t,x,F\n0,0,0\n", ("1 row(s)", "at least")),
     "four rows": (b"t,x,F\n0,0,0\n1,1,1\n2,2,2\n3,3,3\n", ("4 rows", "at least 5")),
@@ -105,8 +109,9 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     # not a text table
     "binary": (bytes(range(256)) * 50, ("line 1", "binary")),
     "a zero byte in a row": (row(5, "0.03,\0,1"), ("line 5", "binary")),
-    "UTF-16": (GOOD.encode("utf-16"), ("line 1",)),
-    "Latin-1": (GOOD.replace("F", "µ", 1).encode("latin-1"), ("line 1", "UTF-8")),
+    "UTF-16 without a mark": (GOOD.encode("utf-16-le"), ("line 1", "binary", "utf-16-le")),
+    "UTF-16 cut short": (GOOD.encode("utf-16")[:-1], ("a line after", "utf-16", "encoding = ")),
+    "Latin-1": (GOOD.replace("F", "µ", 1).encode("latin-1"), ("line 1", "UTF-8", "cp1252")),
     "a picture": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", ("line 1", "UTF-8")),
     "an archive": (b"PK\x03\x04\x14\0\x06\0", ("line 1", "binary")),
 }
@@ -337,6 +342,6 @@ def test_one_message_is_one_line(gms_fsm: CommandLine, monkeypatch: pytest.Monke
     assert answer.code == 2
     assert answer.out == ""
     assert answer.err.splitlines() == [
-        "error: own.csv: row 5, column 'x': 'abc' is not a number (a decimal point is a point); "
+        "error: own.csv: row 5, column 'x': 'abc' is not a number; "
         "correct it, or exclude the row with where = ..., a condition that is false there"
     ]

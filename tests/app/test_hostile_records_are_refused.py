@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gms_fsm.app.records import Column, motion_of, read_record
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.app.units import convert_numbers
 from gms_fsm.errors import (
     RecordError,
     ScenarioError,
 )
-from tests.scenario_files import MEASURED, changed, sine_table, table
+from gms_fsm.records.record import Column
+from gms_fsm.records.units import convert_numbers
+from tests.scenario_files import MEASURED, changed, read_table, sine_table, table
 
 LONG = "x" * 50_000
 
@@ -34,7 +34,7 @@ COLUMNS = {"time": Column("t", "s"), "position": Column("x", "mm"), "force": Col
 def test_a_condition_that_cannot_be_computed_is_refused(tmp_path: Path) -> None:
     path = record(tmp_path, sine_table())
     with pytest.raises(RecordError, match="cannot be computed"):
-        read_record(path, COLUMNS, where="sqrt(force) > 1 N")  # force is negative now and then
+        read_table(path, COLUMNS, where="sqrt(force) > 1 N")  # force is negative now and then
 
 
 def test_a_number_with_an_exponent_is_a_number_without_a_unit() -> None:
@@ -48,7 +48,7 @@ def test_a_number_of_many_digits_is_read_once(tmp_path: Path) -> None:
     """The pattern gave up its digits one by one and read them again: hours for 500 kB."""
     path = record(tmp_path, sine_table())
     with pytest.raises(RecordError, match="where"):
-        read_record(path, COLUMNS, where="1" * 500_000)
+        read_table(path, COLUMNS, where="1" * 500_000)
 
 
 @pytest.mark.parametrize("scale", [1e200, 1e300, 1e308])
@@ -57,7 +57,7 @@ def test_positions_too_large_for_a_motion_are_refused(scale: float, tmp_path: Pa
     path = record(tmp_path, table(["t", "x"], t, scale * np.sin(t)))
     columns = {"time": Column("t", "s"), "position": Column("x", "m")}
     try:
-        motion = motion_of(read_record(path, columns))
+        motion = read_table(path, columns).motion()
     except RecordError as error:
         refused: RecordError | None = error
     else:
@@ -85,5 +85,5 @@ def test_long_cells_do_not_make_long_messages(change: str, tmp_path: Path) -> No
         assert len(str(caught.value)) < 2000
         return
     with pytest.raises(RecordError) as refused:
-        read_record(record(tmp_path, text), columns)
+        read_table(record(tmp_path, text), columns)
     assert len(str(refused.value)) < 2000

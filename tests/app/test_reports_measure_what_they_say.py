@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, Stribeck, Trace, simulate
-from gms_fsm.app.records import Motion, Record, motion_of
+from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, Record, Stribeck, Trace, simulate
 from gms_fsm.app.report import (
     compare,
     dwell_times,
@@ -20,6 +20,7 @@ from gms_fsm.app.report import (
     what_it_cannot_tell,
 )
 from gms_fsm.app.scenario import Loaded, load_scenario
+from gms_fsm.records.motion import Motion
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners
@@ -162,7 +163,7 @@ def measured(noise: np.ndarray, chosen: np.ndarray | None = None) -> tuple[Trace
     assert len(trace.transitions) > 20
     columns = {"time": TIMES, "velocity": speed(TIMES), "force": trace.F + noise}
     chosen = np.ones(TIMES.size, dtype=bool) if chosen is None else chosen
-    return trace, Record(Path("made.csv"), columns, chosen, 2, ())
+    return trace, Record("made", columns, chosen, np.arange(TIMES.size))
 
 
 def by_hand(force: np.ndarray, model: np.ndarray) -> tuple[float, float]:
@@ -193,7 +194,7 @@ def test_a_perfect_record_has_r2_of_1() -> None:
 def test_a_record_worse_than_its_mean_has_a_negative_r2() -> None:
     trace, record = measured(np.zeros(TIMES.size))
     columns = {**record.columns, "force": -record.columns["force"]}
-    found = compare(trace, Record(record.path, columns, record.chosen, 2, ()))
+    found = compare(trace, replace(record, columns=columns))
     assert found is not None
     assert found.r2 == pytest.approx(by_hand(columns["force"], trace.F)[0])
     assert found.r2 < 0.0
@@ -245,7 +246,7 @@ def test_a_run_over_a_part_of_the_record_counts_that_part() -> None:
 def test_without_a_force_there_is_nothing_to_compare() -> None:
     trace, record = measured(NOISE)
     columns = {name: value for name, value in record.columns.items() if name != "force"}
-    bare = Record(record.path, columns, record.chosen, 2, ())
+    bare = replace(record, columns=columns)
     assert compare(trace, bare) is None
     assert measured_force(bare)[0].size == 0
 
@@ -253,7 +254,7 @@ def test_without_a_force_there_is_nothing_to_compare() -> None:
 def test_a_constant_force_has_an_rmse_but_no_r2() -> None:
     trace, record = measured(NOISE)
     columns = {**record.columns, "force": np.full(TIMES.size, 0.5)}
-    found = compare(trace, Record(record.path, columns, record.chosen, 2, ()))
+    found = compare(trace, replace(record, columns=columns))
     assert found is not None
     rmse = float(np.sqrt(np.mean((0.5 - trace.F) ** 2)))
     assert found.rmse == pytest.approx(rmse)
@@ -263,7 +264,7 @@ def test_a_constant_force_has_an_rmse_but_no_r2() -> None:
 @pytest.mark.slow
 def test_the_summary_prints_these_numbers(tmp_path: Path) -> None:
     trace, record = measured(NOISE)
-    x = 1e3 * motion_of(record).position
+    x = 1e3 * record.motion().position
     (tmp_path / "own.csv").write_text(table(["t", "x", "F"], TIMES, x, record.columns["force"]))
     (tmp_path / "own.toml").write_text(MEASURED)
     loaded = load_scenario(tmp_path / "own.toml")
@@ -282,7 +283,7 @@ def test_the_summary_prints_these_numbers(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_rows_every_so_often_change_the_file_not_the_comparison(tmp_path: Path) -> None:
     _, record = measured(NOISE)
-    x = 1e3 * motion_of(record).position
+    x = 1e3 * record.motion().position
     (tmp_path / "own.csv").write_text(table(["t", "x", "F"], TIMES, x, record.columns["force"]))
     found = []
     for every in ("", "every = 0.0125\n"):
@@ -302,7 +303,7 @@ def test_rows_every_so_often_change_the_file_not_the_comparison(tmp_path: Path) 
 def motion(velocity: np.ndarray) -> Motion:
     t = 0.01 * np.arange(velocity.size)
     columns = {"time": t, "velocity": velocity}
-    return motion_of(Record(Path("made.csv"), columns, np.ones(t.size, dtype=bool), 2, ()))
+    return Record.from_arrays(**columns).motion()
 
 
 ONE_SPEED = motion(np.tile(np.repeat([1e-3, 0.0, -1e-3, 0.0], 100), 3))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +12,10 @@ from gms_fsm._files import LIST
 from gms_fsm.app.report import compare, measured_force, plain, run_scenario
 from gms_fsm.app.scenario import Loaded, load_scenario
 from tests.helpers import ROOT, same_bits
+from tests.scenario_files import data_folder
 
 pytestmark = pytest.mark.slow
 
-RECORD = "reciprocating_friction.tsv"
 SHIPPED = sorted((ROOT / "scenarios").glob("*.toml"))
 # Systems with the number of their transitions; tests/zoo and tests/systems run them.
 SYSTEMS = {
@@ -29,15 +28,6 @@ SYSTEMS = {
 }
 OPEN = [path for path in SHIPPED if path.stem not in {"tribometer", *SYSTEMS}]
 TRANSITIONS = {"paper_fig3_non_drifting": 0, "pulled_mass": 72, "stribeck_sweep": 4}
-
-
-def data_folder() -> Path:
-    """Return the folder of the public record, or skip."""
-    named = os.environ.get("GMS_FSM_DATA")
-    for folder in ([Path(named)] if named else []) + [ROOT.parent / "shared" / "data"]:
-        if (folder / RECORD).is_file():
-            return folder
-    pytest.skip(f"{RECORD} is neither in GMS_FSM_DATA nor in ../shared/data")
 
 
 @pytest.fixture(autouse=True)

@@ -41,7 +41,7 @@ ALLOWED = {
         "once.transitions.t[:MODEL.n]",
         "located.transitions.t[:MODEL.n]",
     },
-    "gms_fsm/app/records.py": {"kept[:first]"},  # rows of a measured record
+    "gms_fsm/records/_selection.py": {"kept[:first]"},  # rows of a measured record
     "gms_fsm/lowering/_pulses.py": {"rests[first:last]"},  # samples of a signal
     # In the vector of the MATLAB text, which has its own layout.
     "gms_fsm/exporters/matlab.py": {"first + n", "n * len(order) + 1"},

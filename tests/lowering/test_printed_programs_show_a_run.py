@@ -19,9 +19,8 @@ from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts.registry import registered
 from gms_fsm.systems.models import demonstration
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Slider
-from tests.app.test_scenarios_run import data_folder
 from tests.helpers import ROOT
-from tests.scenario_files import CommandLine
+from tests.scenario_files import CommandLine, data_folder
 
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
 FAST = ("gms-signed", "servo")

@@ -15,9 +15,10 @@ from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, PulledSlider, Slider,
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Formula
-from tests.app.test_scenarios_run import SHIPPED, data_folder
+from tests.app.test_scenarios_run import SHIPPED
 from tests.helpers import pulled_mass
 from tests.scaled import AXES, Case, factors, other_bits, scaled, sequence
+from tests.scenario_files import data_folder
 
 pytestmark = pytest.mark.slow
 

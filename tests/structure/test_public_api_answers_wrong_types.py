@@ -37,6 +37,7 @@ from gms_fsm import (
     Parameter,
     Prescribed,
     PulledSlider,
+    Record,
     Session,
     Settings,
     Slider,
@@ -64,7 +65,17 @@ CHART = Chart("one", ("v",), ("z",), ("k",), (STATE,), (EDGE,), {"F": "k * z"})
 BODY, CONTACT = Body("mass", inertia=1.0), Contact("pad", CHART, {"k": 1.0})
 SYSTEM = System("one mass", bodies=(BODY,), contacts=(CONTACT,))
 # Classes that only the package creates, for users to read.
-RECORDS = {"Finding", "PhenomenaTable", "Report", "Sweep", "Trace", "Model", "Rig", "Signal"}
+RECORDS = {
+    "Finding",
+    "PhenomenaTable",
+    "Record",
+    "Report",
+    "Sweep",
+    "Trace",
+    "Model",
+    "Rig",
+    "Signal",
+}
 
 
 @dataclass(frozen=True)
@@ -210,6 +221,7 @@ def _methods(tmp: Path) -> Iterator[Entry]:
         "FrictionBank": lambda: FrictionBank([MODEL]),
         "FrictionEquations": _settled,
         "FrictionState": lambda: FrictionState(MODEL),
+        "Record": _record,
         "Report": lambda: prove(CHART),
         "LiveChart": lambda: plots.LiveChart(_trace()),
     }
@@ -231,6 +243,11 @@ def _methods(tmp: Path) -> Iterator[Entry]:
                 if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
             }
             yield Entry(f"{kind}.{name}", lambda make=make, name=name: getattr(make(), name), given)
+
+
+def _record() -> Record:
+    t = np.arange(20.0)
+    return Record.from_arrays(time=t, position=np.sin(t), force=np.cos(t))
 
 
 def _settled() -> FrictionEquations:
@@ -274,6 +291,8 @@ RIGHT: dict[str, Any] = {
     "FrictionState.from_array.array": FrictionState(MODEL).to_array(),
     "y": FrictionEquations(MODEL).initial,
     "dt": 0.1,
+    "Record.from_arrays.time": np.arange(20.0),
+    "Record.from_arrays.position": np.arange(20.0),
     "Session.break_on.kind": "tested",
     "Session.watch.expression": "z1",
     "Session.watch.text": "z1",

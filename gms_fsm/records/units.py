@@ -6,7 +6,7 @@ import re
 
 from gms_fsm.errors import UnitError, shown
 
-__all__ = ["FACTORS", "convert_numbers", "factor"]
+__all__ = ["FACTORS", "convert_numbers", "factor", "plain"]
 
 # quantity -> unit -> factor to SI
 FACTORS: dict[str, dict[str, float]] = {
@@ -16,6 +16,27 @@ FACTORS: dict[str, dict[str, float]] = {
     "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "lbf": 4.4482216152605},
 }
 FACTORS["normal"] = FACTORS["force"]
+
+
+def plain(unit: str) -> str:
+    """Return a unit as the table of factors writes it.
+
+    Parameters
+    ----------
+    unit : str
+        Unit, for example ``" µm"``.
+
+    Returns
+    -------
+    str
+        Without spaces around it, and with ``u`` for micro.
+
+    Examples
+    --------
+    >>> plain(" µm")
+    'um'
+    """
+    return unit.strip().replace("µ", "u").replace("μ", "u")
 
 
 def factor(quantity: str, unit: str) -> float:
@@ -43,12 +64,11 @@ def factor(quantity: str, unit: str) -> float:
     >>> factor("position", "µm")
     1e-06
     """
-    plain = unit.strip().replace("µ", "u").replace("μ", "u")
-    known = FACTORS[quantity]
-    if plain in known:
-        return known[plain]
+    name, known = plain(unit), FACTORS[quantity]
+    if name in known:
+        return known[name]
     for other, units in FACTORS.items():
-        if plain in units:
+        if name in units:
             raise UnitError(
                 f"unit {shown(unit)} measures {other}, not {quantity}",
                 advice=f"use one of {', '.join(known)}",

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gms_fsm.app.records import Column, Record, read_record
+from gms_fsm import Record
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import RecordError
-from tests.scenario_files import OPEN_LOOP
+from gms_fsm.records.record import Column
+from tests.scenario_files import OPEN_LOOP, read_table
 
 COLUMNS = {"time": Column("t", "s"), "position": Column("x", "mm"), "force": Column("F", "N")}
 ROWS = [f"{0.01 * i:.2f},{0.5 * i:.1f},{i % 7}" for i in range(20)]  # rows 2 to 21 of the file
@@ -26,22 +27,25 @@ def _read(tmp_path: Path, changes: dict[int, str], where: str = "") -> Record:
         lines[number - 1] = text
     path = tmp_path / "own.csv"
     path.write_text("\n".join(lines) + "\n")
-    return read_record(path, COLUMNS, where)
+    return read_table(path, COLUMNS, where)
 
 
 def test_units_below_the_header(tmp_path: Path) -> None:
-    record = _read(tmp_path, {2: "s,mm,N"}, "time >= 0 s")
-    assert (len(record), record.first_row) == (19, 3)
+    """Recognised, so that no condition is needed."""
+    record = _read(tmp_path, {2: "s,mm,N"})
+    assert (len(record), record.rows.min()) == (19, 3)
     np.testing.assert_array_equal(
         record.columns["time"], [float(r.split(",")[0]) for r in ROWS[1:]]
     )
-    assert any("3 cell(s)" in note and "row 2" in note and "'s'" in note for note in record.notes)
+    assert record.notes == ("row 2 is a line of units: s, mm, N",)
+    again = _read(tmp_path, {2: "s,mm,N", 3: "-,-,-"}, "time >= 0 s")
+    assert any("3 cell(s)" in note and "row 3" in note and "'-'" in note for note in again.notes)
 
 
 def test_words_before_and_after(tmp_path: Path) -> None:
     changes = {2: "0.00,n/a,off", 3: "0.01,n/a,off", 21: "end,of,file"}
     record = _read(tmp_path, changes, "time > 0.015 s")
-    assert (len(record), record.first_row) == (17, 4)
+    assert (len(record), record.rows.min()) == (17, 4)
     assert all(np.isfinite(column).all() for column in record.columns.values())
 
 
@@ -103,7 +107,7 @@ def test_a_measured_signal_has_where_too(tmp_path: Path) -> None:
     )
     path = tmp_path / "own.toml"
     path.write_text(OPEN_LOOP.replace('"0.1*sin(t)"', signal.replace(", WHERE", "")))
-    with pytest.raises(RecordError, match=r"row 2, column 't': 's' is not a number.*where = "):
+    with pytest.raises(RecordError, match=r"row 5, column 'v': 'off' is not a number.*where = "):
         load_scenario(path)
     path.write_text(
         OPEN_LOOP.replace('"0.1*sin(t)"', signal.replace("WHERE", 'where = "velocity < 9 m/s"'))

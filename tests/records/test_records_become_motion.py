@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from gms_fsm.app.records import Column, Motion, Record, motion_of, read_record
-from gms_fsm.app.units import FACTORS, convert_numbers, factor
+from gms_fsm import Record
 from gms_fsm.errors import RecordError, UnitError
-from tests.scenario_files import MEASURED, CommandLine, changed, table
+from gms_fsm.records.motion import Motion, motion_of
+from gms_fsm.records.record import Column
+from gms_fsm.records.units import FACTORS, convert_numbers, factor
+from tests.scenario_files import MEASURED, CommandLine, changed, read_table, table
 
 SI = {
     "time": Column("t", "s"),
@@ -24,12 +26,12 @@ SI = {
 
 def record_of(**columns: np.ndarray) -> Record:
     size = len(columns["time"])
-    return Record(Path("made.csv"), columns, np.ones(size, dtype=bool), 2, ())
+    return Record("made", columns, np.ones(size, dtype=bool), np.arange(size))
 
 
 def read(tmp_path: Path, text: str, where: str = "", **columns: Column) -> Record:
     (tmp_path / "own.csv").write_text(text, encoding="utf-8")
-    return read_record(tmp_path / "own.csv", {"time": SI["time"], **columns}, where)
+    return read_table(tmp_path / "own.csv", {"time": SI["time"], **columns}, where)
 
 
 # --------------------------------------------------------------------------- units
@@ -83,7 +85,7 @@ def test_every_unit_reads_as_its_si_value(quantity: str, unit: str, tmp_path: Pa
         columns["time"] = Column("t", "s")
     text = table(["t", "a"], np.arange(6.0), values)
     (tmp_path / "own.csv").write_text(text)
-    record = read_record(tmp_path / "own.csv", columns)
+    record = read_table(tmp_path / "own.csv", columns)
     np.testing.assert_array_equal(record.columns[quantity], EXPECTED[quantity][unit] * values)
 
 
@@ -143,10 +145,10 @@ def test_tables_come_in_many_formats(
     text = ending.join(line.replace("|", delimiter) for line in lines)
     (tmp_path / "own.txt").write_bytes(bom + text.encode())
     columns = {"time": Column("t [s]", "s"), "position": Column("x, in mm", "mm")}
-    record = read_record(tmp_path / "own.txt", columns)
+    record = read_table(tmp_path / "own.txt", columns)
     np.testing.assert_allclose(record.columns["position"], 0.5e-3 * np.arange(6))
     assert len(record) == 6
-    assert record.first_row == 2
+    assert record.rows.tolist() == [*range(2, 8)]
 
 
 def test_other_columns_may_hold_anything(tmp_path: Path) -> None:
@@ -180,7 +182,7 @@ def test_where_chooses_rows(where: str, kept: range, tmp_path: Path) -> None:
     first, last = min(kept), max(kept)
     np.testing.assert_array_equal(record.columns["time"], T[first : last + 1])
     np.testing.assert_array_equal(record.columns["time"][record.chosen], list(kept))
-    assert record.first_row == first + 2
+    assert record.rows.min() == first + 2
     said = " ".join(record.notes)
     if where:
         assert f"{len(list(kept))} of 20 rows" in said
@@ -321,7 +323,7 @@ def test_an_invalid_smoothing_is_rejected(smoothing: float) -> None:
 
 
 def test_a_record_without_motion_is_rejected() -> None:
-    with pytest.raises(RecordError, match=r"made\.csv.*position.*velocity"):
+    with pytest.raises(RecordError, match=r"made.*position.*velocity"):
         motion_of(record_of(time=T, force=T))
 
 

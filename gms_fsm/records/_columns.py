@@ -1,0 +1,115 @@
+"""Which column of a table is which quantity, and in which unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.records.units import FACTORS, factor
+
+if TYPE_CHECKING:
+    from gms_fsm.charts.parameters import FloatArray
+
+__all__ = ["LOADS", "QUANTITIES", "Column", "ColumnLike", "columns_of"]
+
+QUANTITIES = ("time", "position", "velocity", "force", "normal")
+LOADS = ("force", "normal")  # needed only in selected rows; motion is needed in between too
+
+
+@dataclass(frozen=True)
+class Column:
+    """The column of a quantity in a table.
+
+    Parameters
+    ----------
+    name : str
+        Name in the header line.
+    unit : str
+        Unit, for example ``"mm"``.
+    sign : int
+        -1 to reverse the sign of the quantity.
+    """
+
+    name: str
+    unit: str
+    sign: int = 1
+
+    def in_si(self, quantity: str, values: FloatArray) -> FloatArray:
+        """Return the values of this column in SI units.
+
+        Parameters
+        ----------
+        quantity : {"time", "position", "velocity", "force", "normal"}
+            What the column holds.
+        values : ndarray
+            The numbers of the table.
+
+        Returns
+        -------
+        ndarray
+            ``sign * factor * values``, a new array.
+
+        Raises
+        ------
+        UnitError
+            If the unit is unknown or belongs to another quantity.
+        """
+        return self.sign * factor(quantity, self.unit) * values
+
+
+ColumnLike: TypeAlias = str | tuple[str, str] | tuple[str, str, int] | Column
+
+
+def columns_of(given: dict[str, Any]) -> dict[str, Column]:
+    """Return the column of each quantity that has one.
+
+    Parameters
+    ----------
+    given : dict
+        By quantity: a name (the unit is that of SI), (name, unit), (name, unit, sign), a `Column`,
+        or None.
+
+    Returns
+    -------
+    dict of str to Column
+        Without those that are None.
+
+    Raises
+    ------
+    ParameterError
+        If one of them is something else.
+    UnitError
+        If a unit is unknown or belongs to another quantity.
+
+    Examples
+    --------
+    >>> columns_of({"position": ("x", "mm"), "force": "F", "normal": None})["force"]
+    Column(name='F', unit='N', sign=1)
+    """
+    found = {name: _column(name, each) for name, each in given.items() if each is not None}
+    for quantity, column in found.items():
+        factor(quantity, column.unit)
+    return found
+
+
+def _column(quantity: str, given: Any) -> Column:
+    if isinstance(given, Column):
+        given = (given.name, given.unit, given.sign)
+    match given:
+        case str() as name:
+            return Column(name, _si(quantity))
+        case (str() as name, str() as unit):
+            return Column(name, unit)
+        case (str() as name, str() as unit, 1 | -1 as sign):
+            return Column(name, unit, sign)
+    raise ParameterError(
+        "it must be the name of a column, (name, unit) or (name, unit, sign) with a sign "
+        "of 1 or -1",
+        place=quantity,
+        value=given,
+    )
+
+
+def _si(quantity: str) -> str:
+    return next(unit for unit, value in FACTORS[quantity].items() if value == 1.0)

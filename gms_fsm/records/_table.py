@@ -1,0 +1,439 @@
+"""Text tables as instruments and spreadsheets write them: where the header is, what the cells hold.
+
+A file is read once, line by line, and no line can fill the memory. What was found (a header further
+down, a line of units) is noted.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import ParameterError, RecordError, cut, shown
+from gms_fsm.records._columns import Column
+from gms_fsm.records.units import FACTORS, plain
+
+__all__ = ["Cells", "TextFormat", "Words", "read_cells"]
+
+LONGEST_LINE = 100_000  # characters
+LONGEST_FILE = 5_000_000  # rows
+SEARCHED = 200  # lines in which a header is looked for
+DELIMITERS = "\t;,| "
+# By its first bytes; other encodings have to be given.
+MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+
+Words: TypeAlias = dict[tuple[int, str], str]  # cells that are not numbers, by row and quantity
+Lines: TypeAlias = Iterator[tuple[int, str]]  # with their numbers; the first is 1
+
+
+@dataclass(frozen=True)
+class TextFormat:
+    """How a text table is written.
+
+    Parameters
+    ----------
+    delimiter : str, optional
+        One character between the columns; by default the one that gives the named columns.
+    decimal : str
+        ``"."`` or ``","``.
+    comment : tuple of str
+        What a comment line begins with.
+    header : int, optional
+        The row of the column names; by default the first that has those asked for.
+    encoding : str, optional
+        By default UTF-8, or UTF-16 if the file begins with a byte order mark.
+    """
+
+    delimiter: str | None = None
+    decimal: str = "."
+    comment: tuple[str, ...] = ("#", "%")
+    header: int | None = None
+    encoding: str | None = None
+
+    @classmethod
+    def of(
+        cls, delimiter: Any, decimal: Any, comment: Any, header: Any, encoding: Any
+    ) -> TextFormat:
+        """Return the format with these options, checked.
+
+        Parameters
+        ----------
+        delimiter, decimal, comment, header, encoding
+            As in the class; `comment` may be one text.
+
+        Returns
+        -------
+        TextFormat
+            Checked.
+
+        Raises
+        ------
+        ParameterError
+            Naming the option, its value and what it must be.
+        """
+        marks = (comment,) if isinstance(comment, str) else comment
+        try:
+            marks = tuple(marks)
+        except TypeError:
+            marks = (None,)
+        row = isinstance(header, int) and not isinstance(header, bool) and header > 0
+        wanted = {
+            "delimiter": (
+                delimiter is None or (isinstance(delimiter, str) and _divides(delimiter)),
+                "one character that can stand between columns",
+            ),
+            "decimal": (decimal in (".", ","), "'.' or ','"),
+            "comment": (
+                all(isinstance(mark, str) and mark for mark in marks),
+                "a text that comment lines begin with, or several",
+            ),
+            "header": (header is None or row, "the number of a row, 1 or more"),
+            "encoding": (
+                encoding is None or _is_encoding(encoding),
+                "an encoding of text, for example 'cp1252', 'latin-1' or 'utf-16'",
+            ),
+        }
+        given = {"delimiter": delimiter, "decimal": decimal, "comment": comment}
+        given |= {"header": header, "encoding": encoding}
+        for name, (fits, what) in wanted.items():
+            if not fits:
+                raise ParameterError(f"it must be {what}", place=name, value=given[name])
+        return cls(delimiter, decimal, marks, header, encoding)
+
+    def cells(self, lines: Iterable[str], delimiter: str) -> Iterator[list[str]]:
+        """Return the cells of lines."""
+        if delimiter == " ":  # any number of them
+            lines = (line.strip() for line in lines)
+        return csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
+
+    def commented(self, line: str) -> bool:
+        """Return whether a line is a comment."""
+        return line.lstrip().startswith(self.comment)
+
+
+def _divides(delimiter: str) -> bool:
+    return len(delimiter) == 1 and delimiter not in '\r\n"'
+
+
+def _is_encoding(name: Any) -> bool:
+    try:
+        " ".encode(name)
+    except (LookupError, TypeError, ValueError):  # unknown or of bytes, no text, a null in it
+        return False
+    return True
+
+
+def _is_utf_8(encoding: str) -> bool:
+    """Return whether it is the usual encoding, which may begin with a mark all the same."""
+    return codecs.lookup(encoding).name == "utf-8"
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """The cells of the columns asked for.
+
+    Parameters
+    ----------
+    numbers : mapping of str to ndarray, shape (rows,)
+        By quantity; NaN where the cell is not a number.
+    rows : ndarray of int, shape (rows,)
+        The number of each row in the file.
+    words : dict
+        Cells that are not numbers, by row and quantity.
+    notes : tuple of str
+        What was found in the file.
+    """
+
+    numbers: Mapping[str, FloatArray]
+    rows: NDArray[np.int64]
+    words: Words
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Head:
+    """A line that may be the header."""
+
+    row: int
+    names: list[str]
+    delimiter: str
+
+    def found(self, columns: Mapping[str, Column]) -> int:
+        """Return how many of the columns it has."""
+        return sum(column.name in self.names for column in columns.values())
+
+
+def read_cells(path: Path, columns: Mapping[str, Column], form: TextFormat) -> Cells:
+    """Read the named columns of a text table.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    columns : mapping of str to Column
+        The columns, by quantity.
+    form : TextFormat
+        How the table is written.
+
+    Returns
+    -------
+    Cells
+        In the units of the table.
+
+    Raises
+    ------
+    RecordError
+        If the file cannot be read or has no such columns; the message names file and row.
+    """
+    lines = _lines(path, form.encoding)
+    head = _head(path, lines, columns, form)
+    places = _places(path, head, columns)
+    notes = [f"the header is row {head.row}; the rows above are not read"] if head.row > 1 else []
+    rows = _rows(path, lines, head, form)
+    first = next(rows, None)
+    if first is not None and (said := _units(path, first, columns, places)):
+        notes.append(said)
+    elif first is not None:
+        rows = chain([first], rows)
+    numbers: list[int] = []
+    found: dict[str, list[float]] = {quantity: [] for quantity in columns}
+    words: Words = {}
+    for number, row in rows:
+        numbers.append(number)
+        for quantity, place in places.items():
+            try:
+                found[quantity].append(_number(row[place], form.decimal))
+            except ValueError:
+                found[quantity].append(math.nan)
+                words[number, quantity] = cut(row[place])
+    if len(numbers) < 2:
+        raise RecordError(
+            f"{len(numbers)} row(s) of data", place=str(path), advice="at least 2 are needed"
+        )
+    values = {quantity: np.array(each) for quantity, each in found.items()}
+    return Cells(values, np.array(numbers), words, tuple(notes))
+
+
+# --------------------------------------------------------------------------- lines
+def _lines(path: Path, encoding: str | None) -> Lines:
+    """Yield lines of bounded length, so that a single line cannot fill the memory."""
+    found, number = _encoding_of(path), 0
+    known = found if encoding is None or _is_utf_8(encoding) else encoding
+    try:
+        # Bytes that are no text become surrogates, so that the line they are in can be named.
+        with path.open(encoding=known, errors="surrogateescape") as text:
+            while line := text.readline(LONGEST_LINE + 1):
+                number += 1
+                _check_line(path, number, line, known)
+                yield number, line
+    except OSError as error:
+        raise RecordError(f"cannot be read ({error.strerror})", place=str(path)) from None
+    except UnicodeError:  # of an encoding with several bytes to a character
+        raise _no_text(path, f"a line after line {number}", known) from None
+
+
+def _encoding_of(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return MARKS.get(file.read(2), "utf-8-sig")
+    except FileNotFoundError:
+        raise RecordError(
+            "no such file", place=str(path), advice="check the name and the folder"
+        ) from None
+    except OSError as error:
+        raise RecordError(f"cannot be read ({error.strerror})", place=str(path)) from None
+    except ValueError:  # it has a null in it
+        raise RecordError("this is not a file name", place=shown(str(path))) from None
+
+
+def _check_line(path: Path, number: int, line: str, encoding: str) -> None:
+    if len(line) > LONGEST_LINE:
+        raise RecordError(
+            f"line {number} is longer than {LONGEST_LINE} characters",
+            place=str(path),
+            advice="this is not a table with one row per line",
+        )
+    if number > LONGEST_FILE:
+        raise RecordError(
+            f"more than {LONGEST_FILE} rows",
+            place=str(path),
+            advice="reduce the number of rows first",
+        )
+    if "\0" in line:
+        raise RecordError(
+            f"line {number} contains binary data",
+            place=str(path),
+            advice="give a text table (CSV or TSV); if it is UTF-16 without a byte order mark, "
+            'give encoding = "utf-16-le"',
+        )
+    if not line.isascii() and any("\udc80" <= each <= "\udcff" for each in line):
+        raise _no_text(path, f"line {number}", encoding)
+
+
+def _no_text(path: Path, where: str, encoding: str) -> RecordError:
+    name = "UTF-8" if encoding == "utf-8-sig" else encoding
+    return RecordError(
+        f"{where} is not {name} text",
+        place=str(path),
+        advice='save the table as UTF-8 CSV, or give its encoding, for example encoding = "cp1252" '
+        '(Windows) or encoding = "latin-1"',
+    )
+
+
+# --------------------------------------------------------------------------- the header
+def _head(path: Path, lines: Lines, columns: Mapping[str, Column], form: TextFormat) -> _Head:
+    """Return the header; if there is none, the line that has most of the columns."""
+    best: _Head | None = None
+    for number, line in lines:
+        if form.header is not None and number < form.header:
+            continue
+        for head in _readings(number, line, form):
+            if best is None or head.found(columns) > best.found(columns):
+                best = head
+            if head.found(columns) == len(columns):
+                return head
+        if number in (SEARCHED, form.header):
+            break
+    if best is None:
+        what = "the file is empty" if form.header is None else f"there is no row {form.header}"
+        raise RecordError(what, place=str(path), advice="a row must contain the column names")
+    return best
+
+
+def _readings(number: int, line: str, form: TextFormat) -> Iterator[_Head]:
+    """Yield the ways to read a line as a header; that of a program may be a comment."""
+    if not line.strip():
+        return
+    texts = [line]
+    if form.commented(line):
+        mark = max((m for m in form.comment if line.lstrip().startswith(m)), key=len)
+        texts.insert(0, line.lstrip().removeprefix(mark))
+    for text in texts:
+        likely = sorted(DELIMITERS, key=lambda each: each == " " or -text.count(each))
+        for delimiter in [form.delimiter] if form.delimiter else likely:
+            names = [name.strip() for name in next(form.cells([text], delimiter), [])]
+            while names and not names[-1]:  # a separator at the end
+                names.pop()
+            yield _Head(number, names, delimiter)
+
+
+def _places(path: Path, head: _Head, columns: Mapping[str, Column]) -> dict[str, int]:
+    for quantity, column in columns.items():
+        if head.names.count(column.name) != 1:
+            what = "no column" if column.name not in head.names else "several columns"
+            or_none = "" if quantity == "time" else " or None"
+            advice = (
+                f"name the right one: {quantity} = {{ column = ..., unit = ... }} in a scenario, "
+                f"{quantity}=(name, unit){or_none} in Python"
+            )
+            if len(head.names) == 1:
+                advice = "if these are several columns, give their separator: delimiter = ..."
+            if not head.found(columns):
+                advice += "; if the names are in another row, give its number: header = ..."
+            raise RecordError(
+                f"{what} {shown(column.name)} (for {quantity})",
+                place=str(path),
+                advice=f"columns in row {head.row}: "
+                f"{cut(', '.join(map(repr, head.names)), 1000)}; {advice}",
+            )
+    return {quantity: head.names.index(column.name) for quantity, column in columns.items()}
+
+
+# --------------------------------------------------------------------------- rows
+def _rows(
+    path: Path, lines: Lines, head: _Head, form: TextFormat
+) -> Iterator[tuple[int, list[str]]]:
+    """Yield the rows below the header with their numbers."""
+    taken: list[int] = []  # lines of the row that is being read: a quoted cell may span several
+
+    def counted() -> Iterator[str]:
+        for number, line in lines:
+            if not form.commented(line):
+                taken.append(number)
+                yield line
+
+    rows = form.cells(counted(), head.delimiter)
+    last = empty = 0  # the last row with cells, and the first empty one below it
+    while True:
+        taken.clear()
+        try:
+            row = next(rows, None)
+        except csv.Error as error:
+            raise RecordError(
+                f"row {min(taken)} cannot be read ({error})", place=str(path)
+            ) from None
+        if row is None:
+            return
+        number = min(taken)
+        if not any(cell.strip() for cell in row):
+            empty = empty or number
+            continue
+        if empty and last:  # the table may end here, and another one begin
+            raise RecordError(f"row {empty} is empty", place=str(path), advice="remove it")
+        last, empty = number, 0
+        columns = len(head.names)
+        if len(row) < columns or any(cell.strip() for cell in row[columns:]):
+            raise RecordError(
+                f"row {number} has {len(row)} cells, but the header has {columns}",
+                place=str(path),
+                advice="make them equal, or give the separator of the columns: delimiter = ...; "
+                'numbers with a decimal comma need another separator, and decimal = ","',
+            )
+        yield number, row
+
+
+def _number(text: str, decimal: str) -> float:
+    if "_" in text:  # 0.0_3 is a number in Python, but not in a record
+        raise ValueError
+    if decimal == ",":
+        if "." in text:  # 1.234,5 or a point after all: not to be guessed
+            raise ValueError
+        text = text.replace(",", ".")
+    return float(text)
+
+
+def _units(
+    path: Path,
+    first: tuple[int, list[str]],
+    columns: Mapping[str, Column],
+    places: Mapping[str, int],
+) -> str:
+    """Return a note if the first row below the header holds units; empty if it does not."""
+    number, row = first
+    cells = {
+        quantity: row[place].strip().strip("[]()").strip() for quantity, place in places.items()
+    }
+    known = {unit for units in FACTORS.values() for unit in units}
+    if not any(plain(cell) in known for cell in cells.values()) or any(
+        map(_is_number, cells.values())
+    ):
+        return ""
+    for quantity, cell in cells.items():
+        column = columns[quantity]
+        other = plain(cell) in known and plain(cell) != plain(column.unit)
+        if other:
+            raise RecordError(
+                f"row {number} gives the unit {shown(cell)} for column {shown(column.name)}, but "
+                f"{quantity} is read in {shown(column.unit)}",
+                place=str(path),
+                advice="give the right unit, or correct the row",
+            )
+    return f"row {number} is a line of units: {', '.join(cells.values())}"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        _number(text.replace(",", "."), ".")
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,436 @@
+"""Measured records: from text tables, arrays and data frames, in SI units.
+
+Every row used must be complete and in time order; what was left out or filled is noted.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gms_fsm._arguments import checked_kind, checked_path
+from gms_fsm.charts.parameters import FloatArray, checked_scalar
+from gms_fsm.errors import RecordError, cut, shown
+from gms_fsm.records._columns import QUANTITIES, Column, ColumnLike, columns_of
+from gms_fsm.records._selection import FEWEST, Origin, selected
+from gms_fsm.records._table import TextFormat, read_cells
+from gms_fsm.records.motion import Motion, motion_of
+
+__all__ = ["Column", "Record"]
+
+Missing = Literal["error", "drop", "interpolate"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Record:
+    """A measured record in SI units, made by `from_csv`, `from_arrays` or `from_dataframe`.
+
+    Parameters
+    ----------
+    name : str
+        For tables and messages; of a file its name without the ending.
+    columns : mapping of str to ndarray, shape (rows,)
+        ``time`` and any of ``position``, ``velocity``, ``force``, ``normal``; read-only.
+    chosen : ndarray of bool, shape (rows,)
+        The selected rows; the motion runs from the first to the last of them.
+    rows : ndarray of int, shape (rows,)
+        Number of each row: in a file the first line is 1, in arrays the first index is 0.
+    notes : tuple of str
+        Notes for the user: gaps, rows left out, cells filled.
+    path : Path, optional
+        The file.
+    licence : str, optional
+        Under which the data may be used, and whose they are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0.0, 10.0, 0.01)
+    >>> record = Record.from_arrays(time=t, position=1e-3 * np.sin(t), force=np.cos(t), name="rig")
+    >>> record
+    <Record 'rig': 1000 rows, 9.99 s, position, force>
+    >>> record.between(0.0, 5.0)
+    <Record 'rig': 500 rows, 4.99 s, position, force>
+    >>> round(float(record.motion().velocity.max()), 6)
+    0.001
+    """
+
+    name: str
+    columns: Mapping[str, FloatArray]
+    chosen: NDArray[np.bool_]
+    rows: NDArray[np.int64]
+    notes: tuple[str, ...] = ()
+    path: Path | None = None
+    licence: str = ""
+
+    def __len__(self) -> int:
+        return int(self.columns["time"].size)
+
+    def __repr__(self) -> str:
+        time = self.columns["time"]
+        count = int(self.chosen.sum())
+        chosen = f" ({count} selected)" if count < len(self) else ""
+        held = ", ".join(name for name in QUANTITIES if name in self.columns and name != "time")
+        return (
+            f"<Record {cut(repr(self.name))}: {len(self)} rows{chosen}, "
+            f"{float(np.ptp(time)):.6g} s, {held}>"
+        )
+
+    @property
+    def place(self) -> str:
+        """Where it comes from, for messages: the file, or its name."""
+        return f"record {shown(self.name)}" if self.path is None else str(self.path)
+
+    @cached_property
+    def _motions(self) -> dict[float | None, Motion]:
+        """The motions made so far: a fit asks for the same one in each of its runs."""
+        return {}
+
+    def motion(self, smoothing: float | None = None) -> Motion:
+        """Return the motion, from positions by a smoothing spline; computed once.
+
+        Parameters
+        ----------
+        smoothing : float, optional
+            As in `gms_fsm.records.motion.motion_of`, s.
+
+        Returns
+        -------
+        Motion
+            Time, velocity and position at the rows of the record.
+
+        Raises
+        ------
+        RecordError
+            If there is neither position nor velocity, or the smoothing does not suit the record.
+        """
+        if smoothing is not None:
+            smoothing = checked_scalar("smoothing", smoothing, "finite")
+        if smoothing not in self._motions:
+            self._motions[smoothing] = motion_of(self, smoothing)
+        return self._motions[smoothing]
+
+    def between(self, t0: float | None = None, t1: float | None = None) -> Record:
+        """Return the rows with ``t0 <= time < t1``; parts side by side have no row in common.
+
+        Parameters
+        ----------
+        t0, t1 : float, optional
+            Times of the record, s; by default its start, and its end with the last row.
+
+        Returns
+        -------
+        Record
+            With the same name and notes.
+
+        Raises
+        ------
+        RecordError
+            If fewer than 5 rows are left, or none that is selected.
+        """
+        time = self.columns["time"]
+        start = -np.inf if t0 is None else checked_scalar("t0", t0, "finite")
+        end = np.inf if t1 is None else checked_scalar("t1", t1, "finite")
+        kept = (time >= start) & (time < end)
+        if kept.sum() < FEWEST or not (kept & self.chosen).any():
+            asked = f"from {'its start' if t0 is None else f'{start:g} s'} to "
+            asked += "its end" if t1 is None else f"{end:g} s"
+            raise RecordError(
+                f"{int((kept & self.chosen).sum())} selected row(s) of {int(kept.sum())} {asked}",
+                place=self.place,
+                advice=f"at least {FEWEST} are needed; the record is from {time.min():g} s to "
+                f"{time.max():g} s",
+            )
+        return replace(
+            self,
+            columns={name: _fixed(value[kept]) for name, value in self.columns.items()},
+            chosen=_fixed(self.chosen[kept]),
+            rows=_fixed(self.rows[kept]),
+        )
+
+    # ----------------------------------------------------------------------- sources
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        time: ColumnLike = "t_s",
+        position: ColumnLike | None = ("x_mm", "mm"),
+        velocity: ColumnLike | None = None,
+        force: ColumnLike | None = ("F_N", "N"),
+        normal: ColumnLike | None = None,
+        where: str = "",
+        missing: Missing = "error",
+        delimiter: str | None = None,
+        decimal: Literal[".", ","] = ".",
+        comment: str | Sequence[str] = ("#", "%"),
+        header: int | None = None,
+        encoding: str | None = None,
+        name: str | None = None,
+    ) -> Record:
+        r"""Read a CSV or TSV table.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        time, position, velocity, force, normal : str, tuple or Column, optional
+            The column of each quantity: its name (the unit is that of SI), ``(name, unit)`` or
+            ``(name, unit, sign)`` with a sign of -1 to reverse it. None if there is no such column.
+        where : str, optional
+            Condition on the quantities that selects rows, for example ``"normal > 4.5 N"``. It is
+            evaluated first: a cell in a row that is not selected need not be a number.
+        missing : {"error", "drop", "interpolate"}
+            What to do where a cell is empty or NaN in a row that is used: refuse it, leave the row
+            out, or interpolate in time. The last two are noted.
+        delimiter : str, optional
+            One character; by default tab, semicolon, comma, bar or space, whichever gives the named
+            columns.
+        decimal : {".", ","}
+            The decimal separator.
+        comment : str or sequence of str
+            What comment lines begin with.
+        header : int, optional
+            The row of the column names, the first line of the file being 1; by default the first
+            row that has those of all quantities. Rows above it are not read. A line of units below
+            it is compared with the units given.
+        encoding : str, optional
+            By default UTF-8, or UTF-16 if the file says so by a byte order mark.
+        name : str, optional
+            By default the name of the file without its ending.
+
+        Returns
+        -------
+        Record
+            The record in SI units, from the first to the last selected row, without unselected rows
+            that have no time or no position.
+
+        Raises
+        ------
+        RecordError
+            If the file is missing or not text, a column is missing, a cell is not a finite number,
+            time decreases, or no row is selected. The message names file, row, column and what to
+            do.
+        UnitError
+            If a unit is unknown or belongs to another quantity.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> path = Path(tempfile.mkdtemp()) / "rig.csv"
+        >>> rows = [f"{0.01 * i:.2f};{0.5 * i}".replace(".", ",") for i in range(5)]
+        >>> _ = path.write_text("\n".join(["Rig 4", "Zeit;Weg", "[s];[mm]", *rows]))
+        >>> record = Record.from_csv(
+        ...     path, time="Zeit", position=("Weg", "mm"), force=None, decimal=","
+        ... )
+        >>> record.columns["position"].tolist()
+        [0.0, 0.0005, 0.001, 0.0015, 0.002]
+        >>> for note in record.notes:
+        ...     print(note)
+        the header is row 2; the rows above are not read
+        row 3 is a line of units: s, mm
+        """
+        given = {"time": time, "position": position, "velocity": velocity}
+        columns = columns_of(given | {"force": force, "normal": normal})
+        file = checked_path("path", path)
+        if "time" not in columns:
+            raise RecordError(
+                "no column is given for 'time'", place=str(file), advice="give time = ..."
+            )
+        form = TextFormat.of(delimiter, decimal, comment, header, encoding)
+        cells = read_cells(file, columns, form)
+        origin = Origin(str(file), {quantity: each.name for quantity, each in columns.items()})
+        values = {
+            quantity: column.in_si(quantity, cells.numbers[quantity])
+            for quantity, column in columns.items()
+        }
+        part = selected(origin, values, cells.rows, cells.words, where, missing)
+        notes = (*cells.notes, *part.notes)
+        called = file.stem if name is None else checked_kind("name", name, str, "a text")
+        return cls(called, part.columns, part.chosen, part.rows, notes, file)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        *,
+        time: ArrayLike,
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        force: ArrayLike | None = None,
+        normal: ArrayLike | None = None,
+        missing: Missing = "error",
+        name: str = "arrays",
+    ) -> Record:
+        """Make a record from arrays in SI units.
+
+        Parameters
+        ----------
+        time : array_like, shape (rows,)
+            Increasing, s.
+        position, velocity : array_like, shape (rows,), optional
+            m and m/s; at least one of them is needed.
+        force, normal : array_like, shape (rows,), optional
+            Measured friction and normal force, N.
+        missing : {"error", "drop", "interpolate"}
+            What to do with NaN, as in `from_csv`.
+        name : str
+            For tables and messages.
+
+        Returns
+        -------
+        Record
+            With copies of the arrays.
+
+        Raises
+        ------
+        RecordError
+            If an array has another length, an entry is not finite, time does not increase, or there
+            are fewer than 5 rows; the message names array and index.
+
+        Examples
+        --------
+        >>> Record.from_arrays(time=[0, 1, 2, 3, 3], position=[0, 1, 2, 3, 4])
+        Traceback (most recent call last):
+        gms_fsm.errors.RecordError: record 'arrays': time does not increase after index 3 (index 3: 3.0 s, next: 3.0 s); sort the rows and remove duplicates
+        """  # noqa: E501 (a message is one line)
+        given = {"time": time, "position": position, "velocity": velocity}
+        given |= {"force": force, "normal": normal}
+        checked_kind("name", name, str, "a text")
+        place = f"record {shown(name)}"
+        if position is None and velocity is None:
+            raise RecordError(
+                "neither position nor velocity is given", place=place, advice="give one of them"
+            )
+        values = {
+            quantity: _numbers(place, quantity, each)
+            for quantity, each in given.items()
+            if each is not None or quantity == "time"
+        }
+        origin = Origin(place, {quantity: quantity for quantity in values}, "arrays")
+        return cls._from_numbers(origin, values, "", missing, name)
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        frame: Any,
+        *,
+        time: ColumnLike = "t_s",
+        position: ColumnLike | None = ("x_mm", "mm"),
+        velocity: ColumnLike | None = None,
+        force: ColumnLike | None = ("F_N", "N"),
+        normal: ColumnLike | None = None,
+        where: str = "",
+        missing: Missing = "error",
+        name: str = "frame",
+    ) -> Record:
+        """Make a record from a pandas DataFrame.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+            Or another table with ``columns`` and ``frame[name]``.
+        time, position, velocity, force, normal, where, missing
+            As in `from_csv`.
+        name : str
+            For tables and messages.
+
+        Returns
+        -------
+        Record
+            In SI units.
+
+        Raises
+        ------
+        RecordError
+            As in `from_csv`; rows count from 0.
+        """
+        given = {"time": time, "position": position, "velocity": velocity}
+        columns = columns_of(given | {"force": force, "normal": normal})
+        checked_kind("name", name, str, "a text")
+        place = f"record {shown(name)}"
+        if "time" not in columns:
+            raise RecordError(
+                "no column is given for 'time'", place=place, advice="give time = ..."
+            )
+        values = {
+            quantity: column.in_si(quantity, _frame_column(place, frame, quantity, column))
+            for quantity, column in columns.items()
+        }
+        names = {quantity: column.name for quantity, column in columns.items()}
+        return cls._from_numbers(Origin(place, names, "frame"), values, where, missing, name)
+
+    @classmethod
+    def _from_numbers(
+        cls, origin: Origin, values: dict[str, FloatArray], where: str, missing: str, name: str
+    ) -> Record:
+        size = values["time"].size
+        for quantity, value in values.items():
+            if value.size != size:
+                raise RecordError(
+                    f"{quantity} has {value.size} entries, but time has {size}",
+                    place=origin.place,
+                    advice="give arrays of one length",
+                )
+        if not size:
+            raise RecordError("time is empty", place=origin.place, advice="give some rows")
+        part = selected(origin, values, np.arange(size), {}, where, missing)
+        return cls(name, part.columns, part.chosen, part.rows, tuple(part.notes))
+
+
+def _fixed(array: Any) -> Any:
+    array.flags.writeable = False
+    return array
+
+
+def _numbers(place: str, quantity: str, given: Any) -> FloatArray:
+    """Return a copy as floats; masked entries become NaN."""
+    try:
+        found = np.asarray(given)
+        if found.dtype.kind not in "iufO":  # dates would silently become nanoseconds
+            raise TypeError(f"its entries are of type {found.dtype}")
+        values: FloatArray = np.array(found, dtype=float)
+        if np.ma.isMaskedArray(given):
+            values[np.ma.getmaskarray(given)] = np.nan
+    except (TypeError, ValueError, OverflowError) as error:
+        raise RecordError(
+            f"{quantity} is not an array of numbers ({cut(str(error))})",
+            place=place,
+            advice="give real numbers in SI units, of time seconds since its start",
+        ) from None
+    if values.ndim != 1:
+        raise RecordError(
+            f"{quantity} has the shape {values.shape}",
+            place=place,
+            advice="give one number for each row, shape (rows,)",
+        )
+    return values
+
+
+def _frame_column(place: str, frame: Any, quantity: str, column: Column) -> FloatArray:
+    try:
+        names = list(frame.columns)
+        found = frame[column.name] if names.count(column.name) == 1 else None
+    except (AttributeError, TypeError, KeyError, ValueError):
+        raise RecordError(
+            f"a {type(frame).__name__} is not a table of columns",
+            place=place,
+            advice="give a pandas DataFrame, or use Record.from_arrays",
+        ) from None
+    if found is None:
+        what = "several columns" if column.name in names else "no column"
+        raise RecordError(
+            f"{what} {shown(column.name)} (for {quantity})",
+            place=place,
+            advice=f"columns: {cut(', '.join(map(repr, names)), 1000)}; name the right one: "
+            f"{quantity}=(name, unit)" + (", or None" if quantity != "time" else ""),
+        )
+    if getattr(getattr(found, "dtype", None), "na_value", None) is not None:  # a nullable column
+        found = found.to_numpy(dtype=float, na_value=np.nan)
+    return _numbers(place, f"column {shown(column.name)}", found)

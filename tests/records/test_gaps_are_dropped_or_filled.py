@@ -1,0 +1,116 @@
+"""Empty cells and NaN are refused, left out or interpolated, as asked, and the notes count them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gms_fsm import Record, RecordError
+
+ROWS = 30
+T = 0.5 * np.arange(ROWS)
+LINE = {"time": T, "position": 3.0 * T - 1.0, "force": 2.0 - 0.25 * T}  # exact in binary
+
+
+def read(tmp_path: Path, holes: dict[str, list[int]], empty: str = "", **options: Any) -> Record:
+    """Read the table with holes in some rows, counted from 0."""
+    lines = ["t,x,F"]
+    for i in range(ROWS):
+        cells = [
+            empty if i in holes.get(name, []) else repr(float(v[i])) for name, v in LINE.items()
+        ]
+        lines.append(",".join(map(str, cells)))
+    (tmp_path / "rig.csv").write_text("\n".join(lines))
+    return Record.from_csv(tmp_path / "rig.csv", time="t", position="x", force="F", **options)
+
+
+@pytest.mark.parametrize("empty", ["", " ", "nan", "NaN"])
+def test_without_the_option_the_row_is_named_with_what_to_do(tmp_path: Path, empty: str) -> None:
+    said = r"row 7, column 'x'.*or give missing = \"drop\" or \"interpolate\""
+    with pytest.raises(RecordError, match=said):
+        read(tmp_path, {"position": [5]}, empty)
+
+
+@pytest.mark.parametrize("empty", ["", " ", "nan"])
+def test_rows_are_left_out(tmp_path: Path, empty: str) -> None:
+    record = read(tmp_path, {"position": [5], "force": [8, 9]}, empty, missing="drop")
+    for name, values in LINE.items():
+        np.testing.assert_array_equal(record.columns[name], np.delete(values, [5, 8, 9]))
+    assert record.notes == ("3 row(s) with an empty cell or NaN are left out, rows 7, 10, 11",)
+    assert 7 not in record.rows
+
+
+def test_a_long_hole_is_noted_as_a_gap(tmp_path: Path) -> None:
+    record = read(tmp_path, {"force": list(range(10, 18))}, missing="drop")
+    assert "8 row(s)" in record.notes[0]
+    assert "rows 12, 13, 14, 15, 16 and 3 more" in record.notes[0]
+    assert "1 gap(s) in time" in record.notes[1]
+    assert "after row 11" in record.notes[1]
+
+
+@pytest.mark.parametrize("empty", ["", " ", "nan"])
+def test_cells_are_interpolated_in_time(tmp_path: Path, empty: str) -> None:
+    record = read(tmp_path, {"position": [5, 6], "force": [6]}, empty, missing="interpolate")
+    for name, values in LINE.items():  # a line is met exactly
+        np.testing.assert_array_equal(record.columns[name], values)
+    assert record.notes == ("3 empty cell(s) or NaN are interpolated in time, rows 7, 8",)
+
+
+def test_interpolation_follows_the_times_not_the_rows() -> None:
+    time = np.array([0.0, 1.0, 4.0, 5.0, 6.0, 7.0])
+    force = np.array([0.0, np.nan, 8.0, 0.0, 0.0, 0.0])
+    record = Record.from_arrays(time=time, position=time, force=force, missing="interpolate")
+    assert record.columns["force"].tolist() == [0.0, 2.0, 8.0, 0.0, 0.0, 0.0]
+    assert "index 1" in record.notes[0]
+
+
+@pytest.mark.parametrize("holes", [[0, 1], [ROWS - 1]])
+def test_nothing_is_extrapolated(tmp_path: Path, holes: list[int]) -> None:
+    with pytest.raises(RecordError, match=r"column 'F': empty or NaN at an end.*where = .*drop"):
+        read(tmp_path, {"force": holes}, missing="interpolate")
+    assert len(read(tmp_path, {"force": holes}, missing="drop")) == ROWS - len(holes)
+
+
+def test_a_time_is_not_interpolated(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match="row 7, column 't': not a finite number"):
+        read(tmp_path, {"time": [5]}, missing="interpolate")
+    assert len(read(tmp_path, {"time": [5]}, missing="drop")) == ROWS - 1
+
+
+@pytest.mark.parametrize("missing", ["drop", "interpolate"])
+@pytest.mark.parametrize("cell", ["off", "inf", "1,5", "-"])
+def test_anything_else_is_refused_as_before(tmp_path: Path, missing: str, cell: str) -> None:
+    text = "t;x;F\n" + "".join(f"{i};{i};{i}\n" for i in range(9)) + f"9;9;{cell}\n"
+    (tmp_path / "rig.csv").write_text(text)
+    columns: Any = {"time": "t", "position": "x", "force": "F", "missing": missing}
+    with pytest.raises(RecordError, match="row 11, column 'F'"):
+        Record.from_csv(tmp_path / "rig.csv", **columns)
+
+
+def test_gaps_in_rows_that_are_not_selected_are_no_matter(tmp_path: Path) -> None:
+    for missing in ("error", "drop", "interpolate"):
+        record = read(tmp_path, {"force": [12]}, where="force < 1e9", missing=missing)
+        assert (len(record), int(record.chosen.sum())) == (ROWS, ROWS - 1)
+        assert not any("interpolated" in note or "empty cell or" in note for note in record.notes)
+
+
+@given(
+    position=st.sets(st.integers(1, ROWS - 2), max_size=12),
+    force=st.sets(st.integers(1, ROWS - 2), max_size=12),
+    missing=st.sampled_from(["drop", "interpolate"]),
+)
+def test_any_holes(position: set[int], force: set[int], missing: Any) -> None:
+    columns = {name: value.copy() for name, value in LINE.items()}
+    columns["position"][list(position)] = np.nan
+    columns["force"][list(force)] = np.nan
+    record = Record.from_arrays(**columns, missing=missing)
+    holes = sorted(position | force) if missing == "drop" else []
+    for name, values in LINE.items():
+        np.testing.assert_allclose(record.columns[name], np.delete(values, holes), rtol=1e-15)
+    counted = len(holes) or len(position) + len(force)
+    assert [note.split()[0] for note in record.notes[:1]] == ([str(counted)] if counted else [])

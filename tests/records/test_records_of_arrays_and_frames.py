@@ -1,0 +1,233 @@
+"""Arrays and data frames give the record that the same numbers in a file give.
+
+If they cannot, the message names array and index, or column and row.
+"""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import GMSError, Record, RecordError
+from gms_fsm.records import Column
+from tests.scenario_files import table
+
+T = np.arange(40) * 0.25
+X = np.sin(T)
+F = np.cos(3 * T)
+
+
+def same(one: Record, other: Record) -> None:
+    assert one.columns.keys() == other.columns.keys()
+    for name, value in one.columns.items():
+        np.testing.assert_array_equal(value, other.columns[name])
+    np.testing.assert_array_equal(one.chosen, other.chosen)
+
+
+def in_file(tmp_path: Path, **options: Any) -> Record:
+    (tmp_path / "rig.csv").write_text(table(["t_s", "x_mm", "F_N"], T, X, F))
+    return Record.from_csv(tmp_path / "rig.csv", **options)
+
+
+def test_the_default_columns_are_those_of_the_header(tmp_path: Path) -> None:
+    same(in_file(tmp_path), Record.from_arrays(time=T, position=1e-3 * X, force=F))
+
+
+@pytest.mark.parametrize(
+    "force", ["F_N", ("F_N", "N"), ("F_N", "N", 1), Column("F_N", "N")], ids=repr
+)
+def test_a_column_can_be_given_in_four_ways(tmp_path: Path, force: Any) -> None:
+    same(in_file(tmp_path, force=force), in_file(tmp_path))
+
+
+def test_a_sign_reverses(tmp_path: Path) -> None:
+    record = in_file(tmp_path, force=("F_N", "kN", -1))
+    np.testing.assert_array_equal(record.columns["force"], -1e3 * F)
+
+
+@pytest.mark.parametrize("kind", [list, tuple, np.asarray, np.ma.asarray, np.float32])
+def test_anything_like_an_array_is_copied(kind: Any) -> None:
+    rows = [0, 1, 2, 3, 4, 5]
+    record = Record.from_arrays(time=kind(rows), velocity=kind(rows))
+    assert record.columns["velocity"].tolist() == rows
+    assert record.columns["velocity"].dtype == float
+
+
+def test_arrays_are_copied_and_cannot_be_changed() -> None:
+    time = T.copy()
+    record = Record.from_arrays(time=time, position=X)
+    time[0] = 9.0
+    assert record.columns["time"].tolist() == T.tolist()
+    for array in (*record.columns.values(), record.chosen, record.rows):
+        with pytest.raises(ValueError, match="read-only"):
+            array[:] = 0
+
+
+def test_masked_entries_are_gaps() -> None:
+    masked = np.ma.masked_array(F, mask=T == 2.0)
+    with pytest.raises(RecordError, match="force, index 8: not a finite number"):
+        Record.from_arrays(time=T, position=X, force=masked)
+    record = Record.from_arrays(time=T, position=X, force=masked, missing="drop")
+    assert 2.0 not in record.columns["time"]
+
+
+# place -> changed arguments, and what the message must contain
+WRONG: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
+    "no motion": ({"position": None}, ("neither position nor velocity", "give one of them")),
+    "a shorter array": ({"force": F[:-1]}, ("force has 39 entries", "time has 40")),
+    "two dimensions": ({"position": np.ones((40, 2))}, ("position has the shape (40, 2)",)),
+    "one number": ({"force": 1.0}, ("force has the shape ()",)),
+    "no time": ({"time": None}, ("time has the shape ()",)),
+    "words": ({"force": ["a"] * 40}, ("force is not an array of numbers",)),
+    "dates": ({"time": np.arange(40).astype("M8[s]")}, ("time", "datetime64", "seconds since")),
+    "complex numbers": ({"force": F + 0j}, ("force", "complex128", "real numbers")),
+    "lists of different lengths": ({"force": [[1], [1, 2]]}, ("force is not an array",)),
+    "NaN": ({"force": np.where(T == 2, np.nan, F)}, ("force, index 8", "finite", "missing = ")),
+    "infinity": ({"position": np.where(T == 2, np.inf, X)}, ("position, index 8", "finite")),
+    "time back": ({"time": T[::-1]}, ("time does not increase after indices 0, 1", "9.75 s")),
+    "time twice": ({"time": np.where(T == 2, 2.25, T)}, ("after index 8", "2.25 s, next: 2.25")),
+    "four rows": (
+        {"time": T[:4], "position": X[:4], "force": F[:4]},
+        ("only 4 rows", "at least 5"),
+    ),
+    "no rows": ({"time": [], "position": [], "force": []}, ("time is empty",)),
+    "a wrong option": ({"missing": "fill"}, ("missing is 'fill'", "'error', 'drop'")),
+    "a name that is no text": ({"name": 5}, ("name is 5", "a text")),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_what_is_wrong_is_named(wrong: str) -> None:
+    changed, said = WRONG[wrong]
+    with pytest.raises(GMSError) as caught:
+        Record.from_arrays(**{"time": T, "position": X, "force": F, "name": "rig"} | changed)
+    for part in said:
+        assert part in str(caught.value)
+    assert "'rig'" in str(caught.value) or "option" in wrong or "text" in wrong
+
+
+# --------------------------------------------------------------------------- data frames
+@pytest.fixture
+def pandas() -> Any:
+    return pytest.importorskip("pandas", reason="data frames need the extra 'pandas'")
+
+
+def test_a_frame_is_read_as_its_file(tmp_path: Path, pandas: Any) -> None:
+    record = in_file(tmp_path, where="force > 0 N", force=("F_N", "mN", -1))
+    frame = pandas.read_csv(tmp_path / "rig.csv")
+    again = Record.from_dataframe(frame, where="force > 0 N", force=("F_N", "mN", -1), name="a")
+    same(record, again)
+    assert again.name == "a"
+    assert f"{(F < 0).sum()} of 40 rows are selected" in again.notes[0]
+
+
+@pytest.mark.parametrize("kind", ["float64", "Float64", "object"])
+def test_gaps_of_every_kind(pandas: Any, kind: str) -> None:
+    frame = pandas.DataFrame({"t_s": T, "x_mm": X, "F_N": F}, dtype=kind)
+    frame.loc[8, "F_N"] = None
+    with pytest.raises(RecordError, match="row 8, column 'F_N': not a finite number"):
+        Record.from_dataframe(frame)
+    assert len(Record.from_dataframe(frame, missing="drop")) == 39
+
+
+def test_integers_with_gaps(pandas: Any) -> None:
+    frame = pandas.DataFrame({"t_s": T, "x_mm": X, "F_N": np.arange(40)})
+    frame["F_N"] = frame["F_N"].astype("Int64")
+    frame.loc[8, "F_N"] = pandas.NA
+    record = Record.from_dataframe(frame, missing="interpolate")
+    assert record.columns["force"].tolist() == [*range(40)]
+
+
+def test_wrong_frames_are_named(pandas: Any) -> None:
+    frame = pandas.DataFrame({"t_s": T, "x_mm": X, "F": F})
+    with pytest.raises(RecordError, match=r"no column 'F_N' \(for force\); columns: 't_s', 'x_mm'"):
+        Record.from_dataframe(frame)
+    assert len(Record.from_dataframe(frame, force=None)) == 40
+    double = pandas.concat([frame, frame["F"]], axis=1)
+    with pytest.raises(RecordError, match="several columns 'F'"):
+        Record.from_dataframe(double, force="F")
+    frame["t_s"] = pandas.to_datetime(frame["t_s"], unit="s")
+    with pytest.raises(RecordError, match=r"column 't_s' is not an array.*datetime64.*seconds"):
+        Record.from_dataframe(frame, force="F")
+    for wrong in (None, [], {}, "rig.csv", 5, np.ones(3)):
+        with pytest.raises(RecordError, match=r"not a table of columns.*from_arrays"):
+            Record.from_dataframe(wrong)
+    with pytest.raises(RecordError, match="no column is given for 'time'"):
+        Record.from_dataframe(frame, time=None)  # type: ignore[arg-type]
+
+
+# --------------------------------------------------------------------------- what a record can do
+def test_its_name_is_that_of_the_file_or_given(tmp_path: Path) -> None:
+    assert in_file(tmp_path).name == "rig"
+    assert in_file(tmp_path, name="rig 4").name == "rig 4"
+    assert in_file(tmp_path).path == tmp_path / "rig.csv"
+
+
+def test_it_shows_rows_duration_and_quantities(tmp_path: Path) -> None:
+    assert repr(in_file(tmp_path)) == "<Record 'rig': 40 rows, 9.75 s, position, force>"
+    some = in_file(tmp_path, where="time < 2 s or time > 3 s", name="x" * 10_000)
+    assert "40 rows (35 selected), 9.75 s" in repr(some)
+    assert len(repr(some)) < 300
+
+
+def test_parts_side_by_side_share_no_row() -> None:
+    record = Record.from_arrays(time=T, position=X, force=F, name="rig")
+    parts = record.between(None, 5.0), record.between(5.0)
+    for name in record.columns:
+        joined = np.concatenate([part.columns[name] for part in parts])
+        np.testing.assert_array_equal(joined, record.columns[name])
+    assert record.between(1.0, 5.0).columns["time"].tolist() == T[(T >= 1) & (T < 5)].tolist()
+    assert record.between(1.0, 5.0).rows.tolist() == [*range(4, 20)]
+    assert parts[0].name == "rig"
+
+
+def test_a_part_of_a_part_keeps_the_selection(tmp_path: Path) -> None:
+    record = in_file(tmp_path, where="force > 0 N")
+    part = record.between(1.0, 8.0).between(2.0, 7.0)
+    expected = (record.columns["time"] >= 2.0) & (record.columns["time"] < 7.0)
+    np.testing.assert_array_equal(part.chosen, record.chosen[expected])
+
+
+@pytest.mark.parametrize(
+    ("t0", "t1", "said"),
+    [
+        (5.0, 5.0, "0 selected row"),
+        (8.0, 2.0, "from 8 s to 2 s"),
+        (20.0, None, "from 20 s to its end"),
+        (None, 1.0, "4 selected row(s) of 4 from its start to 1 s"),
+        (float("nan"), None, "t0 is nan"),
+        ("a", None, "t0 is 'a'"),
+    ],
+)
+def test_an_empty_part_is_refused(t0: Any, t1: Any, said: str) -> None:
+    record = Record.from_arrays(time=T, position=X, name="rig")
+    with pytest.raises(GMSError) as caught:
+        record.between(t0, t1)
+    assert said in str(caught.value)
+
+
+def test_a_motion_is_computed_once() -> None:
+    record = Record.from_arrays(time=T, position=X)
+    assert record.motion() is record.motion(None)
+    assert record.motion(0.5) is record.motion(0.5)
+    assert record.motion(0.5) is not record.motion()
+    assert record.between(0.0, 5.0).motion().time.size == 20
+
+
+def test_it_can_be_sent_to_another_process() -> None:
+    record = Record.from_arrays(time=T, position=X)
+    again = pickle.loads(pickle.dumps(record))
+    same(record, again)
+    np.testing.assert_array_equal(again.motion().velocity, record.motion().velocity)
+
+
+# --------------------------------------------------------------------------- fit for a fit, or not
+def test_a_constant_record_and_a_short_one_are_records() -> None:
+    """Whether they tell anything is another question."""
+    still = Record.from_arrays(time=T, position=np.ones(40), force=F)
+    assert not still.motion().velocity.any()
+    assert len(Record.from_arrays(time=T[:10], position=X[:10], force=F[:10])) == 10
