@@ -12,7 +12,8 @@
 #   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
 #                reference, 500 systems in all engines; SOAK_MINUTES=10 for each fuzzer
 #   make foreign the widget, driven in JupyterLab and marimo by their own user interfaces, in Chromium,
-#                whole runs of friction in other simulators, and the exports in the tools they are for
+#                whole runs of friction in other simulators, the exports in the tools they are for, and
+#                the tests marked matrix: further sizes, themes and charts
 #   make gallery the pictures in docs/images, shown in docs/gallery.md, and the pages in docs/zoo
 #   make docs    the documentation -> folder site/, which can be opened from disk
 #   make wheel   a wheel -> folder dist/, installed and tested outside the checkout
@@ -81,13 +82,13 @@ paper: $(VENV)/all.stamp
 	$(RUN)/gms-fsm paper -o paper
 
 test: $(VENV)/dev.stamp
-	$(RUN)/python -m pytest -n auto
+	$(RUN)/python -m pytest -n auto -m "not matrix"
 
 quick: $(VENV)/dev.stamp
-	$(RUN)/python -m pytest -n auto -m "not slow"
+	$(RUN)/python -m pytest -n auto -m "not slow and not matrix"
 
 coverage: $(VENV)/dev.stamp
-	$(RUN)/python -m pytest -n auto --cov --cov-report=term
+	$(RUN)/python -m pytest -n auto --cov --cov-report=term -m "not matrix"
 
 lint: $(VENV)/dev.stamp
 	$(RUN)/ruff format --check .
@@ -96,7 +97,7 @@ lint: $(VENV)/dev.stamp
 	$(RUN)/lint-imports
 
 core: .venv-core/stamp
-	.venv-core/bin/python -m pytest -n auto -m "not slow" tests gms_fsm integrators
+	.venv-core/bin/python -m pytest -n auto -m "not slow and not matrix" tests gms_fsm integrators
 
 # transitions; typer and pydantic; llvmlite; scipy; pandas, pyarrow, xarray, distributed; z3; the drawing libraries
 LOWEST_TESTS := callbacks_* command_line* overrides_* scenarios_run machine_code_* compiled_* engines_agree_* scipy_* \
@@ -138,6 +139,7 @@ foreign: $(VENV)/foreign.stamp
 	$(RUN)/python -m pytest tests/foreign/check_*.py
 	$(RUN)/python docs/make_exports.py
 	$(RUN)/python -m tests.foreign
+	$(RUN)/python -m pytest -n auto -m matrix tests
 
 gallery: $(VENV)/dev.stamp
 	$(RUN)/python docs/make_pictures.py

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Collection, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
 from gms_fsm import (
     GMS,
@@ -28,6 +31,17 @@ FASTEST = "compiled" if importlib.util.find_spec("llvmlite") else "ifelse"
 SINE = "0.2*sin(2*pi*t/20)"
 FIG4_SINE = "0.15*sin(2*pi*t/25)"
 FIG3_FORCE = "min(0.25*t, max(0.25, 0.75 - 0.125*t)) + 0.1*sin(2*pi*2*(max(t, 4) - 4))"
+
+
+def matrix(every: Sequence[Any], kept: Collection[Any]) -> list[Any]:
+    """Return values for `pytest.mark.parametrize`; those not kept are left to make foreign."""
+    marks = pytest.mark.matrix
+    return [
+        value
+        if value in kept
+        else pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=marks)
+        for value in every
+    ]
 
 
 def stick_slip(law: str) -> GMS:

@@ -331,21 +331,21 @@ def fired(trace: Trace) -> None:
     event(f"transitions: {count if count < 3 else '3 or more' if count < 10 else '10 or more'}")
 
 
-@hard(120)
+@hard(60)
 @given(chart_models(), rigs(), options(), rounded(1, 5))
 def test_random_charts(model: ChartModel, rig: Any, given: dict[str, Any], t_end: float) -> None:
     trace, end = attempt(model, rig, t_end, **given)
     lawful(trace, end, t_end, given.get("events") != "step")
 
 
-@hard(80)
+@hard(50)
 @given(banks(), rigs(), options(), rounded(2, 8))
 def test_random_banks(model: GMS, rig: Any, given: dict[str, Any], t_end: float) -> None:
     trace, end = attempt(model, rig, t_end, **given)
     lawful(trace, end, t_end, given.get("events") != "step")
 
 
-@hard(60)
+@hard(40)
 @given(banks(), rigs(), options(), st.data())
 def test_requested_times_change_nothing(
     model: GMS, rig: Any, given: dict[str, Any], data: st.DataObject
@@ -364,7 +364,7 @@ def test_requested_times_change_nothing(
 
 
 # --------------------------------------------------------------------------- engines
-@hard(40)
+@hard(25)
 @given(chart_models(), rigs(), options())
 def test_machines_and_ifelse_agree_on_random_charts(
     model: ChartModel, rig: Any, given: dict[str, Any]
@@ -543,7 +543,7 @@ def test_pieces_of_constant_velocity_are_closed_forms(data: st.DataObject, law: 
 
 
 # --------------------------------------------------------------------------- wrong arguments
-@hard(80)
+@hard(50)
 @given(
     chart_models() | banks(),
     rigs(),

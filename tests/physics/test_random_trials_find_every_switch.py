@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 pytest.importorskip("llvmlite", reason="needs the extra fast: the machines take too long for this")
 
-COUNT = 16  # make soak takes 500 of each family
+COUNT = 10  # make soak takes 500 of each family
 
 
 @pytest.mark.parametrize("family", JUDGED)

@@ -21,7 +21,7 @@ from gms_fsm.systems.models import Model, demonstration
 from plots._excitation import excited
 from plots._handout import PAGE, SMALLEST, handout_figure
 from plots._svg_artists import EXACT
-from tests.helpers import bank, stick_slip
+from tests.helpers import bank, matrix, stick_slip
 from tests.plots.printed import drawn_texts, problems
 from tests.plots.systems_to_draw import SCENARIOS
 from tests.scenario_files import CommandLine
@@ -56,7 +56,7 @@ def checked(model: Model) -> set[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "law"), ZOO)
+@pytest.mark.parametrize(("name", "law"), matrix(ZOO, ZOO[::3]))
 def test_charts_of_the_zoo(name: str, law: str) -> None:
     chart = registered()[name].chart(law)
     texts = checked(demonstration(registered()[name], law))

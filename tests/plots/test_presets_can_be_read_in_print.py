@@ -31,7 +31,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.systems.models import demonstration
 from plots import figures, presets
 from plots.presets import PRESETS, Preset
-from tests.helpers import bank, stick_slip
+from tests.helpers import bank, matrix, stick_slip
 from tests.plots.printed import problems
 
 PRINT = [name for name in PRESETS if name != "screen"]
@@ -162,7 +162,10 @@ SCARCE = {"ieee1", "slide"}  # the narrowest page, and the largest type for its 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "preset"),
-    [(n, p) for n in FIGURES for p in PRINT if n not in VARIANTS or p in SCARCE],
+    matrix(
+        [(n, p) for n in FIGURES for p in PRINT if n not in VARIANTS or p in SCARCE],
+        [(n, p) for n in FIGURES for p in SCARCE],
+    ),
 )
 def test_texts_can_be_read(name: str, preset: str) -> None:
     with plots.preset(preset) as sizes:

@@ -15,7 +15,7 @@ import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
 from plots.replay import write_replay
-from tests.helpers import SINE, bank, open_loop, stick_slip
+from tests.helpers import SINE, bank, matrix, open_loop, stick_slip
 from tests.plots.browser import (
     Axe,
     Open,
@@ -355,8 +355,10 @@ def test_all_contacts_of_a_system_have_lines(open_page: Open, tmp_path: Path) ->
         assert name.startswith(contact)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("name", ["mass", "many"])
+EVERY = [(n, scheme) for n in ("mass", "many") for scheme in ("light", "dark")]
+
+
+@pytest.mark.parametrize(("name", "scheme"), matrix(EVERY, [("mass", "light"), ("many", "dark")]))
 def test_axe_finds_no_accessibility_problem(
     open_page: Open, tmp_path: Path, name: str, scheme: str
 ) -> None:

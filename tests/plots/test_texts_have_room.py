@@ -24,6 +24,7 @@ import plots
 from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, Stribeck, Trace, simulate
 from plots import figures
 from plots.style import ROLES, ramp
+from tests.helpers import matrix
 
 COUNTS = [1, 4, 12, 20]
 END = 9.0
@@ -114,7 +115,7 @@ def _unused_ticks(figure: Figure) -> set[int]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", COUNTS)
+@pytest.mark.parametrize("n", matrix(COUNTS, [max(COUNTS)]))
 @pytest.mark.parametrize("name", DRAWN)
 def test_no_text_is_clipped(name: str, n: int) -> None:
     figure = drawn(name, n)

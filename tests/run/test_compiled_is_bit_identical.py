@@ -340,7 +340,7 @@ METHODS = st.sampled_from(["dp45", "bs23", "rk4", "heun", "euler"])
 
 
 @pytest.mark.slow
-@settings(max_examples=24, deadline=None, derandomize=True)
+@settings(max_examples=12, deadline=None, derandomize=True)
 @given(_banks(), METHODS, st.floats(0.05, 1.0), st.sampled_from(["located", "step"]))
 def test_random_banks_open_loop(model: GMS, method: str, level: float, events: str) -> None:
     ramps = [(0.0, 0.0), (1.0, level), (2.0, -level), (2.0, level), (3.0, -0.5 * level)]
@@ -353,7 +353,7 @@ def test_random_banks_open_loop(model: GMS, method: str, level: float, events: s
 
 
 @pytest.mark.slow
-@settings(max_examples=16, deadline=None, derandomize=True)
+@settings(max_examples=8, deadline=None, derandomize=True)
 @given(_banks(), METHODS, st.floats(0.5, 5.0), st.sampled_from(["all", "end"]))
 def test_random_banks_closed_loop(model: GMS, method: str, stiffness: float, output: str) -> None:
     """The published law slides occasionally: both engines alike."""
