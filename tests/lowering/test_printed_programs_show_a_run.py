@@ -5,6 +5,7 @@ With a number of steps given, they are those of `simulate` with Euler's method, 
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from tests.scenario_files import CommandLine, data_folder
 
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
 FAST = ("gms-signed", "servo")
+NAMED = os.environ.get("GMS_FSM_DATA", "")
 LAWS = {
     "-".join(filter(None, (each.name, law))): (each.name, law)
     for each in registered().values()
@@ -75,6 +77,8 @@ def test_every_shipped_scenario(
     name: str, gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if name == "tribometer":
+        if NAMED:  # the command line of the tests does without
+            monkeypatch.setenv("GMS_FSM_DATA", NAMED)
         monkeypatch.setenv("GMS_FSM_DATA", str(data_folder()))
     path = printed(gms_fsm, str(ROOT / "scenarios" / f"{name}.toml"))
     end = load_scenario(ROOT / "scenarios" / f"{name}.toml").arguments["t_end"]
