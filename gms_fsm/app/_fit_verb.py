@@ -1,0 +1,78 @@
+"""The verb fit: parameters from the record of a scenario."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gms_fsm.app._console import note
+from gms_fsm.app._options import INTERRUPTED, Overrides, PresetName, ScenarioFile
+
+if TYPE_CHECKING:
+    from gms_fsm.identification.result import Fit
+
+__all__ = ["fit_command"]
+
+
+def fit_command(
+    scenario: ScenarioFile,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Output folder; out/<name>-fit by default."),
+    ] = None,
+    overrides: Overrides = None,
+    preset: PresetName = "screen",
+) -> None:
+    """Fit the model of a scenario to its record; write a report and a scenario that runs."""
+    import plots
+    from gms_fsm.app.fits import load_fit
+    from gms_fsm.identification.report import write_report
+
+    task = load_fit(scenario, overrides or [])
+    folder = Path("out") / f"{scenario.stem}-fit" if output is None else output
+    for each in task.notes:
+        note(each)
+    with plots.preset(preset):
+        try:
+            found = task.run()
+        except KeyboardInterrupt:
+            note("interrupted before the first run had ended; nothing was written")
+            raise typer.Exit(INTERRUPTED) from None
+        _print(found)
+        page = write_report(found, folder)
+    typer.echo(f"{found.runs} runs in {found.seconds:.3g} s; start with {page}")
+    if found.stopped:
+        note(found.stopped)
+        raise typer.Exit(INTERRUPTED)
+
+
+def _print(found: Fit) -> None:
+    """Print the parameters, what cannot be told, and the scores."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from gms_fsm.identification.report import unit_of
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for head in ("parameter", "value", "95 % interval", "unit", "note"):
+        table.add_column(head, justify="right" if head == "value" else "left", no_wrap=True)
+    for each in found.table:
+        interval = f"{each.low:.5g} to {each.high:.5g}" if each.told else "–"
+        cells = (each.name, f"{each.value:.5g}", interval, each.unit, each.note)
+        table.add_row(*map(Text, cells))
+    Console().print(table)
+    if found.weakest:
+        typer.echo(found.weakest)
+    unit = unit_of(found.measured)
+    for name, score in (("training", found.training), ("held out", found.held_out)):
+        if score is not None:
+            typer.echo(
+                f"{name}: RMSE {score['rmse']:.4g} {unit}, R² {score['r2']:.4f}, "
+                f"{score['rows']:.0f} rows"
+            )
+    if found.floor is not None:
+        typer.echo(f"repeatability: {found.floor:.4g} {unit}")
