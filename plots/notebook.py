@@ -1,4 +1,4 @@
-"""What notebooks show of charts, models, systems, runs, sessions, explanations and checks.
+"""What notebooks show of charts, models, systems, runs, fits, sessions, explanations and checks.
 
 The classes ask here when a notebook shows an object (`gms_fsm._display`). A chart, a model or a
 system is a picture, or its text without Graphviz; a run is its overview, or its contacts if there
@@ -15,10 +15,12 @@ from typing import Any
 
 import graphviz
 import numpy as np
+from gms_fsm.identification.result import Fit
 
 from gms_fsm._display import Form
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import GMSError, MissingExtraError, OutputError
+from gms_fsm.identification.report import model_title, scores_text
 from gms_fsm.inspection._findings import Finding, Report
 from gms_fsm.inspection._results import BranchComparison, Here
 from gms_fsm.inspection.explain import Explanation, Why
@@ -183,6 +185,29 @@ def parameters_html(parameters: GMSParameters) -> str:
     )
 
 
+# --------------------------------------------------------------------------- fits
+def fit_html(fit: Fit) -> str:
+    """Return the parameters of a fit with what cannot be told, its scores, and its figure."""
+    rows = (
+        [each.name, each.value, *([each.low, each.high] if each.told else ["", ""]), each.unit]
+        + [each.note]
+        for each in fit.table
+    )
+    words = table(
+        ["parameter", "value", "95 % from", "to", "unit", "note"],
+        rows,
+        caption=f"{model_title(fit)}: {scores_text(fit)}",
+        more=fit.weakest,
+    )
+    try:
+        from plots.figures import fit_figure
+    except MissingExtraError:
+        return words
+    buffer = BytesIO()
+    fit_figure(fit).savefig(buffer, format="png", dpi=100)
+    return words + image(buffer.getvalue(), "measurement and model, residuals, parameters")
+
+
 # --------------------------------------------------------------------------- sessions
 def session_html(session: Session) -> str:
     """Return where a session is, and its chart there if it has one contact."""
@@ -277,6 +302,7 @@ FORMS: Mapping[tuple[type, Form], Callable[[Any], Any]] = {
         (kind, "html"): verdict_html
         for kind in (ChatteringVerdict, InvariantVerdict, PassivityVerdict, CoverageVerdict)
     },
+    (Fit, "html"): fit_html,
     (Session, "html"): session_html,
     (Here, "html"): text_html,
     (BranchComparison, "html"): text_html,

@@ -28,15 +28,17 @@ def fit_command(
     """Fit the model of a scenario to its record; write a report and a scenario that runs."""
     import plots
     from gms_fsm.app.fits import load_fit
-    from gms_fsm.identification.report import write_report
+    from gms_fsm.identification.fit import fitted
+    from gms_fsm.identification.report import report_folder, write_report
 
-    task = load_fit(scenario, overrides or [])
+    loaded = load_fit(scenario, overrides or [])
     folder = Path("out") / f"{scenario.stem}-fit" if output is None else output
-    for each in task.notes:
+    for each in loaded.notes:
         note(each)
     with plots.preset(preset):
+        report_folder(folder, loaded.inputs)  # before the search, which may take minutes
         try:
-            found = task.run()
+            found = fitted(loaded.task, progress=None)
         except KeyboardInterrupt:
             note("interrupted before the first run had ended; nothing was written")
             raise typer.Exit(INTERRUPTED) from None
@@ -55,7 +57,7 @@ def _print(found: Fit) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from gms_fsm.identification.report import unit_of
+    from gms_fsm.identification.report import scores_text
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for head in ("parameter", "value", "95 % interval", "unit", "note"):
@@ -67,12 +69,4 @@ def _print(found: Fit) -> None:
     Console().print(table)
     if found.weakest:
         typer.echo(found.weakest)
-    unit = unit_of(found.measured)
-    for name, score in (("training", found.training), ("held out", found.held_out)):
-        if score is not None:
-            typer.echo(
-                f"{name}: RMSE {score['rmse']:.4g} {unit}, R² {score['r2']:.4f}, "
-                f"{score['rows']:.0f} rows"
-            )
-    if found.floor is not None:
-        typer.echo(f"repeatability: {found.floor:.4g} {unit}")
+    typer.echo(scores_text(found))

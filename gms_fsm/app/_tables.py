@@ -21,6 +21,7 @@ from pydantic_core import CoreSchema, PydanticKnownError
 from pydantic_core.core_schema import literal_schema
 
 from gms_fsm._records import LIST, ONE, TABLE, TEXT, Numbers, Table
+from gms_fsm.identification._task import Options
 from gms_fsm.records.record import Column, Record
 from gms_fsm.run.settings import ENGINES, EVENTS, Settings
 from gms_fsm.systems._file import SystemFile
@@ -294,12 +295,27 @@ class FitTable(Table):
         None, description="state in which a record begins; by default whichever fits better"
     )
 
-    def options(self) -> dict[str, Any]:
-        """Return the arguments of `gms_fsm.fit`, by name."""
-        given = self.model_dump(exclude_none=True)
-        pairs = {name: tuple(given[name]) for name in ("train", "test") if name in given}
-        bounds = {name: tuple(pair) for name, pair in self.bounds.items()}
-        return given | pairs | {"bounds": bounds}
+    @model_validator(mode="after")
+    def _fits(self) -> FitTable:
+        for name in ("train", "test"):
+            pair = getattr(self, name)
+            if pair is not None and not pair[0] < pair[1]:
+                raise ValueError(f"{name} ends at {pair[1]:g} s, not after its start")
+        return self
+
+    def options(self, smoothing: float | None) -> Options:
+        """Return the options of a fit, with the smoothing of the record."""
+        lists = ("free", "tied", "nuisance", "linear", "train", "test")
+        given = {name: getattr(self, name) for name in lists}
+        return Options(
+            **{name: None if each is None else tuple(each) for name, each in given.items()},
+            **self.model_dump(include={*_KEPT}),
+            bounds={name: (pair[0], pair[1]) for name, pair in self.bounds.items()},
+            smoothing=smoothing,
+        )
+
+
+_KEPT = ("measured", "drive", "cycles", "search", "seed", "most_steps", "begin")
 
 
 class Scenario(Table):

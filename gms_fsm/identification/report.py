@@ -20,10 +20,15 @@ from gms_fsm.errors import MissingExtraError
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
 
-__all__ = ["report_files", "unit_of", "write_report"]
+__all__ = [
+    "model_title",
+    "report_files",
+    "report_folder",
+    "scores_text",
+    "write_report",
+]
 
 PAGE, PARAMETERS, RESIDUALS, FITTED = "report.md", "parameters.csv", "residuals.csv", "fitted.toml"
-UNITS = {"F": "N", "x": "m", "v": "m/s"}
 
 
 def write_report(fit: Fit, folder: str | Path) -> Path:
@@ -56,7 +61,7 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
     place = report_folder(folder, inputs)
     fit.save(place / FITTED)
     residuals = fit.residuals()
-    unit = unit_of(fit.measured)
+    unit = fit.task.measured.unit
     _write_csv(place / PARAMETERS, _parameter_rows(fit.table))
     _write_csv(place / RESIDUALS, _residual_rows(residuals, unit))
     try:
@@ -103,25 +108,45 @@ def report_files() -> list[str]:
     return [PAGE, *formats.files("fit", "figure"), PARAMETERS, RESIDUALS, FITTED]
 
 
-def unit_of(measured: str) -> str:
-    """Return the unit of what a fit compares.
+def model_title(fit: Fit) -> str:
+    """Return the title of the model of a fit, or the name of its system.
 
     Parameters
     ----------
-    measured : str
-        As in `gms_fsm.fit`: ``"F"``, ``"gear.F"``, ``"load.x"`` or ``"load.v"``.
+    fit : Fit
+        The fit.
 
     Returns
     -------
     str
-        ``"N"``, ``"m"`` or ``"m/s"``.
-
-    Examples
-    --------
-    >>> unit_of("gear.F"), unit_of("load.v")
-    ('N', 'm/s')
+        One line.
     """
-    return UNITS.get(measured.rpartition(".")[2], "N")
+    title: str = getattr(fit.model, "title", "") or getattr(fit.model, "name", "")
+    return title
+
+
+def scores_text(fit: Fit) -> str:
+    """Return the scores of a fit in one line: training, held out, repeatability.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit.
+
+    Returns
+    -------
+    str
+        RMSE in the unit of what was compared, and R².
+    """
+    unit = fit.task.measured.unit
+    named = (("training", fit.training), ("held out", fit.held_out))
+    parts = [
+        f"{name} RMSE {score['rmse']:.4g} {unit}, R² {score['r2']:.4f} ({score['rows']:.0f} rows)"
+        for name, score in named
+        if score is not None
+    ]
+    parts += [f"repeatability {fit.floor:.4g} {unit}"] if fit.floor is not None else []
+    return "; ".join(parts)
 
 
 def _draw(fit: Fit, folder: Path) -> list[str]:
@@ -188,13 +213,8 @@ def _head(fit: Fit) -> list[str]:
     names += f" and {more} more" if more > 0 else ""
     lines = [f"# {plain(model_title(fit))}, fitted to {plain(names)}"]
     if fit.stopped:
-        lines += ["", f"**The search was {plain(fit.stopped)}.**"]
+        lines += ["", f"**{plain(fit.stopped)}**"]
     return lines
-
-
-def model_title(fit: Fit) -> str:
-    """Return the title of the model, or the name of the system."""
-    return getattr(fit.model, "title", "") or getattr(fit.model, "name", "")
 
 
 def _parameter_table(fit: Fit) -> list[str]:
@@ -231,7 +251,7 @@ def _doubts(fit: Fit) -> list[str]:
 
 
 def _scores(fit: Fit, residuals: Sequence[Residuals]) -> list[str]:
-    unit = unit_of(fit.measured)
+    unit = fit.task.measured.unit
     named = {"training": fit.training, "held out": fit.held_out}
     rows = [
         [name, f"{score['rmse']:.4g}", f"{score['r2']:.4f}", f"{score['rows']:.0f}"]
@@ -291,7 +311,7 @@ def _done(fit: Fit) -> list[str]:
         return without if window is None else f"{window[0]:g} s <= t < {window[1]:g} s"
 
     lines = [
-        f"- compared: {plain(fit.measured)} [{unit_of(fit.measured)}]",
+        f"- compared: {plain(fit.measured)} [{fit.task.measured.unit}]",
         f"- fitted to: {rows(fit.train, 'all rows')}; held out: {rows(fit.test, 'none')}",
         f"- besides the model: {plain(', '.join(fit.nuisance)) or 'nothing'}",
         f"- each record begins: {plain(fit.begin)}",

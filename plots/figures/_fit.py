@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm._arguments import checked_kind
 from gms_fsm.errors import ParameterError
+from gms_fsm.identification.report import model_title
 from plots._matplotlib import Axes, Figure, rc_context
 from plots._window import Window
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
@@ -32,7 +33,6 @@ LANE = 0.22  # inches: the row of a parameter
 WIDEST = 100.0  # %: a longer interval ends in arrows
 BINS, FEWEST = 40, 5  # of a mean residual over x, and rows in a bin
 MOVING = 0.05  # of the largest speed; slower rows have no direction
-UNITS = {"F": "N", "x": "m", "v": "m/s"}
 DIRECTIONS: tuple[tuple[int, str, dict[str, Any]], ...] = (
     (1, "forward (v > 0)", {"color": INK, "linestyle": "-", "linewidth": 1.6}),
     (-1, "backward (v < 0)", {"color": LINE_GREY, "linestyle": (0, (4.0, 1.5)), "linewidth": 2.2}),
@@ -56,13 +56,11 @@ class _Compared:
     factor: float  # from SI to `small`
 
     @classmethod
-    def of(cls, residuals: Residuals, quantity: str) -> _Compared:
+    def of(cls, residuals: Residuals, quantity: str, unit: str) -> _Compared:
         """Return a record with rows that are not compared left blank."""
         kept = residuals.rows | residuals.held
         measured = np.where(kept, residuals.measured, np.nan)
         difference = measured - residuals.modelled
-        kind = quantity.rpartition(".")[2]
-        unit = UNITS.get(kind, "N")
         large, long = scaled(measured, unit)
         small, short = scaled(difference, unit)
         far, place = scaled(residuals.x - residuals.x[0], "m")
@@ -115,7 +113,7 @@ def fit_figure(
     every = fit.residuals()
     number = _worst(every) if which is None else _checked_which(which, len(every))
     chosen = every[number]
-    part = _Compared.of(chosen, fit.measured)
+    part = _Compared.of(chosen, fit.measured, fit.task.measured.unit)
     shown = _checked_window(chosen, window)
     listed = fit.table if not low() and len(fit.table) <= MOST_PARAMETERS else ()
     with rc_context(settings()):
@@ -178,39 +176,30 @@ def _checked_window(shown: Residuals, window: Any) -> Window:
 
 
 def _title(fit: Fit, chosen: Residuals, count: int, which: int | None) -> str:
-    model = getattr(fit.model, "title", "") or getattr(fit.model, "name", "")
     others = "" if count == 1 else f" ({'worst ' if which is None else ''}of {count} records)"
-    return f"{model}, fitted to {chosen.record.name}{others}"
+    return f"{model_title(fit)}, fitted to {chosen.record.name}{others}"
 
 
 def _score_name(fit: Fit) -> str:
     held = "" if fit.held_out is None else f", held out {fit.held_out['rmse']:.3g}"
-    unit = UNITS.get(fit.measured.rpartition(".")[2], "N")
-    return f"residual; RMSE {fit.training['rmse']:.3g}{held} {unit}"
+    return f"residual; RMSE {fit.training['rmse']:.3g}{held} {fit.task.measured.unit}"
 
 
 # --------------------------------------------------------------------------- panels
 def _sheet(parameters: int) -> tuple[Figure, Sequence[Axes], Axes | None]:
     """Return an empty figure; its panels over time and x; and that of the parameters, if any."""
+    above = 8.9 if narrow() else 4.9
     below = 0.75 + LANE * parameters if parameters else 0.0
+    figure = sheet(4.2 if narrow() else 11.0, above + below, grows=True)
+    parts: list[Any] = [figure]
+    if below:  # a part of its own, because its labels are wider
+        rows = figure.add_gridspec(2, 1, height_ratios=(above, below))
+        parts = [figure.add_subfigure(rows[row, 0]) for row in (0, 1)]
     if narrow():
-        tall = [1.7, 1.5, 2.0, 1.7]
-        above = sum(tall) + 2.0
-        figure = sheet(4.2, above + below, grows=True)
-        upper, bars = _parts(figure, above, below)
-        return figure, list(upper.subplots(len(tall), 1, height_ratios=tall)), bars
-    figure = sheet(11.0, 4.9 + below, grows=True)
-    upper, bars = _parts(figure, 4.9, below)
-    grid = upper.subplots(2, 2, width_ratios=(1.5, 1))
-    return figure, list(grid.T.ravel()), bars
-
-
-def _parts(figure: Figure, above: float, below: float) -> tuple[Any, Axes | None]:
-    """Return where the curves are, and the panel of the parameters, which has labels of its own."""
-    if not below:
-        return figure, None
-    rows = figure.add_gridspec(2, 1, height_ratios=(above, below))
-    return figure.add_subfigure(rows[0, 0]), figure.add_subfigure(rows[1, 0]).subplots()
+        axes = list(parts[0].subplots(4, 1, height_ratios=(1.7, 1.5, 2.0, 1.7)))
+    else:
+        axes = list(parts[0].subplots(2, 2, width_ratios=(1.5, 1)).T.ravel())
+    return figure, axes, parts[1].subplots() if below else None
 
 
 def _over_time(ax: Axes, part: _Compared, shown: Window, test: Window | None) -> None:
@@ -311,10 +300,11 @@ def _parameters(ax: Axes, table: Sequence[Estimate]) -> None:
     spans = [_relative(each) for each in table]
     told = [max(map(abs, span)) for span in spans if span is not None]
     limit = min(WIDEST, 1.15 * max(told, default=WIDEST)) or 1.0
-    for row, span in enumerate(spans):
+    for row, (each, span) in enumerate(zip(table, spans, strict=True)):
         if span is None:
             ax.barh(row, 2 * limit, left=-limit, height=0.72, color=colour("chosen"))
-            ax.text(0.0, row, "cannot be told", ha="center", va="center", color=TEXT_GREY)
+            said = each.note or "cannot be told"
+            ax.text(0.0, row, said, ha="center", va="center", color=TEXT_GREY, fontsize=font(8.5))
             continue
         left, right = max(span[0], -limit), min(span[1], limit)
         ax.plot([left, right], [row, row], color=TEXT_GREY, linewidth=pt(1.6), zorder=2)
