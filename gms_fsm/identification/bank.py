@@ -37,7 +37,7 @@ MOST_ELEMENTS = 60
 GRID = 60  # thresholds
 FINEST = 1 / 300  # smallest threshold, as a share of the largest
 FEWEST_ROWS = 20
-USED_ROWS = 4000  # of all records together
+USED_ROWS, LEAST_ROWS = 4000, 1000  # of all records together, and of each of many
 COVERED = 0.9  # share of the travel after which the unknown initial state is forgotten
 PASSES, HALVINGS = 8, 4  # of the refinement of the thresholds, and of one of its steps
 APART = 0.05  # thresholds of the two halves of an element differ by this share from its own
@@ -107,7 +107,8 @@ def initial_bank(
     >>> t = np.arange(0.0, 20.0, 0.01)
     >>> x = 1e-3 * np.sin(t)
     >>> force = stop_operators(x, [1e-4, 3e-4]) @ [2e4, 1e4]
-    >>> model = initial_bank(Record.from_arrays(time=t, position=x, force=force), 2)
+    >>> record = Record.from_arrays(time=t, position=x, force=force)
+    >>> model = initial_bank(record, 2, smoothing=0.0)
     >>> model.parameters.k.round(3).tolist()
     [20000.0, 10000.0]
     >>> (model.stribeck.F_c * model.weights).round(9).tolist()
@@ -288,10 +289,11 @@ def _training(
                 "there is no force to fit", place=record.place, advice="give force=(name, unit)"
             )
     place = ", ".join(record.place for record in records)
+    most = max(USED_ROWS // len(records), LEAST_ROWS)
     motions = [record.motion(smoothing) for record in records]
     parts, forces, speeds = list[_Part](), list[FloatArray](), list[FloatArray]()
     for record, motion in zip(records, motions, strict=True):
-        part, rows = _part(record, motion, train, USED_ROWS // len(records))
+        part, rows = _part(record, motion, train, most)
         parts.append(part)
         forces.append(record.columns["force"][rows])
         speeds.append(np.abs(motion.velocity[motion.time < train[1]]))

@@ -170,16 +170,16 @@ class _Move:
 def _limits(
     stroke: float, highest: float, rate: float | None, acceleration: float | None
 ) -> _Limits:
-    most = (
-        math.pi * highest**2 / stroke
-        if acceleration is None
-        else checked_scalar("acceleration", acceleration, ACCELERATION)
-    )
-    sampled = (
-        _round(DEFAULT_RAMP / (0.5 * math.pi * highest / most))
-        if rate is None
-        else checked_scalar("rate", rate, RATE)
-    )
+    if acceleration is None:
+        most = math.pi * highest**2 / stroke
+    else:
+        most = checked_scalar("acceleration", acceleration, ACCELERATION)
+    if rate is None:
+        # A ramp over all of the stroke, where the highest speed cannot be reached.
+        speed = min(highest, math.sqrt(2.0 * most * stroke / math.pi))
+        sampled = _round(DEFAULT_RAMP / (0.5 * math.pi * speed / most))
+    else:
+        sampled = checked_scalar("rate", rate, RATE)
     limits = _Limits(most, sampled)
     possible = limits.fastest(stroke)
     if highest > possible:
@@ -187,8 +187,8 @@ def _limits(
             f"{highest:g} m/s cannot be reached in a stroke of {stroke:g} m with {most:.4g} m/s**2 "
             f"and ramps of at least {SHORTEST_RAMP} rows at {sampled:g} Hz",
             place="speeds",
-            advice=f"the largest possible speed is {_down(possible):g} m/s; a longer stroke, a "
-            "higher rate or acceleration allow more",
+            advice=f"the largest possible speed is {_down(possible):g} m/s; a longer stroke, or a "
+            "higher rate or acceleration, allows more",
         )
     return limits
 
