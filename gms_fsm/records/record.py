@@ -21,6 +21,7 @@ from gms_fsm.errors import RecordError, cut, shown
 from gms_fsm.records._columns import QUANTITIES, Column, ColumnLike, columns_of
 from gms_fsm.records._selection import FEWEST, Origin, selected
 from gms_fsm.records._table import TextFormat, read_cells
+from gms_fsm.records._written import write_csv
 from gms_fsm.records.motion import Motion, motion_of
 
 __all__ = ["Column", "Record"]
@@ -154,6 +155,40 @@ class Record:
             chosen=_fixed(self.chosen[kept]),
             rows=_fixed(self.rows[kept]),
         )
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write the record to a CSV file in SI units, for a rig or another program.
+
+        The columns are ``t_s`` and those there are of ``x_m``, ``v_m_s``, ``F_N`` and ``N_N``.
+        Numbers read back equal; a missing force is an empty cell. All rows are written, and the
+        file does not say which of them are selected.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written, or exists and is not as gms-fsm wrote it.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> record = Record.from_arrays(time=[0, 1, 2, 3, 4], position=[0, 1, 3, 2, 0])
+        >>> path = record.to_csv(Path(tempfile.mkdtemp()) / "motion.csv")
+        >>> path.read_text().split()[:3]
+        ['t_s,x_m', '0.0,0.0', '1.0,1.0']
+        >>> Record.from_csv(path, position=("x_m", "m"), force=None)
+        <Record 'motion': 5 rows, 4 s, position>
+        """
+        return write_csv(self.columns, path)
 
     # ----------------------------------------------------------------------- sources
     @classmethod

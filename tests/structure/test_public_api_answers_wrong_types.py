@@ -147,6 +147,9 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "System": {"name": "one mass", "bodies": (BODY,), "contacts": (CONTACT,), "signals": {}}
         | {"numbers": {}, "flow": {}, "sampled": ()},
         "Transition": edge,
+        "excite": {"stroke": 1e-3, "speeds": [1e-3, 2e-3], "rate": None, "acceleration": None},
+        "initial_bank": {"records": _rubbed(), "n": 2, "law": "signed", "train": None}
+        | {"smoothing": None, "v_c": None},
         "export": {"system": MODEL, "format": "c99", "folder": tmp / "c99", "name": "friction"}
         | {"initial": None, "t_start": 0.0, "settings": None},
         "measure_phenomena": {"models": ["stiction"], "phenomena": ["stick-slip"]}
@@ -248,6 +251,12 @@ def _methods(tmp: Path) -> Iterator[Entry]:
 def _record() -> Record:
     t = np.arange(20.0)
     return Record.from_arrays(time=t, position=np.sin(t), force=np.cos(t))
+
+
+@functools.cache
+def _rubbed() -> Record:
+    t = np.linspace(0.0, 20.0, 200)
+    return Record.from_arrays(time=t, position=np.sin(t), force=np.sign(np.cos(t)) + np.sin(t))
 
 
 def _settled() -> FrictionEquations:

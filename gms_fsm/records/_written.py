@@ -1,0 +1,58 @@
+"""A record as a text file, for a rig or another program; read back it is equal."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from gms_fsm._arguments import checked_path
+from gms_fsm._files import output_folder, write_whole
+from gms_fsm.charts.parameters import FloatArray
+
+__all__ = ["HEADINGS", "write_csv"]
+
+# With the unit, as `Record.from_csv` names them in its examples.
+HEADINGS = {
+    "time": "t_s",
+    "position": "x_m",
+    "velocity": "v_m_s",
+    "force": "F_N",
+    "normal": "N_N",
+}
+
+
+def write_csv(columns: Mapping[str, FloatArray], path: str | os.PathLike[str]) -> Path:
+    """Write columns of a record to a CSV file, whole.
+
+    Parameters
+    ----------
+    columns : mapping of str to ndarray, shape (rows,)
+        As in `Record.columns`; NaN is written as an empty cell.
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written, or exists and is not as gms-fsm wrote it.
+    """
+    place = checked_path("path", path)
+    names = [name for name in HEADINGS if name in columns]
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(HEADINGS[name] for name in names)
+    cells = np.stack([columns[name] for name in names], axis=1).tolist()
+    # The repr of a float reads back equal.
+    table.writerows(["" if cell != cell else repr(cell) for cell in row] for row in cells)
+    output_folder(place.parent, [place.name])
+    return write_whole(place, lambda file: file.write(text.getvalue().encode()))
