@@ -305,17 +305,23 @@ class FitTable(Table):
 
     def options(self, smoothing: float | None) -> Options:
         """Return the options of a fit, with the smoothing of the record."""
-        lists = ("free", "tied", "nuisance", "linear", "train", "test")
-        given = {name: getattr(self, name) for name in lists}
         return Options(
-            **{name: None if each is None else tuple(each) for name, each in given.items()},
-            **self.model_dump(include={*_KEPT}),
+            free=tuple(self.free),
+            tied=tuple(self.tied),
+            nuisance=tuple(self.nuisance),
+            linear=tuple(self.linear),
+            measured=self.measured,
+            drive=self.drive,
+            train=None if self.train is None else (self.train[0], self.train[1]),
+            test=None if self.test is None else (self.test[0], self.test[1]),
+            cycles=self.cycles,
+            search=self.search,
             bounds={name: (pair[0], pair[1]) for name, pair in self.bounds.items()},
+            seed=self.seed,
+            most_steps=self.most_steps,
             smoothing=smoothing,
+            begin=self.begin,
         )
-
-
-_KEPT = ("measured", "drive", "cycles", "search", "seed", "most_steps", "begin")
 
 
 class Scenario(Table):

@@ -314,7 +314,6 @@ def _done(fit: Fit) -> list[str]:
         f"- compared: {plain(fit.measured)} [{fit.task.measured.unit}]",
         f"- fitted to: {rows(fit.train, 'all rows')}; held out: {rows(fit.test, 'none')}",
         f"- besides the model: {plain(', '.join(fit.nuisance)) or 'nothing'}",
-        f"- each record begins: {plain(fit.begin)}",
         f"- {fit.runs} runs in {fit.seconds:.3g} s",
     ]
     return [*lines, *(f"- {plain(note)}" for note in fit.notes)]
@@ -326,7 +325,6 @@ def _records(fit: Fit) -> list[str]:
         licence = f"; licence: {plain(each.licence)}" if each.licence else ""
         name = "" if each.path is None else f", {plain(each.path.name)}"
         lines.append(f"- {plain(each.name)}{name}: {int(each.chosen.sum())} rows{licence}")
-        lines += [f"  - {plain(note)}" for note in each.notes if "licence" not in note]
     return lines
 
 

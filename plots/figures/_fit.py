@@ -16,7 +16,7 @@ from plots._matplotlib import Axes, Figure, rc_context
 from plots._window import Window
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import last_cycles, letter_panels
-from plots.panels._axes import VECTOR_ROWS, time_axis
+from plots.panels._axes import VECTOR_ROWS, draw_curve, time_axis
 from plots.panels._shown import is_number, is_whole, scaled
 from plots.presets import font, pt, settings, to_scale
 from plots.style import INK, LINE_GREY, PALE_GREY, REPORTED, TEXT_GREY, colour
@@ -32,6 +32,7 @@ MOST_PARAMETERS = 40  # more rows are a table, not a picture
 LANE = 0.22  # inches: the row of a parameter
 WIDEST = 100.0  # %: a longer interval ends in arrows
 BINS, FEWEST = 40, 5  # of a mean residual over x, and rows in a bin
+DOT = 1.6  # points, of a residual among thousands
 MOVING = 0.05  # of the largest speed; slower rows have no direction
 DIRECTIONS: tuple[tuple[int, str, dict[str, Any]], ...] = (
     (1, "forward (v > 0)", {"color": INK, "linestyle": "-", "linewidth": 1.6}),
@@ -205,10 +206,10 @@ def _sheet(parameters: int) -> tuple[Figure, Sequence[Axes], Axes | None]:
 def _over_time(ax: Axes, part: _Compared, shown: Window, test: Window | None) -> None:
     inside = (part.t >= shown[0]) & (part.t <= shown[1])
     _shaded(ax, part, test, shown)
-    drawn = {"rasterized": bool(inside.sum() > VECTOR_ROWS)}
-    measured = {"color": LINE_GREY, "linewidth": pt(2.4), "label": "measured"}
-    ax.plot(part.t[inside], part.measured[inside], **measured, **drawn)
-    ax.plot(part.t[inside], part.modelled[inside], color=INK, label="model", **drawn)
+    t = part.t[inside]
+    measured: dict[str, Any] = {"color": LINE_GREY, "linewidth": pt(2.4), "label": "measured"}
+    draw_curve(ax, t, part.measured[inside], **measured)
+    draw_curve(ax, t, part.modelled[inside], color=INK, label="model")
     ax.set_ylabel(f"{part.name} [{part.unit}]")
     time_axis(ax, *shown)
     legend_above(ax)
@@ -217,8 +218,7 @@ def _over_time(ax: Axes, part: _Compared, shown: Window, test: Window | None) ->
 def _residual_over_time(ax: Axes, part: _Compared, fit: Fit) -> None:
     whole = float(part.t[0]), float(part.t[-1])
     _shaded(ax, part, fit.test, whole, label="held out")
-    look = {"color": INK, "linewidth": pt(0.6), "rasterized": part.t.size > VECTOR_ROWS}
-    ax.plot(part.t, part.residual, **look)
+    draw_curve(ax, part.t, part.residual, color=INK, linewidth=pt(0.6))
     if fit.floor is not None:
         for sign, label in ((1, "± repeatability"), (-1, None)):
             ax.axhline(sign * part.factor * fit.floor, label=label, **to_scale(REPORTED))
@@ -240,22 +240,8 @@ def _shaded(ax: Axes, part: _Compared, test: Window | None, shown: Window, label
 
 
 def _loop(ax: Axes, part: _Compared) -> None:
-    ax.plot(
-        part.x,
-        part.measured,
-        color=LINE_GREY,
-        linewidth=pt(2.0),
-        label="measured",
-        rasterized=part.t.size > VECTOR_ROWS,
-    )
-    ax.plot(
-        part.x,
-        part.modelled,
-        color=INK,
-        linewidth=pt(0.7),
-        label="model",
-        rasterized=part.t.size > VECTOR_ROWS,
-    )
+    draw_curve(ax, part.x, part.measured, color=LINE_GREY, linewidth=pt(2.0), label="measured")
+    draw_curve(ax, part.x, part.modelled, color=INK, linewidth=pt(0.7), label="model")
     ax.set(xlabel=f"x [{part.place}]", ylabel=f"{part.name} [{part.unit}]")
 
 
@@ -265,15 +251,15 @@ def _residual_over_x(ax: Axes, part: _Compared) -> None:
     means = []
     for sign, name, look in DIRECTIONS:
         chosen = (sign * part.v > slow) & np.isfinite(part.residual)
-        ax.plot(
+        dots: dict[str, Any] = {"linestyle": "", "marker": ".", "markeredgewidth": 0, "alpha": 0.35}
+        size = pt(DOT if chosen.sum() > VECTOR_ROWS else 2.0 * DOT)
+        draw_curve(
+            ax,
             part.x[chosen],
             part.residual[chosen],
-            ".",
             color=look["color"],
-            markersize=pt(1.6),
-            markeredgewidth=0,
-            alpha=0.35,
-            rasterized=bool(chosen.sum() > VECTOR_ROWS),
+            markersize=size,
+            **dots,
         )
         means.append((_binned(part.x[chosen], part.residual[chosen]), name, look))
     for (x, mean), name, look in means:
