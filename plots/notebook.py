@@ -15,12 +15,12 @@ from typing import Any
 
 import graphviz
 import numpy as np
-from gms_fsm.identification.result import Fit
 
 from gms_fsm._display import Form
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import GMSError, MissingExtraError, OutputError
 from gms_fsm.identification.report import model_title, scores_text
+from gms_fsm.identification.result import Fit
 from gms_fsm.inspection._findings import Finding, Report
 from gms_fsm.inspection._results import BranchComparison, Here
 from gms_fsm.inspection.explain import Explanation, Why
@@ -199,13 +199,21 @@ def fit_html(fit: Fit) -> str:
         caption=f"{model_title(fit)}: {scores_text(fit)}",
         more=fit.weakest,
     )
+    picture = fit_png(fit)
+    if picture is None:
+        return words
+    return words + image(picture, "measurement and model, residuals, parameters")
+
+
+def fit_png(fit: Fit) -> bytes | None:
+    """Return the figure of a fit as PNG, or None without matplotlib."""
     try:
         from plots.figures import fit_figure
     except MissingExtraError:
-        return words
+        return None
     buffer = BytesIO()
     fit_figure(fit).savefig(buffer, format="png", dpi=100)
-    return words + image(buffer.getvalue(), "measurement and model, residuals, parameters")
+    return buffer.getvalue()
 
 
 # --------------------------------------------------------------------------- sessions

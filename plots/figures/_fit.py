@@ -129,7 +129,7 @@ def fit_figure(
             "measurement and model" + ("" if whole else f", {begin:.4g} to {end:.4g} s"),
             _score_name(fit),
             "loop",
-            "residual over x",
+            "residual",
         ]
         axes = [over_time, residual, loop, over_x]
         if bars is not None:
@@ -298,7 +298,7 @@ def _parameters(ax: Axes, table: Sequence[Estimate]) -> None:
         for end, given, marker in ((left, span[0], "<"), (right, span[1], ">")):
             mark = marker if abs(given) > limit else "|"
             ax.plot([end], [row], mark, color=TEXT_GREY, markersize=pt(5.0), zorder=2)
-    ax.axvline(0.0, color=PALE_GREY, linewidth=pt(0.8), zorder=1)
+    ax.axvline(0.0, color=PALE_GREY, linewidth=pt(0.8), zorder=0)
     rows = range(len(table))
     ax.set(xlim=(-1.04 * limit, 1.04 * limit), ylim=(len(table) - 0.5, -0.5))
     ax.set_yticks(rows, [each.name for each in table])
@@ -321,4 +321,4 @@ def _relative(each: Estimate) -> tuple[float, float] | None:
 
 def _value(each: Estimate) -> str:
     note = f", {each.note}" if each.note and each.told else ""
-    return f"{each.value:.4g} {each.unit}".rstrip().replace("-", "−") + note
+    return f"{each.value:.5g} {each.unit}".rstrip().replace("-", "−") + note
