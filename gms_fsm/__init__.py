@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from gms_fsm.exporters import export as export
     from gms_fsm.identification.bank import initial_bank as initial_bank
     from gms_fsm.identification.excite import excite as excite
+    from gms_fsm.identification.fit import fit as fit
+    from gms_fsm.identification.result import Fit as Fit
     from gms_fsm.inspection.prove import Finding as Finding
     from gms_fsm.inspection.prove import Report as Report
     from gms_fsm.inspection.prove import prove as prove
@@ -91,6 +93,8 @@ _HOMES = {
     "exporters": "export",
     "identification.bank": "initial_bank",
     "identification.excite": "excite",
+    "identification.fit": "fit",
+    "identification.result": "Fit",
     "inspection.prove": "Finding Report prove",
     "inspection.session": "Session",
     "phenomena.measure": "Bench PhenomenaTable measure_phenomena",

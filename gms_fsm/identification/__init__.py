@@ -1,1 +1,1 @@
-"""Identification: parameters from measured records, with intervals, and what a record cannot tell."""
+"""Identification: parameters from records, with intervals, and what a record cannot tell."""

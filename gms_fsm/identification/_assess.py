@@ -1,0 +1,352 @@
+"""From the best point of a fit to its table: values, intervals, and what cannot be told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gms_fsm.charts.parameters import WEIGHTS, FloatArray
+from gms_fsm.identification._experiment import NUISANCE, Experiment, Point
+from gms_fsm.identification._runs import LOST, Pool
+from gms_fsm.identification._statistics import Certainty, certainty
+from gms_fsm.identification._task import Task, stretches
+from gms_fsm.identification._unknowns import Subject, Unknown
+from gms_fsm.systems.system import System
+
+__all__ = ["Assessed", "Estimate", "assessed", "sorted_elements"]
+
+FIRST_STEP, LEAST_STEP, MOST_STEP = 1e-3, 1e-4, 0.1
+OPEN = "cannot be told"
+NO_INFLUENCE = "cannot be told: no influence on this record"
+AT_BOUND = "at its bound"
+MOST_NAMED = 4  # parameters in one direction
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One row of the table of a fit.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter, with the number of its element: ``k1``.
+    value : float
+        The estimate, in `unit`.
+    low, high : float
+        The ends of its 95 % interval.
+    unit : str
+        SI.
+    note : str
+        Empty, or what is to be said of it: that it cannot be told, that it is at its bound.
+    meaning : str
+        What it is.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    note: str = ""
+    meaning: str = ""
+
+    @property
+    def told(self) -> bool:
+        """Whether the record determines it."""
+        return not self.note.startswith(OPEN)
+
+
+@dataclass(frozen=True, eq=False)
+class Assessed:
+    """What is known about the unknowns of a fit.
+
+    Parameters
+    ----------
+    table : tuple of Estimate
+        The parameters in the order they were asked for, then the nuisance terms.
+    covariance : ndarray, shape (p, p)
+        Of their values, in the order of the table.
+    certainty : Certainty
+        In coordinates.
+    weakest : str
+        The weakest direction in words.
+    """
+
+    table: tuple[Estimate, ...]
+    covariance: FloatArray
+    certainty: Certainty
+    weakest: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Entry:
+    """An unknown with its value, its slopes, and the coordinate in which its interval is made."""
+
+    name: str
+    unit: str
+    meaning: str
+    value: float
+    slopes: FloatArray  # d(force)/d(coordinate)
+    kind: str  # "log", "excess", "linear"
+    scale: float  # d(value)/d(coordinate)
+    low: float
+    high: float
+    base: float = 0.0  # of an excess
+
+    def place(self, half: float) -> tuple[float, float]:
+        """Return the ends of the interval with a half width in the coordinate."""
+        if not math.isfinite(half):
+            return self.low, self.high
+        if self.kind == "log":
+            wide = min(half, 500.0)
+            ends = self.value * math.exp(-wide), self.value * math.exp(wide)
+        elif self.kind == "excess":
+            wide, excess = min(half, 500.0), self.value - self.base
+            ends = self.base + excess * math.exp(-wide), self.base + excess * math.exp(wide)
+        else:
+            ends = self.value - half * self.scale, self.value + half * self.scale
+        return max(ends[0], self.low), min(ends[1], self.high)
+
+    @property
+    def at_bound(self) -> bool:
+        """Whether the value is at the end of what it may be."""
+        near = 1e-6 * max(abs(self.value), 1e-300)
+        return abs(self.value - self.low) <= near or abs(self.value - self.high) <= near
+
+
+def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
+    """Return the table of a fit.
+
+    Parameters
+    ----------
+    task : Task
+        Whose start values are the fitted ones.
+    point : Point
+        These, evaluated with all rows.
+    pool : Pool
+        To evaluate slopes side by side.
+
+    Returns
+    -------
+    Assessed
+        Table, covariance, and what cannot be told.
+    """
+    experiment = task.fine
+    parts = stretches(task.courses, point.residual)
+    basis = _basis(experiment, point)
+    steps = np.full(len(experiment.searched), FIRST_STEP)
+    for _ in range(2):
+        searched = _searched_slopes(experiment, point, steps, pool)
+        entries = _entries(experiment, point, searched, basis)
+        slopes = np.stack([each.slopes for each in entries], axis=1)
+        logarithmic = np.array([each.kind != "linear" for each in entries])
+        sure = certainty(slopes, parts, logarithmic, experiment.typical)
+        # Second pass: secants about as long as the interval average over jumps of the cost.
+        names = [each.name for each in entries]
+        width = np.array([sure.half[names.index(each.name)] for each in experiment.searched])
+        steps = np.clip(0.25 * np.where(np.isfinite(width), width, 0.0), LEAST_STEP, MOST_STEP)
+    scales = np.array([each.scale for each in entries])
+    with np.errstate(invalid="ignore"):
+        covariance = sure.covariance * np.outer(scales, scales)
+    table = tuple(
+        _estimate(each, float(half), bool(opened), experiment.typical)
+        for each, half, opened in zip(entries, sure.half, sure.open, strict=True)
+    )
+    noise = float(np.sqrt(point.cost / max(point.residual.size, 1)))
+    return Assessed(table, covariance, sure, _in_words(table, entries, noise, task))
+
+
+def _basis(experiment: Experiment, point: Point) -> FloatArray:
+    subject = experiment.reference(experiment.coordinates.numbers(point.u))
+    columns = [experiment.columns(subject, course)[2][course.rows] for course in experiment.courses]
+    return np.concatenate(columns)
+
+
+def _searched_slopes(
+    experiment: Experiment, point: Point, steps: FloatArray, pool: Pool
+) -> FloatArray:
+    """Return secants of the force by each searched coordinate, linear parameters held."""
+
+    def force(u: FloatArray) -> FloatArray | None:
+        try:
+            subject = experiment.reference(experiment.coordinates.numbers(u))
+            parts = []
+            for course in experiment.courses:
+                _, rest, columns = experiment.columns(subject, course)
+                parts.append((rest + columns @ point.linear)[course.rows])
+        except LOST:
+            return None
+        return np.concatenate(parts)
+
+    moves = [step * unit for step, unit in zip(steps, np.eye(steps.size), strict=True)]
+    places = [point.u + sign * move for move in moves for sign in (1.0, -1.0)]
+    found = pool.map(force, places)
+    here = point.residual + experiment.target
+    slopes = np.zeros((here.size, steps.size))
+    for i, step in enumerate(steps):
+        ahead, behind = found[2 * i : 2 * i + 2]
+        if ahead is not None and behind is not None:
+            slopes[:, i] = (ahead - behind) / (2.0 * step)
+        elif ahead is not None:
+            slopes[:, i] = (ahead - here) / step
+        elif behind is not None:
+            slopes[:, i] = (here - behind) / step
+    return slopes
+
+
+def _entries(
+    experiment: Experiment, point: Point, searched: FloatArray, basis: FloatArray
+) -> list[_Entry]:
+    """Return all unknowns in the order they were asked for, then the nuisance terms."""
+    coordinates = experiment.coordinates
+    numbers, scales = coordinates.numbers(point.u), coordinates.slopes(point.u)
+    by_name: dict[str, _Entry] = {}
+    values = dict(zip((each.key for each in experiment.searched), numbers, strict=True))
+    for i, each in enumerate(experiment.searched):
+        low, high = each.low, each.high
+        base = 0.0
+        if each.kind == "excess":
+            base = float(values.get(each.other, np.min(experiment.subject.value(each.other))))
+            low = max(low, base)
+        by_name[each.name] = _Entry(
+            each.name,
+            each.parameter.unit,
+            each.parameter.meaning,
+            float(numbers[i]),
+            searched[:, i],
+            each.kind,
+            float(scales[i]),
+            max(low, each.least),
+            high,
+            base,
+        )
+    for i, unknown in enumerate(experiment.solved):
+        value, column = float(point.linear[i]), basis[:, i]
+        size = float(np.sqrt(np.mean(column**2)))
+        least = unknown.low if math.isfinite(unknown.low) else unknown.least
+        positive = unknown.least >= 0.0 and value * size > 1e-9 * experiment.typical
+        scale = value if positive else (experiment.typical / size if size else 1.0)
+        by_name[unknown.name] = _Entry(
+            unknown.name,
+            unknown.parameter.unit,
+            unknown.parameter.meaning,
+            value,
+            column * scale,
+            "log" if positive else "linear",
+            scale,
+            least,
+            math.inf,
+        )
+    ordered = [by_name[each.name] for each in experiment.order]
+    for i, name in enumerate(experiment.nuisance, start=len(experiment.solved)):
+        column = basis[:, i]
+        size = float(np.sqrt(np.mean(column**2)))
+        scale = experiment.typical / size if size else 1.0
+        unit, meaning = NUISANCE[name]
+        value = float(point.linear[i])
+        slopes = column * scale
+        ordered.append(
+            _Entry(name, unit, meaning, value, slopes, "linear", scale, -math.inf, math.inf)
+        )
+    return ordered
+
+
+def _estimate(entry: _Entry, half: float, opened: bool, size: float) -> Estimate:
+    low, high = entry.place(half)
+    influence = float(np.sqrt(np.mean(entry.slopes**2)))
+    note = ""
+    if influence <= 1e-9 * size:
+        note, low, high = NO_INFLUENCE, entry.low, entry.high
+    elif opened:
+        note = OPEN
+    elif entry.at_bound:
+        note = AT_BOUND
+    return Estimate(entry.name, entry.value, low, high, entry.unit, note, entry.meaning)
+
+
+# --------------------------------------------------------------------------- in words
+def _in_words(
+    table: Sequence[Estimate],
+    entries: Sequence[_Entry],
+    noise: float,
+    task: Task,
+) -> str:
+    """Return what is determined, what is open, and the weakest direction."""
+    told = [each.name for each in table if each.told]
+    opened = [each.name for each in table if not each.told]
+    if not opened:
+        first = "All parameters are determined."
+    elif told:
+        first = f"Only {_and(told)} {_are(told)} determined; {_and(opened)} cannot be told."
+    else:
+        first = "No parameter is determined by this record."
+    silent = {each.name for each in table if each.note == NO_INFLUENCE}
+    taking = [i for i, each in enumerate(table) if each.name not in silent]
+    if not taking:
+        return first
+    # The least determined combination of those that have an influence.
+    slopes = np.stack([entries[i].slopes for i in taking], axis=1)
+    _, strengths, vectors = np.linalg.svd(slopes, full_matrices=False)
+    weakest = vectors[-1]
+    largest = np.argsort(-np.abs(weakest))[:MOST_NAMED]
+    chosen = [j for j in largest if abs(weakest[j]) > 0.25 * abs(weakest[largest[0]])]
+    step = math.log(2.0) / abs(weakest[largest[0]])
+    change = float(strengths[-1]) * step / math.sqrt(slopes.shape[0])
+    sign = math.copysign(1.0, weakest[largest[0]])
+    moves = [_move(entries[taking[j]], sign * step * weakest[j]) for j in chosen]
+    unit = task.measured.unit
+    return (
+        f"{first} The weakest direction: {_and(moves)} "
+        f"{'together change' if len(moves) > 1 else 'changes'} the {task.measured.column} by "
+        f"{change:.2g} {unit}; the residual is {noise:.2g} {unit} (root mean square)."
+    )
+
+
+def _move(entry: _Entry, by: float) -> str:
+    """Return a move along a coordinate in words."""
+    if entry.kind == "linear":
+        return f"{entry.name} by {by * entry.scale:+.2g} {entry.unit}".rstrip()
+    name = f"{entry.name}'s excess" if entry.kind == "excess" else entry.name
+    return f"{name} {'times' if by >= 0 else 'divided by'} {math.exp(abs(by)):.2g}"
+
+
+def _and(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _are(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"
+
+
+# --------------------------------------------------------------------------- order of elements
+def sorted_elements(subject: Subject, unknowns: Sequence[Unknown]) -> Subject:
+    """Return a bank with its elements in the order of their thresholds.
+
+    Elements that may change places in a search are named from the first to slip to the last.
+
+    Parameters
+    ----------
+    subject : Subject
+        Fitted.
+    unknowns : sequence of Unknown
+        What was free.
+
+    Returns
+    -------
+    Subject
+        The same as given unless all that differs between its elements was free.
+    """
+    if isinstance(subject.what, System):
+        return subject
+    wide = {key: n for key, (_, n) in subject.known.items() if n > 1}
+    free = {key: [each for each in unknowns if each.key == key] for key in wide}
+    whole = [key for key, n in wide.items() if sum(e.element is not None for e in free[key]) == n]
+    fixed = [key for key in wide if key not in whole]
+    if not whole or any(np.ptp(np.asarray(subject.value(key))) for key in fixed):
+        return subject
+    by = WEIGHTS.name if WEIGHTS.name in whole else whole[0]
+    order = np.argsort(np.asarray(subject.value(by)), kind="stable")
+    return subject.varied({key: np.asarray(subject.value(key))[order] for key in whole})

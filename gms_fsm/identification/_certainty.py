@@ -1,0 +1,238 @@
+"""Profiles and bootstraps: intervals that do not rely on a linearised model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gms_fsm._arguments import checked_integer
+from gms_fsm.charts.parameters import FloatArray, checked_scalar
+from gms_fsm.errors import GMSError, ParameterError, shown
+from gms_fsm.identification._experiment import Experiment, Point
+from gms_fsm.identification._runs import Pool
+from gms_fsm.identification._search import Best, hops, refine
+from gms_fsm.identification._statistics import BLOCK
+from gms_fsm.identification._task import Task, at_all_rows
+
+__all__ = ["Bootstrap", "Profile", "bootstrapped", "profiled"]
+
+LIMIT = 3.841  # 95 % quantile of chi-squared with one degree of freedom
+FACTOR = 0.1  # first step of a profile: a tenth, relative
+MOST_STEPS = 12  # to each side, each twice as long as the one before
+RESTARTS = 4  # hops at each value
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """How the fit suffers as one parameter is moved and all others are searched again.
+
+    Parameters
+    ----------
+    name, unit : str
+        The parameter.
+    values : ndarray, shape (m,)
+        Increasing.
+    rise : ndarray, shape (m,)
+        Fall of twice the log-likelihood on effective rows; 3.84 is the limit of the 95 % interval.
+    low, high : float
+        The interval; an open end is -inf or inf.
+    """
+
+    name: str
+    unit: str
+    values: FloatArray
+    rise: FloatArray
+    low: float
+    high: float
+
+    @property
+    def open(self) -> bool:
+        """Whether an end of the interval was not found."""
+        return not (math.isfinite(self.low) and math.isfinite(self.high))
+
+    def __str__(self) -> str:
+        low = "open" if math.isinf(self.low) else f"{self.low:.4g}"
+        high = "open" if math.isinf(self.high) else f"{self.high:.4g}"
+        return f"{self.name}: 95 % from {low} to {high} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True, eq=False)
+class Bootstrap:
+    """The parameters of fits to resampled residuals.
+
+    Parameters
+    ----------
+    names : tuple of str
+        As in the table of the fit.
+    draws : ndarray, shape (draws, p)
+        The values; a draw whose search failed has NaN.
+    """
+
+    names: tuple[str, ...]
+    draws: FloatArray
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Return the interval between two quantiles.
+
+        Parameters
+        ----------
+        name : str
+            Of a parameter.
+        level : float
+            Share of the draws inside, between 0 and 1.
+
+        Returns
+        -------
+        tuple of float
+            Its ends.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such parameter, or the level is not between 0 and 1.
+        """
+        if name not in self.names:
+            raise ParameterError(
+                f"there is no parameter {shown(name)}", advice=f"there are {', '.join(self.names)}"
+            )
+        checked_scalar("level", level, "> 0 and < 1")
+        column = self.draws[:, self.names.index(name)]
+        low, high = np.nanquantile(column, [(1.0 - level) / 2.0, (1.0 + level) / 2.0])
+        return float(low), float(high)
+
+
+def _values(experiment: Experiment, point: Point) -> dict[str, float]:
+    """Return all values of a point by name."""
+    numbers = experiment.coordinates.numbers(point.u)
+    found = {e.name: float(x) for e, x in zip(experiment.searched, numbers, strict=True)}
+    solved = [*(each.name for each in experiment.solved), *experiment.nuisance]
+    return found | {name: float(x) for name, x in zip(solved, point.linear, strict=True)}
+
+
+def _searched_again(
+    experiment: Experiment, start: FloatArray, pool: Pool, *, restarts: bool, seed: int
+) -> Point | None:
+    """Refine from a start and hop from there; None if everything is lost."""
+    best = Best()
+    best.take([refine(experiment, start, 1e-3, pool=pool)])
+    if restarts:
+        best.take([experiment.at(experiment.coordinates.start)])
+        hops(experiment, seed, best, pool, many=RESTARTS, spread=0)
+    return best.point
+
+
+def profiled(
+    task: Task, point: Point, estimate: object, effective: float, *, restarts: bool, seed: int
+) -> Profile:
+    """Return the profile of a parameter; see `gms_fsm.Fit.profile`."""
+    checked_integer("seed", seed, 0)
+    unknown = next(each for each in task.unknowns if each.name == getattr(estimate, "name", ""))
+    centre = _values(task.fine, point)[unknown.name]
+    rows = task.coarse.target.size
+    with Pool() as pool:
+        start = task.coarse.coordinates.start
+        best = _searched_again(task.coarse, start, pool, restarts=restarts, seed=seed)
+        if best is None:
+            raise ParameterError("the fitted model cannot be run on few rows", place=unknown.name)
+        effective_rows = min(effective, float(rows))  # few rows know no more than that
+        found = {centre: best.cost}
+        ends = []
+        for side in (-1.0, 1.0):
+            end, before = side * math.inf, (centre, 0.0)
+            for k in range(MOST_STEPS):
+                value = _moved(
+                    unknown.positive, centre, side * FACTOR * 2.0**k / 2.0, unknown.least
+                )
+                if value is None or value in found:
+                    break
+                try:
+                    cost = _cost_at(task, unknown.name, value, pool, restarts=restarts, seed=seed)
+                except GMSError:
+                    break
+                if cost is None:
+                    break
+                found[value] = cost
+                rise = effective_rows * math.log(max(cost, 1e-300) / max(best.cost, 1e-300))
+                if rise > LIMIT:
+                    share = (LIMIT - before[1]) / max(rise - before[1], 1e-300)
+                    end = before[0] + (value - before[0]) * min(max(share, 0.0), 1.0)
+                    break
+                before = (value, max(rise, before[1], 0.0))
+            ends.append(end)
+    values = np.array(sorted(found))
+    lowest = min(found.values())
+    rises = [
+        effective_rows * math.log(max(found[x], 1e-300) / max(lowest, 1e-300))
+        for x in values.tolist()
+    ]
+    return Profile(unknown.name, unknown.parameter.unit, values, np.array(rises), *ends)
+
+
+def _moved(positive: bool, centre: float, by: float, least: float) -> float | None:
+    """Return a value beside another one; None where its rule ends."""
+    if positive and centre > 0.0:
+        return centre * math.exp(by) if abs(by) < 50.0 else None
+    value = centre + by * (abs(centre) or 1.0)
+    return value if value >= least else None
+
+
+def _cost_at(
+    task: Task, name: str, value: float, pool: Pool, *, restarts: bool, seed: int
+) -> float | None:
+    """Return the least cost with one parameter at a value."""
+    held = task.without(name, value)
+    start = held.coarse.coordinates.start
+    point = _searched_again(held.coarse, start, pool, restarts=restarts, seed=seed)
+    return None if point is None else point.cost
+
+
+def bootstrapped(
+    task: Task,
+    point: Point,
+    names: Sequence[str],
+    block: float | None,
+    tau: float,
+    *,
+    draws: int,
+    restarts: bool,
+    seed: int,
+) -> Bootstrap:
+    """Return the fits to resampled residuals; see `gms_fsm.Fit.bootstrap`."""
+    if block is not None:
+        block = checked_scalar("block", block, "> 0")
+    rng = np.random.default_rng(seed)
+    modelled = [at_all_rows(task.fine, point, course) for course in task.courses]
+    found = np.full((draws, len(names)), np.nan)
+    with Pool() as pool:
+        for draw in range(draws):
+            replaced = []
+            for course, model in zip(task.courses, modelled, strict=True):
+                step = float(np.median(np.diff(course.t)))
+                length = max(1, round(BLOCK * tau if block is None else block / step))
+                left = (course.measured - model)[course.rows]
+                values = model.copy()
+                values[course.rows] += _resampled(left, min(length, left.size), rng)
+                replaced.append(values)
+            courses = tuple(
+                replace(course, measured=values)
+                for course, values in zip(task.courses, replaced, strict=True)
+            )
+            again = task.measured_as(courses)
+            start = again.coordinates.start
+            best = _searched_again(again, start, pool, restarts=restarts, seed=seed + draw)
+            if best is not None:
+                values_of = _values(again, best)
+                found[draw] = [values_of[name] for name in names]
+    return Bootstrap(tuple(names), found)
+
+
+def _resampled(residual: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
+    """Return residuals put together from blocks that begin anywhere, around the end as well."""
+    count = -(-residual.size // length)
+    starts = rng.integers(0, residual.size, count)
+    places = (starts[:, None] + np.arange(length)).ravel()[: residual.size] % residual.size
+    drawn: FloatArray = residual[places] - residual.mean()
+    return drawn

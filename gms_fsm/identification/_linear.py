@@ -1,0 +1,106 @@
+"""Which parameters the measured force is linear in: these are solved for, not searched.
+
+They must not appear in any flow, guard, assignment or entry, so that the motion of the elements
+does not depend on them; and no force may have the product of two of them. All of it is read from
+the trees of the chart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import SIGMA_2
+from gms_fsm.identification._unknowns import Subject
+from gms_fsm.language import Condition, Value, derivative, names_in, renamed
+from gms_fsm.systems.system import System
+
+__all__ = ["linear_names"]
+
+
+def linear_names(subject: Subject) -> tuple[str, ...]:
+    """Return the names of the parameters that the friction force is linear in.
+
+    Parameters
+    ----------
+    subject : Subject
+        A model driven by a record, or a system; of a system with a free body, a sampled value or a
+        further state there are none, because its motion depends on the force.
+
+    Returns
+    -------
+    tuple of str
+        In the order of ``subject.known``.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> linear_names(Subject(GMS(GMSParameters.paper("stick-slip"), law="signed")))
+    ('k', 'sigma', 'sigma_2')
+    """
+    what = subject.what
+    if not isinstance(what, System):
+        found = {*_linear_in(what.chart), SIGMA_2.name}
+        return tuple(name for name in subject.known if name in found)
+    if what.flow or what.sampled or not all(body.driven for body in what.bodies):
+        return ()
+    names = {
+        f"{contact.name}.{name}"
+        for contact in what.contacts
+        for name in (
+            *_linear_in(contact.chart),
+            *([SIGMA_2.name] if contact.model is not None else ()),
+        )
+    }
+    return tuple(name for name in subject.known if name in names)
+
+
+def _linear_in(chart: Chart) -> tuple[str, ...]:
+    """Return the parameters of a chart that only its force reads, and that linearly."""
+    if chart.locks:
+        return ()
+    moving = {name for tree in _of_motion(chart) for name in names_in(tree)}
+    for name in reversed(list(chart.lets)):  # a let reads only those before it
+        if name in moving:
+            moving |= names_in(chart.lets[name])
+    found = [name for name in chart.parameter_names if name not in moving]
+    forces = [_expanded(chart, tree) for tree in chart.forces.values() if tree is not None]
+    totals = [_expanded(chart, tree) for tree in chart.totals.values()]
+    if totals and any(names_in(tree) & {*found} for tree in totals):
+        # A total multiplies or shifts the sum of the forces; its own parameters are searched.
+        found = [name for name in found if not any(name in names_in(tree) for tree in totals)]
+    if not all(_is_affine(tree, chart.force_names) for tree in totals):
+        return ()
+    changed = True
+    while changed:  # a parameter in a product with another is left out, then asked again
+        changed = False
+        for name in found:
+            if not all(_is_affine(tree, [name], found) for tree in forces):
+                found, changed = [each for each in found if each != name], True
+                break
+    return tuple(found)
+
+
+def _is_affine(tree: Value, names: Iterable[str], others: Iterable[str] = ()) -> bool:
+    """Return whether a value is affine in names, with slopes that read neither these nor others."""
+    names = tuple(names)
+    for name in names:
+        slope = derivative(tree, name)
+        if slope is None or names_in(slope) & {*names, *others}:
+            return False
+    return True
+
+
+def _of_motion(chart: Chart) -> Iterator[Value | Condition]:
+    """Return the trees that decide how the elements move."""
+    yield from chart.flows.values()
+    yield from chart.guards.values()
+    for steps in chart.assignments.values():
+        yield from steps.values()
+
+
+def _expanded(chart: Chart, tree: Value) -> Value:
+    """Return a tree with the chart's named expressions written out."""
+    while names_in(tree) & {*chart.lets}:
+        tree = renamed(tree, chart.lets)
+    return tree

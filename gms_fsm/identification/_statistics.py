@@ -1,0 +1,197 @@
+"""How sure a fit is: correlated residuals, intervals, and directions that are not determined.
+
+Residuals of a model are correlated over many rows, so that rows count for less than their number:
+intervals follow from sums of the slopes over blocks that are nearly independent (a sandwich), not
+from rows.
+
+References
+----------
+W. K. Newey, K. D. West, "A Simple, Positive Semi-Definite, Heteroskedasticity and Autocorrelation
+Consistent Covariance Matrix", Econometrica 55(3), 703-708 (1987), doi:10.2307/1913610.
+A. Sokal, "Monte Carlo Methods in Statistical Mechanics" (1997), for the window of the correlation
+time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from gms_fsm.charts.parameters import FloatArray
+
+__all__ = ["Certainty", "certainty", "correlation_time", "phase_floor"]
+
+WINDOW = 5.0  # correlation times over which the autocorrelation is summed
+BLOCK = 10.0  # correlation times in a block of the sandwich
+FEWEST_BLOCKS = 12
+# A direction along which the coordinates can move this far (a factor of e**1.5, or the whole size
+# of the force) within the noise is not determined at all.
+LOOSE = 1.5
+# A parameter whose 95 % interval is wider than this (a factor of 3 either way) cannot be told.
+WIDE = math.log(3.0)
+SHARE = 0.3  # of a direction: what makes a parameter take part in it
+NEGLIGIBLE = 0.02  # of the force: an interval whose whole effect is below this tells "nearly zero"
+
+
+def correlation_time(parts: Sequence[FloatArray]) -> float:
+    """Return the integrated autocorrelation time of residuals, in rows.
+
+    ``tau = 1 + 2 * sum(rho_l)`` over lags up to 5 tau; n rows count for n / tau.
+
+    Parameters
+    ----------
+    parts : sequence of ndarray
+        Residuals, one array per unbroken stretch of rows.
+
+    Returns
+    -------
+    float
+        At least 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> noise = np.random.default_rng(0).standard_normal(4000)
+    >>> round(correlation_time([noise]), 1), round(correlation_time([np.repeat(noise, 20)]))
+    (1.0, 20)
+    """
+    longest = max(part.size for part in parts)
+    total = np.zeros(longest)
+    for part in parts:
+        size = 1 << (2 * part.size - 1).bit_length()
+        spectrum = np.abs(np.fft.rfft(part, size)) ** 2
+        total[: part.size] += np.fft.irfft(spectrum, size)[: part.size]
+    if total[0] <= 0.0:
+        return 1.0
+    tau = 1.0 + 2.0 * np.cumsum(total[1:] / total[0])
+    lags = np.arange(1, longest)
+    inside = np.flatnonzero(lags >= WINDOW * tau)
+    found = tau[inside[0]] if inside.size else (tau[-1] if tau.size else 1.0)
+    return float(min(max(found, 1.0), longest / 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Certainty:
+    """What the data say about all unknowns together, in coordinates.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (p, p)
+        Of the coordinates; infinite on the diagonal for those that cannot be told.
+    half : ndarray, shape (p,)
+        Half widths of the 95 % intervals of the coordinates.
+    open : ndarray of bool, shape (p,)
+        Which cannot be told.
+    directions : ndarray, shape (p, p)
+        Combinations of the coordinates, from the best determined to the least.
+    spread : ndarray, shape (p,)
+        How far each can move within the noise (one standard deviation).
+    tau, effective : float
+        Correlation time in rows, and the number of rows that count.
+    """
+
+    covariance: FloatArray
+    half: FloatArray
+    open: FloatArray
+    directions: FloatArray
+    spread: FloatArray
+    tau: float
+    effective: float
+
+
+def certainty(
+    slopes: FloatArray, parts: Sequence[FloatArray], logarithmic: FloatArray, size: float
+) -> Certainty:
+    """Return what the data say, from the slopes of the force and the residuals.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (rows, p)
+        d(force)/d(coordinate) at the rows that count.
+    parts : sequence of ndarray
+        The residuals, by unbroken stretches of rows.
+    logarithmic : ndarray of bool, shape (p,)
+        Whether a coordinate is a logarithm; the others are scaled so that 1 is the force's size.
+    size : float
+        Typical size of the force.
+
+    Returns
+    -------
+    Certainty
+        Intervals and directions.
+    """
+    rows, p = slopes.shape
+    residual = np.concatenate(list(parts))
+    tau = correlation_time(parts)
+    effective = max(rows / tau, 1.0)
+    variance = float(residual @ residual) / max(rows - p, 1)
+    variance = max(variance, (1e-9 * size) ** 2)
+    information = slopes.T @ slopes / (variance * tau)
+    strength, vectors = np.linalg.eigh(information)
+    order = np.argsort(strength)[::-1]
+    strength, vectors = np.maximum(strength[order], 0.0), vectors[:, order]
+    with np.errstate(divide="ignore"):
+        spread = 1.0 / np.sqrt(strength)
+    loose = spread > LOOSE
+    taking = (np.abs(vectors[:, loose]) > SHARE).any(axis=1)
+    kept = vectors[:, ~loose]
+    blocks = _block_sums(slopes @ kept, parts, max(1, math.ceil(BLOCK * tau)))
+    count = len(blocks)
+    inverse = np.diag(spread[~loose] ** 2) / (variance * tau)
+    middle = blocks.T @ blocks * (count / max(count - kept.shape[1], 1))
+    # With few blocks their sums are too uncertain; the information alone is then the better guess.
+    if count < FEWEST_BLOCKS + kept.shape[1]:
+        middle = np.linalg.pinv(inverse) * variance * tau
+    covariance = kept @ inverse @ middle @ inverse @ kept.T
+    degrees = max(effective - p, 3.0)
+    half = student.ppf(0.975, degrees) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    effect = half * np.sqrt(np.einsum("ij,ij->j", slopes, slopes) / rows) / size
+    wide = (half > WIDE) & (logarithmic | (effect > NEGLIGIBLE))
+    opened = taking | wide
+    np.fill_diagonal(covariance, np.where(taking, np.inf, np.diag(covariance)))
+    half = np.where(taking, np.inf, half)
+    return Certainty(covariance, half, opened, vectors, spread, tau, effective)
+
+
+def _block_sums(scores: FloatArray, parts: Sequence[FloatArray], length: int) -> FloatArray:
+    """Return the sums of slope times residual over blocks of rows, shape (blocks, p)."""
+    sums, first = [], 0
+    for part in parts:
+        weighted = scores[first : first + part.size] * part[:, None]
+        first += part.size
+        count = max(1, part.size // length)
+        borders = np.linspace(0, part.size, count + 1).astype(int)[:-1]
+        sums.append(np.add.reduceat(weighted, borders, axis=0))
+    return np.concatenate(sums)
+
+
+def phase_floor(t: FloatArray, values: FloatArray, period: float) -> float:
+    """Return how far single cycles are from their mean: what no model of the motion can beat.
+
+    Parameters
+    ----------
+    t, values : ndarray, shape (rows,)
+        Times, s, and what repeats.
+    period : float
+        s.
+
+    Returns
+    -------
+    float
+        Root mean square, corrected for the number of cycles; NaN with fewer than two.
+    """
+    step = float(np.median(np.diff(t)))
+    bins = max(1, round(period / step))
+    place = np.floor((t - t[0]) % period / period * bins).astype(int) % bins
+    many = np.bincount(place, minlength=bins)
+    mean = np.bincount(place, values, minlength=bins) / np.maximum(many, 1)
+    left = (values - mean[place]) ** 2
+    several = many[place] > 1
+    if not several.any():
+        return math.nan
+    factor = many[place][several] / (many[place][several] - 1.0)
+    return float(np.sqrt(np.mean(left[several] * factor)))

@@ -1,0 +1,410 @@
+"""What a fit varies: the numbers of a model or a system by name, and coordinates to search in.
+
+A positive number is searched by its logarithm, a number with a lower bound that is another number
+(``F_s >= F_c``) by the logarithm of its relative excess, any other linearly.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gms_fsm.charts.parameters import (
+    SIGMA_2,
+    WEIGHTS,
+    FloatArray,
+    Parameter,
+    checked_scalar,
+)
+from gms_fsm.errors import ParameterError, shown
+from gms_fsm.systems._varied import numbers_in, with_numbers_of
+from gms_fsm.systems.models import Model, parameters_of, with_values
+from gms_fsm.systems.system import Contact, System
+from gms_fsm.traces.rows import column_name
+
+__all__ = ["Coordinates", "Subject", "Unknown", "unknowns_of", "values_by_key"]
+
+SPAN = 1e3  # by default a positive number is searched from 1/1000 to 1000 times its start
+LEAST_EXCESS, MOST_EXCESS = 1e-3, 20.0  # of F_s over F_c, relative
+LINEAR_SPAN = 100.0  # times the start
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A model that the record's motion drives, or a system, whose numbers can be varied.
+
+    Parameters
+    ----------
+    what : Model or System
+        As the user gave it.
+    """
+
+    what: Model | System
+
+    @property
+    def known(self) -> dict[str, tuple[Parameter, int]]:
+        """By name: the parameter, and for how many elements it can differ (0: one number)."""
+        if isinstance(self.what, System):
+            return numbers_in(self.what)
+        values, n = self.what.values, self.what.n
+        return {
+            each.name: (
+                each,
+                n if each.name == WEIGHTS.name or np.ndim(values.get(each.name, 0.0)) > 0 else 0,
+            )
+            for each in parameters_of(self.what)
+        }
+
+    def value(self, name: str) -> float | FloatArray:
+        """Return the present value of a number by its name in `known`."""
+        if not isinstance(self.what, System):
+            return _value_in(self.what, name)
+        owner, _, own = name.partition(".")
+        if owner == "numbers":
+            return self.what.numbers[own]
+        return _value_in(self.what.contact(owner), own)
+
+    def varied(self, values: Mapping[str, ArrayLike]) -> Subject:
+        """Return the same with other numbers; a `ParameterError` if one breaks its rule."""
+        if not values:
+            return self
+        if isinstance(self.what, System):
+            return Subject(with_numbers_of(self.what, values))
+        return Subject(with_values(self.what, values))
+
+    @property
+    def contacts(self) -> tuple[Model | Contact, ...]:
+        """What has elements."""
+        return self.what.contacts if isinstance(self.what, System) else (self.what,)
+
+
+def _value_in(model: Model | Contact, name: str) -> float | FloatArray:
+    if name in model.values:
+        return model.values[name]
+    if name == WEIGHTS.name:
+        return model.weights
+    if name == SIGMA_2.name:
+        return model.sigma_2
+    assert model.stribeck is not None  # else the name would not be known
+    return float(getattr(model.stribeck, name))
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number to be found.
+
+    Parameters
+    ----------
+    name : str
+        As in tables: ``k1``, ``F_c``, ``gear.k2``.
+    key : str
+        The parameter's name in the model: ``k``.
+    element : int or None
+        Counted from 0; None for a number that all elements share.
+    parameter : Parameter
+        Unit, rule and meaning.
+    start : float
+        The value at which a search starts.
+    low, high : float
+        Bounds of the search.
+    other : str
+        The parameter that is its lower bound, if any.
+    """
+
+    name: str
+    key: str
+    element: int | None
+    parameter: Parameter
+    start: float
+    low: float = -math.inf
+    high: float = math.inf
+    other: str = ""
+
+    @property
+    def positive(self) -> bool:
+        """Whether its rule and its start make it positive."""
+        limits = [b.limit for b in self.parameter.bounds if b.op in (">", ">=")]
+        return self.start > 0.0 and any(not isinstance(x, str) and x >= 0.0 for x in limits)
+
+    @property
+    def kind(self) -> str:
+        """How it is searched: ``"excess"``, ``"log"`` or ``"linear"``."""
+        if self.other:
+            return "excess"
+        return "log" if self.positive else "linear"
+
+    @property
+    def least(self) -> float:
+        """The smallest value its rule allows, -inf if there is none."""
+        limits = [b.limit for b in self.parameter.bounds if b.op in (">", ">=")]
+        return max((x for x in limits if not isinstance(x, str)), default=-math.inf)
+
+
+def unknowns_of(
+    subject: Subject,
+    free: Iterable[str],
+    tied: Sequence[str],
+    bounds: Mapping[str, tuple[float, float]],
+) -> tuple[Unknown, ...]:
+    """Return the numbers to be found, from their names.
+
+    Parameters
+    ----------
+    subject : Subject
+        Whose numbers.
+    free : iterable of str
+        ``k`` for all elements, ``k2`` for one of them.
+    tied : sequence of str
+        Parameters of which all elements get one value.
+    bounds : mapping of str to (float, float)
+        By either name.
+
+    Returns
+    -------
+    tuple of Unknown
+        In the order of `free`.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown or given twice, or bounds contradict a rule.
+    """
+    known = subject.known
+    found: dict[str, Unknown] = {}
+    for name in free:
+        for each in _named(subject, known, name, tied):
+            if each.name in found:
+                raise ParameterError(f"{each.name!r} is given twice", place="free")
+            found[each.name] = each
+    for name in tied:
+        if not any(each.key == name and each.element is None for each in found.values()):
+            raise ParameterError(
+                f"{shown(name)} is not among the free parameters",
+                place="tied",
+                advice=f"free are {', '.join(found) or 'none'}",
+            )
+    bounded = dict(found)
+    for name, pair in bounds.items():
+        hit = [key for key, each in found.items() if name in (key, each.key)]
+        if not hit:
+            raise ParameterError(
+                f"{shown(name)} is not among the free parameters",
+                place="bounds",
+                advice=f"free are {', '.join(found) or 'none'}",
+            )
+        for key in hit:
+            bounded[key] = _bounded(found[key], pair)
+    return tuple(bounded.values())
+
+
+def _named(
+    subject: Subject, known: Mapping[str, tuple[Parameter, int]], name: str, tied: Sequence[str]
+) -> list[Unknown]:
+    """Return the unknowns that one name stands for."""
+    if name in known:
+        parameter, n = known[name]
+        value = subject.value(name)
+        if not n or name in tied:
+            return [_unknown(subject, name, None, parameter, float(np.mean(value)), name)]
+        values = np.broadcast_to(np.asarray(value, dtype=float), n)
+        return [
+            _unknown(subject, name, i, parameter, float(start), column_name(name, i))
+            for i, start in enumerate(values)
+        ]
+    for key, (parameter, n) in known.items():
+        for i in range(n):
+            if isinstance(name, str) and name == column_name(key, i):
+                start = float(np.broadcast_to(np.asarray(subject.value(key)), n)[i])
+                return [_unknown(subject, key, i, parameter, start, name)]
+    near = difflib.get_close_matches(str(name), known, 1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    raise ParameterError(
+        f"there is no parameter {shown(name)}",
+        place="free",
+        advice=f"{hint}known here are {', '.join(known)}; k2 is k of the second element",
+    )
+
+
+def _unknown(
+    subject: Subject, key: str, element: int | None, parameter: Parameter, start: float, name: str
+) -> Unknown:
+    lead = key.rpartition(".")[0]
+    known = subject.known
+    for bound in parameter.bounds:
+        if isinstance(bound.limit, str) and bound.op in (">", ">="):
+            other = f"{lead}.{bound.limit}" if lead else bound.limit
+            if other in known and float(np.min(subject.value(other))) > 0.0:
+                return Unknown(name, key, element, parameter, start, other=other)
+    return Unknown(name, key, element, parameter, start)
+
+
+def _bounded(unknown: Unknown, pair: Any) -> Unknown:
+    try:
+        low, high = pair
+    except (TypeError, ValueError):
+        raise ParameterError(
+            "it must be a pair of numbers (lowest, highest)",
+            place=f"bounds of {unknown.name!r}",
+            value=pair,
+        ) from None
+    low = checked_scalar(f"bounds of {unknown.name!r}: lowest", low, "finite")
+    high = checked_scalar(f"bounds of {unknown.name!r}: highest", high, "finite")
+    if not low < high:
+        raise ParameterError(
+            f"the lowest value {low!r} is not below the highest {high!r}",
+            place=f"bounds of {unknown.name!r}",
+        )
+    if high <= unknown.least:
+        raise ParameterError(
+            f"the highest value is {high!r}",
+            place=f"bounds of {unknown.name!r}",
+            advice=f"its rule is {unknown.parameter.rule!r}",
+        )
+    return replace(unknown, low=low, high=high, start=min(max(unknown.start, low), high))
+
+
+# --------------------------------------------------------------------------- coordinates
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """The map between the numbers and the coordinates u in which they are searched.
+
+    Parameters
+    ----------
+    subject : Subject
+        Supplies all numbers that are not searched.
+    unknowns : tuple of Unknown
+        What is searched.
+    """
+
+    subject: Subject
+    unknowns: tuple[Unknown, ...]
+
+    def __len__(self) -> int:
+        return len(self.unknowns)
+
+    @property
+    def start(self) -> FloatArray:
+        """The coordinates of the start, within the bounds."""
+        low, high = self.limits
+        found = [self._coordinate(each, each.start) for each in self.unknowns]
+        inside: FloatArray = np.clip(np.array(found, dtype=float), low, high)
+        return inside
+
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """The lowest and the highest coordinates, shape (unknowns,)."""
+        pairs = [self._limits(each) for each in self.unknowns]
+        return np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
+
+    def _limits(self, each: Unknown) -> tuple[float, float]:
+        if each.kind == "excess":
+            least, most = math.log(LEAST_EXCESS), math.log(MOST_EXCESS)
+            base = self._base(each)
+            if each.low > base:
+                least = math.log(max(each.low / base - 1.0, LEAST_EXCESS))
+            if math.isfinite(each.high):
+                most = math.log(max(each.high / base - 1.0, 2.0 * LEAST_EXCESS))
+            return least, max(most, least + 1e-3)
+        if each.kind == "log":
+            rules = [b.limit for b in each.parameter.bounds if b.op in ("<", "<=")]
+            most = min([SPAN * each.start, *(x for x in rules if not isinstance(x, str))])
+            low = each.low if each.low > 0.0 else max(each.start / SPAN, each.least)
+            high = each.high if math.isfinite(each.high) else most
+            return math.log(low), math.log(high)
+        reach = LINEAR_SPAN * self._scale(each)
+        return (
+            (each.low if math.isfinite(each.low) else max(each.start - reach, each.least))
+            / self._scale(each),
+            (each.high if math.isfinite(each.high) else each.start + reach) / self._scale(each),
+        )
+
+    def _base(self, each: Unknown) -> float:
+        return float(np.min(self.subject.value(each.other)))
+
+    def _scale(self, each: Unknown) -> float:
+        return abs(each.start) or 1.0
+
+    def _coordinate(self, each: Unknown, value: float) -> float:
+        if each.kind == "excess":
+            return math.log(max(value / self._base(each) - 1.0, LEAST_EXCESS))
+        return math.log(value) if each.kind == "log" else value / self._scale(each)
+
+    def numbers(self, u: FloatArray) -> FloatArray:
+        """Return the values of the unknowns at some coordinates, shape (unknowns,)."""
+        found = np.empty(len(self.unknowns))
+        plain: dict[str, float] = {}
+        for i, each in enumerate(self.unknowns):
+            if each.kind != "excess":
+                found[i] = math.exp(u[i]) if each.kind == "log" else u[i] * self._scale(each)
+                plain[each.key] = found[i]
+        for i, each in enumerate(self.unknowns):
+            if each.kind == "excess":  # over the present value of the other number
+                found[i] = plain.get(each.other, self._base(each)) * (1.0 + math.exp(u[i]))
+        return found
+
+    def coordinates(self, numbers: FloatArray) -> FloatArray:
+        """Return the coordinates of some values, within the bounds."""
+        plain = {each.key: x for each, x in zip(self.unknowns, numbers, strict=True)}
+        found = []
+        for each, value in zip(self.unknowns, numbers, strict=True):
+            if each.kind == "excess":
+                base = plain.get(each.other, self._base(each))
+                found.append(math.log(max(value / base - 1.0, LEAST_EXCESS)))
+            else:
+                found.append(self._coordinate(each, float(value)))
+        low, high = self.limits
+        inside: FloatArray = np.clip(np.array(found, dtype=float), low, high)
+        return inside
+
+    def slopes(self, u: FloatArray) -> FloatArray:
+        """Return d(value)/d(coordinate), shape (unknowns,)."""
+        numbers = self.numbers(u)
+        return np.array(
+            [
+                self._scale(each)
+                if each.kind == "linear"
+                else value * (math.exp(x) / (1.0 + math.exp(x)) if each.kind == "excess" else 1.0)
+                for each, value, x in zip(self.unknowns, numbers, u, strict=True)
+            ]
+        )
+
+    def values(self, numbers: FloatArray) -> dict[str, Any]:
+        """Return the values by the parameter's name, an array where elements differ."""
+        return values_by_key(self.subject, self.unknowns, numbers)
+
+
+def values_by_key(
+    subject: Subject, unknowns: Sequence[Unknown], numbers: Iterable[float]
+) -> dict[str, Any]:
+    """Return values of unknowns by the names of their parameters.
+
+    Parameters
+    ----------
+    subject : Subject
+        Supplies the elements that are not among the unknowns.
+    unknowns : sequence of Unknown
+        Some unknowns.
+    numbers : iterable of float
+        A value for each.
+
+    Returns
+    -------
+    dict
+        A number, or an array where elements differ.
+    """
+    known, found = subject.known, dict[str, Any]()
+    for each, value in zip(unknowns, numbers, strict=True):
+        if each.element is None:
+            found[each.key] = float(value)
+        else:
+            if each.key not in found:
+                present = np.asarray(subject.value(each.key), dtype=float)
+                found[each.key] = np.broadcast_to(present, known[each.key][1]).copy()
+            found[each.key][each.element] = value
+    return found

@@ -1,0 +1,409 @@
+"""fit(): parameters from measured records, with intervals, and what the records cannot tell.
+
+Parameters that the force is linear in are solved for at every proposal (variable projection); the
+others are searched by hops, first on few rows, then on all of them. Every proposal has a budget of
+steps, so that none can hang a fit.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gms_fsm._arguments import checked_integer, checked_kind, listed
+from gms_fsm.charts.parameters import checked_scalar
+from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
+from gms_fsm.identification._assess import NO_INFLUENCE, assessed, sorted_elements
+from gms_fsm.identification._experiment import NUISANCE
+from gms_fsm.identification._runs import BEGINS, Pool
+from gms_fsm.identification._search import SEARCHES, Best
+from gms_fsm.identification._task import Options, Task, bar
+from gms_fsm.identification._unknowns import Subject
+from gms_fsm.identification.result import Fit
+from gms_fsm.records.record import Record
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import System
+
+__all__ = ["fit", "fitted", "task_of"]
+
+FEWEST_ROWS = 20
+STILL = 1e-9  # of its size: a column that varies less is constant
+
+
+def fit(
+    records: Record | Sequence[Record],
+    model: Model | System,
+    *,
+    free: Sequence[str],
+    fixed: Mapping[str, ArrayLike] | None = None,
+    tied: Sequence[str] = (),
+    nuisance: Sequence[str] = ("offset",),
+    linear: Sequence[str] = (),
+    measured: str = "F",
+    drive: str | None = None,
+    train: tuple[float, float] | None = None,
+    test: tuple[float, float] | None = None,
+    cycles: float | None = None,
+    search: Literal["hops", "local", "de"] = "hops",
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    seed: int = 0,
+    most_steps: int | None = None,
+    smoothing: float | None = None,
+    begin: Literal["relaxed", "run in"] | None = None,
+    progress: bool | None = None,
+) -> Fit:
+    """Find parameters of a model, or of a system, from measured records.
+
+    The motion of each record drives the model, and its force is compared with the measured one.
+    Ctrl-C ends the search; the best so far is returned, and says so.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        Several are one experiment: they share all parameters and nuisance terms.
+    model : GMS, LuGre, ChartModel or System
+        With start values. A system is driven by the record through the signal of its driven body;
+        without one it moves by itself, and the record gives only times and measurements.
+    free : sequence of str
+        What to find: ``k`` for all elements, ``k2`` for one; in a system ``gear.k``, ``numbers.m``.
+    fixed : mapping of str to float or array_like, optional
+        Values that replace those of the model.
+    tied : sequence of str
+        Free parameters of which all elements get one value.
+    nuisance : sequence of str
+        Terms of the measurement besides the model: ``"offset"`` (N), ``"drift"`` (N/s) and
+        ``"inertia"`` (kg, times acceleration).
+    linear : sequence of str
+        Parameters declared linear in the force; they are normally found from the chart.
+    measured : str
+        What is compared: ``"F"``; in a system ``"gear.F"``, ``"load.x"`` or ``"load.v"``, with the
+        record's force, position or velocity.
+    drive : str, optional
+        The signal of a system that the record's velocity replaces.
+    train, test : tuple of float, optional
+        Times from, to (excluded), s. Without `train` all rows; the rows of `test` are looked at
+        once, when `Fit.held_out` is asked for.
+    cycles : float, optional
+        Period of the record, s: for the repeatability floor and the blocks of a bootstrap.
+    search : {"hops", "local", "de"}
+        Hops (perturb, refine, keep the best) find the global minimum most often; ``"local"``
+        refines the start values, ``"de"`` is differential evolution.
+    bounds : mapping of str to (float, float), optional
+        Lowest and highest values. By default a positive number is searched from a thousandth to a
+        thousand times its start.
+    seed : int
+        Of the perturbations; a fit with the same arguments gives the same result.
+    most_steps : int, optional
+        Steps that one run may take, at least one; by default 60 per row, at least 200,000.
+    smoothing : float, optional
+        Time constant of the motion's smoothing spline, s; see `Record.motion`.
+    begin : {"relaxed", "run in"}, optional
+        What is before the first row: all deflections zero, or a first pass of the record's own
+        motion. By default whichever fits the training rows better; see `Fit.begin`.
+    progress : bool, optional
+        Show a progress bar on standard error; by default if that is a terminal.
+
+    Returns
+    -------
+    Fit
+        Parameters with 95 % intervals, scores, and what the records cannot tell.
+
+    Raises
+    ------
+    ParameterError
+        If an argument breaks its rule, or no proposal could be run.
+    RecordError
+        If a record has too few rows, no motion, or no force.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from gms_fsm import LuGre, Prescribed, Record, Stribeck, simulate
+    >>> truth = LuGre(sigma_0=2e4, sigma_1=0.0, sigma_2=30.0, stribeck=Stribeck(2.0, 3.0, 1e-2))
+    >>> t = np.linspace(0.0, 2.0, 401)
+    >>> v = 0.02 * np.sin(2 * np.pi * t)
+    >>> run = simulate(truth, Prescribed((t, v)), 2.0, t_eval=t)
+    >>> record = Record.from_arrays(time=t, velocity=v, force=run.F)
+    >>> start = LuGre(sigma_0=1e4, sigma_1=0.0, sigma_2=0.0, stribeck=Stribeck(2.0, 3.0, 1e-2))
+    >>> found = fit(record, start, free=["sigma_0", "sigma_2"], search="local")
+    >>> round(found["sigma_0"].value), round(found["sigma_2"].value, 3)
+    (20000, 30.0)
+    """
+    options = _options(
+        free=_names("free", free),
+        tied=_names("tied", tied),
+        nuisance=_names("nuisance", nuisance),
+        linear=_names("linear", linear),
+        measured=measured,
+        drive=drive,
+        train=_window("train", train),
+        test=_window("test", test),
+        cycles=cycles,
+        search=search,
+        bounds={} if bounds is None else bounds,
+        seed=seed,
+        most_steps=most_steps,
+        smoothing=smoothing,
+        begin=begin,
+    )
+    task = task_of(records, model, {} if fixed is None else fixed, options)
+    return fitted(task, progress=progress)
+
+
+# --------------------------------------------------------------------------- arguments
+def _options(**given: Any) -> Options:
+    """Check the arguments that do not depend on model and records."""
+    checked_integer("seed", given["seed"], 0)
+    if given["most_steps"] is not None:
+        checked_integer("most_steps", given["most_steps"], 1)
+    for name in ("cycles", "smoothing"):
+        if given[name] is not None:
+            given[name] = checked_scalar(name, given[name], "> 0" if name == "cycles" else ">= 0")
+    _one_of("search", given["search"], SEARCHES)
+    if given["begin"] is not None:
+        _one_of("begin", given["begin"], BEGINS)
+    for name in given["nuisance"]:
+        _one_of("nuisance", name, tuple(NUISANCE))
+    checked_kind("bounds", given["bounds"], Mapping, "a mapping, for example {'C': (1e-5, 1e-2)}")
+    if not given["free"]:
+        raise ParameterError(
+            "nothing is to be found", place="free", advice="name parameters, for example ['k']"
+        )
+    return Options(**given)
+
+
+def _one_of(name: str, given: object, known: tuple[str, ...]) -> None:
+    if not isinstance(given, str) or given not in known:
+        raise ParameterError(f"it must be {' or '.join(map(repr, known))}", place=name, value=given)
+
+
+def _names(name: str, given: Any) -> tuple[str, ...]:
+    """Return names as a tuple; one name may be given as a text."""
+    names = [given] if isinstance(given, str) else listed(name, given, "names of parameters")
+    for each in names:
+        checked_kind(name, each, str, "names of parameters, for example ['k', 'weights']")
+    return tuple(names)
+
+
+def _window(name: str, given: Any) -> tuple[float, float] | None:
+    """Return a span of time."""
+    if given is None:
+        return None
+    try:
+        first, last = given
+    except (TypeError, ValueError):
+        raise ParameterError(
+            "it must be two times (from, to), s", place=name, value=given
+        ) from None
+    first = checked_scalar(f"{name}: from", first, "finite")
+    last = checked_scalar(f"{name}: to", last, "finite")
+    if not first < last:
+        raise ParameterError(
+            f"it ends at {last:g} s, not after its start at {first:g} s", place=name
+        )
+    return first, last
+
+
+def task_of(
+    records: Record | Sequence[Record],
+    model: Model | System,
+    fixed: Mapping[str, ArrayLike],
+    options: Options,
+) -> Task:
+    """Return what is fitted to what, checked.
+
+    Parameters
+    ----------
+    records, model, fixed
+        As in `fit`.
+    options : Options
+        All other arguments.
+
+    Returns
+    -------
+    Task
+        Ready to be searched.
+
+    Raises
+    ------
+    ParameterError, RecordError
+        As in `fit`.
+    """
+    if isinstance(records, Record):
+        records = [records]
+    every = listed("records", records, "records, from Record.from_csv(path)")
+    if not every:
+        raise ParameterError("there is none", place="records", advice="give at least one Record")
+    for each in every:
+        checked_kind("records", each, Record, "a Record, for example Record.from_csv(path)")
+    if not (isinstance(model, System) or (hasattr(model, "chart") and hasattr(model, "weights"))):
+        raise ParameterError(
+            "it must be a model or a system, for example initial_bank(record, 4)",
+            place="model",
+            value=model,
+        )
+    subject = _with_fixed(Subject(model), fixed, options.free)
+    task = Task(subject, tuple(every), options, begin=options.begin or BEGINS[1])
+    _ = task.unknowns  # raises errors of names and bounds
+    for name in options.linear:
+        if name not in subject.known:
+            raise ParameterError(
+                f"there is no parameter {shown(name)}",
+                place="linear",
+                advice=f"known here are {', '.join(subject.known)}",
+            )
+    _check_records(task)
+    return task
+
+
+def _with_fixed(subject: Subject, fixed: Any, free: tuple[str, ...]) -> Subject:
+    checked_kind("fixed", fixed, Mapping, "a mapping, for example {'v_c': 1e-6}")
+    for name in fixed:
+        if name not in subject.known:
+            raise ParameterError(
+                f"there is no parameter {shown(name)}",
+                place="fixed",
+                advice=f"known here are {', '.join(subject.known)}",
+            )
+        if name in free:
+            raise ParameterError(
+                f"{name!r} is free, too", place="fixed", advice="leave it out of one of them"
+            )
+    return subject.varied(dict(fixed))
+
+
+def _check_records(task: Task) -> None:
+    """Refuse records from which nothing can be found."""
+    column, train = task.measured.column, task.options.train
+    for record in task.records:
+        if column not in record.columns:
+            raise RecordError(
+                f"it has no {column}, with which to compare",
+                place=record.place,
+                advice=f"give {column}=(name, unit) when reading it; it has "
+                f"{', '.join(record.columns)}",
+            )
+    if not task.courses:
+        assert train is not None  # a record without selected rows cannot be made
+        raise RecordError(
+            f"no selected row is from {train[0]:g} s to {train[1]:g} s",
+            place=task.records[0].place,
+            advice="change train=(from, to)",
+        )
+    rows = sum(int(course.rows.sum()) for course in task.courses)
+    most = max(FEWEST_ROWS, 2 * (len(task.unknowns) + len(task.options.nuisance)))
+    if rows < most:
+        raise RecordError(
+            f"{rows} rows to train on are too few for {len(task.unknowns)} parameters",
+            place=task.records[0].place,
+            advice=f"give at least {most} rows, or free fewer parameters",
+        )
+    moving = any(np.ptp(course.v) > 0.0 for course in task.courses)
+    if not moving:
+        raise RecordError(
+            "nothing moves in the rows to train on",
+            place=task.records[0].place,
+            advice="check the position (or velocity) column and its unit",
+        )
+    values = np.concatenate([course.measured[course.rows] for course in task.courses])
+    if np.ptp(values) <= STILL * max(np.abs(values).max(), 1e-300):
+        raise RecordError(
+            f"the {column} is constant ({values[0]:.6g}) in the rows to train on",
+            place=task.records[0].place,
+            advice=f"check the {column} column and its unit",
+        )
+
+
+# --------------------------------------------------------------------------- the search
+def fitted(task: Task, *, progress: bool | None = False, start: Best | None = None) -> Fit:
+    """Return the fit of a task.
+
+    Parameters
+    ----------
+    task : Task
+        From `task_of`.
+    progress : bool or None
+        As in `fit`.
+    start : Best, optional
+        Where to keep the best point, for a caller that wants it after an interrupt.
+
+    Returns
+    -------
+    Fit
+        The best found.
+
+    Raises
+    ------
+    ParameterError
+        If no proposal could be run.
+    """
+    began, stopped = time.perf_counter(), ""
+    best = Best() if start is None else start
+    with Pool() as pool, bar("fit", progress) as told:
+        best.told = told
+        # Raises errors that no parameter can change, such as a signal that ends too early.
+        try:
+            task = task.coarse_search(best, pool)
+            coarse, best.point = best.point, None
+            if coarse is not None:
+                best.take([task.fine.at(coarse.u)])
+                task.polish(coarse.u, best, pool)
+        except KeyboardInterrupt:
+            stopped = "The search was interrupted: this is the best so far."
+            if best.point is None:
+                raise
+        told(1.0)
+    if best.point is None:
+        raise _nothing_ran(task)
+    fine = task.fine.at(best.point.u)
+    found = sorted_elements(task.fine.fitted(fine), task.unknowns)
+    final = replace(task, subject=found)
+    point = final.fine.at(final.fine.coordinates.start)
+    with Pool() as pool:
+        table = assessed(final, point, pool)
+    silent = [each.name for each in table.table if each.note == NO_INFLUENCE]
+    own = [each.name for each in final.unknowns]
+    if silent and len(silent) == len(own):
+        raise ParameterError(
+            f"the force in these records does not depend on {', '.join(silent)}",
+            place="free",
+            advice="free parameters that act in this motion: an element that never slips shows "
+            "only its stiffness",
+        )
+    notes = _notes(task, silent)
+    seconds = time.perf_counter() - began
+    return Fit(final, point, table, notes, task.ran[0], seconds, stopped)
+
+
+def _nothing_ran(task: Task) -> GMSError:
+    lost = task.coarse.start_point().lost
+    why = "" if lost is None else f": {lost}"
+    return ParameterError(
+        f"no proposal could be run{why}",
+        place="model",
+        advice="give start values nearer to the truth, bounds, or a larger most_steps",
+    )
+
+
+def _notes(task: Task, silent: Sequence[str]) -> tuple[str, ...]:
+    """Return what was done, for the user."""
+    notes = []
+    for record in task.records:
+        notes += [f"{record.name}: {note}" for note in record.notes]
+        for note in record.motion(task.options.smoothing).notes:
+            notes.append(f"{record.name}: {note}")
+    said = "" if task.options.begin else ", which fits the training rows better"
+    if any(course.lead[0].size for course in task.courses):
+        notes.append(
+            "before each record the model runs in: a first pass of the record's own motion" + said
+        )
+    else:
+        notes.append("each record begins with the initial state of the chart")
+    if silent:
+        notes.append(f"without influence on the force of these records: {', '.join(silent)}")
+    return tuple(notes)

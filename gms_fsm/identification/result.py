@@ -1,0 +1,539 @@
+"""The result of a fit: parameters with honest intervals, and what to ask of it next."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm._arguments import checked_integer, checked_kind, checked_path, listed
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import ParameterError, RecordError, shown
+from gms_fsm.identification._assess import Assessed, Estimate
+from gms_fsm.identification._certainty import Bootstrap, Profile, bootstrapped, profiled
+from gms_fsm.identification._compared import Choice, ChoiceRow, Comparison, score_of
+from gms_fsm.identification._experiment import Point
+from gms_fsm.identification._runs import Course
+from gms_fsm.identification._statistics import phase_floor
+from gms_fsm.identification._task import Task, at_all_rows
+from gms_fsm.records.record import Record
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import System
+from gms_fsm.traces.trace import Trace
+
+__all__ = ["Choice", "ChoiceRow", "Comparison", "Estimate", "Fit", "Residuals", "score_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Measurement and model at all rows of a record.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    t, x, v : ndarray, shape (rows,)
+        Time, s, and the motion: m, m/s.
+    measured, modelled : ndarray, shape (rows,)
+        What was compared; nuisance terms are in the model.
+    rows, held : ndarray of bool, shape (rows,)
+        The rows that were trained on, and those that were held out.
+    """
+
+    record: Record
+    t: FloatArray
+    x: FloatArray
+    v: FloatArray
+    measured: FloatArray
+    modelled: FloatArray
+    rows: NDArray[np.bool_]
+    held: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit:
+    """A model with parameters found from records, their intervals, and what the data cannot tell.
+
+    Made by `fit` and `choose`.
+
+    Attributes
+    ----------
+    task : Task
+        What was fitted to what; its model has the values found.
+    point : Point
+        These values, evaluated on all training rows.
+    assessed : Assessed
+        The table and the covariance.
+    notes : tuple of str
+        What was done, for the user.
+    runs : int
+        Number of runs made.
+    seconds : float
+        Time taken.
+    stopped : str
+        Empty, or why the search ended early.
+    choice : Choice or None
+        How the model was chosen.
+    """
+
+    task: Task
+    point: Point
+    assessed: Assessed
+    notes: tuple[str, ...] = ()
+    runs: int = 0
+    seconds: float = 0.0
+    stopped: str = ""
+    choice: Choice | None = field(default=None)
+
+    # ------------------------------------------------------------------ what was found
+    @property
+    def model(self) -> Model | System:
+        """The model, or the system, with the values found."""
+        return self.task.subject.what
+
+    @property
+    def table(self) -> tuple[Estimate, ...]:
+        """One row per parameter: value, 95 % interval, unit, and whether it can be told."""
+        return self.assessed.table
+
+    def __getitem__(self, name: str) -> Estimate:
+        for each in self.table:
+            if each.name == name:
+                return each
+        known = ", ".join(each.name for each in self.table)
+        raise ParameterError(f"the fit has no parameter {shown(name)}", advice=f"it has {known}")
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the values, shape (p, p), in the order of `table`."""
+        return self.assessed.covariance
+
+    @property
+    def correlation_time(self) -> float:
+        """Rows over which residuals are correlated."""
+        return self.assessed.certainty.tau
+
+    @property
+    def effective_rows(self) -> float:
+        """The number of training rows over their correlation time."""
+        return self.assessed.certainty.effective
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """Names of the parameters that cannot be told from these records."""
+        return tuple(each.name for each in self.table if not each.told)
+
+    @property
+    def weakest(self) -> str:
+        """What is determined, what is not, and the weakest direction, in words."""
+        return self.assessed.weakest
+
+    @cached_property
+    def never_slipped(self) -> tuple[int, ...]:
+        """Elements, from 1, that never changed state in the training runs."""
+        switched: set[int] = set()
+        count = 0
+        for course in self.task.courses:
+            trace = self._ran(course)
+            firings = trace.firings
+            count = sum(contact.n for contact in self.task.subject.contacts)
+            switched |= {int(i) for i in np.unique(firings.machine)}
+        some = any(contact.chart.transitions for contact in self.task.subject.contacts)
+        return tuple(i + 1 for i in range(count) if some and i not in switched)
+
+    def _ran(self, course: Course) -> Trace:
+        return self.task.fine.driver.run(self.task.subject, course).trace
+
+    # ------------------------------------------------------------------ how it was found
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """The records."""
+        return self.task.records
+
+    @property
+    def train(self) -> tuple[float, float] | None:
+        """The times that were trained on, s; None for all."""
+        return self.task.options.train
+
+    @property
+    def test(self) -> tuple[float, float] | None:
+        """The times that were held out, s."""
+        return self.task.options.test
+
+    @property
+    def cycles(self) -> float | None:
+        """The period of the records, s."""
+        return self.task.options.cycles
+
+    @property
+    def smoothing(self) -> float | None:
+        """Time constant of the motion's smoothing spline, s."""
+        return self.task.options.smoothing
+
+    @property
+    def begin(self) -> str:
+        """What is before the first row of a record: ``"relaxed"`` or ``"run in"``."""
+        return self.task.begin
+
+    @property
+    def measured(self) -> str:
+        """What of the model was compared with the record."""
+        return self.task.options.measured
+
+    @property
+    def nuisance(self) -> tuple[str, ...]:
+        """The terms of the measurement that are no part of the model."""
+        return self.task.options.nuisance
+
+    # ------------------------------------------------------------------ scores
+    @cached_property
+    def training(self) -> dict[str, float]:
+        """Score on the training rows: ``rmse``, ``r2``, ``rows``."""
+        target = self.task.fine.target
+        return score_of(target, target + self.point.residual)
+
+    @cached_property
+    def held_out(self) -> dict[str, float] | None:
+        """Score on the rows of `test`; None without any."""
+        if self.test is None:
+            return None
+        parts = [(each.measured[each.held], each.modelled[each.held]) for each in self.residuals()]
+        measured, modelled = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return score_of(measured, modelled) if measured.size else None
+
+    @cached_property
+    def floor(self) -> float | None:
+        """Repeatability: distance of cycles from their mean; None if `cycles` was not given."""
+        if self.cycles is None:
+            return None
+        squares, count = 0.0, 0
+        for course in self.task.courses:
+            rows = course.rows
+            found = phase_floor(course.t[rows], course.measured[rows], self.cycles)
+            if math.isfinite(found):
+                squares, count = squares + found**2 * rows.sum(), count + int(rows.sum())
+        return math.sqrt(squares / count) if count else None
+
+    @property
+    def bic(self) -> float:
+        """Bayesian information criterion on effective rows; lower is better."""
+        rows = self.effective_rows
+        mean = self.point.cost / self.point.residual.size
+        return rows * math.log(max(mean, 1e-300)) + len(self.table) * math.log(max(rows, 2.0))
+
+    def residuals(self, which: int | None = None) -> list[Residuals]:
+        """Return measurement and model at all rows.
+
+        Parameters
+        ----------
+        which : int, optional
+            Number of one record, from 0; all of them by default.
+
+        Returns
+        -------
+        list of Residuals
+            One per record.
+        """
+        if which is None:
+            return list(self._residuals)
+        checked_integer("which", which, 0)
+        if which >= len(self.records):
+            raise ParameterError(
+                f"there are {len(self.records)} records, counted from 0",
+                place="which",
+                value=which,
+            )
+        return [self._residuals[which]]
+
+    @cached_property
+    def _residuals(self) -> tuple[Residuals, ...]:
+        found = []
+        for record in self.records:
+            course = self.task.course(record, None)
+            train = self.task.course(record, self.train).rows
+            held = self.task.course(record, self.test).rows if self.test else ~course.rows
+            held = held & course.rows
+            modelled = at_all_rows(self.task.fine, self.point, course)
+            found.append(
+                Residuals(
+                    record, course.t, course.x, course.v, course.measured, modelled, train, held
+                )
+            )
+        return tuple(found)
+
+    def predict(self, record: Record) -> FloatArray:
+        """Return what the fitted model gives for the motion of a record.
+
+        Parameters
+        ----------
+        record : Record
+            With a position or a velocity; its force is not read.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            The force, N, with the nuisance terms (or what else was measured).
+
+        Raises
+        ------
+        RecordError
+            If it has no motion.
+        SimulationError
+            If the run fails.
+        """
+        checked_kind("record", record, Record, "a Record, for example Record.from_csv(path)")
+        return at_all_rows(self.task.fine, self.point, self.task.course(record, None))
+
+    def score(self, record: Record) -> dict[str, float]:
+        """Return how well the fitted model predicts a record.
+
+        Parameters
+        ----------
+        record : Record
+            With motion and force.
+
+        Returns
+        -------
+        dict
+            ``rmse``, N, ``r2`` and ``rows``, over the selected rows of the record.
+
+        Raises
+        ------
+        RecordError
+            If it has no force.
+        """
+        checked_kind("record", record, Record, "a Record, for example Record.from_csv(path)")
+        column = self.task.measured.column
+        if column not in record.columns:
+            raise RecordError(
+                f"it has no {column}, with which to compare",
+                place=record.place,
+                advice=f"give {column}=(name, unit) when reading it",
+            )
+        chosen = record.chosen
+        return score_of(record.columns[column][chosen], self.predict(record)[chosen])
+
+    # ------------------------------------------------------------------ how sure it is
+    def profile(self, name: str, *, restarts: bool = True, seed: int = 0) -> Profile:
+        """Return the profile of one parameter: how the fit suffers as it is moved away.
+
+        At each value all others are searched again, with hops unless `restarts` is False: a profile
+        that is searched locally looks far too sure.
+
+        Parameters
+        ----------
+        name : str
+            Of a parameter in `table` that was searched or solved for, not of a nuisance term.
+        restarts : bool
+            Whether to hop at each value.
+        seed : int
+            Of the hops.
+
+        Returns
+        -------
+        Profile
+            Values, costs and the 95 % interval; an end that was not found is open.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such parameter.
+        """
+        if name in self.nuisance or name not in {each.name for each in self.table}:
+            known = ", ".join(each.name for each in self.table if each.name not in self.nuisance)
+            raise ParameterError(
+                f"the fit has no parameter {shown(name)}", advice=f"profiles of {known} can be made"
+            )
+        return profiled(
+            self.task, self.point, self[name], self.effective_rows, restarts=restarts, seed=seed
+        )
+
+    def bootstrap(
+        self,
+        block: float | None = None,
+        *,
+        draws: int = 40,
+        restarts: bool = True,
+        seed: int = 0,
+    ) -> Bootstrap:
+        """Return the spread of the parameters over resampled residuals.
+
+        Blocks of residuals are drawn and added to the model; each such record is fitted anew, with
+        hops unless `restarts` is False: a bootstrap that only refines looks far too sure.
+
+        Parameters
+        ----------
+        block : float, optional
+            Length of a block, s; by default `cycles`, or ten correlation times.
+        draws : int
+            Number of refits, at least 2.
+        restarts : bool
+            Whether to hop in each.
+        seed : int
+            Of draws and hops.
+
+        Returns
+        -------
+        Bootstrap
+            The values of each draw, and intervals.
+
+        Raises
+        ------
+        ParameterError
+            If an argument breaks its rule.
+        """
+        checked_integer("draws", draws, 2)
+        checked_integer("seed", seed, 0)
+        return bootstrapped(
+            self.task,
+            self.point,
+            [each.name for each in self.table],
+            block if block is not None else self.cycles,
+            self.correlation_time,
+            draws=draws,
+            restarts=restarts,
+            seed=seed,
+        )
+
+    def compare(self, others: Fit | Sequence[Fit] | Mapping[str, Fit]) -> Comparison:
+        """Return this fit beside others, the best on held-out rows first.
+
+        Parameters
+        ----------
+        others : Fit, sequence of Fit, or mapping of str to Fit
+            Fits to the same rows; a mapping names them.
+
+        Returns
+        -------
+        Comparison
+            Held-out RMSE first, BIC on effective rows beside.
+
+        Raises
+        ------
+        ParameterError
+            If one is no fit, or was made from other rows.
+        """
+        if isinstance(others, Fit):
+            others = [others]
+        named = (
+            dict(others)
+            if isinstance(others, Mapping)
+            else {
+                f"{i}: {_title(each)}": each
+                for i, each in enumerate(listed("others", others, "fits"), start=2)
+            }
+        )
+        every = {f"1: {_title(self)}": self, **named}
+        rows = []
+        for name, each in every.items():
+            checked_kind("others", each, Fit, "fits, from fit(...)")
+            same = each.task.fine.target.size == self.task.fine.target.size
+            if not (same and np.array_equal(each.task.fine.target, self.task.fine.target)):
+                raise ParameterError(
+                    f"fit {shown(name)} was made from other rows",
+                    place="others",
+                    advice="compare fits to the same records, with the same train",
+                )
+            score = each.held_out or each.training
+            note = "" if each.held_out else "training rows: no test was given"
+            rows.append(
+                ChoiceRow(
+                    name,
+                    "",
+                    len(each.table),
+                    score["rmse"],
+                    score["r2"],
+                    each.bic,
+                    each.seconds,
+                    note,
+                )
+            )
+        return Comparison(tuple(sorted(rows, key=lambda row: row.rmse)))
+
+    # ------------------------------------------------------------------ files
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the fitted model, driven by the motion of the first record, as a scenario.
+
+        Parameters
+        ----------
+        path : str or Path
+            File name ending in ``.toml``.
+
+        Returns
+        -------
+        Path
+            The file; ``gms-fsm run`` takes it.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        from gms_fsm.identification._saved import save
+
+        return save(self, checked_path("path", path))
+
+    def report(self, folder: str | os.PathLike[str]) -> Path:
+        """Write a report: figures, tables, what the record cannot tell, and the fitted scenario.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Created if it does not exist.
+
+        Returns
+        -------
+        Path
+            ``report.md`` in it.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        from gms_fsm.identification.report import write_report
+
+        return write_report(self, checked_path("folder", folder))
+
+    # ------------------------------------------------------------------ texts
+    def with_choice(self, choice: Choice, seconds: float) -> Fit:
+        """Return the same fit with how it was chosen."""
+        return replace(self, choice=choice, seconds=seconds)
+
+    def __repr__(self) -> str:
+        opened = f"; {len(self.open)} cannot be told" if self.open else ""
+        return (
+            f"<Fit: {_title(self)}, {len(self.table)} parameters, training RMSE "
+            f"{self.training['rmse']:.4g} {self.task.measured.unit}{opened}>"
+        )
+
+    def __str__(self) -> str:
+        lines = [f"{'parameter':14s} {'value':>11s}   {'95 % interval':25s} unit"]
+        for each in self.table:
+            interval = f"{each.low:.4g} to {each.high:.4g}"
+            note = f"  {each.note}" if each.note else ""
+            lines.append(
+                f"{each.name:14s} {each.value:11.5g}   {interval:25s} {each.unit}{note}".rstrip()
+            )
+        unit = self.task.measured.unit
+        lines.append(_scored("training", self.training, unit))
+        if self.held_out is not None:
+            lines.append(_scored("held out", self.held_out, unit))
+        lines.append(self.weakest)
+        return "\n".join([*lines, self.stopped] if self.stopped else lines)
+
+
+def _title(fit: Fit) -> str:
+    what = fit.model
+    return what.name if isinstance(what, System) else what.title
+
+
+def _scored(name: str, score: Mapping[str, float], unit: str) -> str:
+    rows = int(score["rows"])
+    return f"{name}: RMSE {score['rmse']:.4g} {unit}, R2 {score['r2']:.5f} ({rows} rows)"
