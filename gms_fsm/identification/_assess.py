@@ -58,6 +58,26 @@ class Estimate:
         """Whether the record determines it."""
         return not self.note.startswith(OPEN)
 
+    @property
+    def shown(self) -> tuple[str, str]:
+        """Value and interval as texts, with as many digits as the interval is worth.
+
+        >>> Estimate("k1", 1234.5678, 1230.01, 1239.12, "N/m").shown
+        ('1234.57', '1230.01 to 1239.12')
+        >>> Estimate("C", 0.00123, 0.0, math.inf, "m/s").shown
+        ('0.00123', 'any above 0')
+        """
+        low, high = self.low, self.high
+        if math.isinf(low) and math.isinf(high):
+            return f"{self.value:.4g}", "any"
+        if math.isinf(low) or math.isinf(high):
+            end = f"any above {low:.4g}" if math.isinf(high) else f"any below {high:.4g}"
+            return f"{self.value:.4g}", end
+        size, width = max(abs(low), abs(high)), high - low
+        digits = 4 if width <= 0.0 else math.ceil(math.log10(size / width)) + 3
+        digits = min(max(digits, 3), 12)
+        return f"{self.value:.{digits}g}", f"{low:.{digits}g} to {high:.{digits}g}"
+
 
 @dataclass(frozen=True, eq=False)
 class Assessed:
