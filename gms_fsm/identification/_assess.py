@@ -16,7 +16,7 @@ from gms_fsm.identification._task import Task, stretches
 from gms_fsm.identification._unknowns import Subject, Unknown
 from gms_fsm.systems.system import System
 
-__all__ = ["Assessed", "Estimate", "assessed", "sorted_elements"]
+__all__ = ["Assessed", "Estimate", "assessed", "shown_interval", "sorted_elements"]
 
 FIRST_STEP, LEAST_STEP, MOST_STEP = 1e-3, 1e-4, 0.1
 OPEN = "cannot be told"
@@ -57,6 +57,30 @@ class Estimate:
     def told(self) -> bool:
         """Whether the record determines it."""
         return not self.note.startswith(OPEN)
+
+    @property
+    def shown(self) -> tuple[str, str]:
+        """Value and interval as texts, with as many digits as the interval is worth.
+
+        >>> Estimate("k1", 1234.5678, 1230.01, 1239.12, "N/m").shown
+        ('1234.57', '1230.01 to 1239.12')
+        >>> Estimate("C", 0.00123, 0.0, math.inf, "m/s").shown
+        ('0.00123', 'any above 0')
+        """
+        return shown_interval(self.value, self.low, self.high)
+
+
+def shown_interval(value: float, low: float, high: float) -> tuple[str, str]:
+    """Return a value and its interval as texts, with as many digits as the interval is worth."""
+    if math.isinf(low) and math.isinf(high):
+        return f"{value:.4g}", "any"
+    if math.isinf(low) or math.isinf(high):
+        end = f"any above {low:.4g}" if math.isinf(high) else f"any below {high:.4g}"
+        return f"{value:.4g}", end
+    size, width = max(abs(low), abs(high)), high - low
+    digits = 4 if width <= 0.0 else math.ceil(math.log10(size / width)) + 3
+    digits = min(max(digits, 3), 12)
+    return f"{value:.{digits}g}", f"{low:.{digits}g} to {high:.{digits}g}"
 
 
 @dataclass(frozen=True, eq=False)

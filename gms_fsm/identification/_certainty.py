@@ -11,6 +11,7 @@ import numpy as np
 from gms_fsm._arguments import checked_integer
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, shown
+from gms_fsm.identification._assess import Estimate, shown_interval
 from gms_fsm.identification._experiment import Experiment, Point
 from gms_fsm.identification._runs import Pool
 from gms_fsm.identification._search import Best, hops, refine
@@ -54,9 +55,9 @@ class Profile:
         return not (math.isfinite(self.low) and math.isfinite(self.high))
 
     def __str__(self) -> str:
-        low = "open" if math.isinf(self.low) else f"{self.low:.4g}"
-        high = "open" if math.isinf(self.high) else f"{self.high:.4g}"
-        return f"{self.name}: 95 % from {low} to {high} {self.unit}".rstrip()
+        value = float(self.values[int(np.argmin(self.rise))])
+        _, interval = shown_interval(value, self.low, self.high)
+        return f"{self.name}: 95 % interval {interval} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +126,11 @@ def _searched_again(
 
 
 def profiled(
-    task: Task, point: Point, estimate: object, effective: float, *, restarts: bool, seed: int
+    task: Task, point: Point, estimate: Estimate, effective: float, *, restarts: bool, seed: int
 ) -> Profile:
     """Return the profile of a parameter; see `gms_fsm.Fit.profile`."""
     checked_integer("seed", seed, 0)
-    unknown = next(each for each in task.unknowns if each.name == getattr(estimate, "name", ""))
+    unknown = next(each for each in task.unknowns if each.name == estimate.name)
     centre = _values(task.fine, point)[unknown.name]
     rows = task.coarse.target.size
     with Pool() as pool:

@@ -1,12 +1,13 @@
-"""A fitted model as a scenario that runs."""
+"""A fitted model as a scenario that runs: a system file with the motion and the times of the run."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gms_fsm.systems.rigs import Prescribed
-from gms_fsm.systems.system import System, system_of
+from gms_fsm._records import Table
+from gms_fsm.systems._file import SystemFile, save_as
+from gms_fsm.systems.system import System
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
@@ -14,8 +15,23 @@ if TYPE_CHECKING:
 __all__ = ["save"]
 
 
+class Times(Table):
+    """The run: a part of the table that scenario files have under this name."""
+
+    t_start: float
+    t_end: float
+
+
+class Fitted(SystemFile):
+    """A system file with the tables of a run."""
+
+    title: str
+    notes: str
+    run: Times
+
+
 def save(fit: Fit, path: Path) -> Path:
-    """Write a system file with the fitted values, the motion, and the times of the run.
+    """Write the fitted model, driven by the first record, with its run-in if it has one.
 
     Parameters
     ----------
@@ -28,7 +44,24 @@ def save(fit: Fit, path: Path) -> Path:
     -------
     Path
         The file.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
     """
-    what, course = fit.model, fit.task.courses[0]
-    system = what if isinstance(what, System) else system_of(what, Prescribed(course.signal))
-    return system.save(path)
+    course = fit.task.course(fit.records[0], None)
+    start = fit.task.fine.driver.start(fit.task.subject, course)
+    return save_as(
+        Fitted,
+        start.system,
+        path,
+        title=f"{_name(fit)} fitted to {fit.records[0].name}",
+        notes=fit.weakest,
+        run=Times(t_start=start.t_start, t_end=start.t_end),
+    )
+
+
+def _name(fit: Fit) -> str:
+    what = fit.model
+    return what.name if isinstance(what, System) else what.title

@@ -117,16 +117,17 @@ def refine(
     def residual(place: FloatArray) -> FloatArray:
         return at(place).residual
 
-    least_squares(
-        residual,
-        inside,
-        jac=slopes,
-        bounds=(low, high),
-        max_nfev=most,
-        xtol=1e-6,
-        ftol=1e-7,
-        gtol=None,
-    )
+    with np.errstate(all="ignore"):  # SciPy divides by slopes and steps that may be zero
+        least_squares(
+            residual,
+            inside,
+            jac=slopes,
+            bounds=(low, high),
+            max_nfev=most,
+            xtol=1e-6,
+            ftol=1e-7,
+            gtol=None,
+        )
     return best.point if best.point is not None else at(inside)
 
 

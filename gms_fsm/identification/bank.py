@@ -358,8 +358,9 @@ def _merged(bank: _Bank, n: int) -> FloatArray:
     """
     r, k = bank.r, bank.k
     while r.size > n:
-        # Ward's criterion: the growth of the scatter sum(k (r - mean)**2).
-        growth = k[:-1] * k[1:] / (k[:-1] + k[1:]) * np.diff(r) ** 2
+        # Ward's criterion: the growth of the scatter sum(k (r - mean)**2), without units.
+        share = k / k.sum()
+        growth = share[:-1] * share[1:] / (share[:-1] + share[1:]) * np.diff(r / r[-1]) ** 2
         i = int(growth.argmin())
         pair = slice(i, i + 2)
         stiffness = k[pair].sum()
@@ -376,8 +377,9 @@ def _refined(data: _Training, r: FloatArray) -> _Bank:
     limits = 0.5 * data.travel * FINEST, 0.5 * data.travel
     best = data.fitted(r)
     for _ in range(PASSES):
-        ones = np.ones((best.residual.size, 1))
-        jacobian = np.hstack([best.k * best.slope * best.r, best.z / best.r, ones])
+        plateau = best.k @ best.r  # all columns in N, so that units do not matter
+        ones = np.full((best.residual.size, 1), plateau)
+        jacobian = np.hstack([best.k * best.slope * best.r, plateau * best.z / best.r, ones])
         step = np.linalg.lstsq(jacobian, best.residual)[0][: best.r.size]
         step = best.r * np.clip(step, -0.5, 0.5)
         trial = best

@@ -347,8 +347,9 @@ class Fit:
         ParameterError
             If there is no such parameter.
         """
-        if name in self.nuisance or name not in {each.name for each in self.table}:
-            known = ", ".join(each.name for each in self.table if each.name not in self.nuisance)
+        names = [each.name for each in self.table if each.name not in self.nuisance]
+        if name not in names:
+            known = ", ".join(names)
             raise ParameterError(
                 f"the fit has no parameter {shown(name)}", advice=f"profiles of {known} can be made"
             )
@@ -423,18 +424,16 @@ class Fit:
         """
         if isinstance(others, Fit):
             others = [others]
-        named = (
-            dict(others)
-            if isinstance(others, Mapping)
-            else {
-                f"{i}: {_title(each)}": each
-                for i, each in enumerate(listed("others", others, "fits"), start=2)
-            }
-        )
-        every = {f"1: {_title(self)}": self, **named}
+        if not isinstance(others, Mapping):
+            others = dict(enumerate(listed("others", others, "fits"), start=2))
+        for each in others.values():
+            checked_kind("others", each, Fit, "fits, from fit(...)")
+        every = {f"1: {_title(self)}": self} | {
+            f"{name}: {_title(each)}" if isinstance(name, int) else str(name): each
+            for name, each in others.items()
+        }
         rows = []
         for name, each in every.items():
-            checked_kind("others", each, Fit, "fits, from fit(...)")
             same = each.task.fine.target.size == self.task.fine.target.size
             if not (same and np.array_equal(each.task.fine.target, self.task.fine.target)):
                 raise ParameterError(
@@ -516,12 +515,12 @@ class Fit:
         )
 
     def __str__(self) -> str:
-        lines = [f"{'parameter':14s} {'value':>11s}   {'95 % interval':25s} unit"]
+        lines = [f"{'parameter':14s} {'value':>12s}   {'95 % interval':28s} unit"]
         for each in self.table:
-            interval = f"{each.low:.4g} to {each.high:.4g}"
+            value, interval = each.shown
             note = f"  {each.note}" if each.note else ""
             lines.append(
-                f"{each.name:14s} {each.value:11.5g}   {interval:25s} {each.unit}{note}".rstrip()
+                f"{each.name:14s} {value:>12s}   {interval:28s} {each.unit}{note}".rstrip()
             )
         unit = self.task.measured.unit
         lines.append(_scored("training", self.training, unit))

@@ -32,7 +32,7 @@ from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model
 from gms_fsm.systems.system import Contact, System
 
-__all__ = ["SystemFile", "load", "save"]
+__all__ = ["SystemFile", "load", "save", "save_as"]
 
 KNOWN, OWN = "<known>", "<own>"
 
@@ -183,8 +183,33 @@ def save(system: System, path: Path) -> Path:
     OutputError
         If a signal is a Python function, the file cannot be written, or something else is there.
     """
+    return save_as(SystemFile, system, path)
+
+
+def save_as(kind: type[SystemFile], system: System, path: Path, **further: Any) -> Path:
+    """Write a file that holds a system and more.
+
+    Parameters
+    ----------
+    kind : type of SystemFile
+        What the file holds.
+    system, path
+        As in `save`.
+    **further
+        Its further fields.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    OutputError
+        As in `save`.
+    """
     contacts = [ContactInFile(**described(each), **_numbers(each)) for each in system.contacts]
-    table = SystemFile(**plain(system), contacts=contacts)
+    table = kind(**plain(system), contacts=contacts, **further)
     for name, signal in table.signals.items():
         if isinstance(signal, FunctionTable):
             raise OutputError(

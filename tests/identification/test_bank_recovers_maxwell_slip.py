@@ -107,6 +107,18 @@ def test_many_rows_give_the_bank_of_few() -> None:
     np.testing.assert_allclose(model.weights * model.stribeck.F_c, [1e-4, 3e-4], rtol=1e-4)
 
 
+@pytest.mark.parametrize("length", [2.0**-40, 2.0**30])
+@pytest.mark.parametrize("load", [2.0**-40, 2.0**60])
+def test_other_units_give_the_same_bank(length: float, load: float) -> None:
+    record, force = made([2e4, 1e4, 3e3], [1e-4, 3e-4, 7e-4], 0.1, seed=2)
+    t, x = record.columns["time"], record.columns["position"]
+    other = Record.from_arrays(time=t, position=length * x, force=load * force)
+    for n in (2, 5):
+        one, two = (initial_bank(each, n).parameters for each in (record, other))
+        np.testing.assert_allclose(two.k, load / length * one.k, rtol=1e-6)
+        np.testing.assert_allclose(two.weights, length / load * one.weights, rtol=1e-6)
+
+
 def test_an_unknown_state_at_the_start_does_no_harm() -> None:
     t, x = motion()
     force = stop_operators(np.r_[-0.5 * TRAVEL, x], [1e-4, 8e-4])[1:] @ np.array([2e4, 1e4])

@@ -28,6 +28,7 @@ from gms_fsm import (
     Contact,
     Element,
     ElementMachines,
+    Fit,
     FrictionBank,
     FrictionEquations,
     FrictionState,
@@ -47,6 +48,7 @@ from gms_fsm import (
     System,
     Trace,
     Transition,
+    fit,
     prove,
     simulate,
     sweep,
@@ -67,6 +69,7 @@ SYSTEM = System("one mass", bodies=(BODY,), contacts=(CONTACT,))
 # Classes that only the package creates, for users to read.
 RECORDS = {
     "Finding",
+    "Fit",
     "PhenomenaTable",
     "Record",
     "Report",
@@ -148,6 +151,11 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         | {"numbers": {}, "flow": {}, "sampled": ()},
         "Transition": edge,
         "excite": {"stroke": 1e-3, "speeds": [1e-3, 2e-3], "rate": None, "acceleration": None},
+        "fit": _FIT
+        | {"fixed": {"v_c": 1e-3}, "tied": (), "nuisance": ("offset",)}
+        | {"linear": (), "measured": "F", "drive": None, "train": None, "test": None}
+        | {"cycles": None, "bounds": {}, "seed": 0, "most_steps": None, "smoothing": None}
+        | {"begin": None, "progress": False},
         "initial_bank": {"records": _rubbed(), "n": 2, "law": "signed", "train": None}
         | {"smoothing": None, "v_c": None},
         "export": {"system": MODEL, "format": "c99", "folder": tmp / "c99", "name": "friction"}
@@ -225,6 +233,7 @@ def _methods(tmp: Path) -> Iterator[Entry]:
         "FrictionEquations": _settled,
         "FrictionState": lambda: FrictionState(MODEL),
         "Record": _record,
+        "Fit": _fit,
         "Report": lambda: prove(CHART),
         "LiveChart": lambda: plots.LiveChart(_trace()),
     }
@@ -257,6 +266,14 @@ def _record() -> Record:
 def _rubbed() -> Record:
     t = np.linspace(0.0, 20.0, 200)
     return Record.from_arrays(time=t, position=np.sin(t), force=np.sign(np.cos(t)) + np.sin(t))
+
+
+_FIT = {"records": _rubbed(), "model": MODEL, "free": ["k"], "search": "local"}
+
+
+@functools.cache
+def _fit() -> Fit:
+    return fit(**_FIT)
 
 
 def _settled() -> FrictionEquations:
@@ -300,6 +317,11 @@ RIGHT: dict[str, Any] = {
     "FrictionState.from_array.array": FrictionState(MODEL).to_array(),
     "y": FrictionEquations(MODEL).initial,
     "dt": 0.1,
+    "Fit.bootstrap.draws": 2,
+    "Fit.compare.others": _fit(),
+    "Fit.predict.record": _rubbed(),
+    "Fit.score.record": _rubbed(),
+    "Fit.profile.name": "k1",
     "Record.from_arrays.time": np.arange(20.0),
     "Record.from_arrays.position": np.arange(20.0),
     "Session.break_on.kind": "tested",
