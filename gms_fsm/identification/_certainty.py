@@ -21,7 +21,8 @@ from gms_fsm.identification._task import Task, at_all_rows
 __all__ = ["Bootstrap", "Profile", "bootstrapped", "profiled"]
 
 LIMIT = 3.841  # 95 % quantile of chi-squared with one degree of freedom
-FACTOR = 0.1  # first step of a profile: a tenth, relative
+FACTOR = 0.1  # first step of a profile, relative, where the interval is open
+SHARE = 0.4  # first step as a share of the interval's half width
 MOST_STEPS = 12  # to each side, each twice as long as the one before
 RESTARTS = 4  # hops at each value
 
@@ -140,13 +141,11 @@ def profiled(
             raise ParameterError("the fitted model cannot be run on few rows", place=unknown.name)
         effective_rows = min(effective, float(rows))  # few rows know no more than that
         found = {centre: best.cost}
-        ends = []
+        ends, first = [], _first_step(unknown.positive, estimate)
         for side in (-1.0, 1.0):
             end, before = side * math.inf, (centre, 0.0)
             for k in range(MOST_STEPS):
-                value = _moved(
-                    unknown.positive, centre, side * FACTOR * 2.0**k / 2.0, unknown.least
-                )
+                value = _moved(unknown.positive, centre, side * first * 2.0**k, unknown.least)
                 if value is None or value in found:
                     break
                 try:
@@ -158,8 +157,9 @@ def profiled(
                 found[value] = cost
                 rise = effective_rows * math.log(max(cost, 1e-300) / max(best.cost, 1e-300))
                 if rise > LIMIT:
-                    share = (LIMIT - before[1]) / max(rise - before[1], 1e-300)
-                    end = before[0] + (value - before[0]) * min(max(share, 0.0), 1.0)
+                    # The rise is nearly a parabola: its root is nearly straight.
+                    low, high = math.sqrt(before[1]), math.sqrt(rise)
+                    end = before[0] + (value - before[0]) * (math.sqrt(LIMIT) - low) / (high - low)
                     break
                 before = (value, max(rise, before[1], 0.0))
             ends.append(end)
@@ -170,6 +170,16 @@ def profiled(
         for x in values.tolist()
     ]
     return Profile(unknown.name, unknown.parameter.unit, values, np.array(rises), *ends)
+
+
+def _first_step(positive: bool, estimate: Estimate) -> float:
+    """Return the first step of a profile: a part of the interval, which it makes better."""
+    low, high, value = estimate.low, estimate.high, estimate.value
+    if not (math.isfinite(low) and math.isfinite(high)) or high <= low:
+        return FACTOR
+    if positive and low > 0.0:
+        return min(SHARE * 0.5 * math.log(high / low), 10.0 * FACTOR)
+    return SHARE * 0.5 * (high - low) / (abs(value) or 1.0)
 
 
 def _moved(positive: bool, centre: float, by: float, least: float) -> float | None:

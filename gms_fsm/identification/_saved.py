@@ -1,4 +1,4 @@
-"""A fitted model as a scenario that runs: a system file with the motion and the times of the run."""
+"""A fitted model as a scenario that runs: a system file with motion and times of the run."""
 
 from __future__ import annotations
 

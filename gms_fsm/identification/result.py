@@ -422,16 +422,15 @@ class Fit:
         ParameterError
             If one is no fit, or was made from other rows.
         """
-        if isinstance(others, Fit):
-            others = [others]
-        if not isinstance(others, Mapping):
-            others = dict(enumerate(listed("others", others, "fits"), start=2))
-        for each in others.values():
+        if isinstance(others, Mapping):
+            fits, names = list(others.values()), [str(name) for name in others]
+        else:
+            fits = [others] if isinstance(others, Fit) else listed("others", others, "fits")
+            names = []
+        for each in fits:
             checked_kind("others", each, Fit, "fits, from fit(...)")
-        every = {f"1: {_title(self)}": self} | {
-            f"{name}: {_title(each)}" if isinstance(name, int) else str(name): each
-            for name, each in others.items()
-        }
+        names = names or [f"{i}: {_title(each)}" for i, each in enumerate(fits, start=2)]
+        every = dict(zip([f"1: {_title(self)}", *names], [self, *fits], strict=True))
         rows = []
         for name, each in every.items():
             same = each.task.fine.target.size == self.task.fine.target.size
