@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm._files import output_folder, refuse_input, write_whole
 from gms_fsm._markdown import plain, table_lines
-from gms_fsm.errors import MissingExtraError
+from gms_fsm.errors import MissingExtraError, OutputError
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
@@ -45,8 +45,8 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
     -------
     Path
         The page, ``report.md``. Beside it are the figure, ``parameters.csv``, ``residuals.csv``,
-        and ``fitted.toml``, a scenario that runs. Without matplotlib there is no figure, and the
-        page says so.
+        and ``fitted.toml``, a scenario that runs. What could not be written, such as the figure
+        without matplotlib, is said on the page.
 
     Raises
     ------
@@ -59,18 +59,22 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
     checked_kind("fit", fit, Kind, "a Fit, from gms_fsm.fit")
     inputs = [each.path for each in fit.records if each.path is not None]
     place = report_folder(folder, inputs)
-    fit.save(place / FITTED)
-    residuals = fit.residuals()
+    residuals, written, lacking = fit.residuals(), [PARAMETERS, RESIDUALS], []
     unit = fit.task.measured.unit
     _write_csv(place / PARAMETERS, _parameter_rows(fit.table))
     _write_csv(place / RESIDUALS, _residual_rows(residuals, unit))
     try:
-        pictures = _draw(fit, place)
-        missing = ""
+        fit.save(place / FITTED)
+        written.append(FITTED)
+    except OutputError as error:  # what a file cannot hold: a very long motion, a function
+        lacking.append(f"no scenario was written: {error}")
+    try:
+        written = [*_draw(fit, place), *written]
     except MissingExtraError as error:
-        pictures, missing = [], f"No figure was drawn: {error}."
-        warnings.warn(f"no figure was drawn: {error}", stacklevel=2)
-    text = _page(fit, residuals, pictures, missing).encode()
+        lacking.append(f"no figure was drawn: {error}")
+    for each in lacking:
+        warnings.warn(each, stacklevel=2)
+    text = _page(fit, residuals, written, lacking).encode()
     return write_whole(place / PAGE, lambda file: file.write(text))
 
 
@@ -190,19 +194,22 @@ def _residual_rows(residuals: Sequence[Residuals], unit: str) -> Iterator[Sequen
 
 
 # --------------------------------------------------------------------------- the page
-def _page(fit: Fit, residuals: Sequence[Residuals], pictures: Sequence[str], missing: str) -> str:
-    """Return the page as Markdown."""
+def _page(
+    fit: Fit, residuals: Sequence[Residuals], written: Sequence[str], lacking: Sequence[str]
+) -> str:
+    """Return the page as Markdown, with what was written beside it and what was not."""
+    drawn = [name for name in written if name.startswith("fit.")]
     sections = [
         _head(fit),
-        [f"![Measurement and model, residuals, parameters]({pictures[0]})"] if pictures else [],
-        [missing] if missing else [],
+        [f"![Measurement and model, residuals, parameters]({drawn[0]})"] if drawn else [],
+        [f"- {plain(each)}" for each in lacking],
         ["## Parameters", "", *_parameter_table(fit)],
         ["## What the record cannot tell", "", *_doubts(fit)],
         ["## How well it fits", "", *_scores(fit, residuals)],
         ["## Choice among candidates", "", *_choice(fit.choice)] if fit.choice else [],
         ["## What was done", "", *_done(fit)],
         ["## Records", "", *_records(fit)],
-        ["## Files", "", *_files(pictures)],
+        ["## Files", "", *_files(written)],
     ]
     return "\n\n".join("\n".join(lines) for lines in sections if lines) + "\n"
 
@@ -328,11 +335,10 @@ def _records(fit: Fit) -> list[str]:
     return lines
 
 
-def _files(pictures: Sequence[str]) -> list[str]:
+def _files(written: Sequence[str]) -> list[str]:
     said: Mapping[str, str] = {
-        **dict.fromkeys(pictures, "the figure above"),
         PARAMETERS: "the table of parameters, with all digits",
         RESIDUALS: "measurement, model and residual of every row",
         FITTED: f"a scenario that runs: `gms-fsm run {FITTED}`",
     }
-    return [f"- [{name}]({name}): {what}" for name, what in said.items()]
+    return [f"- [{name}]({name}): {said.get(name, 'the figure above')}" for name in written]
