@@ -188,14 +188,9 @@ def parameters_html(parameters: GMSParameters) -> str:
 # --------------------------------------------------------------------------- fits
 def fit_html(fit: Fit) -> str:
     """Return the parameters of a fit with what cannot be told, its scores, and its figure."""
-    rows = (
-        [each.name, each.value, *([each.low, each.high] if each.told else ["", ""]), each.unit]
-        + [each.note]
-        for each in fit.table
-    )
     words = table(
-        ["parameter", "value", "95 % from", "to", "unit", "note"],
-        rows,
+        ["parameter", "value", "95 % interval", "unit", "note"],
+        ([each.name, *each.shown, each.unit, each.note] for each in fit.table),
         caption=f"{model_title(fit)}: {scores_text(fit)}",
         more=fit.weakest,
     )

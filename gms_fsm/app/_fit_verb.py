@@ -44,7 +44,8 @@ def fit_command(
             raise typer.Exit(INTERRUPTED) from None
         _print(found)
         page = write_report(found, folder)
-    typer.echo(f"{found.runs} runs in {found.seconds:.3g} s; start with {page}")
+    typer.echo(f"{found.runs} runs in {found.seconds:.3g} s")
+    typer.echo(f"start with {page}")
     if found.stopped:
         note(found.stopped)
         raise typer.Exit(INTERRUPTED)
@@ -63,9 +64,7 @@ def _print(found: Fit) -> None:
     for head in ("parameter", "value", "95 % interval", "unit", "note"):
         table.add_column(head, justify="right" if head == "value" else "left", no_wrap=True)
     for each in found.table:
-        interval = f"{each.low:.5g} to {each.high:.5g}" if each.told else "–"
-        cells = (each.name, f"{each.value:.5g}", interval, each.unit, each.note)
-        table.add_row(*map(Text, cells))
+        table.add_row(*map(Text, (each.name, *each.shown, each.unit, each.note)))
     Console().print(table)
     if found.weakest:
         typer.echo(found.weakest)

@@ -228,8 +228,7 @@ def _parameter_table(fit: Fit) -> list[str]:
     rows = [
         [
             plain(each.name),
-            f"{each.value:.5g}",
-            f"{each.low:.5g} to {each.high:.5g}" if each.told else "–",
+            *each.shown,
             plain(each.unit),
             plain(each.note),
             plain(each.meaning),
@@ -271,8 +270,8 @@ def _scores(fit: Fit, residuals: Sequence[Residuals]) -> list[str]:
         lines.append("- no rows were held out: how well the model predicts is not known")
     if fit.floor is not None:
         lines.append(
-            f"- repeatability: {fit.floor:.4g} {unit} is the RMSE of the mean cycle; no model of "
-            "the motion alone can do better"
+            f"- repeatability: {fit.floor:.4g} {unit}, the distance of cycles from their mean; a "
+            "model that repeats itself cannot do better"
         )
     else:
         lines.append("- repeatability is not known: no period was given (cycles)")

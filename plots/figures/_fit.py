@@ -321,4 +321,4 @@ def _relative(each: Estimate) -> tuple[float, float] | None:
 
 def _value(each: Estimate) -> str:
     note = f", {each.note}" if each.note and each.told else ""
-    return f"{each.value:.5g} {each.unit}".rstrip().replace("-", "−") + note
+    return f"{each.shown[0]} {each.unit}".rstrip().replace("-", "−") + note

@@ -53,8 +53,8 @@ def test_the_files_are_there(folder: Path) -> None:
 def test_the_page_has_every_parameter_and_score(folder: Path) -> None:
     page, fit = (folder / "report.md").read_text(encoding="utf-8"), small()
     for each in fit.table:
-        interval = f"{each.low:.5g} to {each.high:.5g}" if each.told else "–"
-        assert f"| {each.name} | {each.value:.5g} | {interval} | {each.unit} |" in page
+        value, interval = each.shown
+        assert f"| {each.name} | {value} | {interval} | {each.unit} |" in page
     assert fit.held_out is not None
     for score in (fit.training, fit.held_out):
         assert f"| {score['rmse']:.4g} | {score['r2']:.4f} | {score['rows']:.0f} |" in page

@@ -16,7 +16,8 @@ def test_the_table_the_scores_and_the_picture() -> None:
     pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
     shown = small()._repr_html_()  # type: ignore[attr-defined]
     for each in small().table:
-        assert f'<td style="text-align:left">{each.name}</td><td>{each.value:.6g}</td>' in shown
+        cells = (each.name, *each.shown, each.unit)
+        assert "".join(f'<td style="text-align:left">{cell}</td>' for cell in cells) in shown
     assert f"training RMSE {small().training['rmse']:.4g} N" in shown
     assert html.escape(small().weakest[:40]) in shown
     (picture,) = re.findall(r'src="data:image/png;base64,([^"]+)"', shown)
