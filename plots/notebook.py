@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from io import BytesIO
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import graphviz
 import numpy as np
@@ -20,7 +20,6 @@ from gms_fsm._display import Form
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import GMSError, MissingExtraError, OutputError
 from gms_fsm.identification.report import model_title, scores_text
-from gms_fsm.identification.result import Fit
 from gms_fsm.inspection._findings import Finding, Report
 from gms_fsm.inspection._results import BranchComparison, Here
 from gms_fsm.inspection.explain import Explanation, Why
@@ -42,6 +41,9 @@ from plots.drawings import DrawnGraph, image
 from plots.live_chart import LiveChart
 from plots.render import available, drawn
 from plots.statechart import statechart
+
+if TYPE_CHECKING:
+    from gms_fsm.identification.result import Fit
 
 __all__ = ["figure_png", "shown", "svg_of"]
 
@@ -66,8 +68,9 @@ def shown(thing: object, form: Form) -> Any:
         None if the object has no such form, or what is needed for it is not installed.
     """
     for kind in type(thing).__mro__:
-        if (kind, form) in FORMS:
-            return FORMS[kind, form](thing)
+        for key in (kind, f"{kind.__module__}.{kind.__qualname__}"):
+            if (key, form) in FORMS:
+                return FORMS[key, form](thing)
     return None
 
 
@@ -294,7 +297,8 @@ def _findings(*findings: Finding) -> Iterator[list[str]]:
         yield [each.check, status, where + case, each.text, each.example]
 
 
-FORMS: Mapping[tuple[type, Form], Callable[[Any], Any]] = {
+# By class; by name where importing the class takes long.
+FORMS: Mapping[tuple[type | str, Form], Callable[[Any], Any]] = {
     **{(kind, "svg"): subject_svg for kind in (Chart, GMS, LuGre, ChartModel, Contact, System)},
     **{(kind, "html"): subject_html for kind in (Chart, GMS, LuGre, ChartModel, Contact, System)},
     (GMSParameters, "html"): parameters_html,
@@ -305,7 +309,7 @@ FORMS: Mapping[tuple[type, Form], Callable[[Any], Any]] = {
         (kind, "html"): verdict_html
         for kind in (ChatteringVerdict, InvariantVerdict, PassivityVerdict, CoverageVerdict)
     },
-    (Fit, "html"): fit_html,
+    ("gms_fsm.identification.result.Fit", "html"): fit_html,
     (Session, "html"): session_html,
     (Here, "html"): text_html,
     (BranchComparison, "html"): text_html,

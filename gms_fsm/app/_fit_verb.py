@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["fit_command"]
 
+NARROWEST = 80  # characters: numbers are not cut in a narrow terminal
+
 
 def fit_command(
     scenario: ScenarioFile,
@@ -40,7 +42,7 @@ def fit_command(
         try:
             found = fitted(loaded.task, progress=None)
         except KeyboardInterrupt:
-            note("interrupted before the first run had ended; nothing was written")
+            note("interrupted; nothing was written")
             raise typer.Exit(INTERRUPTED) from None
         _print(found)
         page = write_report(found, folder)
@@ -61,11 +63,12 @@ def _print(found: Fit) -> None:
     from gms_fsm.identification.report import scores_text
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for head in ("parameter", "value", "95 % interval", "unit", "note"):
+    for head in ("parameter", "value", "95 % interval", "unit"):
         table.add_column(head, justify="right" if head == "value" else "left", no_wrap=True)
+    table.add_column("note", overflow="fold")  # only this column gives way
     for each in found.table:
         table.add_row(*map(Text, (each.name, *each.shown, each.unit, each.note)))
-    Console().print(table)
+    Console(width=max(Console().width, NARROWEST)).print(table)
     if found.weakest:
         typer.echo(found.weakest)
     typer.echo(scores_text(found))
