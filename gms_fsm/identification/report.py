@@ -29,6 +29,7 @@ __all__ = [
 ]
 
 PAGE, PARAMETERS, RESIDUALS, FITTED = "report.md", "parameters.csv", "residuals.csv", "fitted.toml"
+MOTION = "fitted.csv"  # beside the scenario, if it is long
 
 
 def write_report(fit: Fit, folder: str | Path) -> Path:
@@ -65,7 +66,7 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
     _write_csv(place / RESIDUALS, _residual_rows(residuals, unit))
     try:
         fit.save(place / FITTED)
-        written.append(FITTED)
+        written += [name for name in (FITTED, MOTION) if (place / name).exists()]
     except OutputError as error:  # what a file cannot hold: a very long motion, a function
         lacking.append(f"no scenario was written: {error}")
     try:
@@ -109,7 +110,7 @@ def report_files() -> list[str]:
     """Return the names of the files of a report, ``report.md`` first."""
     from plots import formats
 
-    return [PAGE, *formats.files("fit", "figure"), PARAMETERS, RESIDUALS, FITTED]
+    return [PAGE, *formats.files("fit", "figure"), PARAMETERS, RESIDUALS, FITTED, MOTION]
 
 
 def model_title(fit: Fit) -> str:
@@ -339,5 +340,6 @@ def _files(written: Sequence[str]) -> list[str]:
         PARAMETERS: "the table of parameters, with all digits",
         RESIDUALS: "measurement, model and residual of every row",
         FITTED: f"a scenario that runs: `gms-fsm run {FITTED}`",
+        MOTION: "its motion",
     }
     return [f"- [{name}]({name}): {said.get(name, 'the figure above')}" for name in written]

@@ -103,6 +103,20 @@ def test_its_keys_and_defaults_are_those_of_the_function() -> None:
         assert getattr(defaults, name) == empty, name
 
 
+def test_a_system_is_fitted(gms_fsm: CommandLine, scenario: Path, tmp_path: Path) -> None:
+    assert gms_fsm("fit", scenario, "-o", "first", "--set", "fit.free=['k1']").code == 0
+    system = (tmp_path / "first" / "fitted.toml").read_text(encoding="utf-8")
+    record = "[record]" + SCENARIO.partition("[record]")[2].partition("[fit]")[0]
+    table = '[fit]\nfree = ["friction.k"]\nsearch = "local"\n'
+    (tmp_path / "system.toml").write_text(f"{system}\n{record}\n{table}")
+    done = gms_fsm("fit", "system.toml", "-o", "out")
+    assert done.code == 0, done.err
+    assert "friction.k1" in done.out
+    assert "a fit ignores [run]" in done.err
+    (tmp_path / "system.toml").write_text(f"{system}\n{record}")
+    one_message(gms_fsm("run", "system.toml"), "add a table [fit]")
+
+
 def test_a_run_ignores_the_table(gms_fsm: CommandLine, scenario: Path) -> None:
     done = gms_fsm("run", scenario, "-o", "out", "--set", "output.figures=[]")
     assert (done.code, done.err) == (0, "")
