@@ -1,4 +1,4 @@
-"""A fit ends: a proposal costs its budget of steps and no more, and Ctrl-C keeps the best so far."""
+"""A fit ends: a proposal costs its budget of steps and no more, and Ctrl-C keeps the best."""
 
 from __future__ import annotations
 

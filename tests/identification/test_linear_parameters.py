@@ -42,7 +42,7 @@ def test_force_is_affine_in_them(name: str, law: str) -> None:
         assert all(np.array_equal(run.states, at.states) for run in runs), each
         assert all(run.z == pytest.approx(at.z, abs=1e-7, nan_ok=True) for run in runs), each
         size = max(1.0, float(np.abs(runs[1].F).max()))
-        assert runs[1].F - runs[0].F == pytest.approx(runs[0].F - at.F, abs=1e-9 * size), each
+        assert pytest.approx(runs[0].F - at.F, abs=1e-9 * size) == runs[1].F - runs[0].F, each
 
 
 def test_what_the_elements_feel_is_searched() -> None:
