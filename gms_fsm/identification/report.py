@@ -323,16 +323,49 @@ def _done(fit: Fit) -> list[str]:
         f"- besides the model: {plain(', '.join(fit.nuisance)) or 'nothing'}",
         f"- {fit.runs} runs in {fit.seconds:.3g} s",
     ]
-    return [*lines, *(f"- {plain(note)}" for note in fit.notes)]
+    return [*lines, *_notes(fit)]
+
+
+def _notes(fit: Fit) -> list[str]:
+    """Return what was done; what was done with several records once, licences with the records."""
+    names = [each.name for each in fit.records]
+    about: dict[str, list[str]] = {}
+    for note in fit.notes:
+        name, _, text = note.partition(": ")
+        if name in names:
+            about.setdefault(text, []).append(name)
+        else:
+            about[note] = []
+    return [
+        f"- {plain(f'{_those(own, names)}: {text}' if own else text)}"
+        for text, own in about.items()
+        if not text.startswith("licence: ")
+    ]
+
+
+def _those(own: Sequence[str], every: Sequence[str]) -> str:
+    """Return the names of some of the records."""
+    return "all records" if len(own) == len(every) > 1 else ", ".join(own)
 
 
 def _records(fit: Fit) -> list[str]:
-    lines = []
+    rows = [
+        [
+            plain(each.name),
+            "" if each.path is None else plain(each.path.name),
+            str(int(each.chosen.sum())),
+        ]
+        for each in fit.records
+    ]
+    names, licences = [each.name for each in fit.records], dict[str, list[str]]()
     for each in fit.records:
-        licence = f"; licence: {plain(each.licence)}" if each.licence else ""
-        name = "" if each.path is None else f", {plain(each.path.name)}"
-        lines.append(f"- {plain(each.name)}{name}: {int(each.chosen.sum())} rows{licence}")
-    return lines
+        if each.licence:
+            licences.setdefault(each.licence, []).append(each.name)
+    said = [
+        f"- licence of {plain(_those(own, names))}: {plain(licence)}"
+        for licence, own in licences.items()
+    ]
+    return [*table_lines(["record", "file", "rows"], rows), *(["", *said] if said else [])]
 
 
 def _files(written: Sequence[str]) -> list[str]:

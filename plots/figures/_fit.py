@@ -127,7 +127,7 @@ def fit_figure(
         whole = begin <= part.t[0] and end >= part.t[-1]
         names = [
             "measurement and model" + ("" if whole else f", {begin:.4g} to {end:.4g} s"),
-            _score_name(fit),
+            _score_name(chosen, fit.task.measured.unit),
             "loop",
             "residual",
         ]
@@ -145,11 +145,7 @@ def fit_figure(
 # --------------------------------------------------------------------------- what is shown
 def _worst(every: Sequence[Residuals]) -> int:
     """Return the record with the largest root mean square of the residual."""
-    sizes = [
-        np.sqrt(np.mean((each.measured - each.modelled)[each.rows | each.held] ** 2))
-        for each in every
-    ]
-    return int(np.nanargmax(sizes))
+    return int(np.nanargmax([_size(each, each.rows | each.held) for each in every]))
 
 
 def _checked_which(which: Any, count: int) -> int:
@@ -181,9 +177,16 @@ def _title(fit: Fit, chosen: Residuals, count: int, which: int | None) -> str:
     return f"{model_title(fit)}, fitted to {chosen.record.name}{others}"
 
 
-def _score_name(fit: Fit) -> str:
-    held = "" if fit.held_out is None else f", held out {fit.held_out['rmse']:.3g}"
-    return f"residual; RMSE {fit.training['rmse']:.3g}{held} {fit.task.measured.unit}"
+def _score_name(chosen: Residuals, unit: str) -> str:
+    """Name the panel of the residual, with its size in the rows of this record."""
+    parts = [("RMSE", chosen.rows), ("held out", chosen.held)]
+    sizes = [f"{name} {_size(chosen, rows):.3g}" for name, rows in parts if rows.any()]
+    return f"residual; {', '.join(sizes)} {unit}"
+
+
+def _size(each: Residuals, rows: NDArray[np.bool_]) -> float:
+    """Return the root mean square of the residual at some rows."""
+    return float(np.sqrt(np.mean((each.measured - each.modelled)[rows] ** 2)))
 
 
 # --------------------------------------------------------------------------- panels

@@ -112,6 +112,18 @@ def test_several_records_have_a_table(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
+def test_licences_and_notes_are_said_once(tmp_path: Path) -> None:
+    task = two_records().task
+    records = tuple(replace(each, licence="MIT; somebody") for each in task.records)
+    notes = ("long: velocity: as measured", "short: velocity: as measured", "long: 2 gaps", "other")
+    fit = replace(two_records(), task=replace(task, records=records), notes=notes)
+    page = write_report(fit, tmp_path).read_text(encoding="utf-8")
+    assert page.count("- licence of all records: MIT; somebody\n") == 1
+    for said in ("all records: velocity: as measured", "long: 2 gaps", "other"):
+        assert page.count(f"- {said}\n") == 1
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_candidates_are_listed_with_the_chosen_one(tmp_path: Path) -> None:
     rows = tuple(ChoiceRow(name, "simple", 3, 0.1, 0.99, -5.0, 1.0) for name in ("one", "two"))
     chosen = replace(small(), choice=Choice(rows, "two"))

@@ -87,6 +87,13 @@ def test_what_cannot_be_told_has_words_and_no_bar() -> None:
     assert ">" in ends  # five times its value is beyond the axis
 
 
+def test_the_scores_are_those_of_the_fit() -> None:
+    name = lettered(fit_figure(small()))[1].get_title(loc="left")
+    held = small().held_out
+    assert held is not None
+    assert name == f"residual; RMSE {small().training['rmse']:.3g}, held out {held['rmse']:.3g} N"
+
+
 def test_the_worst_record_is_shown() -> None:
     sizes = [np.std(each.measured - each.modelled) for each in two_records().residuals()]
     name = two_records().records[int(np.argmax(sizes))].name
