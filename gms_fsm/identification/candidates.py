@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.charts.parameters import Parameter
+from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.identification.bank import initial_bank
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import GMS, ChartModel, Model
@@ -269,7 +269,7 @@ def behind_backlash(records: Sequence[Record], smoothing: float | None, *, n: in
     seen = _Seen.in_records(records, smoothing)
     bank = initial_bank(records, n, smoothing=smoothing)
     r = bank.weights * bank.stribeck.F_c
-    values = {
+    values: dict[str, float | FloatArray] = {
         "k": bank.parameters.k,
         "b": np.zeros(n),
         "g": GAP * r,

@@ -36,6 +36,7 @@ BLOCKS = 4  # of time, where a record is folded by its cycles
 ROWS, FEWEST_ROWS = 4000, 300  # of all records together, and of each, for comparing candidates
 STEP, EVALUATIONS = 1e-3, 10  # of the refinement in a fold
 REPEATS = 0.5  # least autocorrelation of a motion that repeats
+NEARLY = 0.1  # of a cycle may be missing at the end
 INTERRUPTED = "The choice was interrupted: {done} of {all} candidates were compared."
 
 
@@ -188,9 +189,9 @@ def _checked_candidates(given: Any) -> list[Candidate]:
         found.append(Candidate(name, "given", _given(Start(model, names))))
     if not found:
         raise ParameterError("there is none", place="candidates", advice="give at least one")
-    names = [each.name for each in found]
-    for name in names:
-        if names.count(name) > 1:
+    called = [each.name for each in found]
+    for name in called:
+        if called.count(name) > 1:
             raise ParameterError(f"two are called {shown(name)}", place="candidates")
     return found
 
@@ -305,7 +306,7 @@ def _blocks(record: Record, cycles: float | None) -> Any:
             advice="give cycles=period (s), or several records and fold='record'",
         )
     first, last = t[record.chosen][[0, -1]]
-    whole = int((last - first) / period + 0.5)
+    whole = int((last - first) / period + NEARLY)
     if whole < 2:
         raise RecordError(
             f"its training rows last {last - first:.4g} s, less than two cycles of {period:.4g} s",
