@@ -56,7 +56,7 @@ def test_behind_backlash_is_a_dead_zone_behind_two_thresholds(ratio: float, b: f
 
 
 def test_no_force_in_the_gap() -> None:
-    x, found = forces(backlash(), np.array([0.0, 0.19, -0.19, 0.1]))
+    _x, found = forces(backlash(), np.array([0.0, 0.19, -0.19, 0.1]))
     assert (found == 0.0).all()
 
 

@@ -7,8 +7,17 @@ from functools import partial
 import numpy as np
 import pytest
 
-from gms_fsm import GMS, ChartModel, Fit, GMSParameters, Prescribed, Record, Stribeck, choose
-from gms_fsm import simulate
+from gms_fsm import (
+    GMS,
+    ChartModel,
+    Fit,
+    GMSParameters,
+    Prescribed,
+    Record,
+    Stribeck,
+    choose,
+    simulate,
+)
 from gms_fsm.identification.candidates import (
     BEHIND_BACKLASH,
     Candidate,
