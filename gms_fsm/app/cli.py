@@ -1,8 +1,8 @@
 """The command line. A user's mistake is answered by one message and exit code 2.
 
-The verbs are in ``_run_verbs``, ``_chart_verbs``, ``_export_verb``, ``_trace_verbs`` and
-``_card_verb``. Each imports what it needs when it runs, so that help, completion and error messages
-appear at once.
+The verbs are in ``_run_verbs``, ``_fit_verb``, ``_chart_verbs``, ``_export_verb``, ``_trace_verbs``
+and ``_card_verb``. Each imports what it needs when it runs, so that help, completion and error
+messages appear at once.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from gms_fsm.app._chart_verbs import (
 )
 from gms_fsm.app._console import error_line, note
 from gms_fsm.app._export_verb import export_command
+from gms_fsm.app._fit_verb import fit_command
 from gms_fsm.app._run_verbs import (
     debug_command,
     lesson_command,
@@ -116,6 +117,7 @@ def root(
 app.command("paper")(paper_command)
 app.command("run")(run_command)
 app.command("sweep")(sweep_command)
+app.command("fit")(fit_command)
 app.command("phenomena")(phenomena_command)
 app.command("schema")(schema_command)
 app.command("chart", cls=_Drawing)(chart_command)

@@ -10,8 +10,9 @@ import numpy as np
 
 from gms_fsm.charts.parameters import WEIGHTS, FloatArray
 from gms_fsm.identification._experiment import NUISANCE, Experiment, Point
+from gms_fsm.identification._region import ends_of_region, values_of
 from gms_fsm.identification._runs import LOST, Pool
-from gms_fsm.identification._statistics import Certainty, certainty
+from gms_fsm.identification._statistics import LOOSE, NEGLIGIBLE, WIDE, Certainty, certainty
 from gms_fsm.identification._task import Task, stretches
 from gms_fsm.identification._unknowns import Subject, Unknown
 from gms_fsm.systems.system import System
@@ -134,6 +135,17 @@ class _Entry:
             ends = self.value - half * self.scale, self.value + half * self.scale
         return max(ends[0], self.low), min(ends[1], self.high)
 
+    def wide(self, low: float, high: float, size: float) -> bool:
+        """Return whether an interval is too wide to tell anything."""
+        half = 0.5 * (high - low) / self.scale
+        if self.kind == "linear":
+            return half > WIDE
+        if half * float(np.sqrt(np.mean(self.slopes**2))) < NEGLIGIBLE * size:
+            return False
+        if self.kind == "excess":
+            low, high = low - self.base, high - self.base
+        return low <= 0.0 or math.log(high / low) > 2.0 * WIDE
+
     @property
     def at_bound(self) -> bool:
         """Whether the value is at the end of what it may be."""
@@ -172,15 +184,40 @@ def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
         names = [each.name for each in entries]
         width = np.array([sure.half[names.index(each.name)] for each in experiment.searched])
         steps = np.clip(0.25 * np.where(np.isfinite(width), width, 0.0), LEAST_STEP, MOST_STEP)
+    ends = _ends(task, entries, sure, pool)
     scales = np.array([each.scale for each in entries])
     with np.errstate(invalid="ignore"):
         covariance = sure.covariance * np.outer(scales, scales)
     table = tuple(
-        _estimate(each, float(half), bool(opened), experiment.typical)
+        _estimate(each, float(half), bool(opened), experiment.typical, ends[each.name])
         for each, half, opened in zip(entries, sure.half, sure.open, strict=True)
     )
     noise = float(np.sqrt(point.cost / max(point.residual.size, 1)))
     return Assessed(table, covariance, sure, _in_words(table, entries, noise, task))
+
+
+def _ends(
+    task: Task, entries: Sequence[_Entry], sure: Certainty, pool: Pool
+) -> dict[str, tuple[float, float]]:
+    """Return the ends of the likelihood region, as distances from the best values on few rows."""
+    experiment = task.coarse
+    point = experiment.start_point()
+    names = [each.name for each in entries]
+    if point.lost is not None:
+        return dict.fromkeys(names, (0.0, 0.0))
+    places = [names.index(each.name) for each in experiment.searched]
+    spread = np.minimum(sure.spread, LOOSE)
+    root = sure.directions * spread
+    covariance = root @ root.T
+    width = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    directions = {
+        name: covariance[places, i] / width[i] for i, name in enumerate(names) if width[i] > 0.0
+    }
+    ends = ends_of_region(
+        experiment, point, directions, root[places], sure.effective, pool, task.options.seed
+    )
+    best = values_of(experiment, point)
+    return {name: (low - best[name], high - best[name]) for name, (low, high) in ends.items()}
 
 
 def _basis(experiment: Experiment, point: Point) -> FloatArray:
@@ -278,8 +315,13 @@ def _entries(
     return ordered
 
 
-def _estimate(entry: _Entry, half: float, opened: bool, size: float) -> Estimate:
+def _estimate(
+    entry: _Entry, half: float, opened: bool, size: float, ends: tuple[float, float]
+) -> Estimate:
     low, high = entry.place(half)
+    low = max(min(low, entry.value + ends[0]), entry.low)
+    high = min(max(high, entry.value + ends[1]), entry.high)
+    opened |= entry.wide(low, high, size)
     influence = float(np.sqrt(np.mean(entry.slopes**2)))
     note = ""
     if influence <= 1e-9 * size:

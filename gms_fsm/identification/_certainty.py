@@ -13,6 +13,7 @@ from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, shown
 from gms_fsm.identification._assess import Estimate, shown_interval
 from gms_fsm.identification._experiment import Experiment, Point
+from gms_fsm.identification._region import LIMIT, values_of
 from gms_fsm.identification._runs import Pool
 from gms_fsm.identification._search import Best, hops, refine
 from gms_fsm.identification._statistics import BLOCK
@@ -20,7 +21,6 @@ from gms_fsm.identification._task import Task, at_all_rows
 
 __all__ = ["Bootstrap", "Profile", "bootstrapped", "profiled"]
 
-LIMIT = 3.841  # 95 % quantile of chi-squared with one degree of freedom
 FACTOR = 0.1  # first step of a profile, relative, where the interval is open
 SHARE = 0.4  # first step as a share of the interval's half width
 MOST_STEPS = 12  # to each side, each twice as long as the one before
@@ -106,14 +106,6 @@ class Bootstrap:
         return float(low), float(high)
 
 
-def _values(experiment: Experiment, point: Point) -> dict[str, float]:
-    """Return all values of a point by name."""
-    numbers = experiment.coordinates.numbers(point.u)
-    found = {e.name: float(x) for e, x in zip(experiment.searched, numbers, strict=True)}
-    solved = [*(each.name for each in experiment.solved), *experiment.nuisance]
-    return found | {name: float(x) for name, x in zip(solved, point.linear, strict=True)}
-
-
 def _searched_again(
     experiment: Experiment, start: FloatArray, pool: Pool, *, restarts: bool, seed: int
 ) -> Point | None:
@@ -132,7 +124,7 @@ def profiled(
     """Return the profile of a parameter; see `gms_fsm.Fit.profile`."""
     checked_integer("seed", seed, 0)
     unknown = next(each for each in task.unknowns if each.name == estimate.name)
-    centre = _values(task.fine, point)[unknown.name]
+    centre = values_of(task.fine, point)[unknown.name]
     rows = task.coarse.target.size
     with Pool() as pool:
         start = task.coarse.coordinates.start
@@ -224,9 +216,9 @@ def bootstrapped(
                 step = float(np.median(np.diff(course.t)))
                 length = max(1, round(BLOCK * tau if block is None else block / step))
                 left = (course.measured - model)[course.rows]
-                values = model.copy()
-                values[course.rows] += _resampled(left, min(length, left.size), rng)
-                replaced.append(values)
+                drawn = model.copy()
+                drawn[course.rows] += _resampled(left, min(length, left.size), rng)
+                replaced.append(drawn)
             courses = tuple(
                 replace(course, measured=values)
                 for course, values in zip(task.courses, replaced, strict=True)
@@ -235,8 +227,8 @@ def bootstrapped(
             start = again.coordinates.start
             best = _searched_again(again, start, pool, restarts=restarts, seed=seed + draw)
             if best is not None:
-                values_of = _values(again, best)
-                found[draw] = [values_of[name] for name in names]
+                values = values_of(again, best)
+                found[draw] = [values[name] for name in names]
     return Bootstrap(tuple(names), found)
 
 

@@ -63,6 +63,8 @@ def _linear_in(chart: Chart) -> tuple[str, ...]:
     for name in reversed(list(chart.lets)):  # a let reads only those before it
         if name in moving:
             moving |= names_in(chart.lets[name])
+    if moving & {*chart.force_names, *chart.rate_names}:
+        return ()  # a guard or an action reads the force itself
     found = [name for name in chart.parameter_names if name not in moving]
     forces = [_expanded(chart, tree) for tree in chart.forces.values() if tree is not None]
     totals = [_expanded(chart, tree) for tree in chart.totals.values()]

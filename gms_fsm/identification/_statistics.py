@@ -23,7 +23,15 @@ from scipy.stats import t as student
 
 from gms_fsm.charts.parameters import FloatArray
 
-__all__ = ["Certainty", "certainty", "correlation_time", "phase_floor"]
+__all__ = [
+    "LOOSE",
+    "NEGLIGIBLE",
+    "WIDE",
+    "Certainty",
+    "certainty",
+    "correlation_time",
+    "phase_floor",
+]
 
 WINDOW = 5.0  # correlation times over which the autocorrelation is summed
 BLOCK = 10.0  # correlation times in a block of the sandwich
@@ -147,6 +155,11 @@ def certainty(
     if count < FEWEST_BLOCKS + kept.shape[1]:
         middle = np.linalg.pinv(inverse) * variance * tau
     covariance = kept @ inverse @ middle @ inverse @ kept.T
+    # Blocks are few, and fitted residuals are smaller than the noise: never surer than rows / tau.
+    least = np.einsum("ij,j,ij->i", kept, spread[~loose] ** 2, kept)
+    present = np.maximum(np.diag(covariance), 1e-300)
+    wider = np.sqrt(np.maximum(least / present, 1.0))
+    covariance = covariance * np.outer(wider, wider)
     degrees = max(effective - p, 3.0)
     half = student.ppf(0.975, degrees) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     effect = half * np.sqrt(np.einsum("ij,ij->j", slopes, slopes) / rows) / size
@@ -186,7 +199,7 @@ def phase_floor(t: FloatArray, values: FloatArray, period: float) -> float:
     """
     step = float(np.median(np.diff(t)))
     bins = max(1, round(period / step))
-    place = np.floor((t - t[0]) % period / period * bins).astype(int) % bins
+    place = np.rint((t - t[0]) / period * bins).astype(int) % bins
     many = np.bincount(place, minlength=bins)
     mean = np.bincount(place, values, minlength=bins) / np.maximum(many, 1)
     left = (values - mean[place]) ** 2

@@ -176,7 +176,7 @@ class Task:
         if self.options.begin is not None or best.point is None:
             return self
         if not any(course.lead[0].size for course in self.courses):
-            return self.beginning(BEGINS[0])
+            return self  # no record has begun in motion, and the data say nothing
         other = self.beginning(BEGINS[0])
         there = other.coarse.at(best.point.u)
         if there.lost is None and there.cost < (1.0 - DISTANT) * best.point.cost:

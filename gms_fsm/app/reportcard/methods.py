@@ -110,7 +110,7 @@ def _maxwell(n: int) -> Train:
         basis = np.concatenate([columns(each, smoothing, r)[each.chosen] for each in records])
         force = np.concatenate([each.columns["force"][each.chosen] for each in records])
         scale = np.linalg.norm(basis, axis=0)
-        triangle: FloatArray = np.linalg.qr(np.column_stack([basis / scale, force]), mode="r")
+        triangle: Any = np.linalg.qr(np.column_stack([basis / scale, force]), mode="r")
         shares, _residual = nnls(triangle[:, :-1], triangle[:, -1], maxiter=1000)
         weights = shares / scale
         return Predictor(n + 2, lambda record: columns(record, smoothing, r) @ weights)

@@ -1,0 +1,53 @@
+"""Synthetic records whose truth is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from gms_fsm import GMS, GMSParameters, Prescribed, Record, Stribeck, simulate
+from gms_fsm.systems.models import Model
+
+
+def noise(seed: int, rows: int, correlation: float = 0.0) -> Any:
+    """Return noise of unit variance; with a correlation from row to row, that of AR(1)."""
+    white = np.random.default_rng(seed).standard_normal(rows)
+    if not correlation:
+        return white
+    return lfilter([np.sqrt(1.0 - correlation**2)], [1.0, -correlation], white)
+
+
+def bank(k: Any, weights: Any, **given: Any) -> GMS:
+    """Return a GMS bank under the signed law with thresholds ``weights`` at F_c = 1 N."""
+    n = len(k)
+    numbers: dict[str, Any] = {"C": np.full(n, 5e-4), "sigma_2": 0.0, "v_c": 5e-6}
+    curve = Stribeck(1.0, given.pop("F_s", 1.2), given.pop("v_s", 2e-4))
+    return GMS(
+        GMSParameters(k, np.zeros(n), weights=weights, stribeck=curve, **(numbers | given)),
+        law="signed",
+    )
+
+
+def measured(model: Model, motion: Record, sd: float, seed: int, ar: float = 0.0) -> Record:
+    """Return the record of a model moved like another record, with noise in its force."""
+    t, v = motion.columns["time"], motion.motion().velocity
+    run = simulate(
+        model, Prescribed((t, v)), float(t[-1]), t_start=float(t[0]), t_eval=t, rtol=1e-9
+    )
+    return Record.from_arrays(
+        time=t, velocity=v, force=run.F + sd * noise(seed, t.size, ar), name="synthetic"
+    )
+
+
+def sine(amplitude: float, period: float, cycles: float, rate: float = 200.0) -> Record:
+    """Return a motion that begins at rest in the middle: a sine with a growing start."""
+    t = np.arange(round(cycles * period * rate) + 1) / rate
+    w = 2.0 * np.pi / period
+    grow = np.minimum(t / period, 1.0)
+    x = amplitude * grow * np.sin(w * t)
+    return Record.from_arrays(time=t, position=x, velocity=np.gradient(x, t), name="sine")
+
+
+__all__ = ["bank", "measured", "noise", "sine"]

@@ -1,0 +1,93 @@
+"""Parameters taken as linear do not move the elements, and the force is affine in them: all charts.
+
+The charts' texts say which are; here runs of every included chart are the judge.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import Body, Chart, ChartModel, Contact, Prescribed, State, System, simulate
+from gms_fsm.charts.registry import registered
+from gms_fsm.identification._linear import linear_names
+from gms_fsm.identification._unknowns import Subject
+from gms_fsm.systems.models import demonstration, with_values
+
+RIG = Prescribed("0.1 * sin(3 * t) * exp(0.1 * t)")
+CASES = [
+    (name, law)
+    for name, entry in registered().items()
+    if not entry.chart(entry.laws[0] if entry.laws else "").locks
+    and len(entry.chart(entry.laws[0] if entry.laws else "").velocities) == 1
+    for law in (entry.laws or ("",))
+]
+
+
+@pytest.mark.parametrize(("name", "law"), CASES)
+@pytest.mark.filterwarnings("ignore:published law")
+def test_force_is_affine_in_them(name: str, law: str) -> None:
+    model = demonstration(registered()[name], law)
+    options: dict[str, Any] = {"t_eval": np.linspace(0.0, 4.0, 41), "atol": 1e-9, "rtol": 1e-8}
+    at = simulate(model, RIG, 4.0, **options)
+    for each in linear_names(Subject(model)):
+        start = np.asarray(Subject(model).value(each))
+        step = np.maximum(np.abs(start), 0.1)
+        runs = [
+            simulate(with_values(model, {each: start + k * step}), RIG, 4.0, **options)
+            for k in (1.0, 2.0)
+        ]
+        assert all(np.array_equal(run.states, at.states) for run in runs), each
+        assert all(run.z == pytest.approx(at.z, abs=1e-7, nan_ok=True) for run in runs), each
+        size = max(1.0, float(np.abs(runs[1].F).max()))
+        assert pytest.approx(runs[0].F - at.F, abs=1e-9 * size) == runs[1].F - runs[0].F, each
+
+
+def test_what_the_elements_feel_is_searched() -> None:
+    expected = {"gms": {"k", "sigma", "sigma_2"}, "maxwell-slip": {"sigma_2"}, "backlash": set()}
+    for name, linear in expected.items():
+        entry = registered()[name]
+        model = demonstration(entry, entry.laws[-1] if entry.laws else "")
+        assert {*linear_names(Subject(model))} - {"sigma_2"} == linear - {"sigma_2"}, name
+
+
+def _own(force: str, flow: str = "v", let: dict[str, str] | None = None) -> ChartModel:
+    chart = Chart(
+        "own",
+        ("v",),
+        ("z",),
+        ("k", "b", "c"),
+        (State("stick", flow={"z": flow}),),
+        (),
+        {"F": force},
+        let=let or {},
+    )
+    return ChartModel(chart, {"k": 1.0, "b": 1.0, "c": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("force", "flow", "let", "linear"),
+    [
+        ("k * z + b * abs(z) + c", "v", {}, {"k", "b", "c"}),
+        ("k * z * b + c", "v", {}, {"b", "c"}),  # of a product, one is searched
+        ("k**2 * z + b * c", "v", {}, {"c"}),
+        ("k * z + c", "v / b", {}, {"k", "c"}),
+        ("K * z + c", "v", {"K": "k * (1 + b)"}, {"b", "c"}),
+        ("k * z + c", "K", {"L": "b + 1", "K": "v * L"}, {"k", "c"}),
+        ("abs(k * z) + b * c", "v", {}, {"c"}),
+    ],
+)
+def test_own_charts(force: str, flow: str, let: dict[str, str], linear: set[str]) -> None:
+    assert {*linear_names(Subject(_own(force, flow, let)))} - {"sigma_2"} == linear
+
+
+def test_a_free_body_leaves_none() -> None:
+    contact = Contact("pad", _own("k * z"), v="v")
+    driven = System(
+        "driven", bodies=(Body("b", velocity="w"),), contacts=(contact,), signals={"w": "sin(t)"}
+    )
+    free = System("free", bodies=(Body("b", inertia=1.0, force="sin(t)"),), contacts=(contact,))
+    assert "pad.k" in linear_names(Subject(driven))
+    assert linear_names(Subject(free)) == ()

@@ -1,0 +1,64 @@
+"""A fit names what the record does not determine, and the direction in which it is blind."""
+
+from __future__ import annotations
+
+import pytest
+
+from gms_fsm import fit
+from tests.identification.records import bank, measured, sine
+
+pytest.importorskip("llvmlite", reason="fits take long without machine code")
+
+
+def test_an_element_that_never_slips_shows_its_stiffness_only() -> None:
+    record = measured(bank([2e4, 5e3], [5e-5, 1e-2]), sine(2e-4, 2.0, 4.0), 0.01, 1)
+    found = fit(record, bank([1e4, 1e4], [4e-5, 2e-2]), free=("k", "weights"), search="local")
+    assert found.never_slipped == (2,)
+    assert found.open == ("weights2",)
+    assert found["weights2"].note == "cannot be told: no influence on this record"
+    assert found["k2"].low < 5e3 < found["k2"].high
+    assert "weights2 cannot be told" in found.weakest
+    assert any("without influence" in note for note in found.notes)
+
+
+def test_a_product_is_told_and_its_factors_are_not() -> None:
+    """Thresholds are weights times the curve: its scale and that of the weights are one number."""
+    record = measured(bank([2e4], [5e-5]), sine(2e-4, 2.0, 4.0), 0.01, 2)
+    start = bank([1e4], [4e-5], F_s=1.2)
+    found = fit(record, start, free=("k", "weights", "F_c", "F_s"), search="local")
+    assert {"weights1", "F_c"} <= {*found.open}
+    assert found["k1"].told
+    assert "weights1" in found.weakest.split("The weakest direction:")[1]
+    assert "F_c" in found.weakest.split("The weakest direction:")[1]
+
+
+def test_what_is_told_is_said() -> None:
+    record = measured(bank([2e4], [5e-5]), sine(2e-4, 2.0, 4.0), 0.01, 3)
+    found = fit(record, bank([1e4], [4e-5]), free=("k", "weights"), search="local")
+    assert found.open == ()
+    assert found.weakest.startswith("All parameters are determined.")
+    assert found["k1"].low < 2e4 < found["k1"].high
+    assert found.effective_rows == pytest.approx(len(record), rel=0.3)  # white noise
+
+
+@pytest.mark.slow
+def test_profile_and_bootstrap_agree_with_the_table() -> None:
+    record = measured(bank([2e4], [5e-5]), sine(2e-4, 2.0, 4.0), 0.02, 5)
+    found = fit(record, bank([1e4], [4e-5]), free=("k", "weights"), search="local")
+    half = 0.5 * (found["k1"].high - found["k1"].low)
+    profile = found.profile("k1")
+    assert profile.low < found["k1"].value < profile.high
+    assert 0.5 * (profile.high - profile.low) == pytest.approx(half, rel=0.4)
+    assert profile.rise.min() == 0.0
+    drawn = found.bootstrap(draws=12, restarts=False, seed=1)
+    low, high = drawn.interval("k1", 0.68)
+    assert 0.5 * (high - low) == pytest.approx(half / 1.96, rel=0.6)
+    assert drawn.draws.shape == (12, 3)
+
+
+def test_a_profile_of_what_cannot_be_told_is_open() -> None:
+    record = measured(bank([2e4, 5e3], [5e-5, 1e-2]), sine(2e-4, 2.0, 4.0), 0.01, 1)
+    found = fit(record, bank([1e4, 1e4], [4e-5, 2e-2]), free=("k", "weights"), search="local")
+    profile = found.profile("weights2", restarts=False)
+    assert profile.open
+    assert str(profile).startswith("weights2: 95 % interval any above ")
