@@ -87,7 +87,8 @@ def _static(records: Sequence[Record], smoothing: float | None, _: Predictor | N
     start = np.array([size, 0.1 * size, 0.0, -1.0, -3.0, float(force.mean())])
 
     def left(p: FloatArray) -> FloatArray:
-        return curve(v, p) - force
+        found: FloatArray = curve(v, p) - force
+        return found
 
     best = least_squares(left, start).x
     return Predictor(6, lambda record: curve(record.motion(smoothing).velocity, best))
