@@ -1,7 +1,7 @@
 """The command line. A user's mistake is answered by one message and exit code 2.
 
-The verbs are in ``_run_verbs``, ``_fit_verb``, ``_chart_verbs``, ``_export_verb`` and
-``_trace_verbs``. Each imports what it needs when it runs, so that help, completion and error
+The verbs are in ``_run_verbs``, ``_fit_verb``, ``_chart_verbs``, ``_export_verb``, ``_trace_verbs``
+and ``_card_verb``. Each imports what it needs when it runs, so that help, completion and error
 messages appear at once.
 """
 
@@ -16,6 +16,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 import gms_fsm
+from gms_fsm.app._card_verb import reportcard_command
 from gms_fsm.app._chart_verbs import (
     blocks_command,
     chart_command,
@@ -130,6 +131,7 @@ app.command("debug")(debug_command)
 app.command("lesson")(lesson_command)
 app.command("code")(code_command)
 app.command("export")(export_command)
+app.command("reportcard")(reportcard_command)
 
 
 def main() -> None:
