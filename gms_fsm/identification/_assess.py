@@ -10,14 +10,15 @@ import numpy as np
 
 from gms_fsm.charts.parameters import WEIGHTS, FloatArray
 from gms_fsm.identification._experiment import NUISANCE, Experiment, Point
-from gms_fsm.identification._region import ends_of_region, values_of
+from gms_fsm.identification._profile import Profile, shown_interval
+from gms_fsm.identification._region import Region, walked
 from gms_fsm.identification._runs import LOST, Pool
 from gms_fsm.identification._statistics import LOOSE, NEGLIGIBLE, WIDE, Certainty, certainty
 from gms_fsm.identification._task import Task, stretches
 from gms_fsm.identification._unknowns import Subject, Unknown
 from gms_fsm.systems.system import System
 
-__all__ = ["Assessed", "Estimate", "assessed", "shown_interval", "sorted_elements"]
+__all__ = ["Assessed", "Estimate", "assessed", "sorted_elements"]
 
 FIRST_STEP, LEAST_STEP, MOST_STEP = 1e-3, 1e-4, 0.1
 OPEN = "cannot be told"
@@ -71,19 +72,6 @@ class Estimate:
         return shown_interval(self.value, self.low, self.high)
 
 
-def shown_interval(value: float, low: float, high: float) -> tuple[str, str]:
-    """Return a value and its interval as texts, with as many digits as the interval is worth."""
-    if math.isinf(low) and math.isinf(high):
-        return f"{value:.4g}", "any"
-    if math.isinf(low) or math.isinf(high):
-        end = f"any above {low:.4g}" if math.isinf(high) else f"any below {high:.4g}"
-        return f"{value:.4g}", end
-    size, width = max(abs(low), abs(high)), high - low
-    digits = 4 if width <= 0.0 else math.ceil(math.log10(size / width)) + 3
-    digits = min(max(digits, 3), 12)
-    return f"{value:.{digits}g}", f"{low:.{digits}g} to {high:.{digits}g}"
-
-
 @dataclass(frozen=True, eq=False)
 class Assessed:
     """What is known about the unknowns of a fit.
@@ -98,12 +86,16 @@ class Assessed:
         In coordinates.
     weakest : str
         The weakest direction in words.
+    open_profiles : tuple of Profile
+        Of the parameters that cannot be told: the least rise met on the walk through the region
+        in which the fit is as good. A profile is at most as high.
     """
 
     table: tuple[Estimate, ...]
     covariance: FloatArray
     certainty: Certainty
     weakest: str
+    open_profiles: tuple[Profile, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,40 +176,51 @@ def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
         names = [each.name for each in entries]
         width = np.array([sure.half[names.index(each.name)] for each in experiment.searched])
         steps = np.clip(0.25 * np.where(np.isfinite(width), width, 0.0), LEAST_STEP, MOST_STEP)
-    ends = _ends(task, entries, sure, pool)
+    region = _region(task, entries, sure, pool)
+    nothing = (0.0, 0.0)
     scales = np.array([each.scale for each in entries])
     with np.errstate(invalid="ignore"):
         covariance = sure.covariance * np.outer(scales, scales)
     table = tuple(
-        _estimate(each, float(half), bool(opened), experiment.typical, ends[each.name])
+        _estimate(
+            each,
+            float(half),
+            bool(opened),
+            experiment.typical,
+            nothing if region is None else region.reach(each.name),
+        )
         for each, half, opened in zip(entries, sure.half, sure.open, strict=True)
     )
     noise = float(np.sqrt(point.cost / max(point.residual.size, 1)))
-    return Assessed(table, covariance, sure, _in_words(table, entries, noise, task))
+    words = _in_words(table, entries, noise, task)
+    profiles: tuple[Profile, ...] = ()
+    if region is not None:
+        kinds = {each.name: each.kind == "log" for each in entries}
+        profiles = tuple(
+            region.profile(each.name, each.unit, logarithmic=kinds[each.name])
+            for each in table
+            if not each.told and each.note != NO_INFLUENCE
+        )
+    return Assessed(table, covariance, sure, words, profiles)
 
 
-def _ends(
-    task: Task, entries: Sequence[_Entry], sure: Certainty, pool: Pool
-) -> dict[str, tuple[float, float]]:
-    """Return the ends of the likelihood region, as distances from the best values on few rows."""
+def _region(task: Task, entries: Sequence[_Entry], sure: Certainty, pool: Pool) -> Region | None:
+    """Walk through the likelihood region on few rows; None if nothing was searched."""
     experiment = task.coarse
     point = experiment.start_point()
+    if point.lost is not None or not experiment.searched:
+        return None
     names = [each.name for each in entries]
-    if point.lost is not None:
-        return dict.fromkeys(names, (0.0, 0.0))
     places = [names.index(each.name) for each in experiment.searched]
-    spread = np.minimum(sure.spread, LOOSE)
-    root = sure.directions * spread
+    root = sure.directions * np.minimum(sure.spread, LOOSE)
     covariance = root @ root.T
     width = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     directions = {
         name: covariance[places, i] / width[i] for i, name in enumerate(names) if width[i] > 0.0
     }
-    ends = ends_of_region(
+    return walked(
         experiment, point, directions, root[places], sure.effective, pool, task.options.seed
     )
-    best = values_of(experiment, point)
-    return {name: (low - best[name], high - best[name]) for name, (low, high) in ends.items()}
 
 
 def _basis(experiment: Experiment, point: Point) -> FloatArray:

@@ -11,9 +11,10 @@ import numpy as np
 from gms_fsm._arguments import checked_integer
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, shown
-from gms_fsm.identification._assess import Estimate, shown_interval
+from gms_fsm.identification._assess import Estimate
 from gms_fsm.identification._experiment import Experiment, Point
-from gms_fsm.identification._region import LIMIT, values_of
+from gms_fsm.identification._profile import LIMIT, Profile
+from gms_fsm.identification._region import values_of
 from gms_fsm.identification._runs import Pool
 from gms_fsm.identification._search import Best, hops, refine
 from gms_fsm.identification._statistics import BLOCK
@@ -25,40 +26,6 @@ FACTOR = 0.1  # first step of a profile, relative, where the interval is open
 SHARE = 0.4  # first step as a share of the interval's half width
 MOST_STEPS = 12  # to each side, each twice as long as the one before
 RESTARTS = 4  # hops at each value
-
-
-@dataclass(frozen=True, eq=False)
-class Profile:
-    """How the fit suffers as one parameter is moved and all others are searched again.
-
-    Parameters
-    ----------
-    name, unit : str
-        The parameter.
-    values : ndarray, shape (m,)
-        Increasing.
-    rise : ndarray, shape (m,)
-        Fall of twice the log-likelihood on effective rows; 3.84 is the limit of the 95 % interval.
-    low, high : float
-        The interval; an open end is -inf or inf.
-    """
-
-    name: str
-    unit: str
-    values: FloatArray
-    rise: FloatArray
-    low: float
-    high: float
-
-    @property
-    def open(self) -> bool:
-        """Whether an end of the interval was not found."""
-        return not (math.isfinite(self.low) and math.isfinite(self.high))
-
-    def __str__(self) -> str:
-        value = float(self.values[int(np.argmin(self.rise))])
-        _, interval = shown_interval(value, self.low, self.high)
-        return f"{self.name}: 95 % interval {interval} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,13 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.identification._experiment import Experiment, Point
+from gms_fsm.identification._profile import LIMIT, Profile
 from gms_fsm.identification._runs import Pool
 
-__all__ = ["LIMIT", "ends_of_region", "values_of"]
+__all__ = ["Region", "values_of", "walked"]
 
-LIMIT = 3.841  # 95 % quantile of chi-squared with one degree of freedom
+BINS = 16  # of a parameter's values, in a profile
+HIGHEST = 4.0 * LIMIT  # rises shown in a profile
 ROUNDS = 14  # of one step outward for each end of each parameter
 GROWTH, SHRINK = 1.6, 0.5  # of a step that stayed in the region, or left it
 ASIDE = 0.35  # of the step: a random part, by which the walk follows bends
@@ -44,7 +46,47 @@ class _Walk:
     step: float = 1.0
 
 
-def ends_of_region(
+@dataclass(frozen=True, eq=False)
+class Region:
+    """What was met on a walk through the likelihood region.
+
+    Parameters
+    ----------
+    best : mapping of str to float
+        The values of the best point, by name.
+    met : mapping of str to ndarray, shape (points,)
+        Those of all points met, the best one first.
+    rise : ndarray, shape (points,)
+        Fall of twice the log-likelihood at each.
+    """
+
+    best: dict[str, float]
+    met: dict[str, FloatArray]
+    rise: FloatArray
+
+    def reach(self, name: str) -> tuple[float, float]:
+        """Return how far a parameter goes below and above its best value inside the region."""
+        inside = self.met[name][self.rise < LIMIT]
+        best = self.best[name]
+        return min(float(inside.min()) - best, 0.0), max(float(inside.max()) - best, 0.0)
+
+    def profile(self, name: str, unit: str, *, logarithmic: bool) -> Profile:
+        """Return the least rise met, by values of a parameter; a profile is at most as high."""
+        shown = self.rise < HIGHEST
+        values, rise = self.met[name][shown], self.rise[shown]
+        positive = logarithmic and float(values.min()) > 0.0
+        places = np.log(values) if positive else values
+        borders = np.linspace(places.min(), places.max(), BINS + 1)[1:-1]
+        bins = np.searchsorted(borders, places)
+        order = np.lexsort((rise, bins))
+        lowest = order[np.unique(bins[order], return_index=True)[1]]
+        low, high = self.reach(name)
+        best = self.best[name]
+        order = lowest[np.argsort(values[lowest])]
+        return Profile(name, unit, values[order], rise[order], best + low, best + high)
+
+
+def walked(
     experiment: Experiment,
     point: Point,
     directions: dict[str, FloatArray],
@@ -52,8 +94,8 @@ def ends_of_region(
     effective: float,
     pool: Pool,
     seed: int,
-) -> dict[str, tuple[float, float]]:
-    """Return the lowest and the highest value of each parameter in the likelihood region.
+) -> Region:
+    """Walk through the likelihood region, towards both ends of each parameter.
 
     Parameters
     ----------
@@ -75,13 +117,11 @@ def ends_of_region(
 
     Returns
     -------
-    dict of str to (float, float)
-        By name; both the best value where nothing better was found.
+    Region
+        All points met.
     """
     rows = min(effective, float(experiment.target.size))
     best = values_of(experiment, point)
-    if not len(experiment.searched):
-        return {name: (value, value) for name, value in best.items()}
     low, high = experiment.coordinates.limits
     rng = np.random.default_rng(seed)
     walks = [
@@ -90,7 +130,7 @@ def ends_of_region(
         for side in (-1.0, 1.0)
         if np.isfinite(direction).all()
     ]
-    lowest = point.cost
+    met, rises = [best], [0.0]
     for _ in range(ROUNDS):
         moves = [
             walk.step * (walk.direction + ASIDE * shape @ rng.standard_normal(shape.shape[1]))
@@ -100,22 +140,24 @@ def ends_of_region(
             np.clip(walk.place + move, low, high) for walk, move in zip(walks, moves, strict=True)
         ]
         points = pool.map(experiment.at, places)
-        inside = [_inside(each, lowest, rows) for each in points]
-        for walk, fine in zip(walks, inside, strict=True):
-            walk.step = min(walk.step * (GROWTH if fine else SHRINK), 8.0)
-        for each in (each for each, fine in zip(points, inside, strict=True) if fine):
+        new = [_rise(each, point.cost, rows) for each in points]
+        for walk, rise in zip(walks, new, strict=True):
+            walk.step = min(walk.step * (GROWTH if rise < LIMIT else SHRINK), 8.0)
+        for each, rise in zip(points, new, strict=True):
+            if not math.isfinite(rise):
+                continue
             values = values_of(experiment, each)
+            met.append(values)
+            rises.append(rise)
             for walk in walks:  # a point found for one end may be further out for another
-                if walk.side * (values[walk.name] - walk.value) > 0.0:
+                if rise < LIMIT and walk.side * (values[walk.name] - walk.value) > 0.0:
                     walk.place, walk.value = each.u, values[walk.name]
-    ends = {name: [value, value] for name, value in best.items()}
-    for walk in walks:
-        ends[walk.name][0 if walk.side < 0.0 else 1] = walk.value
-    return {name: (pair[0], pair[1]) for name, pair in ends.items()}
+    columns = {name: np.array([values[name] for values in met]) for name in best}
+    return Region(best, columns, np.array(rises))
 
 
-def _inside(point: Point, lowest: float, rows: float) -> bool:
-    """Return whether a point fits as well as the best within the noise."""
+def _rise(point: Point, lowest: float, rows: float) -> float:
+    """Return the fall of twice the log-likelihood from the best point; inf if it was lost."""
     if point.lost is not None or lowest <= 0.0:
-        return False
-    return rows * math.log(max(point.cost, 1e-300) / lowest) < LIMIT
+        return math.inf
+    return rows * math.log(max(point.cost, 1e-300) / lowest)

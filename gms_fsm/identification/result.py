@@ -17,9 +17,10 @@ from gms_fsm._display import displayed
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError, shown
 from gms_fsm.identification._assess import Assessed, Estimate
-from gms_fsm.identification._certainty import Bootstrap, Profile, bootstrapped, profiled
+from gms_fsm.identification._certainty import Bootstrap, bootstrapped, profiled
 from gms_fsm.identification._compared import Choice, ChoiceRow, Comparison, score_of
 from gms_fsm.identification._experiment import Point
+from gms_fsm.identification._profile import Profile
 from gms_fsm.identification._runs import Course
 from gms_fsm.identification._statistics import phase_floor
 from gms_fsm.identification._task import Task, at_all_rows
@@ -135,6 +136,14 @@ class Fit:
     def weakest(self) -> str:
         """What is determined, what is not, and the weakest direction, in words."""
         return self.assessed.weakest
+
+    @property
+    def open_profiles(self) -> tuple[Profile, ...]:
+        """Of each parameter that cannot be told and has an influence: how little it matters.
+
+        Values that fit nearly as well, met on a walk; `profile` searches all others again.
+        """
+        return self.assessed.open_profiles
 
     @cached_property
     def never_slipped(self) -> tuple[int, ...]:
