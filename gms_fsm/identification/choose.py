@@ -89,13 +89,15 @@ def choose(
 
     Examples
     --------
-    >>> from gms_fsm.identification.bank import initial_bank, stop_operators
+    >>> from gms_fsm.identification.bank import stop_operators
+    >>> from gms_fsm.identification.candidates import stiffer_one_way
     >>> t = np.linspace(0.0, 20.0, 801)
-    >>> x = 1e-3 * np.sin(2 * np.pi * t / 2.5)
+    >>> x = 1e-3 * np.sin(2 * np.pi * t / 2.5 + 1.0)
     >>> noise = 0.02 * np.random.default_rng(0).standard_normal(t.size)
     >>> force = stop_operators(x, [1e-4]) @ [1e4] + noise
     >>> record = Record.from_arrays(time=t, position=x, force=force)
-    >>> kinds = {f"{n} springs": (initial_bank(record, n), ["k", "weights"]) for n in (1, 2)}
+    >>> banks = {n: stiffer_one_way([record], None, n=n).model for n in (1, 2)}
+    >>> kinds = {f"{n} springs": (bank, ["k", "r"]) for n, bank in banks.items()}
     >>> found = choose(record, candidates=kinds, cycles=2.5)
     >>> found.choice.chosen
     '1 springs'
