@@ -89,15 +89,15 @@ def choose(
 
     Examples
     --------
-    >>> from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, simulate
-    >>> from gms_fsm import initial_bank
-    >>> one = GMSParameters(k=[1e4], sigma=[0], C=[0.01], sigma_2=0, weights=[1e-4], v_c=1e-6,
-    ...                     stribeck=Stribeck(1, 1.1, 1e-4))
+    >>> from gms_fsm.identification.bank import stop_operators
+    >>> from gms_fsm.identification.candidates import stiffer_one_way
     >>> t = np.linspace(0.0, 20.0, 801)
-    >>> v = 1e-3 * np.cos(2 * np.pi * t / 2.5)
-    >>> run = simulate(GMS(one, law="signed"), Prescribed((t, v)), 20.0, t_eval=t)
-    >>> record = Record.from_arrays(time=t, velocity=v, force=run.F)
-    >>> kinds = {f"{n} springs": (initial_bank(record, n), ["k", "weights"]) for n in (1, 2)}
+    >>> x = 1e-3 * np.sin(2 * np.pi * t / 2.5 + 1.0)
+    >>> noise = 0.02 * np.random.default_rng(0).standard_normal(t.size)
+    >>> force = stop_operators(x, [1e-4]) @ [1e4] + noise
+    >>> record = Record.from_arrays(time=t, position=x, force=force)
+    >>> banks = {n: stiffer_one_way([record], None, n=n).model for n in (1, 2)}
+    >>> kinds = {f"{n} springs": (bank, ["k", "r"]) for n, bank in banks.items()}
     >>> found = choose(record, candidates=kinds, cycles=2.5)
     >>> found.choice.chosen
     '1 springs'
@@ -138,7 +138,7 @@ def choose(
             stopped = INTERRUPTED.format(done=len(results) + len(rows), all=len(tried))
         if not results:
             raise ParameterError(
-                f"no candidate could be fitted; {rows[0].name}: {rows[0].note}",
+                f"no candidate could be fitted ({rows[0].name}: {rows[0].note})",
                 place="candidates",
                 advice="look at the records, or give other candidates",
             )
@@ -337,7 +337,7 @@ def period_of(t: FloatArray, x: FloatArray) -> float | None:
     Examples
     --------
     >>> t = np.arange(0.0, 30.0, 0.01)
-    >>> round(period_of(t, np.sin(2 * np.pi * t / 4.0)), 2)
+    >>> round(period_of(t, np.sin(2 * np.pi * t / 4.0)), 1)
     4.0
     """
     even = np.linspace(t[0], t[-1], t.size)

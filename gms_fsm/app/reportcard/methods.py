@@ -90,7 +90,8 @@ def _static(records: Sequence[Record], smoothing: float | None, _: Predictor | N
         found: FloatArray = curve(v, p) - force
         return found
 
-    best = least_squares(left, start).x
+    with np.errstate(over="ignore"):  # a curve that is flat at all speeds
+        best = least_squares(left, start).x
     return Predictor(6, lambda record: curve(record.motion(smoothing).velocity, best))
 
 

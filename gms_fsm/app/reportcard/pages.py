@@ -25,22 +25,17 @@ SUBMIT = """\
 
 Write the forces that your model predicts for the held-out rows into a JSON file:
 
+<!-- file: mine.json -->
 ```json
 {"name": "my model", "dataset": "tribometer", "F": {"tribometer": [2.31, 2.30, 2.30]}}
 ```
 
 `F` has one list for each record of the data set (`tribometer`; `test00` to `test12` of the damper):
 the force at each held-out row in N, in the order of the record. `"rows": {"tribometer": [20120]}`
-scores only some of them, by their line in the file (the header of the tribometer's file is line 1,
-and rows with a normal force of at most 4.5 N do not count). What is held out must not have been
-trained on. Then
-
-```console
-$ gms-fsm reportcard --data FOLDER --score FILE.json
-```
-
-prints your row of the table. To have it listed here, open an issue with the file and a sentence on
-how the model was trained.
+scores only some of them, by their line in the file (the header is line 1; rows of the tribometer
+with a normal force of at most 4.5 N do not count). What is held out must not have been trained on.
+Then `gms-fsm reportcard --data FOLDER --score mine.json` prints your row of the table. To have it
+listed here, open an issue with the file and a sentence on how the model was trained.
 """
 
 
