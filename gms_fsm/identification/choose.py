@@ -337,7 +337,7 @@ def period_of(t: FloatArray, x: FloatArray) -> float | None:
     Examples
     --------
     >>> t = np.arange(0.0, 30.0, 0.01)
-    >>> round(period_of(t, np.sin(2 * np.pi * t / 4.0)), 1)
+    >>> round(period_of(t, np.sin(2 * np.pi * t / 4.0)), 3)
     4.0
     """
     even = np.linspace(t[0], t[-1], t.size)
@@ -360,7 +360,15 @@ def period_of(t: FloatArray, x: FloatArray) -> float | None:
     # The first of the peaks that are as high: later ones are multiples of the period.
     first = int(np.argmax(after > after[best] - 0.5 * (1.0 - REPEATS)))
     falls = np.flatnonzero(np.diff(after[first:]) < 0.0)
-    peak = below[0] + first + (int(falls[0]) if falls.size else 0)
+    peak = float(below[0] + first + (int(falls[0]) if falls.size else 0))
+    # The ends of a short record shift the peak; a distance of many cycles does not depend on them.
+    many = 1
+    while many * peak < 0.5 * values.size:
+        reach = max(2.0, 0.1 * peak)
+        near = np.arange(round(many * peak - reach), round(many * peak + reach) + 1)
+        near = near[(near > 0) & (near < values.size)]
+        apart = [float(np.mean((values[lag:] - values[:-lag]) ** 2)) for lag in near]
+        peak, many = float(near[int(np.argmin(apart))]) / many, 2 * many
     return float(peak * (even[1] - even[0]))
 
 
