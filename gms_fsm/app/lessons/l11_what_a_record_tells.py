@@ -184,7 +184,8 @@ class Result:
             f"Measured: on the sine R² is {self.sine.training['r2']:.4f}. Elements that never "
             f"slipped: {never}. Cannot be told: {_listed(self.sine.open)}; any value above "
             f"{1e6 * self.least:.0f} µm/N fits as well, ten times the truth changes the force by "
-            f"{self.unseen:g} N. On the designed motion R² is {self.designed.training['r2']:.4f}. Cannot be told: {_listed(self.designed.open)}; "
+            f"{self.unseen:g} N. On the designed motion R² is "
+            f"{self.designed.training['r2']:.4f}. Cannot be told: {_listed(self.designed.open)}; "
             f"{self.hits} of {len(NAMES)} intervals contain the truth, weights2 is known to "
             f"±{wide:.2g} %.",
             f"Measured: with noise that is correlated by {CORRELATION:g} from row to row, "
@@ -211,12 +212,6 @@ def run() -> Result:
     -------
     Result
         Runs and fits.
-
-    Examples
-    --------
-    >>> result = run()
-    >>> result.sine.open, result.designed.open
-    (('weights2',), ())
     """
     truth = bank(TRUTH)
     waving, motion = sine(), excite(STROKE, SPEEDS, rate=RATE)
@@ -443,7 +438,7 @@ def _draw_thresholds(ax: Axes, result: Result) -> None:
                 ax.plot(ends, [y, y], color=INK, linewidth=2.4)
                 ax.plot(1e6 * each.value, y, marker, color=INK, markersize=4)
                 continue
-            arrow = {"arrowstyle": "|-|>", "color": TEXT_GREY}
+            arrow = {"arrowstyle": "->", "color": TEXT_GREY}
             ax.annotate("", (500, y), (1e6 * result.least, y), arrowprops=arrow)
             note = each.note.partition(":")[0]
             ax.annotate(note, (125, y), ha="right", va="center", color=TEXT_GREY, fontsize=8)
@@ -487,11 +482,13 @@ def _draw_intervals(ax: Axes, result: Result) -> None:
     places = np.arange(len(NAMES))
     found = np.array([result.correlated[name].value for name in NAMES])
     off = 100.0 * (found / TRUTH - 1.0)
-    look = {"fmt": "none", "capsize": 3.0}
-    ax.errorbar(places, off, 100 * result.from_effective, ecolor=LINE_GREY, **look, elinewidth=1.6)
-    ax.errorbar(places + 0.25, off, 100 * result.from_rows, ecolor=INK, **look, elinewidth=1.6)
-    ax.plot([], [], color=LINE_GREY, linewidth=1.6, label="from effective rows")
-    ax.plot([], [], color=INK, linewidth=1.6, label="from rows")
+    for half, aside, colour, label in (
+        (result.from_effective, 0.0, LINE_GREY, "from effective rows"),
+        (result.from_rows, 0.25, INK, "from rows"),
+    ):
+        ends = off + 100.0 * np.array([-half, half])
+        ax.vlines(places + aside, *ends, color=colour, linewidth=1.8, label=label)
+        ax.plot(places + aside, off, "o", color=colour, markersize=3.5)
     ax.axhline(0.0, color=INK, linestyle=":", linewidth=0.9)
     ax.legend(loc="upper right")
     ax.set_xticks(places + 0.12, NAMES, fontsize=8)
@@ -506,6 +503,9 @@ def _draw_product(ax: Axes, result: Result) -> None:
 
     F = np.geomspace(0.2, 3.0, 100)
     ax.loglog(F, 1e6 * TRUTH[2] * F_c / F, color=LINE_GREY, linewidth=0.9)
+    ax.annotate(
+        f"weights1 · $F_c$ = {1e6 * TRUTH[2] * F_c:g} µm", (0.22, 17), color=TEXT_GREY, fontsize=8
+    )
     ax.plot(F_c, 1e6 * TRUTH[2], "x", color=INK, markersize=6)
     ax.annotate("truth", (F_c, 1e6 * TRUTH[2]), (6, 3), textcoords="offset points", fontsize=8)
     for each, side, (right, up) in zip(
