@@ -295,6 +295,7 @@ def draw_howto() -> None:
     figures.save(loops_figure(bilinear), FOLDER / "howto_bilinear_loop.png")
     figures.save(desk_figure(), FOLDER / "howto_desk_experiment.png")
     figures.save(mujoco_figure(), FOLDER / "howto_mujoco.png")
+    figures.save(names_of("fit.md")["figure"], FOLDER / "howto_fit.png")
 
 
 def tutorial_chart() -> Chart:

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from gms_fsm.errors import UnitError as UnitError
     from gms_fsm.exporters import export as export
     from gms_fsm.identification.bank import initial_bank as initial_bank
+    from gms_fsm.identification.choose import choose as choose
     from gms_fsm.identification.excite import excite as excite
     from gms_fsm.identification.fit import fit as fit
     from gms_fsm.identification.result import Fit as Fit
@@ -92,6 +93,7 @@ _HOMES = {
     "ParameterError RecordError ScenarioError SessionError SignalError TraceFileError UnitError",
     "exporters": "export",
     "identification.bank": "initial_bank",
+    "identification.choose": "choose",
     "identification.excite": "excite",
     "identification.fit": "fit",
     "identification.result": "Fit",

@@ -10,15 +10,15 @@ import graphviz
 __all__ = ["DrawnGraph", "MermaidText", "PlantUMLText", "Svg", "TikzText", "image"]
 
 
-def image(svg: str, words: str) -> str:
-    """Return an SVG document as an image in HTML, no wider than the page.
+def image(picture: str | bytes, words: str) -> str:
+    """Return a picture as an image in HTML, no wider than the page.
 
     JupyterLab cuts off the right side of a wide SVG document that is not in HTML.
 
     Parameters
     ----------
-    svg : str
-        The document.
+    picture : str or bytes
+        An SVG document, or PNG.
     words : str
         What it shows, for readers who do not see it.
 
@@ -32,9 +32,10 @@ def image(svg: str, words: str) -> str:
     >>> image("<svg></svg>", "nothing")
     '<img style="max-width:100%" alt="nothing" src="data:image/svg+xml;base64,PHN2Zz48L3N2Zz4=">'
     """
-    data = b64encode(svg.encode()).decode()
+    raw, kind = (picture, "png") if isinstance(picture, bytes) else (picture.encode(), "svg+xml")
+    data = b64encode(raw).decode()
     words = escape(words)
-    return f'<img style="max-width:100%" alt="{words}" src="data:image/svg+xml;base64,{data}">'
+    return f'<img style="max-width:100%" alt="{words}" src="data:image/{kind};base64,{data}">'
 
 
 class DrawnGraph(graphviz.Digraph):  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""What notebooks show of charts, models, systems, runs, sessions, explanations and checks.
+"""What notebooks show of charts, models, systems, runs, fits, sessions, explanations and checks.
 
 The classes ask here when a notebook shows an object (`gms_fsm._display`). A chart, a model or a
 system is a picture, or its text without Graphviz; a run is its overview, or its contacts if there
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from io import BytesIO
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import graphviz
 import numpy as np
@@ -19,6 +19,7 @@ import numpy as np
 from gms_fsm._display import Form
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import GMSError, MissingExtraError, OutputError
+from gms_fsm.identification.report import model_title, scores_text
 from gms_fsm.inspection._findings import Finding, Report
 from gms_fsm.inspection._results import BranchComparison, Here
 from gms_fsm.inspection.explain import Explanation, Why
@@ -40,6 +41,9 @@ from plots.drawings import DrawnGraph, image
 from plots.live_chart import LiveChart
 from plots.render import available, drawn
 from plots.statechart import statechart
+
+if TYPE_CHECKING:
+    from gms_fsm.identification.result import Fit
 
 __all__ = ["figure_png", "shown", "svg_of"]
 
@@ -64,8 +68,9 @@ def shown(thing: object, form: Form) -> Any:
         None if the object has no such form, or what is needed for it is not installed.
     """
     for kind in type(thing).__mro__:
-        if (kind, form) in FORMS:
-            return FORMS[kind, form](thing)
+        for key in (kind, f"{kind.__module__}.{kind.__qualname__}"):
+            if (key, form) in FORMS:
+                return FORMS[key, form](thing)
     return None
 
 
@@ -183,6 +188,32 @@ def parameters_html(parameters: GMSParameters) -> str:
     )
 
 
+# --------------------------------------------------------------------------- fits
+def fit_html(fit: Fit) -> str:
+    """Return the parameters of a fit with what cannot be told, its scores, and its figure."""
+    words = table(
+        ["parameter", "value", "95 % interval", "unit", "note"],
+        ([each.name, *each.shown, each.unit, each.note] for each in fit.table),
+        caption=f"{model_title(fit)}: {scores_text(fit)}",
+        more=fit.weakest,
+    )
+    picture = fit_png(fit)
+    if picture is None:
+        return words
+    return words + image(picture, "measurement and model, residuals, parameters")
+
+
+def fit_png(fit: Fit) -> bytes | None:
+    """Return the figure of a fit as PNG, or None without matplotlib."""
+    try:
+        from plots.figures import fit_figure
+    except MissingExtraError:
+        return None
+    buffer = BytesIO()
+    fit_figure(fit).savefig(buffer, format="png", dpi=100)
+    return buffer.getvalue()
+
+
 # --------------------------------------------------------------------------- sessions
 def session_html(session: Session) -> str:
     """Return where a session is, and its chart there if it has one contact."""
@@ -266,7 +297,8 @@ def _findings(*findings: Finding) -> Iterator[list[str]]:
         yield [each.check, status, where + case, each.text, each.example]
 
 
-FORMS: Mapping[tuple[type, Form], Callable[[Any], Any]] = {
+# By class; by name where importing the class takes long.
+FORMS: Mapping[tuple[type | str, Form], Callable[[Any], Any]] = {
     **{(kind, "svg"): subject_svg for kind in (Chart, GMS, LuGre, ChartModel, Contact, System)},
     **{(kind, "html"): subject_html for kind in (Chart, GMS, LuGre, ChartModel, Contact, System)},
     (GMSParameters, "html"): parameters_html,
@@ -277,6 +309,7 @@ FORMS: Mapping[tuple[type, Form], Callable[[Any], Any]] = {
         (kind, "html"): verdict_html
         for kind in (ChatteringVerdict, InvariantVerdict, PassivityVerdict, CoverageVerdict)
     },
+    ("gms_fsm.identification.result.Fit", "html"): fit_html,
     (Session, "html"): session_html,
     (Here, "html"): text_html,
     (BranchComparison, "html"): text_html,

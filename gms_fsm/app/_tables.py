@@ -20,7 +20,8 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticKnownError
 from pydantic_core.core_schema import literal_schema
 
-from gms_fsm._records import LIST, ONE, TABLE, TEXT, Table
+from gms_fsm._records import LIST, ONE, TABLE, TEXT, Numbers, Table
+from gms_fsm.identification._task import Options
 from gms_fsm.records.record import Column, Record
 from gms_fsm.run.settings import ENGINES, EVENTS, Settings
 from gms_fsm.systems._file import SystemFile
@@ -29,6 +30,7 @@ from gms_fsm.systems.rigs import PulledSlider
 from integrators import METHODS
 
 __all__ = [
+    "FitTable",
     "PrescribedTable",
     "PulledTable",
     "RecordTable",
@@ -264,6 +266,64 @@ class OutputTable(Table):
     csv: bool = Field(False, description="also write the trace as CSV")
 
 
+# --------------------------------------------------------------------------- fits
+_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class FitTable(Table):
+    """What `gms-fsm fit` searches; keys and defaults are those of `gms_fsm.fit`."""
+
+    free: list[str] = Field(min_length=1, description='parameters to find, for example ["k", "C"]')
+    fixed: dict[str, Numbers] = Field({}, description="values that differ from those of the model")
+    tied: list[str] = Field([], description="parameters with one value for all elements")
+    nuisance: list[Literal["offset", "drift", "inertia"]] = Field(
+        ["offset"], description="offset [N], drift [N/s], inertia [kg]: fitted besides the model"
+    )
+    linear: list[str] = Field([], description="further parameters in which the force is linear")
+    measured: str = Field("F", description='compared with the record: "F", "gear.F", "load.x"')
+    drive: str | None = Field(
+        None, description="signal of a system that the velocity of the record replaces"
+    )
+    train: _Pair | None = Field(None, description="rows to fit, from and to, s; all by default")
+    test: _Pair | None = Field(None, description="rows to hold out, from and to, s")
+    cycles: float | None = Field(None, gt=0, description="period of the record, s")
+    search: Literal["hops", "local", "de"] = "hops"
+    bounds: dict[str, _Pair] = Field({}, description="lowest and highest value, by parameter")
+    seed: int = Field(0, ge=0)
+    most_steps: int | None = Field(None, ge=1, description="of the integrator, for each trial run")
+    begin: Literal["relaxed", "run in"] | None = Field(
+        None, description="state in which a record begins; by default whichever fits better"
+    )
+
+    @model_validator(mode="after")
+    def _fits(self) -> FitTable:
+        for name in ("train", "test"):
+            pair = getattr(self, name)
+            if pair is not None and not pair[0] < pair[1]:
+                raise ValueError(f"{name} ends at {pair[1]:g} s, not after its start")
+        return self
+
+    def options(self, smoothing: float | None) -> Options:
+        """Return the options of a fit, with the smoothing of the record."""
+        return Options(
+            free=tuple(self.free),
+            tied=tuple(self.tied),
+            nuisance=tuple(self.nuisance),
+            linear=tuple(self.linear),
+            measured=self.measured,
+            drive=self.drive,
+            train=None if self.train is None else (self.train[0], self.train[1]),
+            test=None if self.test is None else (self.test[0], self.test[1]),
+            cycles=self.cycles,
+            search=self.search,
+            bounds={name: (pair[0], pair[1]) for name, pair in self.bounds.items()},
+            seed=self.seed,
+            most_steps=self.most_steps,
+            smoothing=smoothing,
+            begin=self.begin,
+        )
+
+
 class Scenario(Table):
     """A scenario file."""
 
@@ -277,6 +337,7 @@ class Scenario(Table):
     run: RunTable = RunTable()
     initial: InitialTable = InitialTable()
     output: OutputTable = OutputTable()
+    fit: FitTable | None = Field(None, description="for gms-fsm fit; a run ignores it")
 
     @model_validator(mode="after")
     def _fits(self) -> Scenario:
@@ -329,9 +390,13 @@ class SystemScenario(SystemFile):
         "and further states; all else starts at 0",
     )
     output: OutputTable = OutputTable()
+    record: RecordTable | None = Field(None, description="for gms-fsm fit; a run ignores it")
+    fit: FitTable | None = Field(None, description="for gms-fsm fit; a run ignores it")
 
     @model_validator(mode="after")
     def _fits(self) -> SystemScenario:
+        if self.record is not None and self.fit is None:
+            raise ValueError("the table [record] of a system is for gms-fsm fit; add a table [fit]")
         if self.run.events == "held":
             raise ValueError("run.events = 'held' is for a model on a rig; give a contact a period")
         return self

@@ -1,7 +1,8 @@
 """The command line. A user's mistake is answered by one message and exit code 2.
 
-The verbs are in ``_run_verbs``, ``_chart_verbs``, ``_export_verb`` and ``_trace_verbs``. Each
-imports what it needs when it runs, so that help, completion and error messages appear at once.
+The verbs are in ``_run_verbs``, ``_fit_verb``, ``_chart_verbs``, ``_export_verb``, ``_trace_verbs``
+and ``_card_verb``. Each imports what it needs when it runs, so that help, completion and error
+messages appear at once.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 import gms_fsm
+from gms_fsm.app._card_verb import reportcard_command
 from gms_fsm.app._chart_verbs import (
     blocks_command,
     chart_command,
@@ -24,6 +26,7 @@ from gms_fsm.app._chart_verbs import (
 )
 from gms_fsm.app._console import error_line, note
 from gms_fsm.app._export_verb import export_command
+from gms_fsm.app._fit_verb import fit_command
 from gms_fsm.app._run_verbs import (
     debug_command,
     lesson_command,
@@ -114,6 +117,7 @@ def root(
 app.command("paper")(paper_command)
 app.command("run")(run_command)
 app.command("sweep")(sweep_command)
+app.command("fit")(fit_command)
 app.command("phenomena")(phenomena_command)
 app.command("schema")(schema_command)
 app.command("chart", cls=_Drawing)(chart_command)
@@ -127,6 +131,7 @@ app.command("debug")(debug_command)
 app.command("lesson")(lesson_command)
 app.command("code")(code_command)
 app.command("export")(export_command)
+app.command("reportcard")(reportcard_command)
 
 
 def main() -> None:

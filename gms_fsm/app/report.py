@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm._files import output_folder, refuse_input, write_whole
+from gms_fsm._markdown import plain, table_lines
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
@@ -32,7 +32,6 @@ __all__ = [
     "dwell_times",
     "monitor_lines",
     "note_lines",
-    "plain",
     "run_scenario",
     "summary_text",
 ]
@@ -290,11 +289,15 @@ def _end_tables(trace: Trace, system: System) -> list[str]:
         [f"{name} ({each.x}, {each.v})", f"{body.x[-1]:.6g}", f"{body.v[-1]:.6g}"]
         for each, (name, body) in zip(system.bodies, bodies, strict=True)
     ]
-    lines = [f"At t = {trace.t[-1]:.6g} s:", "", *_table(["body", "position", "velocity"], rows)]
+    lines = [
+        f"At t = {trace.t[-1]:.6g} s:",
+        "",
+        *table_lines(["body", "position", "velocity"], rows),
+    ]
     names = [*system.flow, *(name for each in system.sampled for name in each.updates)]
     if names:
         rows = [[f"{trace.value(name)[-1]:.6g}" for name in names]]
-        lines += ["", *_table(names, rows)]
+        lines += ["", *table_lines(names, rows)]
     return lines
 
 
@@ -333,36 +336,6 @@ def _held(trace: Trace) -> list[str]:
         f"- held on {names}: {len(stretches)} times, {seconds:.4g} s in total, first at t = "
         f"{float(stretches.t_start[0]):.6g} s (a sliding mode: the sign is a number from -1 to 1)"
     ]
-
-
-def plain(text: str) -> str:
-    r"""Return Markdown that displays a text literally.
-
-    Parameters
-    ----------
-    text : str
-        One line or several; the lines are kept.
-
-    Returns
-    -------
-    str
-        Text without HTML, links, images or other active Markdown.
-
-    Examples
-    --------
-    >>> print(plain("F_c < 2 N, *new* ![x](y)"))
-    F_c &lt; 2 N, \*new\* !\[x\](y)
-    """
-    lines = []
-    for line in text.splitlines():
-        shown = "".join(c if c.isprintable() else " " for c in line).strip()
-        shown = re.sub(r"[\\`*\[\]|~$#]", r"\\\g<0>", shown)
-        shown = re.sub(
-            r"(?<![^\W_])_|_(?![^\W_])", r"\\_", shown
-        )  # but not in F_c, which needs none
-        shown = shown.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-        lines.append(re.sub(r"^(\d*)([-+=.)])", r"\1\\\2", shown))  # a list, a rule, a heading
-    return "\n".join(lines)
 
 
 def monitor_lines(trace: Trace) -> list[str]:
@@ -435,11 +408,7 @@ def _element_table(trace: Trace) -> list[str]:
         ]
         for i in range(trace.n)
     ]
-    return _table(head, rows)
-
-
-def _table(head: list[str], rows: list[list[str]]) -> list[str]:
-    return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
+    return table_lines(head, rows)
 
 
 def _measurement(record: Record, motion: Motion, trace: Trace) -> list[str]:

@@ -236,10 +236,30 @@ def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
     ScenarioError
         Naming file, line, key and text.
     """
-    return _system_of(Path(path), overrides)[1]
+    return read_system(Path(path), overrides)[1]
 
 
-def _system_of(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, System]:
+def read_system(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, System]:
+    """Return the contents of a scenario file of a system, and the system.
+
+    Parameters
+    ----------
+    path : Path
+        A TOML file.
+    overrides : sequence of str
+        As in `load_scenario`.
+
+    Returns
+    -------
+    SystemScenario, System
+        Checked.
+
+    Raises
+    ------
+    ScenarioError
+        As `load_system` does.
+    """
+
     def build(table: SystemScenario) -> tuple[SystemScenario, System]:
         return table, table.chosen(path.parent)
 
@@ -250,7 +270,7 @@ def _system_of(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, Sy
 
 
 def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
-    scenario, system = _system_of(path, overrides)
+    scenario, system = read_system(path, overrides)
     run = scenario.run
     start, end = run.t_start or 0.0, run.t_end
     if end is None:

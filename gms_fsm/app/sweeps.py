@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm._files import output_folder, refuse_input, write_whole
-from gms_fsm.app.report import plain
+from gms_fsm._markdown import plain
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import ParameterError, cut

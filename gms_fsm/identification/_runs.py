@@ -312,8 +312,13 @@ class Driver:
     def run(self, subject: Subject, course: Course) -> Ran:
         """Run; a `GMSError` if the numbers break a rule or the run fails."""
         kept = self._runs.get(id(course))
-        if kept is not None and not isinstance(subject.what, System):
-            kept.run.reset(subject.what, kept.run.start.rig)
+        what = subject.what
+        if (
+            kept is not None
+            and not isinstance(what, System)
+            and kept.run.start.has_texts_of(what, kept.run.start.rig)
+        ):
+            kept.run.reset(what, kept.run.start.rig)
             run: Run | CompiledRun = kept.run
         else:
             start = self.start(subject, course)

@@ -5,14 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from gms_fsm._files import output_folder, write_whole
 from gms_fsm._records import Table
-from gms_fsm.systems._file import SystemFile, save_as
+from gms_fsm.systems._file import FileTable, SystemFile, save_as
+from gms_fsm.systems._record import SignalField, signal_table
+from gms_fsm.systems.signals import Corners, Signal
 from gms_fsm.systems.system import System
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
 __all__ = ["save"]
+
+LONGEST = 5000  # corners of a signal in the file itself
 
 
 class Times(Table):
@@ -33,6 +40,8 @@ class Fitted(SystemFile):
 def save(fit: Fit, path: Path) -> Path:
     """Write the fitted model, driven by the first record, with its run-in if it has one.
 
+    A long motion is written to a table beside it, with the same name and the ending ``.csv``.
+
     Parameters
     ----------
     fit : Fit
@@ -52,14 +61,30 @@ def save(fit: Fit, path: Path) -> Path:
     """
     course = fit.task.course(fit.records[0], None)
     start = fit.task.fine.driver.start(fit.task.subject, course)
+    signals = {name: _signal(signal, name, path) for name, signal in start.system.signals.items()}
     return save_as(
         Fitted,
         start.system,
         path,
+        signals=signals,
         title=f"{_name(fit)} fitted to {fit.records[0].name}",
         notes=fit.weakest,
         run=Times(t_start=start.t_start, t_end=start.t_end),
     )
+
+
+def _signal(signal: Signal | str, name: str, path: Path) -> FileTable | SignalField:
+    """Describe a signal; the corners of a long one are written to a table beside the file."""
+    if not isinstance(signal, Corners) or signal.held or signal.times.size <= LONGEST:
+        return signal_table(signal)
+    if not (np.diff(signal.times) > 0.0).all():  # a jump, which a table of a record has not
+        return signal_table(signal)
+    table = path.with_suffix(".csv")
+    rows = (f"{t!r},{u!r}" for t, u in np.stack([signal.times, signal.values], axis=1).tolist())
+    text = "\n".join([f"t_s,{name}", *rows, ""]).encode()
+    output_folder(table.parent, [table.name])
+    write_whole(table, lambda file: file.write(text))
+    return FileTable(file=table.name, value=name)
 
 
 def _name(fit: Fit) -> str:

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from gms_fsm.charts.parameters import FloatArray
 
@@ -161,7 +161,7 @@ def certainty(
     wider = np.sqrt(np.maximum(least / present, 1.0))
     covariance = covariance * np.outer(wider, wider)
     degrees = max(effective - p, 3.0)
-    half = student.ppf(0.975, degrees) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    half = stdtrit(degrees, 0.975) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     effect = half * np.sqrt(np.einsum("ij,ij->j", slopes, slopes) / rows) / size
     wide = (half > WIDE) & (logarithmic | (effect > NEGLIGIBLE))
     opened = taking | wide

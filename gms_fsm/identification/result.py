@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm._arguments import checked_integer, checked_kind, checked_path, listed
+from gms_fsm._display import displayed
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError, shown
 from gms_fsm.identification._assess import Assessed, Estimate
@@ -56,6 +57,7 @@ class Residuals:
     held: NDArray[np.bool_]
 
 
+@displayed("html")
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit:
     """A model with parameters found from records, their intervals, and what the data cannot tell.

@@ -206,6 +206,13 @@ class Start:
             initial=initial,
         )
 
+    def has_texts_of(self, model: Model, rig: Rig) -> bool:
+        """Return whether another model on a rig differs in numbers only.
+
+        A Stribeck exponent of 2 gives another text than any other exponent.
+        """
+        return _system(model, rig, self.chosen).shape is self.system.shape
+
     def with_numbers(self, model: Model, rig: Rig) -> Start:
         """Return the same start with different numbers; signals and initial values stay.
 

@@ -349,7 +349,11 @@ def _run_chunk(
         outcome, message = "ok", ""
         try:
             its = what.varied(values)
-            if compiled is not None and isinstance(its, _OnRig):
+            if (
+                compiled is not None
+                and isinstance(its, _OnRig)
+                and compiled.start.has_texts_of(its.model, its.rig)
+            ):
                 compiled.reset(its.model, its.rig)  # the same buffers and machine code
                 run = compiled
             elif begin.settings.engine == "compiled":

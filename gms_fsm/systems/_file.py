@@ -11,15 +11,18 @@ from pydantic import BaseModel, Discriminator, Field, Tag
 
 import gms_fsm.systems._model_tables as model_tables
 from gms_fsm._files import inside
-from gms_fsm._records import ONE, TABLE, built, read_file, write_file
+from gms_fsm._records import ONE, TABLE, Table, built, read_file, write_file
 from gms_fsm.charts._file import ChartTable
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.registry import chart_named, charts
 from gms_fsm.errors import OutputError, ParameterError, ScenarioError
+from gms_fsm.records.record import Record
 from gms_fsm.systems._record import (
     ContactTable,
+    CornersTable,
     FunctionTable,
     ModelTable,
+    SignalField,
     StribeckTable,
     SystemTable,
     contact_from,
@@ -32,9 +35,10 @@ from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model
 from gms_fsm.systems.system import Contact, System
 
-__all__ = ["SystemFile", "load", "save", "save_as"]
+__all__ = ["FileTable", "SystemFile", "load", "save", "save_as"]
 
 KNOWN, OWN = "<known>", "<own>"
+FILE, HERE = "<file>", "<here>"
 
 
 def _chart_form(given: Any) -> str:
@@ -91,23 +95,57 @@ def _chart(given: str | ChartTable, folder: Path) -> Chart:
         return given.build()
     if not given.endswith(".toml"):
         return chart_named(given)
+    return Chart.load(_beside(folder, given, "chart"))
+
+
+def _beside(folder: Path, given: str, place: str) -> Path:
+    """Return the path of a file in the folder of a system file."""
     try:
         path = inside(folder, given)
     except (OSError, ValueError) as error:
-        raise ScenarioError(f"it is no file name ({error})", place="chart", value=given) from None
+        raise ScenarioError(f"it is no file name ({error})", place=place, value=given) from None
     if path is None:
         raise ScenarioError(
             "it is outside the folder of the system file",
-            place="chart",
+            place=place,
             value=given,
-            advice="put the chart next to the system file",
+            advice=f"put the {place} next to the system file",
         )
-    return Chart.load(path)
+    return path
+
+
+class FileTable(Table):
+    """A signal from two columns of a table next to the system file, in SI units."""
+
+    file: str = Field(description="CSV or TSV, in the folder of the system file")
+    time: str = Field("t_s", description="column of the times, s")
+    value: str = Field(description="column of the values")
+
+    def read(self, folder: Path) -> CornersTable:
+        """Return the signal; its file is in a folder."""
+        path = _beside(folder, self.file, "file")
+        record = Record.from_csv(
+            path, time=self.time, position=None, velocity=self.value, force=None
+        )
+        columns = record.columns
+        return CornersTable(times=columns["time"].tolist(), values=columns["velocity"].tolist())
+
+
+def _signal_form(given: Any) -> str:
+    read = isinstance(given, FileTable) or (isinstance(given, dict) and "file" in given)
+    return FILE if read else HERE
+
+
+SignalInFile = Annotated[
+    Annotated[FileTable, Tag(FILE)] | Annotated[SignalField, Tag(HERE)],
+    Discriminator(_signal_form),
+]
 
 
 class SystemFile(SystemTable):
     """A system file."""
 
+    signals: dict[str, SignalInFile] = Field({})  # type: ignore[assignment]
     contacts: list[ContactInFile] = Field(alias="contact")  # type: ignore[assignment]
 
     def chosen(self, folder: Path) -> System:
@@ -138,7 +176,13 @@ class SystemFile(SystemTable):
         contacts = [
             built(each.chosen, "contacts", i, folder=folder) for i, each in enumerate(self.contacts)
         ]
-        return system_from(self, contacts)
+        signals = {
+            name: built(each.read, "signals", name, folder=folder)
+            if isinstance(each, FileTable)
+            else each
+            for name, each in self.signals.items()
+        }
+        return system_from(self.model_copy(update={"signals": signals}), contacts)
 
 
 def load(path: Path) -> System:
@@ -196,7 +240,7 @@ def save_as(kind: type[SystemFile], system: System, path: Path, **further: Any) 
     system, path
         As in `save`.
     **further
-        Its further fields.
+        Its further fields, and those that replace fields of the system.
 
     Returns
     -------
@@ -209,7 +253,7 @@ def save_as(kind: type[SystemFile], system: System, path: Path, **further: Any) 
         As in `save`.
     """
     contacts = [ContactInFile(**described(each), **_numbers(each)) for each in system.contacts]
-    table = kind(**plain(system), contacts=contacts, **further)
+    table = kind(**{**plain(system), "contacts": contacts, **further})
     for name, signal in table.signals.items():
         if isinstance(signal, FunctionTable):
             raise OutputError(

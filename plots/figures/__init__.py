@@ -1,10 +1,11 @@
-"""Composite figures: the paper's Fig. 3 and 4, overview of a run, ribbons and cascades.
+"""Composite figures: the paper's Fig. 3 and 4, overview of a run, a fit, ribbons, cascades.
 
 Figures are made without pyplot, so there is no global state and no display.
 """
 
 from __future__ import annotations
 
+from plots.figures._fit import fit_figure
 from plots.figures._landscapes import landscape
 from plots.figures._paper import (
     FIG3_PHASES,
@@ -29,6 +30,7 @@ __all__ = [
     "compare_laws",
     "figure_3",
     "figure_4",
+    "fit_figure",
     "held_residuals",
     "landscape",
     "overview",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from string import ascii_lowercase
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
 from plots import panels
@@ -17,6 +19,18 @@ from plots.panels._shown import checked_elements
 from plots.presets import pt
 
 LANE = 0.15  # inches: a row of one element, with its label
+
+
+class Moving(Protocol):
+    """What has a motion: a run, a record compared with a model."""
+
+    @property
+    def t(self) -> NDArray[np.float64]:
+        """Times, s."""
+
+    @property
+    def v(self) -> NDArray[np.float64]:
+        """Velocity, m/s."""
 
 
 def head(trace: Trace, title: str) -> str:
@@ -64,11 +78,11 @@ def one_time_axis(column: Sequence[Axes]) -> None:
         ax.tick_params(labelbottom=False)
 
 
-def last_cycles(trace: Trace) -> Window:
+def last_cycles(run: Moving) -> Window:
     """Return the time interval to show: a short run whole, the last three cycles of a long one."""
-    quiet = 0.05 * np.nanmax(np.abs(trace.v))
-    signs = np.sign(trace.v) * (np.abs(trace.v) > quiet)
+    quiet = 0.05 * np.nanmax(np.abs(run.v))
+    signs = np.sign(run.v) * (np.abs(run.v) > quiet)
     moving = np.flatnonzero(signs)
     turns = moving[1:][np.diff(signs[moving]) != 0]
-    begin = trace.t[0] if turns.size <= 12 else trace.t[turns[-7]]
-    return float(begin), float(trace.t[-1])
+    begin = run.t[0] if turns.size <= 12 else run.t[turns[-7]]
+    return float(begin), float(run.t[-1])

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Chart, ChartModel, ParameterError, Record, State, fit
+from gms_fsm import Chart, ChartModel, ParameterError, Record, State, StepLimitError, fit
 from gms_fsm.identification import _runs
 from tests.identification.records import bank, measured, sine
 
@@ -42,7 +42,6 @@ def _lag() -> Record:
 
 
 def test_a_proposal_costs_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
-    steps: list[int] = []
     lost = 0
     own = _runs.Driver.run
 
@@ -52,14 +51,14 @@ def test_a_proposal_costs_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
         assert start.options.max_steps == 3000
         try:
             return own(self, subject, course)
-        except Exception as error:
+        except StepLimitError:
             lost += 1
-            steps.append(len(getattr(error, "trace", [])) or 0)
             raise
 
     monkeypatch.setattr(_runs.Driver, "run", watched)
+    # At the start a run takes some 1,700 steps; a few times stiffer, more than the budget.
     found = fit(
-        _lag(), _stiff(5.0), free=("k", "rate"), most_steps=3000, bounds={"rate": (1e-2, 1e9)}
+        _lag(), _stiff(1e3), free=("k", "rate"), most_steps=3000, bounds={"rate": (1e-2, 1e9)}
     )
     assert found["rate"].value == pytest.approx(5.0, rel=0.01)
     assert lost > 0, "no proposal was ever lost, so this tested nothing"

@@ -62,3 +62,12 @@ def test_a_profile_of_what_cannot_be_told_is_open() -> None:
     profile = found.profile("weights2", restarts=False)
     assert profile.open
     assert str(profile).startswith("weights2: 95 % interval any above ")
+
+
+def test_the_stribeck_exponent_is_searched_across_two() -> None:
+    """An exponent of 2 gives another text of the curve, and so another program."""
+    record = measured(bank([2e4], [5e-5], F_s=1.5), sine(4e-4, 2.0, 4.0), 0.005, 4)
+    start = bank([1.5e4], [5e-5], F_s=1.5)
+    found = fit(record, start, free=("k", "delta"), search="local", bounds={"delta": (0.5, 5.0)})
+    assert found["delta"].low < 2.0 < found["delta"].high
+    assert found["k1"].low < 2e4 < found["k1"].high

@@ -19,8 +19,8 @@ SVG, PNG, HTML, TEXT = "image/svg+xml", "image/png", "text/html", "text/plain"
 
 BEGIN = """
 import sys
-from gms_fsm import (GMS, ChartModel, GMSParameters, LuGre, Prescribed, Session, Slider, Stribeck,
-                     prove, simulate)
+from gms_fsm import (GMS, ChartModel, GMSParameters, LuGre, Prescribed, Record, Session, Slider,
+                     Stribeck, fit, prove, simulate)
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.systems.system import system_of
 chart = GMS_ELEMENT["signed"]
@@ -30,6 +30,9 @@ trace = simulate(model, rig, 100.0, monitors=["coverage"])
 session = Session(model, rig, 20.0)
 here = session.next_transition()
 report = prove(GMS_ELEMENT["published"])
+rows = trace.sample([0.1 * i for i in range(300)])
+record = Record.from_arrays(time=rows.t, velocity=rows.v, force=rows.F)
+found = fit(record, model, free=["k"], search="local", progress=False)
 assert "plots" not in sys.modules and "matplotlib" not in sys.modules
 """
 FIGURE = (
@@ -51,6 +54,7 @@ SHOWN = {
     "session.why(0)": HTML,
     "session.why(0)[0]": HTML,
     "report": HTML,
+    "found": HTML,
     "report.refuted[0]": HTML,
     FIGURE: PNG,
     "import plots; plots.LiveChart(trace, 1)": SVG,
@@ -113,7 +117,8 @@ def test_each_shows_itself(shown: str, outputs: dict[str, Any]) -> None:
     if SHOWN[shown] == HTML:
         assert re.search(r"<(table|pre|p|iframe)\b", data[HTML])
         assert " at 0x" not in data[HTML]
-        assert len(data[HTML]) < (1_000_000 if "replay" in shown else 100_000)
+        most = 1_000_000 if "replay" in shown else 300_000 if "base64" in data[HTML] else 100_000
+        assert len(data[HTML]) < most
 
 
 @pytest.mark.slow

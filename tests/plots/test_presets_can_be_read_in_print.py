@@ -32,6 +32,7 @@ from gms_fsm.systems.models import demonstration
 from plots import figures, presets
 from plots.presets import PRESETS, Preset
 from tests.helpers import bank, matrix, stick_slip
+from tests.identification.fits_made import small, with_table
 from tests.plots.printed import problems
 
 PRINT = [name for name in PRESETS if name != "screen"]
@@ -150,6 +151,8 @@ FIGURES: dict[str, Callable[[], Any]] = {
         phases={"ramp": (0.0, 2.0), "oscillation": (2.0, 6.0)},
         title="Fig. 3, outputs held between ticks, minus if-else evaluated inside the steps",
     ),
+    "fit": lambda: figures.fit_figure(small()),
+    "fit of twelve parameters": lambda: figures.fit_figure(with_table(12)),
     "phenomenon": lambda: figures.phenomenon_figure(table(), table().phenomena[0].name),
     "matrix": lambda: figures.phenomena_matrix(table(), title="Models and phenomena"),
 }

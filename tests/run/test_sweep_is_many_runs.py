@@ -222,6 +222,17 @@ def test_one_number_applies_to_all_elements() -> None:
     assert other.parameters["k"].shape == (2, 4)
 
 
+def test_an_exponent_of_two_among_others_is_a_run_like_them(engine: str) -> None:
+    """It gives another text than other exponents, and so other machine code."""
+    delta = np.where(np.arange(130) % 3, 1.5, 2.0)  # several runs per task
+    model, rig = stick_slip("signed"), Prescribed("0.2")
+    result = sweep(model, rig, 2.5, {"delta": delta}, engine=engine, progress=False)
+    assert set(result.outcome) == {"ok"}
+    for value in (1.5, 2.0):
+        alone = simulate(with_values(model, {"delta": value}), rig, 2.5, engine=engine)
+        assert set(result.F[delta == value]) == {alone.F[-1]}
+
+
 def test_the_parameters_given_are_not_changed_and_are_kept() -> None:
     model, rig = pulled_mass()
     k = K * np.ones((3, 4))

@@ -156,6 +156,9 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         | {"linear": (), "measured": "F", "drive": None, "train": None, "test": None}
         | {"cycles": None, "bounds": {}, "seed": 0, "most_steps": None, "smoothing": None}
         | {"begin": None, "progress": False},
+        "choose": {"records": _rubbed(), "candidates": {"bank": (_FIT["model"], ["k"])}}
+        | {"fold": "cycles", "cycles": 5.0, "train": None, "test": None, "smoothing": None}
+        | {"seed": 0, "most_steps": None, "progress": False},
         "initial_bank": {"records": _rubbed(), "n": 2, "law": "signed", "train": None}
         | {"smoothing": None, "v_c": None},
         "export": {"system": MODEL, "format": "c99", "folder": tmp / "c99", "name": "friction"}

@@ -1,0 +1,117 @@
+"""Fits of a scenario: the record, the model and the table [fit] of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from gms_fsm._toml import parsed
+from gms_fsm.app._tables import FitTable, RecordTable, Scenario, SystemScenario
+from gms_fsm.app.scenario import find_file, kind_of, load_scenario, read_system
+from gms_fsm.errors import GMSError, RecordError, ScenarioError
+from gms_fsm.identification._task import Task
+from gms_fsm.identification.fit import task_of
+from gms_fsm.records.record import Record
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import System
+
+__all__ = ["LoadedFit", "load_fit"]
+
+EXAMPLE = 'free = ["k"] and further keys of gms_fsm.fit'
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedFit:
+    """A fit that a file describes, with its record read.
+
+    Parameters
+    ----------
+    path : Path
+        The scenario file.
+    task : Task
+        Model, record and options, checked; for `gms_fsm.identification.fit.fitted`.
+    notes : tuple of str
+        What in the file has no effect on a fit.
+    """
+
+    path: Path
+    task: Task
+    notes: tuple[str, ...] = ()
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The files that were read."""
+        read = (each.path for each in self.task.records)
+        return (self.path, *(path for path in read if path is not None))
+
+
+def load_fit(path: str | Path, overrides: Sequence[str] = ()) -> LoadedFit:
+    """Read a scenario file with a table [fit], and its record.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file: [model], [rig] of kind "record", [record] and [fit]; or a system file with
+        [record] and [fit].
+    overrides : sequence of str
+        As in `gms_fsm.app.scenario.load_scenario`.
+
+    Returns
+    -------
+    LoadedFit
+        Ready to be searched.
+
+    Raises
+    ------
+    ScenarioError
+        If the file is invalid, has no record or no table [fit], or these do not suit the model.
+    RecordError
+        If the record is invalid, or nothing can be found from it.
+    """
+    path = Path(path)
+    scenario: Scenario | SystemScenario
+    model: Model | System
+    if kind_of(parsed(path)) == "system":
+        scenario, model = read_system(path, overrides)
+        table, columns = _given(path, scenario)
+        record = columns.read(find_file(path, columns.file), columns.columns())
+    else:
+        loaded = load_scenario(path, overrides)
+        scenario, model = loaded.scenario, loaded.model
+        table, columns = _given(path, scenario)
+        assert loaded.record is not None
+        record = loaded.record
+    unused = [f"[{name}]" for name in ("run", "initial") if name in scenario.model_fields_set]
+    notes = (f"a fit ignores {' and '.join(unused)}",) if unused else ()
+    return LoadedFit(path, _task(path, record, model, table, columns.smoothing), notes)
+
+
+def _given(path: Path, scenario: Scenario | SystemScenario) -> tuple[FitTable, RecordTable]:
+    """Return the tables [fit] and [record] of a file that has both."""
+    if scenario.fit is None:
+        raise ScenarioError(
+            "there is no table [fit]", place=str(path), advice=f"add one with {EXAMPLE}"
+        )
+    if scenario.record is None:
+        raise ScenarioError(
+            "there is no table [record], and a fit needs a measured force",
+            place=str(path),
+            advice='add [record] with file, time, position and force; and kind = "record" in [rig]',
+        )
+    return scenario.fit, scenario.record
+
+
+def _task(
+    path: Path,
+    record: Record,
+    model: Model | System,
+    table: FitTable,
+    smoothing: float | None,
+) -> Task:
+    try:
+        return task_of(record, model, table.fixed, table.options(smoothing))
+    except RecordError:
+        raise
+    except GMSError as error:
+        raise ScenarioError.of(error).inside("[fit]").inside(path) from None

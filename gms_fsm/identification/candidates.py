@@ -1,0 +1,325 @@
+"""The models that `choose` tries: each with the reason why, and a start from the records.
+
+They were fixed, with these reasons, before any held-out row was looked at. What can be solved for
+enters the force linearly; the rest is bounded by what a record can show (thresholds by its travel,
+speeds by its own), because a parameter at an absurd value may fit the training rows and fail on
+others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.parameters import FloatArray, Parameter
+from gms_fsm.identification.bank import initial_bank
+from gms_fsm.records.record import Record
+from gms_fsm.systems.models import GMS, ChartModel, Model
+from gms_fsm.systems.system import System
+
+__all__ = [
+    "BEHIND_BACKLASH",
+    "CANDIDATES",
+    "STIFFER_ONE_WAY",
+    "Build",
+    "Candidate",
+    "Start",
+    "behind_backlash",
+    "gms",
+    "stiffer_one_way",
+]
+
+FINEST = 1e-3  # smallest threshold and gap, as a share of the travel
+# C as multiples of the median speed: slip settles within a threshold of travel, or at once.
+SLOWEST_SLIP, FASTEST_SLIP = 1.0, 300.0
+NARROWEST = 0.05  # v_s as a multiple of the median speed: narrower is seen in a few rows only
+STICTION = 2.0  # most of F_s over F_c, and of the threshold at rest over that in motion
+GAP = 0.1  # start of the half gap, as a share of the element's threshold
+STIFFNESS = Parameter("k", "N/m", "> 0", meaning="mean stiffness of the two directions")
+BIAS = Parameter("b", "N/m", meaning="stiffness added forward, taken away backward")
+
+STIFFER_ONE_WAY = Chart(
+    name="Maxwell-slip element, stiffer one way",
+    inputs=("v",),
+    variables=("z",),
+    parameters=(STIFFNESS, BIAS, Parameter("r", "m", "> 0", meaning="threshold")),
+    states=(
+        State("stick", flow={"z": "v"}),
+        State("slip_forward", entry={"z": "r"}),
+        State("slip_backward", entry={"z": "-r"}),
+    ),
+    transitions=(
+        Transition("break_away_forward", "stick", "slip_forward", guard="z >= r and v > 0"),
+        Transition("break_away_backward", "stick", "slip_backward", guard="z <= -r and v < 0"),
+        Transition("turn_backward", "slip_forward", "stick", guard="v < 0"),
+        Transition("turn_forward", "slip_backward", "stick", guard="v > 0"),
+    ),
+    outputs={"F": "k * z + b * abs(z)"},
+    reference="chosen by us",
+)
+
+# In slip the force follows the threshold without a flow of its own: z is set when slip ends.
+BEHIND_BACKLASH = Chart(
+    name="Slipping spring behind backlash",
+    inputs=("v",),
+    variables=("z",),
+    parameters=(
+        STIFFNESS,
+        BIAS,
+        Parameter("g", "m", "> 0", meaning="half of the gap"),
+        Parameter("r", "m", "> 0", meaning="threshold beyond the gap, forward"),
+        Parameter("ratio", "1", "> 0", per_element=False, meaning="backward threshold / forward"),
+        Parameter("rho", "1", ">= 0", per_element=False, meaning="rise of thresholds at rest"),
+        Parameter("v_s", "m/s", "> 0", per_element=False, meaning="Stribeck velocity"),
+    ),
+    let={"s_forward": "r * (1 + rho * exp(-(v / v_s)**2))", "s_backward": "ratio * s_forward"},
+    states=(
+        State("free", flow={"z": "v"}, outputs={"F": "0"}),
+        State("pressed_forward", flow={"z": "v"}, outputs={"F": "(k + b) * (z - g)"}),
+        State("pressed_backward", flow={"z": "v"}, outputs={"F": "(k - b) * (z + g)"}),
+        State("slip_forward", exit={"z": "g + s_forward"}, outputs={"F": "(k + b) * s_forward"}),
+        State(
+            "slip_backward", exit={"z": "-g - s_backward"}, outputs={"F": "-(k - b) * s_backward"}
+        ),
+    ),
+    transitions=(
+        Transition("touch_forward", "free", "pressed_forward", guard="z >= g"),
+        Transition("touch_backward", "free", "pressed_backward", guard="z <= -g"),
+        Transition("part_forward", "pressed_forward", "free", guard="z < g"),
+        Transition("part_backward", "pressed_backward", "free", guard="z > -g"),
+        Transition(
+            "break_away_forward",
+            "pressed_forward",
+            "slip_forward",
+            guard="z >= g + s_forward and v > 0",
+        ),
+        Transition(
+            "break_away_backward",
+            "pressed_backward",
+            "slip_backward",
+            guard="z <= -g - s_backward and v < 0",
+        ),
+        Transition("turn_backward", "slip_forward", "pressed_forward", guard="v < 0"),
+        Transition("turn_forward", "slip_backward", "pressed_backward", guard="v > 0"),
+    ),
+    outputs={},
+    reference="chosen by us",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """What a candidate gives `fit`: a model with start values, and what to find.
+
+    Parameters
+    ----------
+    model : Model or System
+        With start values.
+    free : tuple of str
+        What to find.
+    tied : tuple of str
+        Free parameters of which all elements get one value.
+    bounds : mapping of str to (float, float)
+        Lowest and highest values.
+    """
+
+    model: Model | System
+    free: tuple[str, ...]
+    tied: tuple[str, ...] = ()
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+Build = Callable[[Sequence[Record], float | None], Start]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A kind of model that `choose` tries.
+
+    Parameters
+    ----------
+    name : str
+        For tables.
+    reason : str
+        Why it is tried.
+    build : callable
+        Makes the `Start` from records, of which it may read the force at the selected rows only,
+        and the time constant of the motion's smoothing spline.
+
+    Examples
+    --------
+    >>> [each.name for each in CANDIDATES if each.name.startswith("GMS")][:3]
+    ['GMS 1', 'GMS 2', 'GMS 4']
+    """
+
+    name: str
+    reason: str
+    build: Build
+
+
+# --------------------------------------------------------------------------- starts
+@dataclass(frozen=True)
+class _Seen:
+    """What the motion of the records allows to be seen."""
+
+    travel: float  # m
+    speed: float  # median in motion, m/s
+    fastest: float  # but for a hundredth of the rows, m/s
+
+    @classmethod
+    def in_records(cls, records: Sequence[Record], smoothing: float | None) -> _Seen:
+        motions = [record.motion(smoothing) for record in records]
+        speed = np.concatenate([np.abs(motion.velocity) for motion in motions])
+        fastest = float(np.quantile(speed, 0.99))
+        moving = speed[speed > 0.1 * fastest]
+        travel = max(float(np.ptp(motion.position)) for motion in motions)
+        return cls(travel, float(np.median(moving)), fastest)
+
+    @property
+    def slip(self) -> tuple[float, float]:
+        """Bounds of C, m/s."""
+        return SLOWEST_SLIP * self.speed, FASTEST_SLIP * self.speed
+
+    @property
+    def dip(self) -> tuple[float, float]:
+        """Bounds of v_s, m/s."""
+        return NARROWEST * self.speed, self.fastest
+
+
+def gms(records: Sequence[Record], smoothing: float | None, *, n: int) -> Start:
+    """Return a bank of GMS elements, signed law, with one C and a bounded Stribeck curve.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        With forces.
+    smoothing : float or None
+        Of the motion, s.
+    n : int
+        Number of elements.
+
+    Returns
+    -------
+    Start
+        From `initial_bank`. F_c is held: only its products with the weights can be told.
+    """
+    seen = _Seen.in_records(records, smoothing)
+    bank = initial_bank(records, n, smoothing=smoothing)
+    given = bank.parameters
+    slip = seen.slip
+    model = GMS(
+        replace(given, C=np.full(n, np.clip(np.median(given.C), *slip))),
+        law="signed",
+    )
+    F_c = given.stribeck.F_c
+    return Start(
+        model,
+        ("k", "weights", "C", "F_s", "v_s", "sigma_2"),
+        tied=("C",),
+        bounds={
+            "weights": (FINEST * seen.travel / F_c, 0.5 * seen.travel / F_c),
+            "C": slip,
+            "F_s": (F_c, STICTION * F_c),
+            "v_s": seen.dip,
+        },
+    )
+
+
+def stiffer_one_way(records: Sequence[Record], smoothing: float | None, *, n: int) -> Start:
+    """Return a Maxwell-slip bank whose springs are stiffer in one direction.
+
+    Parameters
+    ----------
+    records, smoothing, n
+        As in `gms`.
+
+    Returns
+    -------
+    Start
+        From `initial_bank`, equal in both directions.
+    """
+    seen = _Seen.in_records(records, smoothing)
+    bank = initial_bank(records, n, smoothing=smoothing)
+    r = bank.weights * bank.stribeck.F_c
+    model = ChartModel(STIFFER_ONE_WAY, {"k": bank.parameters.k, "b": np.zeros(n), "r": r}, n=n)
+    return Start(
+        model,
+        ("k", "b", "r", "sigma_2"),
+        bounds={"r": (FINEST * seen.travel, seen.travel)},
+    )
+
+
+def behind_backlash(records: Sequence[Record], smoothing: float | None, *, n: int) -> Start:
+    """Return slipping springs behind gaps, with thresholds that differ by direction.
+
+    Parameters
+    ----------
+    records, smoothing, n
+        As in `gms`.
+
+    Returns
+    -------
+    Start
+        From `initial_bank`: a tenth of each threshold becomes half a gap.
+    """
+    seen = _Seen.in_records(records, smoothing)
+    bank = initial_bank(records, n, smoothing=smoothing)
+    r = bank.weights * bank.stribeck.F_c
+    values: dict[str, float | FloatArray] = {
+        "k": bank.parameters.k,
+        "b": np.zeros(n),
+        "g": GAP * r,
+        "r": (1.0 - GAP) * r,
+        "ratio": 1.0,
+        "rho": 0.05,
+        "v_s": 0.5 * seen.speed,
+    }
+    return Start(
+        ChartModel(BEHIND_BACKLASH, values, n=n),
+        ("k", "b", "g", "r", "ratio", "rho", "v_s", "sigma_2"),
+        bounds={
+            "g": (FINEST * seen.travel, 0.5 * seen.travel),
+            "r": (FINEST * seen.travel, seen.travel),
+            "ratio": (0.2, 5.0),
+            "rho": (1e-3, STICTION - 1.0),
+            "v_s": seen.dip,
+        },
+    )
+
+
+# --------------------------------------------------------------------------- the list
+CANDIDATES: tuple[Candidate, ...] = (
+    Candidate("GMS 1", "one spring that slips: the least that has hysteresis", partial(gms, n=1)),
+    Candidate("GMS 2", "pre-sliding in two slopes", partial(gms, n=2)),
+    Candidate("GMS 4", "a rounded pre-sliding curve, inner loops", partial(gms, n=4)),
+    Candidate(
+        "GMS 1, stiffer one way",
+        "guides and grips rarely are the same in both directions",
+        partial(stiffer_one_way, n=1),
+    ),
+    Candidate(
+        "GMS 2, stiffer one way",
+        "the same with a second slope, or a spring that never slips",
+        partial(stiffer_one_way, n=2),
+    ),
+    Candidate(
+        "GMS 3, stiffer one way",
+        "the same with a rounded pre-sliding curve",
+        partial(stiffer_one_way, n=3),
+    ),
+    Candidate(
+        "behind backlash 1",
+        "play in the drive: no force in the gap, other thresholds forward than backward, "
+        "thresholds that fall with speed",
+        partial(behind_backlash, n=1),
+    ),
+    Candidate(
+        "behind backlash 2",
+        "the same with two flanks, or one flank and one spring without play",
+        partial(behind_backlash, n=2),
+    ),
+)

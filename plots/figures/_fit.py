@@ -1,0 +1,327 @@
+"""Figure of a fit: measurement and model, residuals, parameters with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm._arguments import checked_kind
+from gms_fsm.errors import ParameterError
+from gms_fsm.identification.report import model_title
+from plots._matplotlib import Axes, Figure, rc_context
+from plots._window import Window
+from plots.figures._layout import fitted, legend_above, low, narrow, sheet
+from plots.figures._parts import last_cycles, letter_panels
+from plots.panels._axes import VECTOR_ROWS, draw_curve, time_axis
+from plots.panels._shown import is_number, is_whole, scaled
+from plots.presets import font, pt, settings, to_scale
+from plots.style import INK, LINE_GREY, PALE_GREY, REPORTED, TEXT_GREY, colour
+
+if TYPE_CHECKING:
+    from gms_fsm.identification.result import Estimate, Fit, Residuals
+
+__all__ = ["fit_figure"]
+
+Floats = NDArray[np.float64]
+
+MOST_PARAMETERS = 40  # more rows are a table, not a picture
+LANE = 0.22  # inches: the row of a parameter
+WIDEST = 100.0  # %: a longer interval ends in arrows
+BINS, FEWEST = 40, 5  # of a mean residual over x, and rows in a bin
+DOT = 1.6  # points, of a residual among thousands
+MOVING = 0.05  # of the largest speed; slower rows have no direction
+DIRECTIONS: tuple[tuple[int, str, dict[str, Any]], ...] = (
+    (1, "forward (v > 0)", {"color": INK, "linestyle": "-", "linewidth": 1.6}),
+    (-1, "backward (v < 0)", {"color": LINE_GREY, "linestyle": (0, (4.0, 1.5)), "linewidth": 2.2}),
+)
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """One record of a fit: what was measured, what the model gives, in units for the figure."""
+
+    name: str
+    unit: str  # of measurement and residual: the prefix suits the measurement
+    small: str  # unit of the residual
+    place: str  # unit of x
+    t: Floats
+    x: Floats
+    v: Floats
+    measured: Floats
+    modelled: Floats
+    residual: Floats
+    factor: float  # from SI to `small`
+
+    @classmethod
+    def of(cls, residuals: Residuals, quantity: str, unit: str) -> _Compared:
+        """Return a record with rows that are not compared left blank."""
+        kept = residuals.rows | residuals.held
+        measured = np.where(kept, residuals.measured, np.nan)
+        difference = measured - residuals.modelled
+        large, long = scaled(measured, unit)
+        small, short = scaled(difference, unit)
+        far, place = scaled(residuals.x - residuals.x[0], "m")
+        return cls(
+            quantity,
+            long,
+            short,
+            place,
+            residuals.t,
+            far * (residuals.x - residuals.x[0]),
+            residuals.v,
+            large * measured,
+            large * np.where(kept, residuals.modelled, np.nan),
+            small * difference,
+            small,
+        )
+
+
+def fit_figure(
+    fit: Fit, which: int | None = None, *, window: Window | None = None, title: str = ""
+) -> Figure:
+    """Draw a fit: measurement and model over t and x, residual over t and x, parameters.
+
+    Parameters
+    ----------
+    fit : Fit
+        From `gms_fsm.fit` or `gms_fsm.choose`.
+    which : int, optional
+        The record, counted from 0; by default the one with the largest residual (RMSE).
+    window : (float, float), optional
+        Time interval of the first panel, s; by default the last three cycles of a long record.
+    title : str
+        Of the figure; by default the model and the record.
+
+    Returns
+    -------
+    Figure
+        x is relative to its start. Rows that were held out are shaded. Intervals are relative to
+        the value of the parameter; one that is longer than 100 % ends in arrows. On a slide, or
+        with more than 40 parameters, parameters are left out.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such record, or the window does not overlap it.
+    """
+    from gms_fsm.identification.result import Fit as Kind
+
+    checked_kind("fit", fit, Kind, "a Fit, from gms_fsm.fit")
+    every = fit.residuals()
+    number = _worst(every) if which is None else _checked_which(which, len(every))
+    chosen = every[number]
+    part = _Compared.of(chosen, fit.measured, fit.task.measured.unit)
+    shown = _checked_window(chosen, window)
+    listed = fit.table if not low() and len(fit.table) <= MOST_PARAMETERS else ()
+    with rc_context(settings()):
+        figure, (over_time, residual, loop, over_x), bars = _sheet(len(listed))
+        _over_time(over_time, part, shown, fit.test)
+        _residual_over_time(residual, part, fit)
+        _loop(loop, part)
+        _residual_over_x(over_x, part)
+        begin, end = shown
+        whole = begin <= part.t[0] and end >= part.t[-1]
+        names = [
+            "measurement and model" + ("" if whole else f", {begin:.4g} to {end:.4g} s"),
+            _score_name(chosen, fit.task.measured.unit),
+            "loop",
+            "residual",
+        ]
+        axes = [over_time, residual, loop, over_x]
+        if bars is not None:
+            _parameters(bars, listed)
+            axes.append(bars)
+            names.append("parameters with 95 % intervals")
+        letter_panels(axes, names)
+        figure.align_ylabels([over_time, residual])
+        figure.suptitle(title or _title(fit, chosen, len(every), which), x=0.01, ha="left")
+    return fitted(figure)
+
+
+# --------------------------------------------------------------------------- what is shown
+def _worst(every: Sequence[Residuals]) -> int:
+    """Return the record with the largest root mean square of the residual."""
+    return int(np.nanargmax([_size(each, each.rows | each.held) for each in every]))
+
+
+def _checked_which(which: Any, count: int) -> int:
+    if not is_whole(which) or not 0 <= which < count:
+        raise ParameterError(
+            f"it must be an integer from 0 to {count - 1}, one of the records of the fit",
+            place="which",
+            value=which,
+        )
+    return int(which)
+
+
+def _checked_window(shown: Residuals, window: Any) -> Window:
+    if window is None:
+        return last_cycles(shown)
+    first, last = float(shown.t[0]), float(shown.t[-1])
+    pair = isinstance(window, (tuple, list)) and len(window) == 2 and all(map(is_number, window))
+    if not pair or not (window[0] < window[1] and window[0] < last and window[1] > first):
+        raise ParameterError(
+            f"it must be two increasing times that overlap the record, {first:g} to {last:g} s",
+            place="window",
+            value=window,
+        )
+    return max(first, float(window[0])), min(last, float(window[1]))
+
+
+def _title(fit: Fit, chosen: Residuals, count: int, which: int | None) -> str:
+    others = "" if count == 1 else f" ({'worst ' if which is None else ''}of {count} records)"
+    return f"{model_title(fit)}, fitted to {chosen.record.name}{others}"
+
+
+def _score_name(chosen: Residuals, unit: str) -> str:
+    """Name the panel of the residual, with its size in the rows of this record."""
+    parts = [("RMSE", chosen.rows), ("held out", chosen.held)]
+    sizes = [f"{name} {_size(chosen, rows):.3g}" for name, rows in parts if rows.any()]
+    return f"residual; {', '.join(sizes)} {unit}"
+
+
+def _size(each: Residuals, rows: NDArray[np.bool_]) -> float:
+    """Return the root mean square of the residual at some rows."""
+    return float(np.sqrt(np.mean((each.measured - each.modelled)[rows] ** 2)))
+
+
+# --------------------------------------------------------------------------- panels
+def _sheet(parameters: int) -> tuple[Figure, Sequence[Axes], Axes | None]:
+    """Return an empty figure; its panels over time and x; and that of the parameters, if any."""
+    above = 8.9 if narrow() else 4.9
+    below = 0.75 + LANE * parameters if parameters else 0.0
+    figure = sheet(4.2 if narrow() else 11.0, above + below, grows=True)
+    parts: list[Any] = [figure]
+    if below:  # a part of its own, because its labels are wider
+        rows = figure.add_gridspec(2, 1, height_ratios=(above, below))
+        parts = [figure.add_subfigure(rows[row, 0]) for row in (0, 1)]
+    if narrow():
+        axes = list(parts[0].subplots(4, 1, height_ratios=(1.7, 1.5, 2.0, 1.7)))
+    else:
+        axes = list(parts[0].subplots(2, 2, width_ratios=(1.5, 1)).T.ravel())
+    return figure, axes, parts[1].subplots() if below else None
+
+
+def _over_time(ax: Axes, part: _Compared, shown: Window, test: Window | None) -> None:
+    inside = (part.t >= shown[0]) & (part.t <= shown[1])
+    _shaded(ax, part, test, shown)
+    t = part.t[inside]
+    measured: dict[str, Any] = {"color": LINE_GREY, "linewidth": pt(2.4), "label": "measured"}
+    draw_curve(ax, t, part.measured[inside], **measured)
+    draw_curve(ax, t, part.modelled[inside], color=INK, label="model")
+    ax.set_ylabel(f"{part.name} [{part.unit}]")
+    time_axis(ax, *shown)
+    legend_above(ax)
+
+
+def _residual_over_time(ax: Axes, part: _Compared, fit: Fit) -> None:
+    whole = float(part.t[0]), float(part.t[-1])
+    _shaded(ax, part, fit.test, whole, label="held out")
+    draw_curve(ax, part.t, part.residual, color=INK, linewidth=pt(0.6))
+    if fit.floor is not None:
+        for sign, label in ((1, "± repeatability"), (-1, None)):
+            ax.axhline(sign * part.factor * fit.floor, label=label, **to_scale(REPORTED))
+    ax.set_ylabel(f"measured − model [{part.small}]")
+    time_axis(ax, *whole)
+    if ax.get_legend_handles_labels()[1]:
+        legend_above(ax)
+
+
+def _shaded(ax: Axes, part: _Compared, test: Window | None, shown: Window, label: str = "") -> None:
+    """Shade the rows that were held out, as far as they are shown."""
+    if test is None:
+        return
+    begin, end = max(test[0], shown[0], part.t[0]), min(test[1], shown[1], part.t[-1])
+    if begin < end:
+        ax.axvspan(
+            begin, end, color=PALE_GREY, alpha=0.35, linewidth=0, zorder=0, label=label or None
+        )
+
+
+def _loop(ax: Axes, part: _Compared) -> None:
+    draw_curve(ax, part.x, part.measured, color=LINE_GREY, linewidth=pt(2.0), label="measured")
+    draw_curve(ax, part.x, part.modelled, color=INK, linewidth=pt(0.7), label="model")
+    ax.set(xlabel=f"x [{part.place}]", ylabel=f"{part.name} [{part.unit}]")
+
+
+def _residual_over_x(ax: Axes, part: _Compared) -> None:
+    """Draw the residual over x in two shades, and its mean for each direction."""
+    slow = MOVING * float(np.nanmax(np.abs(part.v)))
+    means = []
+    for sign, name, look in DIRECTIONS:
+        chosen = (sign * part.v > slow) & np.isfinite(part.residual)
+        dots: dict[str, Any] = {"linestyle": "", "marker": ".", "markeredgewidth": 0, "alpha": 0.35}
+        size = pt(DOT if chosen.sum() > VECTOR_ROWS else 2.0 * DOT)
+        draw_curve(
+            ax,
+            part.x[chosen],
+            part.residual[chosen],
+            color=look["color"],
+            markersize=size,
+            **dots,
+        )
+        means.append((_binned(part.x[chosen], part.residual[chosen]), name, look))
+    for (x, mean), name, look in means:
+        ax.plot(x, mean, color=colour("paper"), linewidth=pt(look["linewidth"] + 2.0))
+        ax.plot(x, mean, label=name, **to_scale(look))
+    ax.set(xlabel=f"x [{part.place}]", ylabel=f"measured − model [{part.small}]")
+    legend_above(ax)
+
+
+def _binned(x: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return means over parts of x; NaN where there are few rows."""
+    if not x.size or np.ptp(x) == 0.0:
+        return np.empty(0), np.empty(0)
+    edges = np.linspace(x.min(), x.max(), BINS + 1)
+    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
+    counts = np.bincount(place, minlength=BINS)
+    sums = np.bincount(place, weights=values, minlength=BINS)
+    mean = np.where(counts >= FEWEST, sums / np.maximum(counts, 1), np.nan)
+    return 0.5 * (edges[1:] + edges[:-1]), mean
+
+
+def _parameters(ax: Axes, table: Sequence[Estimate]) -> None:
+    """Draw a row for each parameter: a dot with its interval, or that it cannot be told."""
+    spans = [_relative(each) for each in table]
+    told = [max(map(abs, span)) for span in spans if span is not None]
+    limit = min(WIDEST, 1.15 * max(told, default=WIDEST)) or 1.0
+    for row, (each, span) in enumerate(zip(table, spans, strict=True)):
+        if span is None:
+            ax.barh(row, 2 * limit, left=-limit, height=0.72, color=colour("chosen"))
+            said = each.note or "cannot be told"
+            ax.text(0.0, row, said, ha="center", va="center", color=TEXT_GREY, fontsize=font(8.5))
+            continue
+        left, right = max(span[0], -limit), min(span[1], limit)
+        ax.plot([left, right], [row, row], color=TEXT_GREY, linewidth=pt(1.6), zorder=2)
+        ax.plot([0.0], [row], "o", color=INK, markersize=pt(4.0), zorder=3)
+        for end, given, marker in ((left, span[0], "<"), (right, span[1], ">")):
+            mark = marker if abs(given) > limit else "|"
+            ax.plot([end], [row], mark, color=TEXT_GREY, markersize=pt(5.0), zorder=2)
+    ax.axvline(0.0, color=PALE_GREY, linewidth=pt(0.8), zorder=0)
+    rows = range(len(table))
+    ax.set(xlim=(-1.04 * limit, 1.04 * limit), ylim=(len(table) - 0.5, -0.5))
+    ax.set_yticks(rows, [each.name for each in table])
+    ax.set_xlabel("interval relative to the value [%]")
+    ax.tick_params(axis="y", length=0, labelsize=font(8.5))
+    if not narrow():
+        values = ax.secondary_yaxis("right")
+        values.set_yticks(rows, [_value(each) for each in table])
+        values.tick_params(axis="y", length=0, labelsize=font(8.5))
+        values.spines["right"].set_visible(False)
+
+
+def _relative(each: Estimate) -> tuple[float, float] | None:
+    """Return the ends of an interval relative to the value, %; None if it cannot be told."""
+    if not each.told or not np.isfinite([each.low, each.high]).all():
+        return None
+    size = abs(each.value) or max(abs(each.low), abs(each.high)) or 1.0
+    return 100 * (each.low - each.value) / size, 100 * (each.high - each.value) / size
+
+
+def _value(each: Estimate) -> str:
+    note = f", {each.note}" if each.note and each.told else ""
+    return f"{each.shown[0]} {each.unit}".rstrip().replace("-", "−") + note

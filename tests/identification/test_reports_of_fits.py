@@ -1,0 +1,180 @@
+"""Claim: the report of a fit says what was fitted, how well, and what cannot be told, in files."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gms_fsm import Fit, Record
+from gms_fsm._extras import missing
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.errors import OutputError, ParameterError
+from gms_fsm.identification import report
+from gms_fsm.identification.report import report_files, write_report
+from gms_fsm.identification.result import Choice, ChoiceRow
+from tests.identification.fits_made import small, two_records, with_table
+
+FILES = {"report.md", "parameters.csv", "residuals.csv", "fitted.toml"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")
+    place = tmp_path_factory.mktemp("report")
+    assert write_report(small(), place) == place / "report.md"
+    return place
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the figure, which takes longest."""
+    monkeypatch.setattr(report, "_draw", lambda *_: [])
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_files_are_there(folder: Path) -> None:
+    written = {path.name for path in folder.iterdir()}
+    wanted = set(report_files()) - {"fitted.csv"}  # for a long motion
+    assert wanted | FILES | {"fit.png"} <= written
+    page = (folder / "report.md").read_text(encoding="utf-8")
+    for name in wanted - {"report.md"}:
+        assert f"({name})" in page
+    assert (folder / "fit.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_page_has_every_parameter_and_score(folder: Path) -> None:
+    page, fit = (folder / "report.md").read_text(encoding="utf-8"), small()
+    for each in fit.table:
+        value, interval = each.shown
+        assert f"| {each.name} | {value} | {interval} | {each.unit} |" in page
+    assert fit.held_out is not None
+    for score in (fit.training, fit.held_out):
+        assert f"| {score['rmse']:.4g} | {score['r2']:.4f} | {score['rows']:.0f} |" in page
+    assert f"repeatability: {fit.floor:.4g} N" in page
+    assert "0 s <= t < 8 s; held out: 8 s <= t < 12 s" in page.replace("&lt;", "<")
+    assert f"count {fit.effective_rows:.0f} independent rows" in page
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_what_cannot_be_told_is_named(tmp_path: Path) -> None:
+    page = write_report(with_table(5), tmp_path).read_text(encoding="utf-8")
+    doubts = page.partition("## What the record cannot tell")[2].partition("##")[0]
+    assert f"- {small().weakest}\n" in doubts.replace("\\", "")
+    assert "- cannot be told: parameter_2\n" in doubts
+    assert ("never slipped: element" in doubts) == bool(small().never_slipped)
+
+
+def test_tables_have_all_digits(folder: Path) -> None:
+    rows = table(folder / "parameters.csv")
+    assert [row["name"] for row in rows] == [each.name for each in small().table]
+    for row, each in zip(rows, small().table, strict=True):
+        numbers = float(row["value"]), float(row["low"]), float(row["high"])
+        assert numbers == (each.value, each.low, each.high)
+    (part,) = small().residuals()
+    found = table(folder / "residuals.csv")
+    assert [float(row["measured_N"]) for row in found] == part.measured.tolist()
+    assert [float(row["modelled_N"]) for row in found] == part.modelled.tolist()
+    assert [row["use"] == "held out" for row in found] == part.held.tolist()
+    assert [row["use"] == "training" for row in found] == part.rows.tolist()
+
+
+def test_residuals_are_read_back_as_a_record(folder: Path) -> None:
+    again = Record.from_csv(folder / "residuals.csv", position="x_m", force="residual_N")
+    (part,) = small().residuals()
+    assert np.array_equal(again.columns["force"], part.measured - part.modelled)
+
+
+def test_the_scenario_runs_and_gives_the_fitted_force(folder: Path) -> None:
+    (part,) = small().residuals()
+    trace = load_scenario(folder / "fitted.toml").simulate(t_eval=part.t)
+    offset = next(each.value for each in small().table if each.name == "offset")
+    spread = float(np.std(part.measured - part.modelled))
+    assert np.abs(trace.F + offset - part.modelled).max() < 0.05 * spread
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_several_records_have_a_table(tmp_path: Path) -> None:
+    page = write_report(two_records(), tmp_path).read_text(encoding="utf-8")
+    assert "| record | training [N] | held out [N] |" in page
+    for part in two_records().residuals():
+        rmse = np.sqrt(np.mean((part.measured - part.modelled)[part.rows] ** 2))
+        assert f"| {part.record.name} | {rmse:.4g} | – |" in page
+    assert "no rows were held out" in page
+    assert "repeatability is not known" in page
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_licences_and_notes_are_said_once(tmp_path: Path) -> None:
+    task = two_records().task
+    records = tuple(replace(each, licence="MIT; somebody") for each in task.records)
+    notes = ("long: velocity: as measured", "short: velocity: as measured", "long: 2 gaps", "other")
+    fit = replace(two_records(), task=replace(task, records=records), notes=notes)
+    page = write_report(fit, tmp_path).read_text(encoding="utf-8")
+    assert page.count("- licence of all records: MIT; somebody\n") == 1
+    for said in ("all records: velocity: as measured", "long: 2 gaps", "other"):
+        assert page.count(f"- {said}\n") == 1
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_candidates_are_listed_with_the_chosen_one(tmp_path: Path) -> None:
+    rows = tuple(ChoiceRow(name, "simple", 3, 0.1, 0.99, -5.0, 1.0) for name in ("one", "two"))
+    chosen = replace(small(), choice=Choice(rows, "two"))
+    page = write_report(chosen, tmp_path).read_text(encoding="utf-8")
+    assert "| one | simple | 3 | 0.1 | 0.9900 | -5 | 1 |  |" in page
+    assert "| **two** | simple | 3 | 0.1 | 0.9900 | -5 | 1 |  |" in page
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_an_interrupted_search_is_said_first(tmp_path: Path) -> None:
+    stopped = replace(small(), stopped="The search was interrupted: this is the best so far.")
+    page = write_report(stopped, tmp_path).read_text(encoding="utf-8")
+    assert page.splitlines()[2] == "**The search was interrupted: this is the best so far.**"
+
+
+def test_without_matplotlib_the_texts_are_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> list[str]:
+        raise missing("matplotlib", "plots")
+
+    monkeypatch.setattr(report, "_draw", refused)
+    with pytest.warns(UserWarning, match="no figure was drawn: figures and animations need"):
+        page = write_report(small(), tmp_path).read_text(encoding="utf-8")
+    assert "- no figure was drawn: figures and animations need matplotlib" in page
+    assert {path.name for path in tmp_path.iterdir()} >= FILES
+    assert not list(tmp_path.glob("fit.*"))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_motion_too_long_for_a_scenario_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> Path:
+        raise OutputError("it would have 1316456 bytes", place="fitted.toml")
+
+    monkeypatch.setattr(Fit, "save", refused)
+    with pytest.warns(UserWarning, match="no scenario was written"):
+        page = write_report(small(), tmp_path).read_text(encoding="utf-8")
+    assert "- no scenario was written: fitted.toml: it would have 1316456 bytes" in page
+    assert "gms-fsm run" not in page
+
+
+def test_files_of_the_users_stay(tmp_path: Path) -> None:
+    (tmp_path / "parameters.csv").write_text("mine")
+    with pytest.raises(OutputError, match="was not written by gms-fsm"):
+        write_report(small(), tmp_path)
+    assert (tmp_path / "parameters.csv").read_text() == "mine"
+    assert not (tmp_path / "report.md").exists()
+
+
+def test_something_else_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"it must be a Fit, from gms_fsm\.fit"):
+        write_report("fit", tmp_path)  # type: ignore[arg-type]
