@@ -34,6 +34,26 @@ def test_an_excellent_fit_does_not_know_a_parameter(result: lesson.Result) -> No
     assert result.unseen == 0.0
 
 
+@pytest.mark.parametrize(("amplitude", "opened"), [(220e-6, ("weights2",)), (260e-6, ())])
+def test_it_is_the_amplitude_and_not_the_start(amplitude: float, opened: tuple[str, ...]) -> None:
+    """Started at the truth, which slips at its reversal beyond F_s / F_c times 200 µm."""
+    record = lesson.recorded(lesson.sine(amplitude), 0.0, 1)
+    found = lesson.fitted(record, second=lesson.TRUTH[3])
+    assert found.open == opened
+
+
+def test_a_failed_search_shows_in_the_residual() -> None:
+    """From too high a threshold the search does not find the way, though the element slips."""
+    record = lesson.recorded(lesson.sine(300e-6), 0.0, 1)
+    lost = lesson.fitted(record)
+    found = lesson.fitted(record, second=150e-6)
+    assert lost.open == ("weights2",)
+    assert lost.training["rmse"] > 5 * lesson.NOISE
+    assert found.open == ()
+    assert found.training["rmse"] == pytest.approx(lesson.NOISE, rel=0.05)
+    assert found["weights2"].low < lesson.TRUTH[3] < found["weights2"].high
+
+
 def test_above_the_least_weight_nothing_changes(result: lesson.Result) -> None:
     motion = lesson.sine()
     truth = lesson.force(lesson.bank(lesson.TRUTH), motion)

@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 
 from gms_fsm import (
     GMS,
@@ -60,7 +59,6 @@ BEGINNINGS = (0.5, 2.0)  # of F_c, where two fits of the product start
 REPEATED, SURE = 200, 1.96  # records, and half of a 95 % interval in standard deviations
 STEP = 1e-3  # relative, of the derivatives
 GAP = 165.0  # mN, between two curves of residuals
-BURNT = 200  # rows of noise that are thrown away, until it does not know its beginning
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +190,7 @@ class Result:
             f"{self.slopes.shape[0]} rows count for {self.correlated.effective_rows:.0f}; "
             f"intervals from rows are {self.too_short:.1f} times shorter. Of {REPEATED} such "
             f"records (linearised) they contain the truth in {short:.0f} %, those from effective "
-            f"rows in {long:.1f} %. With F_c and F_s free, too, two fits find {pairs}: products of "
+            f"rows in {long:.3g} %. With F_c and F_s free, too, two fits find {pairs}: products of "
             f"{' and '.join(f'{1e6 * each:.2f}' for each in thresholds)} µm. They say: "
             f"{self.weakest}.",
             "So: a good fit is no evidence for its numbers. Ask which elements slipped, count "
@@ -322,11 +320,14 @@ def force(model: GMS, motion: Record) -> FloatArray:
 
 
 def noise(rows: int, correlation: float, seed: int) -> FloatArray:
-    """Return noise of the size `NOISE`, N, with a correlation from row to row, shape (rows,)."""
-    white = np.random.default_rng(seed).standard_normal(rows + BURNT)
-    gain = NOISE * np.sqrt(1.0 - correlation**2)
-    made: FloatArray = lfilter([gain], [1.0, -correlation], white)[BURNT:]
-    return made
+    """Return noise of the size `NOISE`, N, with a correlation from row to row, shape (rows,).
+
+    ``e[i] = a e[i-1] + white noise``, filtered around the end, so that it has no beginning.
+    """
+    white = np.random.default_rng(seed).standard_normal(rows)
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(rows))
+    made = np.fft.irfft(np.fft.rfft(white) / (1.0 - correlation * turn), rows)
+    return np.asarray(NOISE * np.sqrt(1.0 - correlation**2) * made)
 
 
 def recorded(motion: Record, correlation: float, seed: int) -> Record:
@@ -341,20 +342,23 @@ def recorded(motion: Record, correlation: float, seed: int) -> Record:
     )
 
 
-def fitted(record: Record) -> Fit:
+def fitted(record: Record, second: float = START[3]) -> Fit:
     """Fit stiffnesses and weights, from `START`.
 
     Parameters
     ----------
     record : Record
         Which begins relaxed.
+    second : float
+        The second weight to start from, m/N.
 
     Returns
     -------
     Fit
         With the offset of the sensor as nuisance.
     """
-    return fit(record, bank(START), free=("k", "weights"), search="local", begin="relaxed")
+    start = bank([*START[:3], second])
+    return fit(record, start, free=("k", "weights"), search="local", begin="relaxed")
 
 
 def _slopes(motion: Record) -> FloatArray:
