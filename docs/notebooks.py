@@ -40,7 +40,11 @@ warnings.simplefilter("error")
 warnings.filterwarnings("ignore", module=".*({OTHERS})")"""
 # The lessons' pages show sliders, so ipywidgets is there; nothing else of the extra docs is.
 HIDDEN = ("furo", "latex2mathml", "myst_parser", "nbformat", "sphinx")
-WITHOUT_DOCS = f"import sys\nsys.modules.update(dict.fromkeys({HIDDEN!r}))  # as if not installed"
+WITHOUT_DOCS = f"""import sys
+
+import scipy.stats  # before: it takes the None of Sphinx below for a package
+
+sys.modules.update(dict.fromkeys({HIDDEN!r}))  # as if not installed"""
 VIEW = "application/vnd.jupyter.widget-view+json"
 SLIDER_NOTE = "*The notebook has a slider; this page shows its initial picture.*"
 

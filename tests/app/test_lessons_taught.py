@@ -1,4 +1,4 @@
-"""`gms-fsm lesson` lists ten lessons, and writes the text, figure and replay page of one."""
+"""`gms-fsm lesson` lists eleven lessons, and writes the text, figure and replay page of one."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
 from tests.scenario_files import CommandLine
 
 
-def test_there_are_ten_each_a_plain_module() -> None:
-    assert list(lessons.LESSONS) == list(range(1, 11))
+def test_there_are_eleven_each_a_plain_module() -> None:
+    assert list(lessons.LESSONS) == list(range(1, 12))
     for number, lesson in lessons.LESSONS.items():
         assert isinstance(lesson, types.ModuleType)
         assert lesson.__name__.startswith(f"gms_fsm.app.lessons.l{number}_")
         assert (lesson.__doc__ or "").startswith(f"Lesson {number}: ")
-    assert len({lesson.QUESTION for lesson in lessons.LESSONS.values()}) == 10
+    assert len({lesson.QUESTION for lesson in lessons.LESSONS.values()}) == 11
 
 
 def test_without_a_number_they_are_listed(gms_fsm: CommandLine) -> None:
     done = gms_fsm("lesson")
     assert done.code == 0, done.err
     lines = done.out.splitlines()
-    assert [int(line.split()[0]) for line in lines] == list(range(1, 11))
+    assert [int(line.split()[0]) for line in lines] == list(range(1, 12))
     for line, lesson in zip(lines, lessons.LESSONS.values(), strict=True):
         assert lesson.QUESTION in line
 

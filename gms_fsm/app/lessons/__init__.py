@@ -1,4 +1,4 @@
-"""Ten lessons: the behaviour of friction models, and the pitfalls of simulating them.
+"""Eleven lessons: the behaviour of friction models, and the pitfalls of simulating and fitting.
 
 Each lesson is a module that answers one question: ``run()`` makes the runs, measures, and returns a
 result; ``figure(result)`` draws it; ``result.lines()`` summarizes it in five lines, in which every
@@ -16,6 +16,7 @@ number is measured in that run.
 8 Does it matter whether a chart or if-else code decides?
 9 What counts as a contact?
 10 Which friction model shows what?
+11 What can a record tell about the parameters?
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ def lesson(number: int) -> Lesson:
     Parameters
     ----------
     number : int
-        1 to 10.
+        1 to 11.
 
     Returns
     -------
@@ -160,7 +161,7 @@ def teach(number: int, folder: str | Path) -> Taught:
     Parameters
     ----------
     number : int
-        1 to 10.
+        1 to 11.
     folder : str or Path
         Output folder for ``lesson_N.txt``, the figure and the replay page; created before the run
         if it does not exist.

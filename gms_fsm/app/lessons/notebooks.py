@@ -39,7 +39,7 @@ def write_notebook(number: int, folder: str | Path) -> Path:
     Parameters
     ----------
     number : int
-        1 to 10.
+        1 to 11.
     folder : str or Path
         Output folder for ``lesson_N.ipynb``; created if it does not exist.
 
@@ -73,7 +73,7 @@ def composed(number: int) -> tuple[Cell, ...]:
     Parameters
     ----------
     number : int
-        1 to 10.
+        1 to 11.
 
     Returns
     -------
