@@ -246,12 +246,11 @@ def _searched_slopes(
         return np.concatenate(parts)
 
     moves = [step * unit for step, unit in zip(steps, np.eye(steps.size), strict=True)]
-    places = [point.u + sign * move for move in moves for sign in (1.0, -1.0)]
-    found = pool.map(force, places)
+    forward = pool.map(force, [point.u + move for move in moves])
+    backward = pool.map(force, [point.u - move for move in moves])
     here = point.residual + experiment.target
     slopes = np.zeros((here.size, steps.size))
-    for i, step in enumerate(steps):
-        ahead, behind = found[2 * i : 2 * i + 2]
+    for i, (step, ahead, behind) in enumerate(zip(steps, forward, backward, strict=True)):
         if ahead is not None and behind is not None:
             slopes[:, i] = (ahead - behind) / (2.0 * step)
         elif ahead is not None:

@@ -261,8 +261,8 @@ def _run_in(t: FloatArray, x: FloatArray, v: FloatArray) -> tuple[FloatArray, Fl
     if not found.size:
         return None
     # The nearest of the first passage.
-    first = found[found < found[0] + max(2, t.size // 20)]
-    last = int(first[np.argmin(np.abs(x[first] - x[0]))])
+    passage = found[found < found[0] + max(2, t.size // 20)]
+    last = int(passage[np.argmin(np.abs(x[passage] - x[0]))])
     if last < 2:
         return None
     return t[:last] - t[last] + t[0], v[:last]
@@ -379,9 +379,10 @@ def driver_of(subject: Subject, drive: str | None, rtol: float) -> Driver:
     if not isinstance(what, System):
         if drive is not None:
             raise ParameterError(
-                "a model is driven by the velocity of the record; only a system has signals",
+                "a model is driven by the velocity of the record",
                 place="drive",
                 value=drive,
+                advice="leave it out; only a system has signals to choose from",
             )
         return Driver("", rtol)
     if drive is not None:

@@ -172,10 +172,10 @@ def certainty(
 
 def _block_sums(scores: FloatArray, parts: Sequence[FloatArray], length: int) -> FloatArray:
     """Return the sums of slope times residual over blocks of rows, shape (blocks, p)."""
-    sums, first = [], 0
-    for part in parts:
-        weighted = scores[first : first + part.size] * part[:, None]
-        first += part.size
+    sums = []
+    ends = np.cumsum([part.size for part in parts])[:-1]
+    for part, own in zip(parts, np.split(scores, ends), strict=True):
+        weighted = own * part[:, None]
         count = max(1, part.size // length)
         borders = np.linspace(0, part.size, count + 1).astype(int)[:-1]
         sums.append(np.add.reduceat(weighted, borders, axis=0))

@@ -241,11 +241,10 @@ def stretches(courses: Sequence[Course], residual: FloatArray) -> list[FloatArra
     list of ndarray
         None is empty.
     """
-    found, first = [], 0
-    for course in courses:
-        where = np.flatnonzero(course.rows)
-        own = residual[first : first + where.size]
-        first += where.size
+    places = [np.flatnonzero(course.rows) for course in courses]
+    ends = np.cumsum([where.size for where in places])[:-1]
+    found = list[FloatArray]()
+    for where, own in zip(places, np.split(residual, ends), strict=True):
         found += np.split(own, np.flatnonzero(np.diff(where) > 1) + 1)
     return [each for each in found if each.size]
 

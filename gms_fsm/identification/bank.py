@@ -401,10 +401,10 @@ def _split(bank: _Bank, n: int) -> tuple[FloatArray, FloatArray]:
     """Return thresholds and stiffnesses of n elements; halves keep the sums of both."""
     r, k = bank.r, bank.k
     while r.size < n:
-        i = int((k * r).argmax())
-        halves = r[i] * np.array([1.0 - APART, 1.0 + APART])
-        r = np.r_[np.delete(r, i), halves]
-        k = np.r_[np.delete(k, i), np.full(2, 0.5 * k[i])]
+        most = int((k * r).argmax())
+        halves = r[most] * np.array([1.0 - APART, 1.0 + APART])
+        r = np.r_[np.delete(r, most), halves]
+        k = np.r_[np.delete(k, most), np.full(2, 0.5 * k[most])]
     order = np.argsort(r, kind="stable")
     return r[order], k[order]
 

@@ -358,9 +358,9 @@ def period_of(t: FloatArray, x: FloatArray) -> float | None:
     if after[best] < REPEATS:
         return None
     # The first of the peaks that are as high: later ones are multiples of the period.
-    first = int(np.argmax(after > after[best] - 0.5 * (1.0 - REPEATS)))
-    falls = np.flatnonzero(np.diff(after[first:]) < 0.0)
-    peak = float(below[0] + first + (int(falls[0]) if falls.size else 0))
+    high = int(np.argmax(after > after[best] - 0.5 * (1.0 - REPEATS)))
+    falls = np.flatnonzero(np.diff(after[high:]) < 0.0)
+    peak = float(below[0] + high + (int(falls[0]) if falls.size else 0))
     # The ends of a short record shift the peak; a distance of many cycles does not depend on them.
     many = 1
     while many * peak < 0.5 * values.size:

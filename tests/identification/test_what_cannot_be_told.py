@@ -71,3 +71,14 @@ def test_the_stribeck_exponent_is_searched_across_two() -> None:
     found = fit(record, start, free=("k", "delta"), search="local", bounds={"delta": (0.5, 5.0)})
     assert found["delta"].low < 2.0 < found["delta"].high
     assert found["k1"].low < 2e4 < found["k1"].high
+
+
+@pytest.mark.parametrize("start", [8e-5, 1.3e-4, 1.8e-4, 2.3e-4])
+def test_a_search_that_ends_at_the_edge_of_slipping_is_not_sure(start: float) -> None:
+    """The element never slips; any threshold beyond the stroke fits as well, from any start."""
+    truth = bank([2e4, 5e3], [5e-5, 2e-4], F_s=1.001)
+    record = measured(truth, sine(1.6e-4, 2.0, 4.0), 0.01, 2)
+    model = bank([2e4, 5e3], [5e-5, start], F_s=1.001)
+    found = fit(record, model, free=("k", "weights"), search="local")
+    assert not found["weights2"].told
+    assert found["weights1"].told
