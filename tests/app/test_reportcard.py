@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import GMSError, ParameterError, Record, RecordError
+from gms_fsm import GMSError, ParameterError, Record, RecordError, fit
 from gms_fsm.app.reportcard import datasets, make, page, scored, write
 from gms_fsm.app.reportcard.datasets import DataSet, Split, data_set
 from gms_fsm.app.reportcard.methods import METHODS, Method, Predictor
@@ -91,6 +91,16 @@ def test_interrupted_it_keeps_what_is_complete(tmp_path: Path) -> None:
     assert "interrupted" in files[0].read_text()
     written = json.loads(files[1].read_text())
     assert written["sections"][0]["rows"][1]["rmse"] == card.sections[0].rows[1].rmse
+
+
+def test_a_fit_that_was_interrupted_is_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*arguments: Any, **given: Any) -> Any:
+        return replace(fit(*arguments, **{**given, "search": "local"}), stopped="interrupted")
+
+    monkeypatch.setattr("gms_fsm.app.reportcard.methods.fit", interrupted)
+    card = make(Path(), data=[SMALL], methods=[constant(0.0), of_card("GMS 1")])
+    assert not card.complete
+    assert [row.model for row in card.sections[0].rows] == ["other", "constant 0"]
 
 
 def test_the_page_says_what_was_held_out_and_how_to_submit() -> None:

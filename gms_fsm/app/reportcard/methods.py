@@ -211,6 +211,8 @@ def _refined(records: Sequence[Record], smoothing: float | None, before: Fit) ->
 
 
 def _predictor(found: Fit) -> Predictor:
+    if found.stopped:  # a fit keeps its best on Ctrl-C; a row of the card is complete or not there
+        raise KeyboardInterrupt
     return Predictor(len(found.table), found.predict, fit=found)
 
 
