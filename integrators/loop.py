@@ -26,6 +26,7 @@ from integrators.advance import (
     knot_after,
     put_row,
     raise_floor,
+    tick_at,
 )
 from integrators.crossings import FOR_A_GUARD, Watched, listed
 from integrators.sliding import (
@@ -351,7 +352,8 @@ def _begin_arc(
                 clock[ERROR_BEFORE] = 1.0
                 knot = knot_after(plan, clock, cursor)
                 order = plan.method.error_order
-                clock[H] = starting_step(motion, order, control, now, knot, scratch)
+                first = starting_step(motion, order, control, now, knot, scratch)
+                clock[H] = max(first, tick_at(clock[T]))  # a knot may be a few ticks away
     return ADVANCE if plan.foreign else NOTHING
 
 

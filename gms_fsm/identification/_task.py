@@ -27,7 +27,7 @@ from gms_fsm.records.record import Record
 __all__ = ["Options", "Task", "Window"]
 
 Window = tuple[float, float]
-COARSE_ROWS = 3000
+COARSE_ROWS, FEWEST_ROWS = 3000, 300  # of all records together, and of each
 COARSE_RTOL, FINE_RTOL = 1e-6, 1e-9
 FINE_STEPS = (1e-3, 1e-4)
 DISTANT = 0.02  # relative: how much better the other beginning must be
@@ -125,9 +125,9 @@ class Task:
 
     def measured_as(self, courses: tuple[Course, ...]) -> Experiment:
         """Return the experiment with few rows of some courses, which may have other values."""
-        total = sum(int(each.rows.sum()) for each in courses)
-        every = max(1, total // COARSE_ROWS)
-        return self._experiment(tuple(each.thinned(every) for each in courses), COARSE_RTOL)
+        many = max(FEWEST_ROWS, COARSE_ROWS // len(courses))
+        few = [each.thinned(max(1, int(each.rows.sum()) // many)) for each in courses]
+        return self._experiment(tuple(few), COARSE_RTOL)
 
     def _experiment(self, courses: tuple[Course, ...], rtol: float) -> Experiment:
         given = self.options

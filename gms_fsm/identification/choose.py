@@ -25,7 +25,7 @@ from gms_fsm.identification._search import Best, refine
 from gms_fsm.identification._statistics import correlation_time
 from gms_fsm.identification._task import Options, Task, at_all_rows, bar, stretches
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, Start
-from gms_fsm.identification.fit import _options, _window, fitted, task_of
+from gms_fsm.identification.fit import fitted, options_of, task_of, window_of
 from gms_fsm.identification.result import Choice, ChoiceRow, Fit
 from gms_fsm.records.record import Record
 
@@ -103,10 +103,10 @@ def choose(
     '1 springs'
     """
     every = _checked_records(records)
-    common = _options(
+    common = options_of(
         free=("k",),  # each candidate has its own
-        train=_window("train", train),
-        test=_window("test", test),
+        train=window_of("train", train),
+        test=window_of("test", test),
         cycles=cycles,
         smoothing=smoothing,
         seed=seed,

@@ -29,7 +29,7 @@ from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
 
-__all__ = ["fit", "fitted", "task_of"]
+__all__ = ["fit", "fitted", "options_of", "task_of", "window_of"]
 
 FEWEST_ROWS = 20
 STILL = 1e-9  # of its size: a column that varies less is constant
@@ -134,15 +134,15 @@ def fit(
     >>> round(found["sigma_0"].value), round(found["sigma_2"].value, 3)
     (20000, 30.0)
     """
-    options = _options(
+    options = options_of(
         free=_names("free", free),
         tied=_names("tied", tied),
         nuisance=_names("nuisance", nuisance),
         linear=_names("linear", linear),
         measured=measured,
         drive=drive,
-        train=_window("train", train),
-        test=_window("test", test),
+        train=window_of("train", train),
+        test=window_of("test", test),
         cycles=cycles,
         search=search,
         bounds={} if bounds is None else bounds,
@@ -156,7 +156,7 @@ def fit(
 
 
 # --------------------------------------------------------------------------- arguments
-def _options(**given: Any) -> Options:
+def options_of(**given: Any) -> Options:
     """Check the arguments that do not depend on model and records."""
     checked_integer("seed", given["seed"], 0)
     if given["most_steps"] is not None:
@@ -190,7 +190,7 @@ def _names(name: str, given: Any) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _window(name: str, given: Any) -> tuple[float, float] | None:
+def window_of(name: str, given: Any) -> tuple[float, float] | None:
     """Return a span of time."""
     if given is None:
         return None
