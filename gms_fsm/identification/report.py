@@ -218,7 +218,7 @@ def _page(
         [f"- {plain(each)}" for each in lacking],
         ["## Parameters", "", *_parameter_table(fit)],
         ["## What the record cannot tell", "", *_doubts(fit)],
-        [f"![Profiles of what cannot be told]({profiles[0]})"] if profiles else [],
+        _profiles(profiles),
         ["## How well it fits", "", *_scores(fit, residuals)],
         ["## Choice among candidates", "", *_choice(fit.choice)] if fit.choice else [],
         ["## What was done", "", *_done(fit)],
@@ -276,12 +276,13 @@ def _as_good(profiles: Sequence[Profile]) -> list[str]:
     if not profiles:
         return []
     ranges = [
-        f"{each.name} from {each.low:.3g} to {each.high:.3g} {each.unit}".rstrip()
+        f"{each.name} from {each.low:.3g} to {each.high:.3g}"
+        + ("" if each.unit in ("", "1") else f" {each.unit}")
         for each in profiles
     ]
     lines = [
         f"- fit as well (rise below {LIMIT:.2f}), if all others follow: values of "
-        f"{plain(', of '.join(ranges))}; a profile is at most as high as the dots"
+        f"{plain(', of '.join(ranges))}"
     ]
     lowest = min(float(each.rise.min()) for each in profiles)
     if lowest < -LIMIT:
@@ -290,6 +291,13 @@ def _as_good(profiles: Sequence[Profile]) -> list[str]:
             'best; search again, for example with search = "de" or another seed'
         )
     return lines
+
+
+def _profiles(drawn: Sequence[str]) -> list[str]:
+    if not drawn:
+        return []
+    words = "The dots were met on a walk from the fitted values; a profile is at most as high."
+    return [f"![Profiles of what cannot be told]({drawn[0]})", "", words]
 
 
 def _scores(fit: Fit, residuals: Sequence[Residuals]) -> list[str]:

@@ -20,7 +20,7 @@ from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
-__all__ = ["MOST_PROFILES", "profiles_figure"]
+__all__ = ["profiles_figure"]
 
 MOST_PROFILES = 12
 COLUMNS, PANEL, NARROWEST = 4, (2.7, 1.9), 2.1  # inches

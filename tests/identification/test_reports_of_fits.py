@@ -78,7 +78,8 @@ def test_profiles_are_there_exactly_when_something_is_open(tmp_path: Path) -> No
     page = write_report(with_profiles(1), tmp_path).read_text(encoding="utf-8")
     doubts = page.partition("## What the record cannot tell")[2].partition("##")[0]
     assert "![Profiles of what cannot be told](profiles.png)" in doubts
-    assert "values of v_c0 from 6.31e-09 to 1.58e-06 m/s; a profile is at most" in doubts
+    assert "values of v_c0 from 6.31e-09 to 1.58e-06 m/s\n" in doubts
+    assert "a profile is at most as high" in doubts
     assert "a better fit was met" not in page
     assert names <= {path.name for path in tmp_path.iterdir()}
     assert two_records().open == ()
