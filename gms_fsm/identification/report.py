@@ -16,6 +16,7 @@ from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm._files import output_folder, refuse_input, write_whole
 from gms_fsm._markdown import plain, table_lines
 from gms_fsm.errors import MissingExtraError, OutputError
+from gms_fsm.identification._profile import LIMIT, Profile
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
@@ -30,6 +31,7 @@ __all__ = [
 
 PAGE, PARAMETERS, RESIDUALS, FITTED = "report.md", "parameters.csv", "residuals.csv", "fitted.toml"
 MOTION = "fitted.csv"  # beside the scenario, if it is long
+PROFILES = "profiles"  # a figure, if there is anything to draw
 
 
 def write_report(fit: Fit, folder: str | Path) -> Path:
@@ -45,8 +47,9 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
     Returns
     -------
     Path
-        The page, ``report.md``. Beside it are the figure, ``parameters.csv``, ``residuals.csv``,
-        and ``fitted.toml``, a scenario that runs. What could not be written, such as the figure
+        The page, ``report.md``. Beside it are the figure, one of the profiles of what cannot be
+        told (if anything), ``parameters.csv``, ``residuals.csv``, and ``fitted.toml``, a scenario
+        that runs. What could not be written, such as the figure
         without matplotlib, is said on the page.
 
     Raises
@@ -56,6 +59,7 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
         or that is an input.
     """
     from gms_fsm.identification.result import Fit as Kind
+    from plots import formats
 
     checked_kind("fit", fit, Kind, "a Fit, from gms_fsm.fit")
     inputs = [each.path for each in fit.records if each.path is not None]
@@ -69,6 +73,8 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
         written += [name for name in (FITTED, MOTION) if (place / name).exists()]
     except OutputError as error:  # what a file cannot hold: a very long motion, a function
         lacking.append(f"no scenario was written: {error}")
+    for name in formats.files(PROFILES, "figure"):  # of a fit that was here before
+        (place / name).unlink(missing_ok=True)
     try:
         written = [*_draw(fit, place), *written]
     except MissingExtraError as error:
@@ -110,7 +116,8 @@ def report_files() -> list[str]:
     """Return the names of the files of a report, ``report.md`` first."""
     from plots import formats
 
-    return [PAGE, *formats.files("fit", "figure"), PARAMETERS, RESIDUALS, FITTED, MOTION]
+    drawn = [name for stem in ("fit", PROFILES) for name in formats.files(stem, "figure")]
+    return [PAGE, *drawn, PARAMETERS, RESIDUALS, FITTED, MOTION]
 
 
 def model_title(fit: Fit) -> str:
@@ -155,14 +162,18 @@ def scores_text(fit: Fit) -> str:
 
 
 def _draw(fit: Fit, folder: Path) -> list[str]:
-    """Write the figure in the usual formats; return their names."""
+    """Write the figures in the usual formats; return their names."""
     from plots import figures, formats
 
-    names = formats.files("fit", "figure")
-    figure = figures.fit_figure(fit)
-    for name in names:
+    drawn = {"fit": figures.fit_figure(fit)}
+    if fit.open_profiles:
+        drawn[PROFILES] = figures.profiles_figure(fit)
+    files = {
+        name: figure for stem, figure in drawn.items() for name in formats.files(stem, "figure")
+    }
+    for name, figure in files.items():
         figures.save(figure, folder / name)
-    return names
+    return list(files)
 
 
 # --------------------------------------------------------------------------- tables
@@ -200,12 +211,14 @@ def _page(
 ) -> str:
     """Return the page as Markdown, with what was written beside it and what was not."""
     drawn = [name for name in written if name.startswith("fit.")]
+    profiles = [name for name in written if name.startswith(f"{PROFILES}.")]
     sections = [
         _head(fit),
         [f"![Measurement and model, residuals, parameters]({drawn[0]})"] if drawn else [],
         [f"- {plain(each)}" for each in lacking],
         ["## Parameters", "", *_parameter_table(fit)],
         ["## What the record cannot tell", "", *_doubts(fit)],
+        _profiles(profiles),
         ["## How well it fits", "", *_scores(fit, residuals)],
         ["## Choice among candidates", "", *_choice(fit.choice)] if fit.choice else [],
         ["## What was done", "", *_done(fit)],
@@ -248,6 +261,7 @@ def _doubts(fit: Fit) -> list[str]:
     lines = [f"- {plain(fit.weakest)}"] if fit.weakest else []
     if fit.open:
         lines.append(f"- cannot be told: {plain(', '.join(fit.open))}")
+        lines += _as_good(fit.open_profiles)
     if fit.never_slipped:
         numbers = ", ".join(map(str, fit.never_slipped))
         lines.append(
@@ -255,6 +269,35 @@ def _doubts(fit: Fit) -> list[str]:
             "longer stroke"
         )
     return lines or ["- nothing: every parameter has an interval"]
+
+
+def _as_good(profiles: Sequence[Profile]) -> list[str]:
+    """Say how far open parameters go while the fit is as good, and whether a better fit was met."""
+    if not profiles:
+        return []
+    ranges = [
+        f"{each.name} from {each.low:.3g} to {each.high:.3g}"
+        + ("" if each.unit in ("", "1") else f" {each.unit}")
+        for each in profiles
+    ]
+    lines = [
+        f"- fit as well (rise below {LIMIT:.2f}), if all others follow: values of "
+        f"{plain(', of '.join(ranges))}"
+    ]
+    lowest = min(float(each.rise.min()) for each in profiles)
+    if lowest < -LIMIT:
+        lines.append(
+            f"- a better fit was met on the way (rise {lowest:.3g}): the search had not found the "
+            'best; search again, for example with search = "de" or another seed'
+        )
+    return lines
+
+
+def _profiles(drawn: Sequence[str]) -> list[str]:
+    if not drawn:
+        return []
+    words = "The dots were met on a walk from the fitted values; a profile is at most as high."
+    return [f"![Profiles of what cannot be told]({drawn[0]})", "", words]
 
 
 def _scores(fit: Fit, residuals: Sequence[Residuals]) -> list[str]:

@@ -17,6 +17,7 @@ from plots.figures._paper import (
 )
 from plots.figures._phase import phase
 from plots.figures._phenomena import phenomena_matrix, phenomenon_figure
+from plots.figures._profiles import profiles_figure
 from plots.figures._runs import Measured, cascade_figure, overview, ribbons_figure
 from plots.figures._saving import save
 from plots.figures._unfold import unfold
@@ -37,6 +38,7 @@ __all__ = [
     "phase",
     "phenomena_matrix",
     "phenomenon_figure",
+    "profiles_figure",
     "residuals",
     "ribbons_figure",
     "save",

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gms_fsm import GMS, Fit, GMSParameters, Record, Stribeck, fit
+from gms_fsm.identification._profile import Profile
 from gms_fsm.identification.result import Estimate
 
 PERIOD = 2.0  # s
@@ -71,6 +72,28 @@ def with_table(count: int) -> Fit:
         for i in range(count)
     )
     return replace(small(), assessed=replace(small().assessed, table=tuple(rows)))
+
+
+def with_profiles(count: int) -> Fit:
+    """Return the small fit with so many parameters that cannot be told, over many ranges."""
+    kinds = [  # name, unit, meaning, lowest and highest value
+        ("v_c", "m/s", "arrest velocity", 1e-9, 1e-5),
+        ("k", "N/m", "stiffness", 1e4, 3e4),
+        ("delta", "1", "Stribeck exponent", 1.0, 12.0),
+        ("offset", "N", "", -0.03, 0.02),
+        ("v_s", "m/s", "Stribeck velocity", 1e-4, 8e-4),
+    ]
+    rows, profiles = [], []
+    for i in range(count):
+        kind, unit, meaning, low, high = kinds[i % len(kinds)]
+        values = np.geomspace(low, high, 11) if low > 0.0 else np.linspace(low, high, 11)
+        rise = 10.0 * np.linspace(-1.0, 1.0, 11) ** 2
+        name = f"{kind}{i}"
+        profiles.append(Profile(name, unit, values, rise, float(values[2]), float(values[8])))
+        value = float(values[5])
+        rows.append(Estimate(name, value, low, high, unit, "cannot be told", meaning))
+    made = replace(small().assessed, table=tuple(rows), open_profiles=tuple(profiles))
+    return replace(small(), assessed=made)
 
 
 def without_test() -> Fit:

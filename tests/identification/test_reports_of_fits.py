@@ -16,7 +16,7 @@ from gms_fsm.errors import OutputError, ParameterError
 from gms_fsm.identification import report
 from gms_fsm.identification.report import report_files, write_report
 from gms_fsm.identification.result import Choice, ChoiceRow
-from tests.identification.fits_made import small, two_records, with_table
+from tests.identification.fits_made import small, two_records, with_profiles, with_table
 
 FILES = {"report.md", "parameters.csv", "residuals.csv", "fitted.toml"}
 
@@ -70,6 +70,31 @@ def test_what_cannot_be_told_is_named(tmp_path: Path) -> None:
     assert f"- {small().weakest}\n" in doubts.replace("\\", "")
     assert "- cannot be told: parameter_2\n" in doubts
     assert ("never slipped: element" in doubts) == bool(small().never_slipped)
+
+
+def test_profiles_are_there_exactly_when_something_is_open(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")
+    names = {"profiles.png", "profiles.svg"}
+    page = write_report(with_profiles(1), tmp_path).read_text(encoding="utf-8")
+    doubts = page.partition("## What the record cannot tell")[2].partition("##")[0]
+    assert "![Profiles of what cannot be told](profiles.png)" in doubts
+    assert "values of v_c0 from 6.31e-09 to 1.58e-06 m/s\n" in doubts
+    assert "a profile is at most as high" in doubts
+    assert "a better fit was met" not in page
+    assert names <= {path.name for path in tmp_path.iterdir()}
+    assert two_records().open == ()
+    page = write_report(two_records(), tmp_path).read_text(encoding="utf-8")
+    assert "profiles" not in page
+    assert not names & {path.name for path in tmp_path.iterdir()}  # of the fit before
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_better_fit_met_on_the_walk_is_said(tmp_path: Path) -> None:
+    """A local search of two elements from far away ends in a wrong place."""
+    (lowest,) = {each.rise.min() for each in small().open_profiles}
+    assert lowest < -3.84
+    page = write_report(small(), tmp_path).read_text(encoding="utf-8")
+    assert f"- a better fit was met on the way (rise {lowest:.3g})" in page
 
 
 def test_tables_have_all_digits(folder: Path) -> None:

@@ -32,7 +32,7 @@ from gms_fsm.systems.models import demonstration
 from plots import figures, presets
 from plots.presets import PRESETS, Preset
 from tests.helpers import bank, matrix, stick_slip
-from tests.identification.fits_made import small, with_table
+from tests.identification.fits_made import small, with_profiles, with_table
 from tests.plots.printed import problems
 
 PRINT = [name for name in PRESETS if name != "screen"]
@@ -153,6 +153,8 @@ FIGURES: dict[str, Callable[[], Any]] = {
     ),
     "fit": lambda: figures.fit_figure(small()),
     "fit of twelve parameters": lambda: figures.fit_figure(with_table(12)),
+    "profiles": lambda: figures.profiles_figure(with_profiles(5)),
+    "profiles of nine parameters": lambda: figures.profiles_figure(with_profiles(9)),
     "phenomenon": lambda: figures.phenomenon_figure(table(), table().phenomena[0].name),
     "matrix": lambda: figures.phenomena_matrix(table(), title="Models and phenomena"),
 }
