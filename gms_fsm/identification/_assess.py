@@ -86,6 +86,8 @@ class Assessed:
         In coordinates.
     weakest : str
         The weakest direction in words.
+    better : Point or None
+        A point met on the walk that fits clearly better on few rows.
     open_profiles : tuple of Profile
         Of the parameters that cannot be told: the least rise met on the walk through the region
         in which the fit is as good. A profile is at most as high.
@@ -95,6 +97,7 @@ class Assessed:
     covariance: FloatArray
     certainty: Certainty
     weakest: str
+    better: Point | None = None
     open_profiles: tuple[Profile, ...] = ()
 
 
@@ -201,7 +204,8 @@ def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
             for each in table
             if not each.told and each.note != NO_INFLUENCE
         )
-    return Assessed(table, covariance, sure, words, profiles)
+    better = None if region is None else region.better
+    return Assessed(table, covariance, sure, words, better, profiles)
 
 
 def _region(task: Task, entries: Sequence[_Entry], sure: Certainty, pool: Pool) -> Region | None:

@@ -21,6 +21,7 @@ from gms_fsm.identification._runs import Pool
 __all__ = ["Region", "values_of", "walked"]
 
 BINS = 16  # of a parameter's values, in a profile
+BETTER = 1.0  # fall of the rise below that of the best point
 HIGHEST = 4.0 * LIMIT  # rises shown in a profile
 ROUNDS = 14  # of one step outward for each end of each parameter
 GROWTH, SHRINK = 1.6, 0.5  # of a step that stayed in the region, or left it
@@ -62,11 +63,19 @@ class Region:
         Those of all points met, the best one first.
     rise : ndarray, shape (points,)
         Fall of twice the log-likelihood at each.
+    lowest : Point
+        The point with the lowest cost.
     """
 
     best: dict[str, float]
     met: dict[str, FloatArray]
     rise: FloatArray
+    lowest: Point
+
+    @property
+    def better(self) -> Point | None:
+        """A point that fits clearly better than the best one, if the walk met one."""
+        return self.lowest if float(self.rise.min()) < -BETTER else None
 
     def reach(self, name: str) -> tuple[float, float]:
         """Return how far a parameter goes below and above its best value inside the region."""
@@ -80,7 +89,7 @@ class Region:
         values, rise = self.met[name][shown], self.rise[shown]
         positive = logarithmic and float(values.min()) > 0.0
         places = np.log(values) if positive else values
-        borders = np.linspace(places.min(), places.max(), BINS + 1)[1:-1]
+        borders = np.quantile(places, np.linspace(0.0, 1.0, BINS + 1)[1:-1])
         bins = np.searchsorted(borders, places)
         order = np.lexsort((rise, bins))
         lowest = order[np.unique(bins[order], return_index=True)[1]]
@@ -134,9 +143,10 @@ def walked(
         for side in (-1.0, 1.0)
         if np.isfinite(direction).all()
     ]
-    met, rises = [best], [0.0]
+    met, rises, lowest = [best], [0.0], [point]
 
     def take(points: Sequence[Point], new: Sequence[float]) -> None:
+        lowest.append(min([lowest[-1], *points], key=lambda each: each.cost))
         for each, rise in zip(points, new, strict=True):
             if not math.isfinite(rise):
                 continue
@@ -169,7 +179,7 @@ def walked(
             walk.step = min(walk.step * (GROWTH if rise < LIMIT else SHRINK), 8.0)
         take(points, new)
     columns = {name: np.array([values[name] for values in met]) for name in best}
-    return Region(best, columns, np.array(rises))
+    return Region(best, columns, np.array(rises), lowest[-1])
 
 
 def _rise(point: Point, lowest: float, rows: float) -> float:

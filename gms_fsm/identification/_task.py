@@ -187,8 +187,9 @@ class Task:
     def polish(self, u: FloatArray, best: Best, pool: Pool) -> None:
         """Refine on all rows, with smaller and smaller steps."""
         for step in FINE_STEPS:
-            here = u if best.point is None else best.point.u
-            best.take([refine(self.fine, here, step, pool=pool)])
+            found = refine(self.fine, u, step, pool=pool)
+            best.take([found])
+            u = found.u if found.lost is None else u
 
 
 def _local(experiment: Experiment, _: int, best: Best, pool: Pool) -> None:

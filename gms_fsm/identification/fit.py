@@ -19,7 +19,7 @@ from gms_fsm._arguments import checked_integer, checked_kind, listed
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
 from gms_fsm.identification._assess import NO_INFLUENCE, assessed, sorted_elements
-from gms_fsm.identification._experiment import NUISANCE
+from gms_fsm.identification._experiment import NUISANCE, Point
 from gms_fsm.identification._runs import BEGINS, Pool
 from gms_fsm.identification._search import SEARCHES, Best
 from gms_fsm.identification._task import Options, Task, bar
@@ -32,6 +32,7 @@ from gms_fsm.systems.system import System
 __all__ = ["fit", "fitted", "options_of", "task_of", "window_of"]
 
 FEWEST_ROWS = 20
+AGAIN = 3  # searches from a better point met while looking for the ends of intervals
 STILL = 1e-9  # of its size: a column that varies less is constant
 
 
@@ -361,11 +362,19 @@ def fitted(task: Task, *, progress: bool | None = False, start: Best | None = No
     if best.point is None:
         raise _nothing_ran(task)
     fine = task.fine.at(best.point.u)
-    found = sorted_elements(task.fine.fitted(fine), task.unknowns)
-    final = replace(task, subject=found)
-    point = final.fine.at(final.fine.coordinates.start)
+    final, point = _settled(task, fine)
     with Pool() as pool:
         table = assessed(final, point, pool)
+        for _ in range(AGAIN if not stopped else 0):
+            if table.better is None:
+                break
+            nearer = Best()
+            nearer.take([point])
+            final.polish(table.better.u, nearer, pool)
+            if nearer.point is None or nearer.point is point:
+                break
+            final, point = _settled(final, nearer.point)
+            table = assessed(final, point, pool)
     silent = [each.name for each in table.table if each.note == NO_INFLUENCE]
     own = [each.name for each in final.unknowns]
     if silent and len(silent) == len(own):
@@ -378,6 +387,13 @@ def fitted(task: Task, *, progress: bool | None = False, start: Best | None = No
     notes = _notes(task, silent)
     seconds = time.perf_counter() - began
     return Fit(final, point, table, notes, task.ran[0], seconds, stopped)
+
+
+def _settled(task: Task, point: Point) -> tuple[Task, Point]:
+    """Return a task that starts from the numbers found, elements in order, and its start."""
+    found = sorted_elements(task.fine.fitted(point), task.unknowns)
+    final = replace(task, subject=found)
+    return final, final.fine.at(final.fine.coordinates.start)
 
 
 def _nothing_ran(task: Task) -> GMSError:

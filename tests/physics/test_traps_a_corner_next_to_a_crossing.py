@@ -1,7 +1,7 @@
 """A crossing a few clock ticks before a corner of a signal is no reason to give up.
 
-A velocity made from positions is about 1e-17 m/s at the turning points, not 0: its sign changes just
-before the sample, and what is left of the interval is too short for a first step of the usual size.
+A velocity made from positions is about 1e-17 m/s at the turning points, not 0: its sign changes
+just before the sample, and what is left is too short for a first step of the usual size.
 """
 
 from __future__ import annotations
