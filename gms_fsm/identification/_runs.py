@@ -6,6 +6,7 @@ its own buffers, so that runs can go side by side.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 from collections.abc import Callable, Iterable
@@ -431,12 +432,16 @@ class Pool:
 
     def __init__(self, workers: int | None = None) -> None:
         self._threads = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+        self._limits: contextlib.AbstractContextManager[object] = contextlib.nullcontext()
 
     def __enter__(self) -> Pool:
+        self._limits = _alone()
+        self._limits.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._threads.shutdown(wait=True, cancel_futures=True)
+        self._limits.__exit__(None, None, None)
 
     def map(self, call: Callable[[Given], Result], given: Iterable[Given]) -> list[Result]:
         """Return the results of calls in the order given."""
@@ -446,6 +451,20 @@ class Pool:
         finally:  # also on Ctrl-C: what has not begun does not begin
             for task in tasks:
                 task.cancel()
+
+
+def _alone() -> contextlib.AbstractContextManager[object]:
+    """Let linear algebra use one thread per call, if the extra ``fast`` is there to say so.
+
+    Its own threads would wait for each other and for those of the pool: a fit takes three times as
+    long, and its last digits depend on the number of cores.
+    """
+    try:
+        from threadpoolctl import threadpool_limits
+    except ImportError:
+        return contextlib.nullcontext()
+    limits: contextlib.AbstractContextManager[object] = threadpool_limits(1, user_api="blas")
+    return limits
 
 
 LOST = (GMSError, ArithmeticError, np.linalg.LinAlgError)  # what makes a proposal worthless
