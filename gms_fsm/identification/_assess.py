@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gms_fsm.charts.parameters import WEIGHTS, FloatArray
+from gms_fsm.charts.parameters import QUANTITIES, WEIGHTS, FloatArray
 from gms_fsm.identification._experiment import NUISANCE, Experiment, Point
 from gms_fsm.identification._profile import Profile, shown_interval
 from gms_fsm.identification._region import Region, walked
 from gms_fsm.identification._runs import LOST, Pool
-from gms_fsm.identification._statistics import LOOSE, NEGLIGIBLE, WIDE, Certainty, certainty
+from gms_fsm.identification._statistics import (
+    LOOSE,
+    NEGLIGIBLE,
+    WIDE,
+    Certainty,
+    certainty,
+    correlation_time,
+)
 from gms_fsm.identification._task import Task, stretches
 from gms_fsm.identification._unknowns import Subject, Unknown
 from gms_fsm.systems.system import System
 
-__all__ = ["Assessed", "Estimate", "assessed", "sorted_elements"]
+__all__ = ["Assessed", "Estimate", "assessed", "sorted_elements", "unassessed"]
 
 FIRST_STEP, LEAST_STEP, MOST_STEP = 1e-3, 1e-4, 0.1
 OPEN = "cannot be told"
 NO_INFLUENCE = "cannot be told: no influence on this record"
+NOT_KNOWN = f"{OPEN}: interrupted before its interval was known"
 AT_BOUND = "at its bound"
 MOST_NAMED = 4  # parameters in one direction
 
@@ -115,6 +123,7 @@ class _Entry:
     low: float
     high: float
     base: float = 0.0  # of an excess
+    other: str = ""  # the name of the base, if it was found, too
 
     def place(self, half: float) -> tuple[float, float]:
         """Return the ends of the interval with a half width in the coordinate."""
@@ -181,18 +190,16 @@ def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
         steps = np.clip(0.25 * np.where(np.isfinite(width), width, 0.0), LEAST_STEP, MOST_STEP)
     region = _region(task, entries, sure, pool)
     nothing = (0.0, 0.0)
-    scales = np.array([each.scale for each in entries])
-    with np.errstate(invalid="ignore"):
-        covariance = sure.covariance * np.outer(scales, scales)
+    entries, halves, covariance = _in_values(entries, sure)
     table = tuple(
         _estimate(
             each,
-            float(half),
+            half,
             bool(opened),
             experiment.typical,
             nothing if region is None else region.reach(each.name),
         )
-        for each, half, opened in zip(entries, sure.half, sure.open, strict=True)
+        for each, half, opened in zip(entries, halves, sure.open, strict=True)
     )
     noise = float(np.sqrt(point.cost / max(point.residual.size, 1)))
     words = _in_words(table, entries, noise, task)
@@ -206,6 +213,40 @@ def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
         )
     better = None if region is None else region.better
     return Assessed(table, covariance, sure, words, better, profiles)
+
+
+def unassessed(task: Task, point: Point) -> Assessed:
+    """Return the table of a fit without intervals, for one that was interrupted.
+
+    Parameters
+    ----------
+    task, point
+        As in `assessed`.
+
+    Returns
+    -------
+    Assessed
+        With the values only.
+    """
+    experiment, count = task.fine, len(task.unknowns) + len(task.options.nuisance)
+    nothing = np.zeros((point.residual.size, len(experiment.searched)))
+    entries = _entries(experiment, point, nothing, _basis(experiment, point))
+    table = tuple(
+        Estimate(each.name, each.value, each.low, each.high, each.unit, NOT_KNOWN, each.meaning)
+        for each in entries
+    )
+    tau = correlation_time(stretches(task.courses, point.residual))
+    without = np.full(count, np.inf)
+    sure = Certainty(
+        np.full((count, count), np.nan),
+        without,
+        np.ones(count, dtype=bool),
+        np.eye(count),
+        without,
+        tau,
+        max(point.residual.size / tau, 1.0),
+    )
+    return Assessed(table, sure.covariance, sure, "No interval is known.")
 
 
 def _region(task: Task, entries: Sequence[_Entry], sure: Certainty, pool: Pool) -> Region | None:
@@ -225,6 +266,35 @@ def _region(task: Task, entries: Sequence[_Entry], sure: Certainty, pool: Pool) 
     return walked(
         experiment, point, directions, root[places], sure.effective, pool, task.options.seed
     )
+
+
+def _in_values(
+    entries: Sequence[_Entry], sure: Certainty
+) -> tuple[list[_Entry], list[float], FloatArray]:
+    """Return the covariance of the values, and half widths of the intervals in coordinates.
+
+    Where the number that is the base of an excess was found, too, its uncertainty adds to that of
+    the sum, whose interval is then relative to its value.
+    """
+    names = [each.name for each in entries]
+    slopes = np.diag([each.scale for each in entries])
+    found, halves = list(entries), sure.half.tolist()
+    over = {i: names.index(each.other) for i, each in enumerate(entries) if each.other in names}
+    for i, base in over.items():
+        slopes[i, base] = entries[i].value / entries[base].value * entries[base].scale
+    known = np.isfinite(np.diag(sure.covariance))
+    covariance = slopes @ np.where(np.outer(known, known), sure.covariance, 0.0) @ slopes.T
+    unknown = (np.abs(slopes) > 0.0) @ ~known
+    np.fill_diagonal(covariance, np.where(unknown, np.inf, np.diag(covariance)))
+    for i in over:
+        deviation = math.sqrt(max(float(covariance[i, i]), 0.0))
+        if math.isfinite(deviation) and sure.covariance[i, i] > 0.0:
+            size = entries[i].value
+            halves[i] *= deviation / math.sqrt(float(sure.covariance[i, i])) / size
+            found[i] = replace(entries[i], kind="linear", scale=size)
+        else:
+            halves[i] = math.inf
+    return found, halves, covariance
 
 
 def _basis(experiment: Experiment, point: Point) -> FloatArray:
@@ -277,7 +347,7 @@ def _entries(
         base = 0.0
         if each.kind == "excess":
             base = float(values.get(each.other, np.min(experiment.subject.value(each.other))))
-            low = max(low, base)
+            low = max(low, each.least) if each.other in values else max(low, base)
         by_name[each.name] = _Entry(
             each.name,
             each.parameter.unit,
@@ -289,6 +359,7 @@ def _entries(
             max(low, each.least),
             high,
             base,
+            each.other if each.other in values else "",
         )
     for i, unknown in enumerate(experiment.solved):
         value, column = float(point.linear[i]), basis[:, i]
@@ -312,12 +383,11 @@ def _entries(
         column = basis[:, i]
         size = float(np.sqrt(np.mean(column**2)))
         scale = experiment.typical / size if size else 1.0
-        unit, meaning = NUISANCE[name]
+        unit, meaning = experiment.unit_of(name), NUISANCE[name]
+        least = experiment.least_nuisance(name)
         value = float(point.linear[i])
         slopes = column * scale
-        ordered.append(
-            _Entry(name, unit, meaning, value, slopes, "linear", scale, -math.inf, math.inf)
-        )
+        ordered.append(_Entry(name, unit, meaning, value, slopes, "linear", scale, least, math.inf))
     return ordered
 
 
@@ -394,10 +464,13 @@ def _are(names: Sequence[str]) -> str:
 
 
 # --------------------------------------------------------------------------- order of elements
-def sorted_elements(subject: Subject, unknowns: Sequence[Unknown]) -> Subject:
+def sorted_elements(
+    subject: Subject, unknowns: Sequence[Unknown], bounded: Collection[str]
+) -> Subject:
     """Return a bank with its elements in the order of their thresholds.
 
-    Elements that may change places in a search are named from the first to slip to the last.
+    Elements that may change places in a search are named from the first to slip to the last; all
+    that belongs to an element moves with it.
 
     Parameters
     ----------
@@ -405,20 +478,31 @@ def sorted_elements(subject: Subject, unknowns: Sequence[Unknown]) -> Subject:
         Fitted.
     unknowns : sequence of Unknown
         What was free.
+    bounded : collection of str
+        The names for which there were bounds.
 
     Returns
     -------
     Subject
-        The same as given unless all that differs between its elements was free.
+        The same as given if elements cannot change places: a name stands for one element only, in
+        `free` or in the bounds; or if no parameter is a threshold.
     """
     if isinstance(subject.what, System):
         return subject
     wide = {key: n for key, (_, n) in subject.known.items() if n > 1}
-    free = {key: [each for each in unknowns if each.key == key] for key in wide}
-    whole = [key for key, n in wide.items() if sum(e.element is not None for e in free[key]) == n]
-    fixed = [key for key in wide if key not in whole]
-    if not whole or any(np.ptp(np.asarray(subject.value(key))) for key in fixed):
+    own = [each for each in unknowns if each.element is not None]
+    whole = [key for key, n in wide.items() if sum(each.key == key for each in own) == n]
+    if len(own) != sum(wide[key] for key in whole) or {each.name for each in own} & {*bounded}:
         return subject
-    by = WEIGHTS.name if WEIGHTS.name in whole else whole[0]
-    order = np.argsort(np.asarray(subject.value(by)), kind="stable")
-    return subject.varied({key: np.asarray(subject.value(key))[order] for key in whole})
+    lengths = [key for key in wide if subject.known[key][0].unit == QUANTITIES["z"].unit]
+    by = [key for key in (WEIGHTS.name, *lengths) if key in whole]
+    if not by:
+        return subject
+    order = np.argsort(np.asarray(subject.value(by[0])), kind="stable")
+    if (np.diff(order) > 0).all():
+        return subject
+    return subject.varied({key: _each(subject, key, n)[order] for key, n in wide.items()})
+
+
+def _each(subject: Subject, key: str, n: int) -> FloatArray:
+    return np.broadcast_to(np.asarray(subject.value(key), dtype=float), n).copy()

@@ -19,6 +19,7 @@ from gms_fsm.identification._runs import Pool
 from gms_fsm.identification._search import Best, hops, refine
 from gms_fsm.identification._statistics import BLOCK
 from gms_fsm.identification._task import Task, at_all_rows
+from gms_fsm.identification._unknowns import Unknown
 
 __all__ = ["Bootstrap", "Profile", "bootstrapped", "profiled"]
 
@@ -100,11 +101,10 @@ def profiled(
             raise ParameterError("the fitted model cannot be run on few rows", place=unknown.name)
         effective_rows = min(effective, float(rows))  # few rows know no more than that
         found = {centre: best.cost}
-        ends, first = [], _first_step(unknown.positive, estimate)
+        first = _first_step(unknown.positive, estimate)
         for side in (-1.0, 1.0):
-            end, before = side * math.inf, (centre, 0.0)
             for k in range(MOST_STEPS):
-                value = _moved(unknown.positive, centre, side * first * 2.0**k, unknown.least)
+                value = _moved(unknown, centre, side * first * 2.0**k)
                 if value is None or value in found:
                     break
                 try:
@@ -114,21 +114,33 @@ def profiled(
                 if cost is None:
                     break
                 found[value] = cost
-                rise = effective_rows * math.log(max(cost, 1e-300) / max(best.cost, 1e-300))
-                if rise > LIMIT:
-                    # The rise is nearly a parabola: its root is nearly straight.
-                    low, high = math.sqrt(before[1]), math.sqrt(rise)
-                    end = before[0] + (value - before[0]) * (math.sqrt(LIMIT) - low) / (high - low)
+                if _rise(cost, min(found.values()), effective_rows) > LIMIT:
                     break
-                before = (value, max(rise, before[1], 0.0))
-            ends.append(end)
     values = np.array(sorted(found))
     lowest = min(found.values())
-    rises = [
-        effective_rows * math.log(max(found[x], 1e-300) / max(lowest, 1e-300))
-        for x in values.tolist()
-    ]
-    return Profile(unknown.name, unknown.parameter.unit, values, np.array(rises), *ends)
+    rises = np.array([_rise(found[x], lowest, effective_rows) for x in values.tolist()])
+    ends = [_end(unknown, values, rises, side) for side in (-1, 1)]
+    return Profile(unknown.name, unknown.parameter.unit, values, rises, *ends)
+
+
+def _rise(cost: float, lowest: float, rows: float) -> float:
+    return rows * math.log(max(cost, 1e-300) / max(lowest, 1e-300))
+
+
+def _end(unknown: Unknown, values: FloatArray, rises: FloatArray, side: int) -> float:
+    """Return where the rise reaches its limit on one side; the bound if that is reached before."""
+    best = int(np.argmin(rises))
+    way = slice(best, None) if side > 0 else slice(best, None, -1)
+    own, up = values[way], np.maximum(rises[way], 0.0)
+    above = np.flatnonzero(up > LIMIT)
+    if not above.size:
+        bound = unknown.high if side > 0 else max(unknown.low, unknown.least)
+        return bound if own[-1] == bound else side * math.inf
+    after = int(above[0])
+    # The rise is nearly a parabola: its root is nearly straight.
+    roots = np.sqrt(up[after - 1 : after + 1])
+    share = (math.sqrt(LIMIT) - float(roots[0])) / float(np.ptp(roots))
+    return float(own[after - 1] + share * (own[after] - own[after - 1]))
 
 
 def _first_step(positive: bool, estimate: Estimate) -> float:
@@ -141,12 +153,15 @@ def _first_step(positive: bool, estimate: Estimate) -> float:
     return SHARE * 0.5 * (high - low) / (abs(value) or 1.0)
 
 
-def _moved(positive: bool, centre: float, by: float, least: float) -> float | None:
-    """Return a value beside another one; None where its rule ends."""
-    if positive and centre > 0.0:
-        return centre * math.exp(by) if abs(by) < 50.0 else None
-    value = centre + by * (abs(centre) or 1.0)
-    return value if value >= least else None
+def _moved(unknown: Unknown, centre: float, by: float) -> float | None:
+    """Return a value beside another one, within the bounds; None where none is left."""
+    if unknown.positive and centre > 0.0:
+        value = centre * math.exp(by) if abs(by) < 50.0 else None
+    else:
+        value = centre + by * (abs(centre) or 1.0)
+    if value is None or (value < unknown.least and unknown.positive):
+        return None
+    return min(max(value, unknown.low, unknown.least), unknown.high)
 
 
 def _cost_at(

@@ -19,14 +19,15 @@ from gms_fsm.errors import GMSError
 from gms_fsm.identification._runs import LOST, Course, Driver, Measured, Ran, with_numbers
 from gms_fsm.identification._unknowns import Coordinates, Subject, Unknown, values_by_key
 
-__all__ = ["NUISANCE", "Experiment", "Point"]
+__all__ = ["MASS", "NUISANCE", "Experiment", "Point", "split_unknowns", "value_of"]
 
-# Terms of the measurement that are no part of the model, with their units and meanings.
-NUISANCE: Mapping[str, tuple[str, str]] = {
-    "offset": ("N", "constant force of the sensor"),
-    "drift": ("N/s", "force of the sensor growing with time"),
-    "inertia": ("kg", "mass between contact and sensor, times acceleration"),
+# Terms of the measurement that are no part of the model, with what they are.
+NUISANCE: Mapping[str, str] = {
+    "offset": "constant error of the sensor",
+    "drift": "error of the sensor that grows with time",
+    "inertia": "mass between contact and sensor, times acceleration",
 }
+MASS = "inertia"  # which is not negative, and makes a force
 TINY = 1e-9  # of a linear parameter's largest value: what stands for 0 where a rule says > 0
 
 
@@ -134,7 +135,7 @@ class Experiment:
         whole = self.measured.values(ran)
         columns, rest = [], whole.copy()
         for each in self.solved:
-            present = _present(subject, each)
+            present = value_of(subject, each)
             step = present if present != 0.0 else 1.0
             moved = subject.varied(values_by_key(subject, [each], [present + step]))
             program = with_numbers(ran.program, moved, course, self.driver)
@@ -178,7 +179,16 @@ class Experiment:
     def _least(self) -> FloatArray:
         """The lower bounds of what is solved for."""
         own = [each.low if np.isfinite(each.low) else each.least for each in self.solved]
-        return np.array([*own, *(-np.inf for _ in self.nuisance)])
+        return np.array([*own, *map(self.least_nuisance, self.nuisance)])
+
+    def least_nuisance(self, name: str) -> float:
+        """Return the least value of a nuisance term."""
+        return 0.0 if name == MASS else -np.inf
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit of a nuisance term."""
+        unit = self.measured.unit
+        return {"offset": unit, "drift": f"{unit}/s".replace("/s/s", "/s^2"), MASS: "kg"}[name]
 
     def _solved(self, basis: FloatArray, wanted: FloatArray) -> FloatArray:
         """Solve for the linear parameters, each at least its lower bound.
@@ -221,7 +231,21 @@ class Experiment:
         return self.at(self.coordinates.start)
 
 
-def _present(subject: Subject, unknown: Unknown) -> float:
+def value_of(subject: Subject, unknown: Unknown) -> float:
+    """Return the present value of an unknown.
+
+    Parameters
+    ----------
+    subject : Subject
+        Whose.
+    unknown : Unknown
+        Which.
+
+    Returns
+    -------
+    float
+        In its unit.
+    """
     value = np.asarray(subject.value(unknown.key), dtype=float)
     if unknown.element is None or value.ndim == 0:
         return float(value.flat[0])

@@ -53,6 +53,7 @@ COVERED = 0.9  # share of the travel that a run-in must cover
 NEAR = 0.02  # of the travel: where the motion is back at its start
 STEPS_PER_ROW = 60  # default budget of a run
 FEWEST_STEPS = 200_000
+MOST_KEPT = 32  # runs with their buffers, in each thread
 
 
 def engine() -> str:
@@ -207,6 +208,7 @@ def course_of(
     smoothing: float | None,
     begin: str,
     most_steps: int | None,
+    seen: int | None = None,
 ) -> Course:
     """Return what a record makes a model do.
 
@@ -224,6 +226,8 @@ def course_of(
         What is before the first row.
     most_steps : int or None
         Budget of a run.
+    seen : int or None
+        Number of rows that a run-in is taken from; all of them by default.
 
     Returns
     -------
@@ -232,7 +236,10 @@ def course_of(
     """
     motion = record.motion(smoothing)
     nothing = np.empty(0)
-    lead = _run_in(motion.time, motion.position, motion.velocity) if begin == "run in" else None
+    first = slice(seen)
+    lead = None
+    if begin == "run in":
+        lead = _run_in(motion.time[first], motion.position[first], motion.velocity[first])
     times, values = (nothing, nothing) if lead is None else lead
     count = motion.time.size + times.size
     return Course(
@@ -326,6 +333,8 @@ class Driver:
             if start.chosen.engine == "compiled":
                 run = CompiledRun(start)
                 if start.given is None:
+                    while len(self._runs) >= MOST_KEPT:  # the oldest goes first
+                        del self._runs[next(iter(self._runs))]
                     self._runs[id(course)] = _Kept(course, run)
             else:
                 run = Run(start)

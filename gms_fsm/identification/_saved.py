@@ -68,7 +68,7 @@ def save(fit: Fit, path: Path) -> Path:
         path,
         signals=signals,
         title=f"{_name(fit)} fitted to {fit.records[0].name}",
-        notes=fit.weakest,
+        notes=f"{_terms(fit)}{fit.weakest}",
         run=Times(t_start=start.t_start, t_end=start.t_end),
     )
 
@@ -85,6 +85,13 @@ def _signal(signal: Signal | str, name: str, path: Path) -> FileTable | SignalFi
     output_folder(table.parent, [table.name])
     write_whole(table, lambda file: file.write(text))
     return FileTable(file=table.name, value=name)
+
+
+def _terms(fit: Fit) -> str:
+    """Say which terms of the measurement are no part of the scenario."""
+    terms = (each for each in fit.table if each.name in fit.nuisance)
+    found = ", ".join(f"{each.name} {each.value:.6g} {each.unit}" for each in terms)
+    return f"Without terms of the measurement that were fitted besides: {found}. " * bool(found)
 
 
 def _name(fit: Fit) -> str:

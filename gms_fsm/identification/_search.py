@@ -59,6 +59,7 @@ def refine(
     step: float,
     most: int = MOST_EVALUATIONS,
     pool: Pool | None = None,
+    kept: Best | None = None,
 ) -> Point:
     """Refine a proposal by Levenberg-Marquardt steps within the bounds.
 
@@ -75,6 +76,8 @@ def refine(
         Evaluations, without those of the slopes.
     pool : Pool, optional
         To evaluate the slopes side by side.
+    kept : Best, optional
+        Takes each point as it is found, for the case of an interrupt.
 
     Returns
     -------
@@ -93,6 +96,8 @@ def refine(
             known.clear()
             known[key] = experiment.at(place.copy())
             best.take([known[key]])
+            if kept is not None:
+                kept.take([known[key]])
         return known[key]
 
     def slopes(place: FloatArray) -> FloatArray:

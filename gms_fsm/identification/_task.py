@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.identification._experiment import Experiment, Point, split_unknowns
@@ -24,7 +25,7 @@ from gms_fsm.identification._search import Best, de, hops, refine
 from gms_fsm.identification._unknowns import Subject, Unknown, unknowns_of, values_by_key
 from gms_fsm.records.record import Record
 
-__all__ = ["Options", "Task", "Window"]
+__all__ = ["Options", "Task", "Window", "inside", "training_rows"]
 
 Window = tuple[float, float]
 COARSE_ROWS, FEWEST_ROWS = 3000, 300  # of all records together, and of each
@@ -94,15 +95,17 @@ class Task:
         """The records with the rows to train on, up to the last of them."""
         found = []
         for record in self.records:
-            course = self.course(record, self.options.train)
+            course = self.course(record, training_rows(record, self.options))
             if course.rows.any():
                 found.append(course.ended())
         return tuple(found)
 
-    def course(self, record: Record, window: Window | None) -> Course:
-        """Return what a record makes the model do, with the rows of a window that count."""
-        time, given = record.columns["time"], self.options
-        rows = None if window is None else (time >= window[0]) & (time < window[1])
+    def course(self, record: Record, rows: NDArray[np.bool_] | None) -> Course:
+        """Return what a record makes the model do, with the rows that count (None: all)."""
+        given, seen = self.options, None
+        if any(record is each for each in self.records):  # its run-in was that of training rows
+            known = np.flatnonzero(training_rows(record, given) & record.chosen)
+            seen = int(known[-1]) + 1 if known.size else None
         return course_of(
             record,
             self.measured.column,
@@ -110,6 +113,7 @@ class Task:
             smoothing=given.smoothing,
             begin=self.begin,
             most_steps=given.most_steps,
+            seen=seen,
         )
 
     # ------------------------------------------------------------------ as least squares
@@ -187,15 +191,27 @@ class Task:
     def polish(self, u: FloatArray, best: Best, pool: Pool) -> None:
         """Refine on all rows, with smaller and smaller steps."""
         for step in FINE_STEPS:
-            found = refine(self.fine, u, step, pool=pool)
-            best.take([found])
+            found = refine(self.fine, u, step, pool=pool, kept=best)
             u = found.u if found.lost is None else u
 
 
+def training_rows(record: Record, options: Options) -> NDArray[np.bool_]:
+    """Return which rows of a record may be trained on: without `train`, all but those of `test`."""
+    time = record.columns["time"]
+    if options.train is not None:
+        return inside(time, options.train)
+    return ~inside(time, options.test) if options.test is not None else np.ones(time.size, bool)
+
+
+def inside(time: FloatArray, window: Window) -> NDArray[np.bool_]:
+    """Return which times are in a window, its end excluded."""
+    found: NDArray[np.bool_] = (time >= window[0]) & (time < window[1])
+    return found
+
+
 def _local(experiment: Experiment, _: int, best: Best, pool: Pool) -> None:
-    best.take([refine(experiment, experiment.coordinates.start, 1e-2, 30, pool)])
-    if best.point is None:
-        best.take([experiment.start_point()])
+    best.take([experiment.start_point()])
+    refine(experiment, experiment.coordinates.start, 1e-2, 30, pool, best)
 
 
 @contextlib.contextmanager

@@ -199,7 +199,9 @@ def unknowns_of(
                 advice=f"free are {', '.join(found) or 'none'}",
             )
         for key in hit:
-            bounded[key] = _bounded(found[key], pair)
+            other = found[key].other
+            base = float(np.min(subject.value(other))) if other else 0.0
+            bounded[key] = _bounded(found[key], pair, base)
     return tuple(bounded.values())
 
 
@@ -244,7 +246,7 @@ def _unknown(
     return Unknown(name, key, element, parameter, start)
 
 
-def _bounded(unknown: Unknown, pair: Any) -> Unknown:
+def _bounded(unknown: Unknown, pair: Any, base: float) -> Unknown:
     try:
         low, high = pair
     except (TypeError, ValueError):
@@ -263,6 +265,12 @@ def _bounded(unknown: Unknown, pair: Any) -> Unknown:
     if high <= unknown.least:
         raise ParameterError(
             f"the highest value is {high!r}",
+            place=f"bounds of {unknown.name!r}",
+            advice=f"its rule is {unknown.parameter.rule!r}",
+        )
+    if unknown.other and high <= base:
+        raise ParameterError(
+            f"the highest value is {high!r}, and {unknown.other} is {base!r}",
             place=f"bounds of {unknown.name!r}",
             advice=f"its rule is {unknown.parameter.rule!r}",
         )
@@ -345,7 +353,9 @@ class Coordinates:
                 plain[each.key] = found[i]
         for i, each in enumerate(self.unknowns):
             if each.kind == "excess":  # over the present value of the other number
-                found[i] = plain.get(each.other, self._base(each)) * (1.0 + math.exp(u[i]))
+                base = plain.get(each.other, self._base(each))
+                value = min(base * (1.0 + math.exp(u[i])), each.high)
+                found[i] = max(value, each.low, base * (1.0 + LEAST_EXCESS))
         return found
 
     def coordinates(self, numbers: FloatArray) -> FloatArray:

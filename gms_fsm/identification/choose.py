@@ -23,9 +23,10 @@ from gms_fsm.identification._experiment import Point
 from gms_fsm.identification._runs import Pool
 from gms_fsm.identification._search import Best, refine
 from gms_fsm.identification._statistics import correlation_time
-from gms_fsm.identification._task import Options, Task, at_all_rows, bar, stretches
+from gms_fsm.identification._task import Options, Task, at_all_rows, bar, stretches, training_rows
+from gms_fsm.identification._unknowns import Subject, unknowns_of
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, Start
-from gms_fsm.identification.fit import fitted, options_of, task_of, window_of
+from gms_fsm.identification.fit import check_model, fitted, options_of, task_of, window_of
 from gms_fsm.identification.result import Choice, ChoiceRow, Fit
 from gms_fsm.records.record import Record
 
@@ -118,7 +119,7 @@ def choose(
     )
     tried = _checked_candidates(candidates)
     seen = [_training_rows(record, common) for record in every]
-    folds = _folds([_few(each, common, len(seen)) for each in seen], fold, common)
+    folds = _folds([_few(each, len(seen)) for each in seen], fold, common)
     began = time.perf_counter()
     results: list[_Tried] = []
     rows: list[ChoiceRow] = []
@@ -186,6 +187,11 @@ def _checked_candidates(given: Any) -> list[Candidate]:
         name, model, free = _parts(f"candidates[{i}]", each, 3)
         checked_kind(f"name of candidates[{i}]", name, str, "a text")
         names = (free,) if isinstance(free, str) else tuple(listed("free", free, "names"))
+        check_model(model, f"model of candidate {shown(name)}")
+        try:
+            unknowns_of(Subject(model), names, (), {})
+        except GMSError as error:
+            raise error.inside(f"candidate {shown(name)}") from None
         found.append(Candidate(name, "given", _given(Start(model, names))))
     if not found:
         raise ParameterError("there is none", place="candidates", advice="give at least one")
@@ -212,30 +218,31 @@ def _given(start: Start) -> Any:
 
 # --------------------------------------------------------------------------- rows and folds
 def _training_rows(record: Record, options: Options) -> Record:
-    """Return a record of which only the training rows are selected."""
-    if options.train is None:
-        return record
-    t = record.columns["time"]
-    inside = (t >= options.train[0]) & (t < options.train[1])
-    return replace(record, chosen=record.chosen & inside)
+    """Return a record up to its last training row, of which only training rows are selected.
 
-
-def _few(record: Record, options: Options, among: int) -> Record:
-    """Return the motion and force of a record in few rows, up to its last selected one."""
-    if not record.chosen.any():
+    Its motion is that of the whole record, smoothed.
+    """
+    chosen = record.chosen & training_rows(record, options)
+    if not chosen.any():
         raise RecordError(
             "no selected row is in train", place=record.place, advice="change train=(from, to)"
         )
+    last = int(np.flatnonzero(chosen)[-1]) + 1
     motion = record.motion(options.smoothing)
-    last = int(np.flatnonzero(record.chosen)[-1]) + 1
-    every = max(1, last // max(FEWEST_ROWS, ROWS // among))
-    kept = slice(None, last, every)
     columns = {
-        "time": motion.time[kept],
-        "position": motion.position[kept],
-        "velocity": motion.velocity[kept],
-        "force": record.columns["force"][kept],
+        "time": motion.time[:last],
+        "position": motion.position[:last],
+        "velocity": motion.velocity[:last],
+        "force": record.columns["force"][:last],
     }
+    return replace(record, columns=columns, chosen=chosen[:last], rows=record.rows[:last])
+
+
+def _few(record: Record, among: int) -> Record:
+    """Return a record, up to its last training row, in few rows."""
+    every = max(1, len(record) // max(FEWEST_ROWS, ROWS // among))
+    kept = slice(None, None, every)
+    columns = {name: values[kept] for name, values in record.columns.items()}
     return replace(record, columns=columns, chosen=record.chosen[kept], rows=record.rows[kept])
 
 
@@ -421,7 +428,7 @@ def _try(
     """Search a candidate on all training rows, then refine and score it fold by fold."""
     began = time.perf_counter()
     try:
-        start = candidate.build(records, options.smoothing)
+        start = candidate.build(records, None)  # their motion is smoothed already
         # In few rows: their velocity is that of the motion, smoothed already.
         here = replace(
             options,

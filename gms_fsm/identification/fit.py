@@ -18,19 +18,28 @@ from numpy.typing import ArrayLike
 from gms_fsm._arguments import checked_integer, checked_kind, listed
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
-from gms_fsm.identification._assess import NO_INFLUENCE, assessed, sorted_elements
-from gms_fsm.identification._experiment import NUISANCE, Point
+from gms_fsm.identification._assess import (
+    NO_INFLUENCE,
+    Assessed,
+    assessed,
+    sorted_elements,
+    unassessed,
+)
+from gms_fsm.identification._experiment import MASS, NUISANCE, Point, value_of
+from gms_fsm.identification._linear import linear_names
 from gms_fsm.identification._runs import BEGINS, Pool
 from gms_fsm.identification._search import SEARCHES, Best
-from gms_fsm.identification._task import Options, Task, bar
-from gms_fsm.identification._unknowns import Subject
+from gms_fsm.identification._task import Options, Task, bar, inside, training_rows
+from gms_fsm.identification._unknowns import Subject, values_by_key
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
 
-__all__ = ["fit", "fitted", "options_of", "task_of", "window_of"]
+__all__ = ["check_model", "fit", "fitted", "options_of", "task_of", "window_of"]
 
+STOPPED = "The search was interrupted: this is the best so far."
+STOPPED_LATE = "Interrupted before the intervals were known: this is the best so far."
 FEWEST_ROWS = 20
 AGAIN = 3  # searches from a better point met while looking for the ends of intervals
 STILL = 1e-9  # of its size: a column that varies less is constant
@@ -87,8 +96,8 @@ def fit(
     drive : str, optional
         The signal of a system that the record's velocity replaces.
     train, test : tuple of float, optional
-        Times from, to (excluded), s. Without `train` all rows; the rows of `test` are looked at
-        once, when `Fit.held_out` is asked for.
+        Times from, to (excluded), s. Without `train` all rows but those of `test`, which are looked
+        at once, when `Fit.held_out` is asked for.
     cycles : float, optional
         Period of the record, s: for the repeatability floor and the blocks of a bootstrap.
     search : {"hops", "local", "de"}
@@ -170,6 +179,8 @@ def options_of(**given: Any) -> Options:
         _one_of("begin", given["begin"], BEGINS)
     for name in given["nuisance"]:
         _one_of("nuisance", name, tuple(NUISANCE))
+        if given["nuisance"].count(name) > 1:
+            raise ParameterError(f"{name!r} is given twice", place="nuisance")
     checked_kind("bounds", given["bounds"], Mapping, "a mapping, for example {'C': (1e-5, 1e-2)}")
     if not given["free"]:
         raise ParameterError(
@@ -242,15 +253,16 @@ def task_of(
         raise ParameterError("there is none", place="records", advice="give at least one Record")
     for each in every:
         checked_kind("records", each, Record, "a Record, for example Record.from_csv(path)")
-    if not (isinstance(model, System) or (hasattr(model, "chart") and hasattr(model, "weights"))):
-        raise ParameterError(
-            "it must be a model or a system, for example initial_bank(record, 4)",
-            place="model",
-            value=model,
-        )
+    check_model(model, "model")
     subject = _with_fixed(Subject(model), fixed, options.free)
     task = Task(subject, tuple(every), options, begin=options.begin or BEGINS[1])
     _ = task.unknowns  # raises errors of names and bounds
+    if MASS in options.nuisance and task.measured.column != "force":
+        raise ParameterError(
+            f"{MASS!r} makes a force, and what is measured is a {task.measured.column}",
+            place="nuisance",
+            advice="leave it out",
+        )
     for name in options.linear:
         if name not in subject.known:
             raise ParameterError(
@@ -259,7 +271,32 @@ def task_of(
                 advice=f"known here are {', '.join(subject.known)}",
             )
     _check_records(task)
+    _check_linear(task)
     return task
+
+
+def check_model(model: object, place: str) -> None:
+    """Refuse what is neither a model nor a system.
+
+    Parameters
+    ----------
+    model : object
+        As given.
+    place : str
+        What it is called, for the message.
+
+    Raises
+    ------
+    ParameterError
+        If it is something else.
+    """
+    if isinstance(model, System) or (hasattr(model, "chart") and hasattr(model, "weights")):
+        return
+    raise ParameterError(
+        "it must be a model or a system, for example initial_bank(record, 4)",
+        place=place,
+        value=model,
+    )
 
 
 def _with_fixed(subject: Subject, fixed: Any, free: tuple[str, ...]) -> Subject:
@@ -280,7 +317,7 @@ def _with_fixed(subject: Subject, fixed: Any, free: tuple[str, ...]) -> Subject:
 
 def _check_records(task: Task) -> None:
     """Refuse records from which nothing can be found."""
-    column, train = task.measured.column, task.options.train
+    column = task.measured.column
     for record in task.records:
         if column not in record.columns:
             raise RecordError(
@@ -289,12 +326,28 @@ def _check_records(task: Task) -> None:
                 advice=f"give {column}=(name, unit) when reading it; it has "
                 f"{', '.join(record.columns)}",
             )
-    if not task.courses:
-        assert train is not None  # a record without selected rows cannot be made
+    train, test = task.options.train, task.options.test
+    if train is not None and test is not None and train[0] < test[1] and test[0] < train[1]:
+        raise ParameterError(
+            f"it is from {test[0]:g} s to {test[1]:g} s, and train from {train[0]:g} s to "
+            f"{train[1]:g} s",
+            place="test",
+            advice="held-out rows must not be trained on",
+        )
+    for record in task.records:
+        if not (training_rows(record, task.options) & record.chosen).any():
+            what = "outside test" if train is None else f"from {train[0]:g} s to {train[1]:g} s"
+            raise RecordError(
+                f"no selected row is {what}",
+                place=record.place,
+                advice="change train=(from, to), or leave the record out",
+            )
+    times = [record.columns["time"][record.chosen] for record in task.records]
+    if test is not None and not any(inside(each, test).any() for each in times):
         raise RecordError(
-            f"no selected row is from {train[0]:g} s to {train[1]:g} s",
+            f"no selected row is from {test[0]:g} s to {test[1]:g} s",
             place=task.records[0].place,
-            advice="change train=(from, to)",
+            advice="change test=(from, to)",
         )
     rows = sum(int(course.rows.sum()) for course in task.courses)
     most = max(FEWEST_ROWS, 2 * (len(task.unknowns) + len(task.options.nuisance)))
@@ -318,6 +371,29 @@ def _check_records(task: Task) -> None:
             place=task.records[0].place,
             advice=f"check the {column} column and its unit",
         )
+
+
+def _check_linear(task: Task) -> None:
+    """Refuse parameters declared linear if the force of a run does not follow them linearly."""
+    experiment, course = task.coarse, task.coarse.courses[0]
+    known = linear_names(task.subject)
+    for each in (one for one in experiment.solved if one.key not in known):
+        here = task.subject
+        value = value_of(here, each)
+        there = here.varied(values_by_key(here, [each], [1.5 * value or 1.0]))
+        _, rest, columns = experiment.columns(here, course)
+        _, other_rest, others = experiment.columns(there, course)
+        # Where only the force depends on a parameter, no other term of it changes.
+        sizes = np.array([abs(value_of(here, one)) for one in experiment.solved])
+        terms = np.abs(columns - others)[:, : len(sizes)] * sizes
+        moved = max(float(np.abs(rest - other_rest).max()), float(terms.max()))
+        if moved > 1e-6 * experiment.typical:
+            raise ParameterError(
+                f"the force is not linear in {each.name!r}: with another value the elements move "
+                "in another way",
+                place="linear",
+                advice="leave it out, and it is searched",
+            )
 
 
 # --------------------------------------------------------------------------- the search
@@ -344,37 +420,28 @@ def fitted(task: Task, *, progress: bool | None = False, start: Best | None = No
         If no proposal could be run.
     """
     began, stopped = time.perf_counter(), ""
-    best = Best() if start is None else start
-    with Pool() as pool, bar("fit", progress) as told:
-        best.told = told
-        # Raises errors that no parameter can change, such as a signal that ends too early.
-        try:
-            task = task.coarse_search(best, pool)
-            coarse, best.point = best.point, None
-            if coarse is not None:
-                best.take([task.fine.at(coarse.u)])
-                task.polish(coarse.u, best, pool)
-        except KeyboardInterrupt:
-            stopped = "The search was interrupted: this is the best so far."
-            if best.point is None:
-                raise
-        told(1.0)
-    if best.point is None:
-        raise _nothing_ran(task)
-    fine = task.fine.at(best.point.u)
-    final, point = _settled(task, fine)
+    coarse, fine = Best() if start is None else start, Best()
     with Pool() as pool:
-        table = assessed(final, point, pool)
-        for _ in range(AGAIN if not stopped else 0):
-            if table.better is None:
-                break
-            nearer = Best()
-            nearer.take([point])
-            final.polish(table.better.u, nearer, pool)
-            if nearer.point is None or nearer.point is point:
-                break
-            final, point = _settled(final, nearer.point)
-            table = assessed(final, point, pool)
+        try:
+            with bar("fit", progress) as told:
+                coarse.told = told
+                task = task.coarse_search(coarse, pool)
+                if coarse.point is not None:
+                    fine.take([task.fine.at(coarse.point.u)])
+                    task.polish(coarse.point.u, fine, pool)
+                told(1.0)
+        except KeyboardInterrupt:
+            stopped = STOPPED
+            if coarse.point is None:
+                raise
+        if coarse.point is None:
+            raise _nothing_ran(task)
+        point = task.fine.at(coarse.point.u) if fine.point is None else fine.point
+        final, point = _settled(task, point)
+        try:
+            final, point, table = _assessed(final, point, pool, again=0 if stopped else AGAIN)
+        except KeyboardInterrupt:
+            stopped, table = STOPPED_LATE, unassessed(final, point)
     silent = [each.name for each in table.table if each.note == NO_INFLUENCE]
     own = [each.name for each in final.unknowns]
     if silent and len(silent) == len(own):
@@ -389,9 +456,25 @@ def fitted(task: Task, *, progress: bool | None = False, start: Best | None = No
     return Fit(final, point, table, notes, task.ran[0], seconds, stopped)
 
 
+def _assessed(task: Task, point: Point, pool: Pool, again: int) -> tuple[Task, Point, Assessed]:
+    """Return the table of a fit; a better point met on the way is searched from, and assessed."""
+    table = assessed(task, point, pool)
+    for _ in range(again):
+        if table.better is None:
+            break
+        nearer = Best()
+        nearer.take([point])
+        task.polish(table.better.u, nearer, pool)
+        if nearer.point is None or nearer.point is point:
+            break
+        task, point = _settled(task, nearer.point)
+        table = assessed(task, point, pool)
+    return task, point, table
+
+
 def _settled(task: Task, point: Point) -> tuple[Task, Point]:
     """Return a task that starts from the numbers found, elements in order, and its start."""
-    found = sorted_elements(task.fine.fitted(point), task.unknowns)
+    found = sorted_elements(task.fine.fitted(point), task.unknowns, task.options.bounds)
     final = replace(task, subject=found)
     return final, final.fine.at(final.fine.coordinates.start)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gms_fsm._arguments import checked_integer, checked_kind, checked_path, listed
 from gms_fsm._display import displayed
-from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError, RecordError, shown
 from gms_fsm.identification._assess import Assessed, Estimate
 from gms_fsm.identification._certainty import Bootstrap, bootstrapped, profiled
@@ -23,7 +23,7 @@ from gms_fsm.identification._experiment import Point
 from gms_fsm.identification._profile import Profile
 from gms_fsm.identification._runs import Course
 from gms_fsm.identification._statistics import phase_floor
-from gms_fsm.identification._task import Task, at_all_rows
+from gms_fsm.identification._task import Task, at_all_rows, inside, training_rows
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
@@ -231,12 +231,23 @@ class Fit:
                 squares, count = squares + found**2 * rows.sum(), count + int(rows.sum())
         return math.sqrt(squares / count) if count else None
 
-    @property
-    def bic(self) -> float:
-        """Bayesian information criterion on effective rows; lower is better."""
-        rows = self.effective_rows
+    def bic(self, effective: float | None = None) -> float:
+        """Return the Bayesian information criterion on effective rows; lower is better.
+
+        Parameters
+        ----------
+        effective : float, optional
+            Number of rows; by default `effective_rows`. Fits are only comparable on the same one.
+
+        Returns
+        -------
+        float
+            ``n * log(mean square) + p * log(n)``.
+        """
+        rows = self.effective_rows if effective is None else effective
+        rows = max(checked_scalar("effective", rows, "> 0"), 2.0)
         mean = self.point.cost / self.point.residual.size
-        return rows * math.log(max(mean, 1e-300)) + len(self.table) * math.log(max(rows, 2.0))
+        return rows * math.log(max(mean, 1e-300)) + len(self.table) * math.log(rows)
 
     def residuals(self, which: int | None = None) -> list[Residuals]:
         """Return measurement and model at all rows.
@@ -267,8 +278,8 @@ class Fit:
         found = []
         for record in self.records:
             course = self.task.course(record, None)
-            train = self.task.course(record, self.train).rows
-            held = self.task.course(record, self.test).rows if self.test else ~course.rows
+            train = training_rows(record, self.task.options) & course.rows
+            held = inside(course.t, self.test) if self.test else np.zeros(len(record), bool)
             held = held & course.rows
             modelled = at_all_rows(self.task.fine, self.point, course)
             found.append(
@@ -440,30 +451,31 @@ class Fit:
             checked_kind("others", each, Fit, "fits, from fit(...)")
         names = names or [f"{i}: {_title(each)}" for i, each in enumerate(fits, start=2)]
         every = dict(zip([f"1: {_title(self)}", *names], [self, *fits], strict=True))
-        rows = []
         for name, each in every.items():
-            same = each.task.fine.target.size == self.task.fine.target.size
-            if not (same and np.array_equal(each.task.fine.target, self.task.fine.target)):
+            if not np.array_equal(each.task.fine.target, self.task.fine.target):
                 raise ParameterError(
                     f"fit {shown(name)} was made from other rows",
                     place="others",
                     advice="compare fits to the same records, with the same train",
                 )
-            score = each.held_out or each.training
-            note = "" if each.held_out else "training rows: no test was given"
-            rows.append(
-                ChoiceRow(
-                    name,
-                    "",
-                    len(each.table),
-                    score["rmse"],
-                    score["r2"],
-                    each.bic,
-                    each.seconds,
-                    note,
+            if None not in (each.test, self.test) and each.test != self.test:
+                raise ParameterError(
+                    f"other rows were held out of fit {shown(name)}",
+                    place="others",
+                    advice="compare fits with the same test",
                 )
-            )
-        return Comparison(tuple(sorted(rows, key=lambda row: row.rmse)))
+        # One number of rows for all, that of the best: else the order would depend on units.
+        effective = min(every.values(), key=lambda each: each.point.cost).effective_rows
+        rows = [each._compared(name, effective) for name, each in every.items()]
+        return Comparison(tuple(sorted(rows, key=lambda row: (bool(row.note), row.rmse))))
+
+    def _compared(self, name: str, effective: float) -> ChoiceRow:
+        score = self.held_out or self.training
+        note = "" if self.held_out else "training rows: no test was given"
+        bic = self.bic(effective)
+        return ChoiceRow(
+            name, "", len(self.table), score["rmse"], score["r2"], bic, self.seconds, note
+        )
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | os.PathLike[str]) -> Path:
@@ -535,6 +547,10 @@ class Fit:
         if self.held_out is not None:
             lines.append(_scored("held out", self.held_out, unit))
         lines.append(self.weakest)
+        if self.choice is not None:
+            failed = [f"{row.name} failed: {row.note}" for row in self.choice.rows if row.note]
+            count = len(self.choice.rows)
+            lines += [f"chosen among {count} candidates: {self.choice.chosen}", *failed]
         return "\n".join([*lines, self.stopped] if self.stopped else lines)
 
 

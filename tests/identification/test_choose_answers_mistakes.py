@@ -31,7 +31,7 @@ ONE = {"one": (initial_bank(RECORD, 1), ["k", "weights"])}
         (RECORD, {"candidates": [("a", ONE["one"][0])]}, ["(name, model, free)"]),
         (RECORD, {"candidates": [("a", *ONE["one"])] * 2}, ["two are called 'a'"]),
         (RECORD, {"candidates": {"one": 1}}, ["(model, free)", "1"]),
-        (RECORD, {"candidates": {"one": (5, ["k"])}}, ["no candidate could be fitted", "model"]),
+        (RECORD, {"candidates": {"one": (5, ["k"])}}, ["model of candidate 'one' is 5"]),
         (RECORD, {"train": (50.0, 60.0)}, ["rig", "no selected row is in train"]),
         (RECORD, {"train": (3.0, 1.0)}, ["train", "after its start"]),
         (RECORD, {"seed": 0.5}, ["seed"]),
