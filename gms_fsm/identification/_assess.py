@@ -30,7 +30,7 @@ __all__ = ["Assessed", "Estimate", "assessed", "sorted_elements", "unassessed"]
 FIRST_STEP, LEAST_STEP, MOST_STEP = 1e-3, 1e-4, 0.1
 OPEN = "cannot be told"
 NO_INFLUENCE = "cannot be told: no influence on this record"
-NOT_KNOWN = f"{OPEN}: interrupted before its interval was known"
+NOT_KNOWN = f"{OPEN}: its interval was not computed"
 AT_BOUND = "at its bound"
 MOST_NAMED = 4  # parameters in one direction
 
@@ -205,9 +205,8 @@ def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
     words = _in_words(table, entries, noise, task)
     profiles: tuple[Profile, ...] = ()
     if region is not None:
-        kinds = {each.name: each.kind == "log" for each in entries}
         profiles = tuple(
-            region.profile(each.name, each.unit, logarithmic=kinds[each.name])
+            region.profile(each.name, each.unit)
             for each in table
             if not each.told and each.note != NO_INFLUENCE
         )
@@ -216,7 +215,7 @@ def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
 
 
 def unassessed(task: Task, point: Point) -> Assessed:
-    """Return the table of a fit without intervals, for one that was interrupted.
+    """Return the table of a fit without intervals, for one that was interrupted or needs none.
 
     Parameters
     ----------
@@ -246,7 +245,7 @@ def unassessed(task: Task, point: Point) -> Assessed:
         tau,
         max(point.residual.size / tau, 1.0),
     )
-    return Assessed(table, sure.covariance, sure, "No interval is known.")
+    return Assessed(table, sure.covariance, sure, "No interval was computed.")
 
 
 def _region(task: Task, entries: Sequence[_Entry], sure: Certainty, pool: Pool) -> Region | None:

@@ -20,7 +20,7 @@ from gms_fsm.identification._runs import Pool
 
 __all__ = ["Region", "values_of", "walked"]
 
-BINS = 16  # of a parameter's values, in a profile
+POINTS = 10  # of a profile on each side
 BETTER = 1.0  # fall of the rise below that of the best point
 HIGHEST = 4.0 * LIMIT  # rises shown in a profile
 ROUNDS = 14  # of one step outward for each end of each parameter
@@ -83,20 +83,27 @@ class Region:
         best = self.best[name]
         return min(float(inside.min()) - best, 0.0), max(float(inside.max()) - best, 0.0)
 
-    def profile(self, name: str, unit: str, *, logarithmic: bool) -> Profile:
-        """Return the least rise met, by values of a parameter; a profile is at most as high."""
+    def profile(self, name: str, unit: str) -> Profile:
+        """Return the least rises met, by values of a parameter; a profile is at most as high.
+
+        Left out are points above others that are further away: looser bounds than these.
+        """
         shown = self.rise < HIGHEST
         values, rise = self.met[name][shown], self.rise[shown]
-        positive = logarithmic and float(values.min()) > 0.0
-        places = np.log(values) if positive else values
-        borders = np.quantile(places, np.linspace(0.0, 1.0, BINS + 1)[1:-1])
-        bins = np.searchsorted(borders, places)
-        order = np.lexsort((rise, bins))
-        lowest = order[np.unique(bins[order], return_index=True)[1]]
+        best = int(np.argmin(rise))
+        kept = [best]
+        for side in (-1.0, 1.0):
+            away = side * (values - values[best])
+            outward = np.lexsort((rise, -away))  # the farthest first, at one place the lowest
+            outward = outward[away[outward] > 0.0]
+            falls = rise[outward] < np.minimum.accumulate(np.append(np.inf, rise[outward]))[:-1]
+            inward = outward[falls]
+            chosen = np.linspace(0, inward.size - 1, min(POINTS, inward.size)).round().astype(int)
+            kept += inward[chosen].tolist()
+        order = np.array(kept)[np.argsort(values[kept])]
         low, high = self.reach(name)
-        best = self.best[name]
-        order = lowest[np.argsort(values[lowest])]
-        return Profile(name, unit, values[order], rise[order], best + low, best + high)
+        value = self.best[name]
+        return Profile(name, unit, values[order], rise[order], value + low, value + high)
 
 
 def walked(

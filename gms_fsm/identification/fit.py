@@ -397,7 +397,7 @@ def _check_linear(task: Task) -> None:
 
 
 # --------------------------------------------------------------------------- the search
-def fitted(task: Task, *, progress: bool | None = False, start: Best | None = None) -> Fit:
+def fitted(task: Task, *, progress: bool | None = False, intervals: bool = True) -> Fit:
     """Return the fit of a task.
 
     Parameters
@@ -406,8 +406,8 @@ def fitted(task: Task, *, progress: bool | None = False, start: Best | None = No
         From `task_of`.
     progress : bool or None
         As in `fit`.
-    start : Best, optional
-        Where to keep the best point, for a caller that wants it after an interrupt.
+    intervals : bool
+        Whether to find out how sure the parameters are, which takes as long as a local search.
 
     Returns
     -------
@@ -420,7 +420,7 @@ def fitted(task: Task, *, progress: bool | None = False, start: Best | None = No
         If no proposal could be run.
     """
     began, stopped = time.perf_counter(), ""
-    coarse, fine = Best() if start is None else start, Best()
+    coarse, fine = Best(), Best()
     with Pool() as pool:
         try:
             with bar("fit", progress) as told:
@@ -439,7 +439,11 @@ def fitted(task: Task, *, progress: bool | None = False, start: Best | None = No
         point = task.fine.at(coarse.point.u) if fine.point is None else fine.point
         final, point = _settled(task, point)
         try:
-            final, point, table = _assessed(final, point, pool, again=0 if stopped else AGAIN)
+            if intervals:
+                again = 0 if stopped else AGAIN
+                final, point, table = _assessed(final, point, pool, again)
+            else:
+                table = unassessed(final, point)
         except KeyboardInterrupt:
             stopped, table = STOPPED_LATE, unassessed(final, point)
     silent = [each.name for each in table.table if each.note == NO_INFLUENCE]

@@ -13,10 +13,11 @@ from gms_fsm.charts.bouc_wen import BOUC_WEN
 from gms_fsm.charts.dahl import DAHL
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.charts.stribeck import Stribeck
+from gms_fsm.identification._task import Options
 from gms_fsm.identification.bank import initial_bank, stop_operators, thresholds
 from gms_fsm.identification.candidates import Start, gms
 from gms_fsm.identification.choose import choose
-from gms_fsm.identification.fit import fit
+from gms_fsm.identification.fit import fitted, task_of
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import ChartModel, LuGre
@@ -170,15 +171,7 @@ def _fitted(build: Callable[[Sequence[Record], float | None], Start]) -> Train:
         if before is not None and before.fit is not None:
             return _refined(few, smoothing, before.fit)
         start = build(few, smoothing)
-        found = fit(
-            few,
-            start.model,
-            free=start.free,
-            tied=start.tied,
-            bounds=start.bounds,
-            smoothing=smoothing,
-        )
-        return _predictor(found)
+        return _predictor(_fit(few, start, smoothing, "hops", None))
 
     return train
 
@@ -197,17 +190,27 @@ def _chosen(
 
 def _refined(records: Sequence[Record], smoothing: float | None, before: Fit) -> Predictor:
     given = before.task.options
-    found = fit(
-        records,
-        before.model,
-        free=given.free,
-        tied=given.tied,
-        bounds=given.bounds,
+    start = Start(before.model, given.free, given.tied, given.bounds)
+    return _predictor(_fit(records, start, smoothing, "local", before.begin))
+
+
+def _fit(
+    records: Sequence[Record],
+    start: Start,
+    smoothing: float | None,
+    search: str,
+    begin: str | None,
+) -> Fit:
+    """Fit without intervals, which predictions do not need."""
+    options = Options(
+        free=start.free,
+        tied=start.tied,
+        bounds=start.bounds,
         smoothing=smoothing,
-        search="local",
-        begin="relaxed" if before.begin == "relaxed" else "run in",
+        search=search,
+        begin=begin,
     )
-    return _predictor(found)
+    return fitted(task_of(records, start.model, {}, options), intervals=False)
 
 
 def _predictor(found: Fit) -> Predictor:
