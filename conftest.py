@@ -11,6 +11,7 @@ if not importlib.util.find_spec("textual"):
 # The examples compile (extra: fast).
 if not importlib.util.find_spec("llvmlite"):
     collect_ignore += ["integrators/machine_code/objects.py"]
+    collect_ignore += [f"gms_fsm/identification/{name}.py" for name in ("choose", "fit")]
 # Adapters' examples and whole runs use the library that is served (extras of the same names).
 collect_ignore += [
     path

@@ -12,6 +12,8 @@ from gms_fsm import GMSError, ParameterError, Record, RecordError, choose, initi
 from gms_fsm.identification.bank import stop_operators
 from gms_fsm.identification.candidates import Candidate, Start
 
+pytest.importorskip("llvmlite", reason="fits take long without machine code")
+
 T = np.linspace(0.0, 12.0, 601)
 X = 1e-3 * np.sin(2.0 * np.pi * T / 2.0)
 F = stop_operators(X, [2e-4]) @ [5e3]

@@ -29,6 +29,8 @@ from gms_fsm.identification.choose import period_of
 from gms_fsm.systems.models import Model
 from tests.helpers import FASTEST
 
+pytest.importorskip("llvmlite", reason="fits take long without machine code")
+
 PERIOD, CYCLES, NOISE = 2.0, 6, 0.01
 KINDS = [
     Candidate("plain", "", partial(gms, n=1)),

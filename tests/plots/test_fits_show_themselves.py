@@ -11,6 +11,8 @@ import pytest
 from plots import notebook
 from tests.identification.fits_made import small, with_table
 
+pytest.importorskip("llvmlite", reason="fits take long without machine code")
+
 
 def test_the_table_the_scores_and_the_picture() -> None:
     pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
