@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import GMSError, ParameterError, Record, RecordError, fit
+from gms_fsm import GMSError, ParameterError, Record, RecordError
 from gms_fsm.app.reportcard import datasets, make, page, scored, write
 from gms_fsm.app.reportcard.datasets import DataSet, Split, data_set
 from gms_fsm.app.reportcard.methods import METHODS, Method, Predictor
 from gms_fsm.identification.bank import stop_operators
+from gms_fsm.identification.fit import fitted
 from tests.scenario_files import CommandLine, data_folder
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
@@ -96,10 +97,11 @@ def test_interrupted_it_keeps_what_is_complete(tmp_path: Path) -> None:
 
 
 def test_a_fit_that_was_interrupted_is_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*arguments: Any, **given: Any) -> Any:
-        return replace(fit(*arguments, **{**given, "search": "local"}), stopped="interrupted")
+    def interrupted(task: Any, **_: Any) -> Any:
+        local = replace(task, options=replace(task.options, search="local"))
+        return replace(fitted(local, intervals=False), stopped="interrupted")
 
-    monkeypatch.setattr("gms_fsm.app.reportcard.methods.fit", interrupted)
+    monkeypatch.setattr("gms_fsm.app.reportcard.methods.fitted", interrupted)
     card = make(Path(), data=[SMALL], methods=[constant(0.0), of_card("GMS 1")])
     assert not card.complete
     assert [row.model for row in card.sections[0].rows] == ["other", "constant 0"]
