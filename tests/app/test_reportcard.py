@@ -172,8 +172,15 @@ def test_missing_data_are_said_first(gms_fsm: CommandLine) -> None:
     assert gms_fsm("reportcard", "--score", "none.json").code == 2
 
 
-def test_the_tribometer_is_scored_from_the_command_line(gms_fsm: CommandLine) -> None:
-    folder = data_folder()
+@pytest.fixture
+def tribometer_folder() -> Path:
+    return data_folder()
+
+
+def test_the_tribometer_is_scored_from_the_command_line(
+    tribometer_folder: Path, gms_fsm: CommandLine
+) -> None:
+    folder = tribometer_folder  # found before the command line forgets where
     (split,) = data_set("tribometer").splits(folder)
     (held,) = split.held
     forces = held.columns["force"][held.chosen] + 0.1

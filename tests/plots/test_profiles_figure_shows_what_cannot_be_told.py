@@ -14,7 +14,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.identification._profile import LIMIT
 from plots.figures import profiles_figure
 from plots.presets import SCREEN
-from tests.identification.fits_made import small, two_records, with_profiles
+from tests.identification.fits_made import two_records, with_profiles
 from tests.plots.printed import drawn_texts, problems
 
 
@@ -57,13 +57,17 @@ def test_dots_are_those_of_the_profile() -> None:
 
 
 def test_a_better_fit_and_the_fitted_value_are_inside() -> None:
-    """The small fit ends in a wrong place: the walk met lower costs, far from its value."""
-    for ax, each in zip(panels(profiles_figure(small())), small().open_profiles, strict=True):
-        low, high = ax.get_ylim()
-        assert low < each.rise.min() < -LIMIT
-        assert LIMIT < high <= 2.0 * LIMIT
-        left, right = ax.get_xlim()
-        assert left < drawn(ax, "fitted value").get_xdata()[0] < right
+    """Where the walk met lower costs, and the search from there found nothing."""
+    found = with_profiles(1)
+    (given,) = found.open_profiles
+    lower = replace(given, rise=given.rise - 20.0)
+    found = replace(found, assessed=replace(found.assessed, open_profiles=(lower,)))
+    (ax,) = panels(profiles_figure(found))
+    low, high = ax.get_ylim()
+    assert low < lower.rise.min() < -LIMIT
+    assert LIMIT < high <= 2.0 * LIMIT
+    left, right = ax.get_xlim()
+    assert left < drawn(ax, "fitted value").get_xdata()[0] < right
 
 
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (3, 3), (9, 3), (14, 4)])
