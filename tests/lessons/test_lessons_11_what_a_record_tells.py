@@ -42,13 +42,9 @@ def test_it_is_the_amplitude_and_not_the_start(amplitude: float, opened: tuple[s
     assert found.open == opened
 
 
-def test_a_failed_search_shows_in_the_residual() -> None:
-    """From too high a threshold the search does not find the way, though the element slips."""
-    record = lesson.recorded(lesson.sine(300e-6), 0.0, 1)
-    lost = lesson.fitted(record)
-    found = lesson.fitted(record, second=150e-6)
-    assert lost.open == ("weights2",)
-    assert lost.training["rmse"] > 5 * lesson.NOISE
+def test_a_start_without_slope_is_left_by_the_walk() -> None:
+    """From too high a threshold the element never slips, but the fit finds the way."""
+    found = lesson.fitted(lesson.recorded(lesson.sine(300e-6), 0.0, 1))
     assert found.open == ()
     assert found.training["rmse"] == pytest.approx(lesson.NOISE, rel=0.05)
     assert found["weights2"].low < lesson.TRUTH[3] < found["weights2"].high
