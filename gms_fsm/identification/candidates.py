@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.maxwell_slip import MAXWELL_SLIP
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.identification.bank import initial_bank
 from gms_fsm.records.record import Record
@@ -42,22 +43,13 @@ GAP = 0.1  # start of the half gap, as a share of the element's threshold
 STIFFNESS = Parameter("k", "N/m", "> 0", meaning="mean stiffness of the two directions")
 BIAS = Parameter("b", "N/m", meaning="stiffness added forward, taken away backward")
 
+# It switches as a Maxwell-slip element does; its threshold is a parameter of its own.
 STIFFER_ONE_WAY = Chart(
     name="Maxwell-slip element, stiffer one way",
-    inputs=("v",),
-    variables=("z",),
-    parameters=(STIFFNESS, BIAS, Parameter("r", "m", "> 0", meaning="threshold")),
-    states=(
-        State("stick", flow={"z": "v"}),
-        State("slip_forward", entry={"z": "r"}),
-        State("slip_backward", entry={"z": "-r"}),
-    ),
-    transitions=(
-        Transition("break_away_forward", "stick", "slip_forward", guard="z >= r and v > 0"),
-        Transition("break_away_backward", "stick", "slip_backward", guard="z <= -r and v < 0"),
-        Transition("turn_backward", "slip_forward", "stick", guard="v < 0"),
-        Transition("turn_forward", "slip_backward", "stick", guard="v > 0"),
-    ),
+    variables=MAXWELL_SLIP.variables,
+    parameters=(STIFFNESS, BIAS, Parameter("z_c", "m", "> 0", meaning="threshold")),
+    states=MAXWELL_SLIP.states,
+    transitions=MAXWELL_SLIP.transitions,
     outputs={"F": "k * z + b * abs(z)"},
     reference="chosen by us",
 )
@@ -244,12 +236,15 @@ def stiffer_one_way(records: Sequence[Record], smoothing: float | None, *, n: in
     """
     seen = _Seen.in_records(records, smoothing)
     bank = initial_bank(records, n, smoothing=smoothing)
-    r = bank.weights * bank.stribeck.F_c
-    model = ChartModel(STIFFER_ONE_WAY, {"k": bank.parameters.k, "b": np.zeros(n), "r": r}, n=n)
+    values = {
+        "k": bank.parameters.k,
+        "b": np.zeros(n),
+        "z_c": bank.weights * bank.stribeck.F_c,
+    }
     return Start(
-        model,
-        ("k", "b", "r", "sigma_2"),
-        bounds={"r": (FINEST * seen.travel, seen.travel)},
+        ChartModel(STIFFER_ONE_WAY, values, n=n),
+        ("k", "b", "z_c", "sigma_2"),
+        bounds={"z_c": (FINEST * seen.travel, seen.travel)},
     )
 
 

@@ -98,7 +98,7 @@ def choose(
     >>> force = stop_operators(x, [1e-4]) @ [1e4] + noise
     >>> record = Record.from_arrays(time=t, position=x, force=force)
     >>> banks = {n: stiffer_one_way([record], None, n=n).model for n in (1, 2)}
-    >>> kinds = {f"{n} springs": (bank, ["k", "r"]) for n, bank in banks.items()}
+    >>> kinds = {f"{n} springs": (bank, ["k", "z_c"]) for n, bank in banks.items()}
     >>> found = choose(record, candidates=kinds, cycles=2.5)
     >>> found.choice.chosen
     '1 springs'

@@ -71,7 +71,7 @@ def test_thresholds_rise_at_rest_by_rho(sign: float) -> None:
 
 
 def test_stiffer_one_way_is_a_bent_spring_behind_a_threshold() -> None:
-    model = ChartModel(STIFFER_ONE_WAY, {"k": 3.0, "b": -1.0, "r": 0.4})
+    model = ChartModel(STIFFER_ONE_WAY, {"k": 3.0, "b": -1.0, "z_c": 0.4})
     x, found = forces(model, TURNS)
     z = play(x, 0.4, 0.4)
     np.testing.assert_allclose(found, 3.0 * z - np.abs(z), atol=1e-6)
@@ -95,5 +95,5 @@ def test_a_closed_cycle_never_gives_energy(seed: int) -> None:
 @pytest.mark.parametrize("chart", [BEHIND_BACKLASH, STIFFER_ONE_WAY])
 def test_stiffnesses_are_solved_for_and_not_searched(chart: object) -> None:
     model = backlash() if chart is BEHIND_BACKLASH else None
-    model = model or ChartModel(STIFFER_ONE_WAY, {"k": 3.0, "b": -1.0, "r": 0.4})
+    model = model or ChartModel(STIFFER_ONE_WAY, {"k": 3.0, "b": -1.0, "z_c": 0.4})
     assert linear_names(Subject(model)) == ("k", "b", "sigma_2")

@@ -24,15 +24,19 @@ def _record(**given: Any) -> Record:
     return measured(TRUTH, sine(3e-4, 2.0, 5.0), 0.01, 0, **given)
 
 
-@pytest.mark.parametrize("bounds", [{}, {"r1": (2e-5, 2e-4), "r2": (2e-5, 1.1e-4)}])
+@pytest.mark.parametrize("bounds", [{}, {"z_c1": (2e-5, 2e-4), "z_c2": (2e-5, 1.1e-4)}])
 def test_elements_are_in_the_order_of_their_thresholds_unless_bounds_name_them(
     bounds: dict[str, tuple[float, float]],
 ) -> None:
-    values: Any = {"k": [5e3, 2e4], "b": [0.0, 0.0], "r": [1.1e-4, 5e-5]}
+    values: Any = {"k": [5e3, 2e4], "b": [0.0, 0.0], "z_c": [1.1e-4, 5e-5]}
     found = fit(
-        _record(), ChartModel(STIFFER_ONE_WAY, values, n=2), free=["k", "r"], bounds=bounds, **LOCAL
+        _record(),
+        ChartModel(STIFFER_ONE_WAY, values, n=2),
+        free=["k", "z_c"],
+        bounds=bounds,
+        **LOCAL,
     )
-    thresholds = [found["r1"].value, found["r2"].value]
+    thresholds = [found["z_c1"].value, found["z_c2"].value]
     assert thresholds == sorted(thresholds, reverse=bool(bounds))
     stiff = "k2" if bounds else "k1"
     assert found[stiff].value == pytest.approx(2e4, rel=0.2)
