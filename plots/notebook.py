@@ -19,7 +19,7 @@ import numpy as np
 from gms_fsm._display import Form
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import GMSError, MissingExtraError, OutputError
-from gms_fsm.identification.report import model_title, scores_text
+from gms_fsm.identification.report import scores_text
 from gms_fsm.inspection._findings import Finding, Report
 from gms_fsm.inspection._results import BranchComparison, Here
 from gms_fsm.inspection.explain import Explanation, Why
@@ -194,7 +194,7 @@ def fit_html(fit: Fit) -> str:
     words = table(
         ["parameter", "value", "95 % interval", "unit", "note"],
         ([each.name, *each.shown, each.unit, each.note] for each in fit.table),
-        caption=f"{model_title(fit)}: {scores_text(fit)}",
+        caption=f"{fit.title}: {scores_text(fit)}",
         more=fit.weakest,
     )
     picture = fit_png(fit)

@@ -12,7 +12,6 @@ from gms_fsm._records import Table
 from gms_fsm.systems._file import FileTable, SystemFile, save_as
 from gms_fsm.systems._record import SignalField, signal_table
 from gms_fsm.systems.signals import Corners, Signal
-from gms_fsm.systems.system import System
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
@@ -67,7 +66,7 @@ def save(fit: Fit, path: Path) -> Path:
         start.system,
         path,
         signals=signals,
-        title=f"{_name(fit)} fitted to {fit.records[0].name}",
+        title=f"{fit.title} fitted to {fit.records[0].name}",
         notes=f"{_terms(fit)}{fit.weakest}",
         run=Times(t_start=start.t_start, t_end=start.t_end),
     )
@@ -92,8 +91,3 @@ def _terms(fit: Fit) -> str:
     terms = (each for each in fit.table if each.name in fit.nuisance)
     found = ", ".join(f"{each.name} {each.value:.6g} {each.unit}" for each in terms)
     return f"Without terms of the measurement that were fitted besides: {found}. " * bool(found)
-
-
-def _name(fit: Fit) -> str:
-    what = fit.model
-    return what.name if isinstance(what, System) else what.title

@@ -79,6 +79,11 @@ class Subject:
         return Subject(with_values(self.what, values))
 
     @property
+    def title(self) -> str:
+        """The model's title, or the system's name."""
+        return self.what.name if isinstance(self.what, System) else self.what.title
+
+    @property
     def contacts(self) -> tuple[Model | Contact, ...]:
         """What has elements."""
         return self.what.contacts if isinstance(self.what, System) else (self.what,)

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
 
 __all__ = [
-    "model_title",
     "report_files",
     "report_folder",
     "scores_text",
@@ -120,23 +119,6 @@ def report_files() -> list[str]:
     return [PAGE, *drawn, PARAMETERS, RESIDUALS, FITTED, MOTION]
 
 
-def model_title(fit: Fit) -> str:
-    """Return the title of the model of a fit, or the name of its system.
-
-    Parameters
-    ----------
-    fit : Fit
-        The fit.
-
-    Returns
-    -------
-    str
-        One line.
-    """
-    title: str = getattr(fit.model, "title", "") or getattr(fit.model, "name", "")
-    return title
-
-
 def scores_text(fit: Fit) -> str:
     """Return the scores of a fit in one line: training, held out, repeatability.
 
@@ -232,7 +214,7 @@ def _head(fit: Fit) -> list[str]:
     names = ", ".join(each.name for each in fit.records[:3])
     more = len(fit.records) - 3
     names += f" and {more} more" if more > 0 else ""
-    lines = [f"# {plain(model_title(fit))}, fitted to {plain(names)}"]
+    lines = [f"# {plain(fit.title)}, fitted to {plain(names)}"]
     if fit.stopped:
         lines += ["", f"**{plain(fit.stopped)}**"]
     return lines

@@ -101,6 +101,11 @@ class Fit:
         return self.task.subject.what
 
     @property
+    def title(self) -> str:
+        """The title of the model, or the name of the system."""
+        return self.task.subject.title
+
+    @property
     def table(self) -> tuple[Estimate, ...]:
         """One row per parameter: value, 95 % interval, unit, and whether it can be told."""
         return self.assessed.table
@@ -449,8 +454,8 @@ class Fit:
             names = []
         for each in fits:
             checked_kind("others", each, Fit, "fits, from fit(...)")
-        names = names or [f"{i}: {_title(each)}" for i, each in enumerate(fits, start=2)]
-        every = dict(zip([f"1: {_title(self)}", *names], [self, *fits], strict=True))
+        names = names or [f"{i}: {each.title}" for i, each in enumerate(fits, start=2)]
+        every = dict(zip([f"1: {self.title}", *names], [self, *fits], strict=True))
         for name, each in every.items():
             if not np.array_equal(each.task.fine.target, self.task.fine.target):
                 raise ParameterError(
@@ -530,7 +535,7 @@ class Fit:
     def __repr__(self) -> str:
         opened = f"; {len(self.open)} cannot be told" if self.open else ""
         return (
-            f"<Fit: {_title(self)}, {len(self.table)} parameters, training RMSE "
+            f"<Fit: {self.title}, {len(self.table)} parameters, training RMSE "
             f"{self.training['rmse']:.4g} {self.task.measured.unit}{opened}>"
         )
 
@@ -552,11 +557,6 @@ class Fit:
             count = len(self.choice.rows)
             lines += [f"chosen among {count} candidates: {self.choice.chosen}", *failed]
         return "\n".join([*lines, self.stopped] if self.stopped else lines)
-
-
-def _title(fit: Fit) -> str:
-    what = fit.model
-    return what.name if isinstance(what, System) else what.title
 
 
 def _scored(name: str, score: Mapping[str, float], unit: str) -> str:

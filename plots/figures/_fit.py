@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from gms_fsm._arguments import checked_kind
 from gms_fsm.errors import ParameterError
-from gms_fsm.identification.report import model_title
 from plots._matplotlib import Axes, Figure, rc_context
 from plots._window import Window
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
@@ -174,7 +173,7 @@ def _checked_window(shown: Residuals, window: Any) -> Window:
 
 def _title(fit: Fit, chosen: Residuals, count: int, which: int | None) -> str:
     others = "" if count == 1 else f" ({'worst ' if which is None else ''}of {count} records)"
-    return f"{model_title(fit)}, fitted to {chosen.record.name}{others}"
+    return f"{fit.title}, fitted to {chosen.record.name}{others}"
 
 
 def _score_name(chosen: Residuals, unit: str) -> str:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from gms_fsm._arguments import checked_kind
 from gms_fsm.errors import ParameterError
 from gms_fsm.identification._profile import LIMIT, Profile
-from gms_fsm.identification.report import model_title
 from plots._matplotlib import Axes, Figure, MaxNLocator, NullLocator, rc_context
 from plots.figures._layout import fitted, legend_below, sheet
 from plots.figures._parts import letter_panels
@@ -88,7 +87,7 @@ def profiles_figure(fit: Fit) -> Figure:
 def _title(fit: Fit, shown: int) -> str:
     count = len(fit.open_profiles)
     left_out = f" (the first {shown} of {count})" if shown < count else ""
-    return f"{model_title(fit)}: what cannot be told{left_out}"
+    return f"{fit.title}: what cannot be told{left_out}"
 
 
 def _panel(ax: Axes, profile: Profile, value: float) -> None:
