@@ -81,7 +81,6 @@ def _searched_again(
     best = Best()
     best.take([refine(experiment, start, 1e-3, pool=pool)])
     if restarts:
-        best.take([experiment.at(experiment.coordinates.start)])
         hops(experiment, seed, best, pool, many=RESTARTS, spread=0)
     return best.point
 

@@ -143,8 +143,6 @@ class Course:
         Times and velocities before the first row: the run-in; empty without one.
     budget : int
         Steps a run may take.
-    driven : bool
-        Whether the record drives the model; a system with its own signals takes only its times.
     """
 
     record: Record
@@ -170,7 +168,7 @@ class Course:
         return np.gradient(self.v, self.t)
 
     def thinned(self, every: int) -> Course:
-        """Return the same course with every so-manieth row only."""
+        """Return the same course with every n-th row only."""
         if every <= 1:
             return self
         kept = slice(None, None, every)

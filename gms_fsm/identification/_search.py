@@ -8,7 +8,7 @@ a break-away near a reversal appears, so that one local search often stays in th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -43,12 +43,10 @@ class Best:
 
     told: Callable[[float], object] = float  # which does nothing else
     point: Point | None = None
-    costs: list[float] = field(default_factory=list)
 
     def take(self, points: Iterable[Point]) -> None:
         """Keep the best; at equal cost the first."""
         for point in points:
-            self.costs.append(point.cost)
             if point.lost is None and (self.point is None or point.cost < self.point.cost):
                 self.point = point
 
