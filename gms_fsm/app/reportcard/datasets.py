@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError
+from gms_fsm.identification._compared import score_of
 from gms_fsm.records import damper, tribometer
 from gms_fsm.records.record import Record
 
@@ -172,18 +173,15 @@ def score(held: Mapping[str, Record], forces: Mapping[str, FloatArray]) -> dict[
     RecordError
         If a record without forces, or with another number of them, is scored.
     """
-    errors, measured, by_record = [], [], {}
+    modelled, measured, by_record = [], [], {}
     for name, force in forces.items():
         target = held[name].columns["force"][held[name].chosen]
         if force.shape != target.shape:
             raise RecordError(
                 f"{force.size} forces for {target.size} held-out rows", place=held[name].place
             )
-        errors.append(force - target)
+        modelled.append(force)
         measured.append(target)
-        by_record[name] = float(np.sqrt(np.mean(errors[-1] ** 2)))
-    error, target = np.concatenate(errors), np.concatenate(measured)
-    rmse = float(np.sqrt(np.mean(error**2)))
-    about = float(np.sum((target - target.mean()) ** 2))
-    r2 = 1.0 - float(error @ error) / about if about else float("nan")
-    return {"rmse": rmse, "r2": r2, "rows": int(error.size), "by_record": by_record}
+        by_record[name] = score_of(target, force)["rmse"]
+    whole = score_of(np.concatenate(measured), np.concatenate(modelled))
+    return {**whole, "by_record": by_record}

@@ -100,8 +100,8 @@ def table(rows: Sequence[Row]) -> str:
         "|---|--:|--:|--:|--:|--:|---|",
     ]
     lines += [
-        f"| {row.model} | {_number(row.free, 'd')} | {_number(row.train_rmse, '.4g')} "
-        f"| {_number(row.rmse, '.4g')} | {_number(row.r2, '.5f')} | {_number(row.seconds, '.1f')} "
+        f"| {row.model} | {_number(row.free, 'd')} | {_force(row.train_rmse)} "
+        f"| {_force(row.rmse)} | {_number(row.r2, '.5f')} | {_number(row.seconds, '.1f')} "
         f"| {row.note} |"
         for row in rows
     ]
@@ -118,6 +118,10 @@ def _by_record(rows: Sequence[Row], records: Sequence[str]) -> str:
         if row.by_record
     ]
     return "\n".join(lines)
+
+
+def _force(value: float | None) -> str:
+    return _number(value, ".0f" if value is not None and value >= 1e4 else ".4g")
 
 
 def _number(value: float | None, form: str) -> str:

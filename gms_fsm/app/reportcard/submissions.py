@@ -77,7 +77,7 @@ def scored(path: Path, folder: Path) -> Row:
                 advice=f"held out is {data.held_out}; give one force for each such row, or rows",
             )
     scores: Any = score(left, arrays)
-    note = "" if not wanted else f"{scores['rows']} rows"
+    note = "" if not wanted else f"{scores['rows']:.0f} rows"
     return Row(
         given["name"],
         rmse=scores["rmse"],
