@@ -28,6 +28,7 @@ from gms_fsm.identification._unknowns import Subject, unknowns_of
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, Start
 from gms_fsm.identification.fit import check_model, fitted, options_of, task_of, window_of
 from gms_fsm.identification.result import Choice, ChoiceRow, Fit
+from gms_fsm.records._parts import only, thinned
 from gms_fsm.records.record import Record
 
 __all__ = ["choose", "period_of"]
@@ -119,7 +120,8 @@ def choose(
     )
     tried = _checked_candidates(candidates)
     seen = [_training_rows(record, common) for record in every]
-    folds = _folds([_few(each, len(seen)) for each in seen], fold, common)
+    enough = max(FEWEST_ROWS, ROWS // len(seen))
+    folds = _folds([thinned(each, enough) for each in seen], fold, common)
     began = time.perf_counter()
     results: list[_Tried] = []
     rows: list[ChoiceRow] = []
@@ -238,14 +240,6 @@ def _training_rows(record: Record, options: Options) -> Record:
     return replace(record, columns=columns, chosen=chosen[:last], rows=record.rows[:last])
 
 
-def _few(record: Record, among: int) -> Record:
-    """Return a record, up to its last training row, in few rows."""
-    every = max(1, len(record) // max(FEWEST_ROWS, ROWS // among))
-    kept = slice(None, None, every)
-    columns = {name: values[kept] for name, values in record.columns.items()}
-    return replace(record, columns=columns, chosen=record.chosen[kept], rows=record.rows[kept])
-
-
 @dataclass(frozen=True, eq=False)
 class _Folds:
     """What is fitted to and what is left out, in few rows.
@@ -285,21 +279,17 @@ def _folds(records: Sequence[Record], fold: Any, options: Options) -> _Folds:
         tuple(
             (
                 tuple(
-                    _only(record, block % count != i)
+                    only(record, block % count != i)
                     for record, block in zip(every, blocks, strict=True)
                 ),
                 tuple(
-                    _only(record, block % count == i)
+                    only(record, block % count == i)
                     for record, block in zip(every, blocks, strict=True)
                 ),
             )
             for i in range(count)
         ),
     )
-
-
-def _only(record: Record, rows: Any) -> Record:
-    return replace(record, chosen=record.chosen & rows)
 
 
 def _blocks(record: Record, cycles: float | None) -> Any:

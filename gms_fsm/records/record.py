@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -19,6 +19,7 @@ from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import RecordError, cut, shown
 from gms_fsm.records._columns import QUANTITIES, Column, ColumnLike, columns_of
+from gms_fsm.records._parts import some_rows
 from gms_fsm.records._selection import FEWEST, Origin, selected
 from gms_fsm.records._table import TextFormat, read_cells
 from gms_fsm.records._written import write_csv
@@ -149,12 +150,7 @@ class Record:
                 advice=f"at least {FEWEST} are needed; the record is from {time.min():g} s to "
                 f"{time.max():g} s",
             )
-        return replace(
-            self,
-            columns={name: _fixed(value[kept]) for name, value in self.columns.items()},
-            chosen=_fixed(self.chosen[kept]),
-            rows=_fixed(self.rows[kept]),
-        )
+        return some_rows(self, kept)
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the record to a CSV file in SI units, for a rig or another program.
@@ -417,11 +413,6 @@ class Record:
             raise RecordError("time is empty", place=origin.place, advice="give some rows")
         part = selected(origin, values, np.arange(size), {}, where, missing)
         return cls(name, part.columns, part.chosen, part.rows, tuple(part.notes))
-
-
-def _fixed(array: Any) -> Any:
-    array.flags.writeable = False
-    return array
 
 
 def _numbers(place: str, quantity: str, given: Any) -> FloatArray:

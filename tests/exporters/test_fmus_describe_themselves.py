@@ -28,6 +28,7 @@ from gms_fsm.systems.models import ChartModel
 
 PAPER = GMS(GMSParameters.paper("stick-slip"), law="signed")
 FORMATS = ("fmu2", "fmu3")
+pytestmark = pytest.mark.slow
 SERVO = Path(__file__).parents[2] / "scenarios" / "servo.toml"
 
 

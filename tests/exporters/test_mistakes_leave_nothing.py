@@ -41,7 +41,11 @@ F = "k * z"
 name = "on"
 flow.z = "v"
 """
-FORMATS = [*EXPORTERS, "states"]
+COMPILED = ("fmu2", "fmu3")  # an archive of these takes seconds
+FORMATS = [
+    pytest.param(name, marks=[pytest.mark.slow] if name in COMPILED else [])
+    for name in (*EXPORTERS, "states")
+]
 GMS_MODEL = GMS(GMSParameters.paper("stick-slip"), law="signed")
 LINUX = pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no /proc")
 
@@ -181,7 +185,7 @@ def test_a_name_that_is_no_identifier(form: str, name: str, tmp_path: Path) -> N
     assert repr(name) in refused(tmp_path, GMS_MODEL, form, tmp_path / "out", name=name)
 
 
-@pytest.mark.parametrize("form", [form for form in FORMATS if form != "states"])
+@pytest.mark.parametrize("form", FORMATS[:-1])
 def test_a_word_of_the_language_as_chart_or_parameter(form: str, tmp_path: Path) -> None:
     words = words_for_charts(form)
     for word in words:

@@ -26,6 +26,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "law"), CASES)
 @pytest.mark.filterwarnings("ignore:published law")
 def test_force_is_affine_in_them(name: str, law: str) -> None:

@@ -12,6 +12,8 @@ from gms_fsm.app.scenario import load_scenario
 from gms_fsm.identification import _saved
 from tests.identification.fits_made import small
 
+pytest.importorskip("llvmlite", reason="fits take long without machine code")
+
 
 @pytest.fixture
 def saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

@@ -18,6 +18,8 @@ from gms_fsm.identification.report import report_files, write_report
 from gms_fsm.identification.result import Choice, ChoiceRow
 from tests.identification.fits_made import small, two_records, with_profiles, with_table
 
+pytest.importorskip("llvmlite", reason="fits take long without machine code")
+
 FILES = {"report.md", "parameters.csv", "residuals.csv", "fitted.toml"}
 
 

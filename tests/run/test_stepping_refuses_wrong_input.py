@@ -205,7 +205,7 @@ def test_a_joint_of_a_bank_that_fails() -> None:
         bank.advance([0.1, 0.01, 1.0], [0.1, 0.01, 9.0], 5.0)
 
 
-@pytest.mark.parametrize("engine", ["ifelse", None])
+@pytest.mark.parametrize("engine", [pytest.param("ifelse", marks=pytest.mark.slow), None])
 def test_what_the_last_sample_found_survives_a_failure(engine: str | None) -> None:
     k = np.linspace(40.0, 10.0, 100)  # more elements than the log of a sample has places
     stribeck = Stribeck(1.0, 1.5, 0.05)

@@ -12,7 +12,8 @@ CASES = {
     "pulled mass": (*pulled_mass(), 20.0),
     "fig. 3, slipping": (*non_drifting("signed", slipping=True), 10.0),
 }
-METHODS = [{}, {"method": "bs23"}, {"method": "rk4", "step": 2.03e-3}]
+MANY_STEPS = pytest.param({"method": "rk4", "step": 2.03e-3}, marks=pytest.mark.slow)
+METHODS = [{}, {"method": "bs23"}, MANY_STEPS]
 cases = pytest.mark.parametrize("case", CASES)
 
 

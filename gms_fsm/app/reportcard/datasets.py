@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError
 from gms_fsm.identification._compared import score_of
 from gms_fsm.records import damper, tribometer
+from gms_fsm.records._parts import only
 from gms_fsm.records.record import Record
 
 __all__ = ["DATA_SETS", "DataSet", "Split", "data_set", "held_rows", "score"]
@@ -66,17 +66,13 @@ def _tribometer(folder: Path) -> tuple[Split, ...]:
     record = tribometer(folder)
     t = record.columns["time"]
     return (
-        Split((_only(record, (t >= TRAIN[0]) & (t < TRAIN[1])),), (_only(record, t >= TRAIN[1]),)),
+        Split((only(record, (t >= TRAIN[0]) & (t < TRAIN[1])),), (only(record, t >= TRAIN[1]),)),
     )
 
 
 def _damper(folder: Path) -> tuple[Split, ...]:
     every = tuple(damper(folder / "damper" if (folder / "damper").is_dir() else folder))
     return tuple(Split(every[:i] + every[i + 1 :], (each,)) for i, each in enumerate(every))
-
-
-def _only(record: Record, rows: NDArray[np.bool_]) -> Record:
-    return replace(record, chosen=record.chosen & rows)
 
 
 # RMSE of the predictions that the authors stored with their data, on the full rate.

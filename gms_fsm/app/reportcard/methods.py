@@ -19,6 +19,7 @@ from gms_fsm.identification.candidates import Start, gms
 from gms_fsm.identification.choose import choose
 from gms_fsm.identification.fit import fitted, task_of
 from gms_fsm.identification.result import Fit
+from gms_fsm.records._parts import thinned
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import ChartModel, LuGre
 
@@ -223,14 +224,7 @@ def _few(records: Sequence[Record]) -> list[Record]:
     """Return several records in fewer rows; one record as it is."""
     if len(records) == 1:
         return list(records)
-    found = []
-    for record in records:
-        kept = slice(None, None, max(1, len(record) // FEW))
-        columns = {name: values[kept] for name, values in record.columns.items()}
-        found.append(
-            replace(record, columns=columns, chosen=record.chosen[kept], rows=record.rows[kept])
-        )
-    return found
+    return [thinned(record, FEW) for record in records]
 
 
 BOTH = ("tribometer", "damper")

@@ -1,0 +1,72 @@
+"""Parts of records: fewer rows, or the same rows of which fewer are selected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from gms_fsm.records.record import Record
+
+__all__ = ["only", "some_rows", "thinned"]
+
+
+def some_rows(record: Record, rows: NDArray[np.bool_] | slice) -> Record:
+    """Return a record with some of its rows.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    rows : ndarray of bool or slice
+        Which.
+
+    Returns
+    -------
+    Record
+        With read-only columns, and the same name and notes.
+    """
+    columns = {name: values[rows] for name, values in record.columns.items()}
+    found = replace(record, columns=columns, chosen=record.chosen[rows], rows=record.rows[rows])
+    for array in (*columns.values(), found.chosen, found.rows):
+        array.flags.writeable = False
+    return found
+
+
+def thinned(record: Record, rows: int) -> Record:
+    """Return every n-th row of a record, so that about as many are left as asked for.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    rows : int
+        At least as many, and less than twice as many, if it has them.
+
+    Returns
+    -------
+    Record
+        From the first row on.
+    """
+    return some_rows(record, slice(None, None, max(1, len(record) // rows)))
+
+
+def only(record: Record, rows: NDArray[np.bool_]) -> Record:
+    """Return a record of which no other rows are selected; its motion is that of all of them.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    rows : ndarray of bool, shape (rows,)
+        Which may stay selected.
+
+    Returns
+    -------
+    Record
+        With the same rows.
+    """
+    return replace(record, chosen=record.chosen & rows)
