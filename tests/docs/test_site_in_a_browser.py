@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.docs.conftest import Built
-from tests.helpers import ROOT
+from tests.helpers import ROOT, matrix
 from tests.plots.browser import Axe, Browser, Page, browser, expect
 
 __all__ = ["browser"]
@@ -210,7 +210,7 @@ def test_axe_finds_no_accessibility_problem(
     assert [(v["id"], [n["target"] for n in v["nodes"]][:3]) for v in found] == []
 
 
-@pytest.mark.parametrize("width", SIZES)
+@pytest.mark.parametrize("width", matrix(list(SIZES), [400, 1366]))
 def test_nothing_is_wider_than_the_screen(visit: Visit, width: int) -> None:
     for name in (*PAGES, "zoo/lugre.html"):
         page = visit(name, width)

@@ -14,14 +14,16 @@ import pytest
 from gms_fsm.app.lessons import LESSONS
 from gms_fsm.app.lessons.notebooks import composed
 from gms_fsm.app.lessons.predict import reveal, vary
-from tests.helpers import ROOT
+from tests.helpers import ROOT, matrix
 from tests.scenario_files import CommandLine
 
 FOLDER = ROOT / "docs" / "lessons"
 NOTEBOOKS = [*(f"lesson_{number}" for number in LESSONS), "desk_experiment"]
 # With ipywidgets, and nothing else of the extra docs, the site runs all lessons
 # (tests/docs/test_docs_build.py). Without it, `vary` draws once; one lesson has no slider.
-WITHOUT_SLIDERS = ["lesson_1", "lesson_4", "desk_experiment"]
+WITHOUT_SLIDERS = matrix(
+    ["lesson_1", "lesson_4", "desk_experiment"], ["lesson_1", "desk_experiment"]
+)
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 from collections.abc import Callable
@@ -19,7 +20,7 @@ from matplotlib.figure import Figure
 
 from plots import figures, panels
 from plots.mechanism import schematic_figure
-from tests.helpers import FIG4_SINE, ROOT, non_drifting, open_loop, pulled_mass, stick_slip
+from tests.helpers import FIG4_SINE, ROOT, matrix, non_drifting, open_loop, pulled_mass, stick_slip
 
 pytestmark = pytest.mark.slow
 
@@ -74,8 +75,10 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Trace]:
     return {name: make(folder) for name, make in RUNS.items()}
 
 
-@pytest.mark.parametrize("kind", FIGURES)
-@pytest.mark.parametrize("name", [name for name in RUNS if name != "Fig. 4, signed"])
+PAIRS = list(itertools.product([name for name in RUNS if name != "Fig. 4, signed"], FIGURES))
+
+
+@pytest.mark.parametrize(("name", "kind"), matrix(PAIRS, PAIRS[::3]))
 def test_every_figure(runs: dict[str, Trace], name: str, kind: str, tmp_path: Path) -> None:
     before = dict(matplotlib.rcParams)
     figure = FIGURES[kind](runs[name])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from gms_fsm import Prescribed, simulate
 from gms_fsm.inspection.explain import explain
 from plots.replay import write_replay
-from tests.helpers import bank
+from tests.helpers import bank, matrix
 from tests.plots.browser import SIZES, Open, browser, fig4, in_view, mass, open_page, pages
 
 __all__ = ["browser", "open_page", "pages"]
@@ -96,8 +97,10 @@ def test_every_row_has_the_truths_and_margins_of_the_run_bit_for_bit(
             ]
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", SIZES)
+VIEWS = list(itertools.product(SIZES, ["light", "dark"]))
+
+
+@pytest.mark.parametrize(("size", "scheme"), matrix(VIEWS, VIEWS[::3]))
 def test_what_fired_its_guard_and_the_cursor_are_in_view(
     open_page: Open, size: str, scheme: str
 ) -> None:
