@@ -152,16 +152,23 @@ class Fit:
 
     @cached_property
     def never_slipped(self) -> tuple[int, ...]:
-        """Elements, from 1, that never changed state in the training runs."""
-        switched: set[int] = set()
-        count = 0
+        """Elements, from 1, that keep their initial state from the first training row to the last.
+
+        Whatever a record does before these rows, in them such an element acts as a spring.
+        """
+        if not any(contact.chart.transitions for contact in self.task.subject.contacts):
+            return ()
+        kept: NDArray[np.bool_] = np.array(True)
         for course in self.task.courses:
             trace = self._ran(course)
-            firings = trace.firings
-            count = sum(contact.n for contact in self.task.subject.contacts)
-            switched |= {int(i) for i in np.unique(firings.machine)}
-        some = any(contact.chart.transitions for contact in self.task.subject.contacts)
-        return tuple(i + 1 for i in range(count) if some and i not in switched)
+            elements = trace.program.layout.elements
+            initial = self.task.fine.driver.start(self.task.subject, course).mode[elements]
+            same = (trace.rows.mode[course.rows, elements] == initial).all(axis=0)
+            first, last = course.t[course.rows][[0, -1]]
+            t = trace.firings.t
+            same[trace.firings.machine[(t > first) & (t <= last)]] = False
+            kept = kept & same
+        return tuple(int(i) + 1 for i in np.flatnonzero(kept))
 
     def _ran(self, course: Course) -> Trace:
         return self.task.fine.driver.run(self.task.subject, course).trace

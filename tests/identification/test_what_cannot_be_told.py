@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from gms_fsm import fit
+from gms_fsm import Record, fit
 from tests.identification.records import bank, measured, sine
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
@@ -19,6 +20,17 @@ def test_an_element_that_never_slips_shows_its_stiffness_only() -> None:
     assert found["k2"].low < 5e3 < found["k2"].high
     assert "weights2 cannot be told" in found.weakest
     assert any("without influence" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("rows", [(0.0, 8.0), (3.0, 8.0), (3.0, 6.0)])
+def test_slip_before_the_training_rows_does_not_count(rows: tuple[float, float]) -> None:
+    """One wide stroke, then narrow ones, in which the second element sticks."""
+    truth = bank([2e4, 5e3], [5e-5, 3e-4])
+    t = np.arange(800) * 0.01
+    x = np.where(t < 2.0, 1e-3, 1.5e-4) * np.sin(np.pi * t)
+    record = measured(truth, Record.from_arrays(time=t, position=x), 0.01, 1)
+    found = fit(record, truth, free=("k",), train=rows, search="local", begin="relaxed")
+    assert found.never_slipped == (() if rows[0] == 0.0 else (2,))
 
 
 def test_a_product_is_told_and_its_factors_are_not() -> None:
