@@ -309,10 +309,13 @@ class Driver:
         system that moves by itself.
     rtol : float
         Relative tolerance.
+    budgets : int
+        How many budgets of its course a run may take.
     """
 
     drive: str
     rtol: float
+    budgets: int
     _own: threading.local = field(default_factory=threading.local, repr=False)
 
     def run(self, subject: Subject, course: Course) -> Ran:
@@ -349,7 +352,7 @@ class Driver:
     def start(self, subject: Subject, course: Course) -> Start:
         """Return the start of a run along a course."""
         settings = Settings(
-            engine=engine(), rtol=self.rtol, t_eval=course.t, max_steps=course.budget
+            engine=engine(), rtol=self.rtol, t_eval=course.t, max_steps=course.budget * self.budgets
         )
         what: Any = subject.what
         rig = None
@@ -361,7 +364,7 @@ class Driver:
         return Start.of(what, rig, float(course.t[-1]), settings, t_start=float(first))
 
 
-def driver_of(subject: Subject, drive: str | None, rtol: float) -> Driver:
+def driver_of(subject: Subject, drive: str | None, rtol: float, budgets: int) -> Driver:
     """Return what runs a subject.
 
     Parameters
@@ -372,6 +375,8 @@ def driver_of(subject: Subject, drive: str | None, rtol: float) -> Driver:
         As the user gave it.
     rtol : float
         Relative tolerance.
+    budgets : int
+        As in `Driver`.
 
     Returns
     -------
@@ -392,7 +397,7 @@ def driver_of(subject: Subject, drive: str | None, rtol: float) -> Driver:
                 value=drive,
                 advice="leave it out; only a system has signals to choose from",
             )
-        return Driver("", rtol)
+        return Driver("", rtol, budgets)
     if drive is not None:
         if drive not in what.signals:
             raise ParameterError(
@@ -400,12 +405,12 @@ def driver_of(subject: Subject, drive: str | None, rtol: float) -> Driver:
                 place="drive",
                 advice=f"there are {', '.join(what.signals) or 'none'}",
             )
-        return Driver(drive, rtol)
+        return Driver(drive, rtol, budgets)
     driven = [each.velocity for each in what.bodies if each.driven]
     if not driven:
-        return Driver("", rtol)
+        return Driver("", rtol, budgets)
     if len(driven) == 1 and driven[0] in what.signals:
-        return Driver(str(driven[0]), rtol)
+        return Driver(str(driven[0]), rtol, budgets)
     raise ParameterError(
         "it cannot be told which signal the velocity of the record replaces",
         place="drive",

@@ -31,6 +31,9 @@ Window = tuple[float, float]
 COARSE_ROWS, FEWEST_ROWS = 3000, 300  # of all records together, and of each
 COARSE_RTOL, FINE_RTOL = 1e-6, 1e-9
 FINE_STEPS = (1e-3, 1e-4)
+# What ran in the search must run with all rows and the small tolerance, too: these runs are few,
+# and may take more steps.
+FINE_BUDGETS = 10
 DISTANT = 0.02  # relative: how much better the other beginning must be
 
 
@@ -120,7 +123,7 @@ class Task:
     @cached_property
     def fine(self) -> Experiment:
         """With all rows."""
-        return self._experiment(self.courses, FINE_RTOL)
+        return self._experiment(self.courses, FINE_RTOL, FINE_BUDGETS)
 
     @cached_property
     def coarse(self) -> Experiment:
@@ -131,13 +134,13 @@ class Task:
         """Return the experiment with few rows of some courses, which may have other values."""
         many = max(FEWEST_ROWS, COARSE_ROWS // len(courses))
         few = [each.thinned(max(1, int(each.rows.sum()) // many)) for each in courses]
-        return self._experiment(tuple(few), COARSE_RTOL)
+        return self._experiment(tuple(few), COARSE_RTOL, 1)
 
-    def _experiment(self, courses: tuple[Course, ...], rtol: float) -> Experiment:
+    def _experiment(self, courses: tuple[Course, ...], rtol: float, budgets: int) -> Experiment:
         given = self.options
         linear = (*given.linear, *(linear_names(self.subject) if self.measured.contact else ()))
         searched, solved = split_unknowns(self.unknowns, linear)
-        driver = driver_of(self.subject, given.drive, rtol)
+        driver = driver_of(self.subject, given.drive, rtol, budgets)
         names = tuple(each.name for each in self.unknowns)
         return Experiment(
             self.subject,

@@ -109,7 +109,8 @@ def fit(
     seed : int
         Of the perturbations; a fit with the same arguments gives the same result.
     most_steps : int, optional
-        Steps that one run may take, at least one; by default 60 per row, at least 200,000.
+        Steps that one run of the search may take, at least one; by default 60 per row, at least
+        200,000. The runs at the end, with smaller tolerances, may take ten times as many.
     smoothing : float, optional
         Time constant of the motion's smoothing spline, s; see `Record.motion`.
     begin : {"relaxed", "run in"}, optional
@@ -435,9 +436,13 @@ def fitted(task: Task, *, progress: bool | None = False, intervals: bool = True)
             if coarse.point is None:
                 raise
         if coarse.point is None:
-            raise _nothing_ran(task)
+            raise _nothing_ran(task.coarse.start_point().lost, "no proposal could be run")
         point = task.fine.at(coarse.point.u) if fine.point is None else fine.point
         final, point = _settled(task, point)
+        if point.lost is not None:
+            raise _nothing_ran(
+                point.lost, "the best proposal ran on few rows, and not on all of them"
+            )
         try:
             if intervals:
                 again = 0 if stopped else AGAIN
@@ -471,8 +476,10 @@ def _assessed(task: Task, point: Point, pool: Pool, again: int) -> tuple[Task, P
         task.polish(table.better.u, nearer, pool)
         if nearer.point is None or nearer.point is point:
             break
-        task, point = _settled(task, nearer.point)
-        table = assessed(task, point, pool)
+        moved, there = _settled(task, nearer.point)
+        if there.lost is not None:
+            break
+        task, point, table = moved, there, assessed(moved, there, pool)
     return task, point, table
 
 
@@ -483,11 +490,9 @@ def _settled(task: Task, point: Point) -> tuple[Task, Point]:
     return final, final.fine.at(final.fine.coordinates.start)
 
 
-def _nothing_ran(task: Task) -> GMSError:
-    lost = task.coarse.start_point().lost
-    why = "" if lost is None else f": {lost}"
+def _nothing_ran(lost: GMSError | None, what: str) -> GMSError:
     return ParameterError(
-        f"no proposal could be run{why}",
+        what if lost is None else f"{what}: {lost}",
         place="model",
         advice="give start values nearer to the truth, bounds, or a larger most_steps",
     )
