@@ -21,8 +21,8 @@ def some_rows(record: Record, rows: NDArray[np.bool_] | slice) -> Record:
     ----------
     record : Record
         The record.
-    rows : ndarray of bool or slice
-        Which.
+    rows : ndarray of bool, shape (rows,), or slice
+        Which of its rows.
 
     Returns
     -------

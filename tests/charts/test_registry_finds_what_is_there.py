@@ -85,7 +85,7 @@ def test_every_demonstration_runs_alike_on_two_engines(name: str, law: str) -> N
     runs = []
     for engine in ("machines", "ifelse"):
         try:
-            runs.append(simulate(*what, 4.0, engine=engine))
+            runs.append(simulate(*what, 8.0, engine=engine))
         except LivelockError as error:
             assert entry(name).wrong
             runs.append(error.trace)

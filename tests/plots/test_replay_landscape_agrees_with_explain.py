@@ -35,7 +35,7 @@ SHOWN = """([asked, far]) => asked.map(([row, element]) => {
 })"""
 
 
-@pytest.mark.parametrize(("size", "rows"), [("laptop", 200), ("phone", 100)])
+@pytest.mark.parametrize(("size", "rows"), [("laptop", 400), ("phone", 200)])
 @pytest.mark.parametrize("name", NAMES)
 def test_truths_at_random_rows(
     open_page: Open, tmp_path: Path, name: str, size: str, rows: int
