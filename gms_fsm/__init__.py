@@ -77,7 +77,9 @@ if TYPE_CHECKING:
     from gms_fsm.systems.system import System as System
     from gms_fsm.traces.failures import CallbackError as CallbackError
     from gms_fsm.traces.failures import LivelockError as LivelockError
+    from gms_fsm.traces.failures import LockError as LockError
     from gms_fsm.traces.failures import NotFiniteError as NotFiniteError
+    from gms_fsm.traces.failures import NotUniqueError as NotUniqueError
     from gms_fsm.traces.failures import SignalEndError as SignalEndError
     from gms_fsm.traces.failures import SimulationError as SimulationError
     from gms_fsm.traces.failures import StepLimitError as StepLimitError
@@ -113,8 +115,8 @@ _HOMES = {
     "systems.rigs": "Prescribed PulledSlider Rig Slider",
     "systems.signals": "Signal",
     "systems.system": "Body Contact Sampled System",
-    "traces.failures": "CallbackError LivelockError NotFiniteError SignalEndError SimulationError "
-    "StepLimitError StepSizeError",
+    "traces.failures": "CallbackError LivelockError LockError NotFiniteError NotUniqueError "
+    "SignalEndError SimulationError StepLimitError StepSizeError",
     "traces.trace": "Trace",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}

@@ -9,6 +9,7 @@ from integrators.hybrid import (
     MOST_SWITCHES,
     ROWS_AT_ONCE,
     Arc,
+    Entangled,
     Equations,
     Event,
     Firing,
@@ -16,6 +17,7 @@ from integrators.hybrid import (
     Livelock,
     NotFinite,
     Options,
+    Refused,
     Slide,
     StepTooSmall,
     Stop,
@@ -23,8 +25,19 @@ from integrators.hybrid import (
     TooManySteps,
     run,
 )
-from integrators.sliding import LIVE, Functions, Held, Surfaces, look, sliding_scratch, slope_on
+from integrators.jolts import JUMPED, LET_GO
+from integrators.sliding import (
+    LIVE,
+    Functions,
+    Held,
+    Surfaces,
+    arm_on,
+    look,
+    sliding_scratch,
+    slope_on,
+)
 from integrators.tableaux import BS23, DP45, EULER, HEUN, METHODS, RK4, Tableau
+from integrators.ticks import Ticks
 
 __all__ = [
     "BS23",
@@ -33,6 +46,8 @@ __all__ = [
     "FOR_A_GUARD",
     "FOR_A_SIGN",
     "HEUN",
+    "JUMPED",
+    "LET_GO",
     "LIVE",
     "METHODS",
     "MOST_SWITCHES",
@@ -40,6 +55,7 @@ __all__ = [
     "ROWS_AT_ONCE",
     "WAITING",
     "Arc",
+    "Entangled",
     "Equations",
     "Event",
     "Firing",
@@ -49,13 +65,16 @@ __all__ = [
     "Livelock",
     "NotFinite",
     "Options",
+    "Refused",
     "Slide",
     "StepTooSmall",
     "Stop",
     "Surfaces",
     "Switch",
     "Tableau",
+    "Ticks",
     "TooManySteps",
+    "arm_on",
     "look",
     "run",
     "sliding_scratch",

@@ -29,6 +29,7 @@ from integrators.step_size import (
 )
 from integrators.steps import (
     ERROR_BEFORE,
+    SEEN,
     T_STOP,
     Coefficients,
     Dense,
@@ -54,6 +55,12 @@ REDO = 0.9  # a crossing before this fraction of an adaptive step causes the ste
 ROUGH = 0.01  # of a step: width of the bracket that decides whether it is repeated
 SMALLEST = 1e-280  # of an absolute tolerance: smaller numbers lose precision
 AT_ONCE = 1e3  # ticks; a crossing closer than this is taken immediately
+# Error control alone lets what relaxes wander by its tolerance about where it tends to, at the edge
+# of stability. A guard that compares the two would be decided by chance. So the last steps before a
+# crossing are this many, of this length in relaxation times: each leaves a fifth of a deviation.
+CALM_STEPS = 8.0
+CALM = 2.0
+QUIET = 0.55  # what the controller remembers of a step with hardly an error
 # Significant difference of two times: four units in the last place, whatever the run's length.
 TICK = 4.0 * 2.0**-52
 # Indices into Output.cursor.
@@ -69,11 +76,14 @@ class Plan(NamedTuple):
     located: bool  # stop at crossings; otherwise evaluate guards once at the end of each step
     foreign: bool  # the caller takes the steps (the loop requests them)
     jumps: Vector  # times at which the flow jumps, increasing
-    before_jumps: Vector  # one clock tick before each
+    before_jumps: Vector  # one clock tick before each, where the system shows what is before
     ticks: list[int]  # what ticks at each jump, as bits
     discrete: list[int]  # for each machine the bit with which it is asked; 0: whenever it may fire
     knots: Vector  # times that steps may not jump over
+    relaxing: Vector  # relaxation times of the modes of each machine, one machine after another
     max_steps: int  # attempted steps in the whole run
+    impulses: list[int]  # for each edge: 1 if it is an impulse, 2 if it changes forces at once
+    leaps: bool  # whether velocities that are given may jump at a crossing
 
 
 class Output(NamedTuple):
@@ -136,6 +146,26 @@ def limit_after(plan: Plan, clock: Vector, cursor: list[int]) -> float:
     return min(clock[T_STOP], knot_after(plan, clock, cursor))
 
 
+def calm_step(plan: Plan, mode: list[int]) -> float:
+    """Return the length of steps before a crossing; infinity if nothing relaxes in these modes."""
+    fastest, relaxing = INFINITY, plan.relaxing
+    if len(relaxing) > 0:
+        modes = len(relaxing) // len(mode)
+        for i in range(len(mode)):
+            fastest = min(fastest, relaxing[i * modes + mode[i]])
+    return CALM * fastest
+
+
+def _is_ahead(w: Watched, steps: float) -> bool:
+    """Return whether a relation will change within this many more of the last step."""
+    ahead = False
+    for r in w.active:
+        g = w.end[r] + steps * (w.end[r] - w.start[r])
+        ahead = ahead or (g > w.above[r]) != w.truth[r]
+    return ahead
+
+
+# Long because a step is judged, searched and stored in one order, and calls cost time.
 def advance(
     motion: Motion,
     plan: Plan,
@@ -178,15 +208,15 @@ def advance(
     scaleless = False
     for j in range(len(y)):
         scaleless = scaleless or plan.control.atol[j] == 0.0
-    rejected = False
-    redone = False
+    calm = calm_step(plan, now.mode) if adaptive and watching else INFINITY
+    rejected = redone = False
     while True:
         t = clock[T]
         if t >= clock[T_STOP]:
             return REACHED
         if not (rejected or redone) and (most_steps <= 0 or is_full(out)):
             return FULL
-        t_new, tick = _next_end(plan, clock, cursor)
+        t_new, seen, tick = _next_end(plan, clock, cursor)
         if not t_new > t:
             return TOO_SMALL
         h = t_new - t
@@ -203,12 +233,18 @@ def advance(
         wanted = cursor[NEXT_TIME] < len(times) and times[cursor[NEXT_TIME]] < t_new
         theta = NO_CHANGE
         near = watching and not is_quiet_step(motion, now, t_new, scratch, w)
+        wanders = calm < INFINITY and not redone and clock[ERROR_BEFORE] > QUIET
+        if wanders and not near and _is_ahead(w, CALM_STEPS * calm / h):
+            if h - calm > AT_ONCE * tick:
+                clock[H] = calm
+                continue
+            clock[H] = min(clock[H], calm)
         if waiting and adaptive:
             clock[H] = min(clock[H], longest_next(motion, now, t_new, scratch, w))
         if near or wanted:
             fit_dense(plan.method, h, y, scratch)
         if near:
-            path = Path(motion, now.mode, interpolate, scratch.dense, t, t_new, y_new)
+            path = Path(motion, now.mode, interpolate, scratch.dense, t, t_new, seen, y_new)
             if adaptive and not redone:
                 # If the stages lay far beyond the crossing they may have missed events before it:
                 # the step up to the crossing is repeated on its own, and a rough place is enough.
@@ -217,6 +253,9 @@ def advance(
                 theta = first_change(path, w, max(ROUGH * h, tick))
                 if theta <= ROUGH:  # perhaps almost zero
                     theta = first_change(path, w, tick)
+                if wanders and theta < NO_CHANGE and theta * h - calm > AT_ONCE * tick:
+                    clock[H] = max(calm, theta * h - CALM_STEPS * calm)
+                    continue
                 if theta < REDO and theta * h > AT_ONCE * tick:
                     clock[H] = theta * h
                     redone = True
@@ -229,24 +268,25 @@ def advance(
         else:
             copy_margins(w, w.end, w.start)
         if wanted:
-            _put_wanted(out, scratch.dense, t, h, t_new)
+            _put_wanted(motion, now, out, scratch.dense, h, t_new)
         if theta < 1.0:
             interpolate(scratch.dense, theta, y)
         else:
             for j in range(len(y)):
                 y[j] = y_new[j]
                 f[j] = f_new[j]
+        motion.follow(min(t_new, seen), y, now.mode, now.held, motion.p)
         clock[T] = t_new
         if scaleless:
             raise_floor(plan.control, now)
         if out.every_step:
-            put_row(out, t_new, y)
+            put_row(out, min(t_new, seen), y)
         if theta != NO_CHANGE:
             return CROSSED
 
 
-def _next_end(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float]:
-    """Return the end of the next step, and the significant difference of times there.
+def _next_end(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float, float]:
+    """Return the end of the next step, when it is seen, and the significant difference of times.
 
     It follows the grid or the controller, but not past a stop, and avoids a sliver before one.
     """
@@ -259,7 +299,7 @@ def _next_end(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, floa
     tick = TICK * max(abs(t), abs(t_new))
     if t_new + tick >= limit:
         t_new = limit
-    return t_new, tick
+    return t_new, min(t_new, clock[SEEN]), tick
 
 
 def _assess_step(
@@ -292,17 +332,20 @@ def _assess_step(
     return ACCEPTED
 
 
-def _put_wanted(out: Output, dense: Dense, t: float, h: float, t_new: float) -> None:
-    """Write the rows requested before t_new, from the step of length h that began at t.
+def _put_wanted(
+    motion: Motion, now: Now, out: Output, dense: Dense, h: float, t_new: float
+) -> None:
+    """Write the rows requested before t_new, from the step of length h that begins now.
 
     They are right-continuous: a time that coincides with a stop is written after the stop, when the
     states have switched.
     """
-    cursor = out.cursor
+    cursor, t = out.cursor, now.clock[T]
     while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
         time = out.times[cursor[NEXT_TIME]]
         row = cursor[ROW]
         interpolate(dense, (time - t) / h, out.rows_y[row])
+        motion.follow(min(time, now.clock[SEEN]), out.rows_y[row], now.mode, now.held, motion.p)
         out.rows_t[row] = time
         cursor[ROW] = row + 1
         cursor[NEXT_TIME] += 1

@@ -25,8 +25,8 @@ from integrators.loop import (
     Machines,
     run_to_event,
 )
-from integrators.sliding import Functions, Held, flow_on, look, margins_on
-from integrators.steps import Motion, Now, T, Vector
+from integrators.sliding import Functions, Held, flow_on, follow_on, look, margins_on
+from integrators.steps import SEEN, Motion, Now, T, Vector
 
 __all__ = ["FIRINGS", "STOPS", "Log", "Recorded", "record"]
 
@@ -94,14 +94,14 @@ def record(
     counts, cursor = b.memory.counts, b.out.cursor
     seen_at = float("nan")  # the time at which log.seen was computed
     on = Held(functions, now.held, b.sliding)
-    motion = Motion(flow_on, margins_on, on)
+    motion = Motion(flow_on, margins_on, on, follow_on)
     left = most_steps
     while True:
         left -= 1
         if left < 0 or _is_full(b.out, log):
             return ROWS
         event = run_to_event(functions, machines, motion, b, most_steps)
-        t = now.clock[T]
+        t = min(now.clock[T], now.clock[SEEN])
         if event == ROWS:
             for row in range(counts[TAKEN], cursor[ROW]):
                 log.rows_microstep[row] = 0
@@ -158,7 +158,7 @@ def _put_stop(
     now: Now, counts: list[int], out: Output, flags: list[int], log: Log, switched: bool
 ) -> None:
     """Write the state and the modes from here on."""
-    t = now.clock[T]
+    t = now.clock[T] if switched else min(now.clock[T], now.clock[SEEN])
     if out.every_step and switched:
         row = out.cursor[ROW]
         put_row(out, t, now.y)

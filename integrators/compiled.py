@@ -20,7 +20,17 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from integrators import advance, columns, crossings, loop, sliding, step_size, stepping, steps
+from integrators import (
+    advance,
+    columns,
+    crossings,
+    loop,
+    seizing,
+    sliding,
+    step_size,
+    stepping,
+    steps,
+)
 from integrators.columns import Log, Recorded
 from integrators.loop import Buffers, Machines
 from integrators.machine_code import (
@@ -74,8 +84,11 @@ NOT_INLINE = [
     "scaled_size", "starting_step", "retry_factor", "next_on_grid", "raise_floor", "longest_next",
     "_search", "_put_wanted", "_put_firing", "_put_stop", "_begin_arc", "_choose_stop", "_fired",
     "_finish", "_held", "_jump", "_list", "_make_due", "_no_progress", "_often_changed",
-    "_only_due", "_pick", "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
+    "_only_due", "only_let_go", "_pick", "jolted", "arrived", "jolts", "_act", "_refuse",
+    "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
     "advance", "_begin", "_impulse", "step_to",
+    "arm_on", "drop", "entangled", "let_go", "look_back", "look_held", "release", "_ask", "_bears",
+    "_combine", "crossed", "_is_far", "leave", "let_go_in_time", "_values",
 ]  # fmt: skip
 # A step calls these seven times. Inline, the slopes stay in registers: a tenth of the time.
 INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", "flow_on"), True)
@@ -167,7 +180,7 @@ def edition() -> str:
     >>> len(edition())
     16
     """
-    loops = (steps, step_size, crossings, advance, sliding, loop, columns, stepping)
+    loops = (steps, step_size, crossings, advance, sliding, seizing, loop, columns, stepping)
     front = (sources, work, bindings, passing, expressions, statements, translate)
     tools = (*front, values, tree, layouts, llvm, objects)
     functions: list[Callable[..., Any]] = []

@@ -23,7 +23,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from integrators.step_size import INFINITY
-from integrators.steps import Motion, Now, Scratch, T, Vector
+from integrators.steps import SEEN, Motion, Now, Scratch, T, Vector
 
 __all__ = [
     "DEEPEST",
@@ -90,6 +90,7 @@ class Path(NamedTuple):
     dense: Any
     t: float
     t_new: float
+    seen: float  # the time at which its end is seen: t_new, or one clock tick before a jump there
     y_new: Vector  # state at t_new
 
 
@@ -190,13 +191,14 @@ def is_quiet_step(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: W
     t, y, f = now.clock[T], now.y, now.f
     y_new, f_new = scratch.y_new, scratch.f_new
     middle, probe = w.search.y_probe, w.search.probe
-    margins(t_new, y_new, mode, p, w.watch, w.end)
+    seen = now.clock[SEEN]
+    margins(min(t_new, seen), y_new, mode, p, w.watch, w.end)
     if any_changed(w, w.end):
         return False
     h = t_new - t
     for j in range(len(y)):
         middle[j] = 0.5 * (y[j] + y_new[j]) + 0.125 * h * (f[j] - f_new[j])
-    margins(t + 0.5 * h, middle, mode, p, w.watch, probe)
+    margins(min(t + 0.5 * h, seen), middle, mode, p, w.watch, probe)
     return _is_quiet(w, w.start, probe, w.end)
 
 
@@ -258,7 +260,7 @@ def first_change(path: Path, w: Watched, resolution: float) -> float:
         In (0, 1], or `NO_CHANGE`.
     """
     motion, search = path.motion, w.search
-    motion.margins(path.t_new, path.y_new, path.mode, motion.p, w.watch, w.end)
+    motion.margins(path.seen, path.y_new, path.mode, motion.p, w.watch, w.end)
     found = NO_CHANGE
     low, high = 0.0, 1.0
     quiet = 1.0  # the step up to this point must be searched; its margins are in rights[0]
@@ -279,7 +281,7 @@ def _probe(path: Path, place: float, w: Watched) -> bool:
     """Fill the margins at a point; return whether any has changed there."""
     motion, search = path.motion, w.search
     path.interpolate(path.dense, place, search.y_probe)
-    t = min(path.t + place * (path.t_new - path.t), path.t_new)
+    t = min(path.t + place * (path.t_new - path.t), path.seen)
     motion.margins(t, search.y_probe, path.mode, motion.p, w.watch, search.probe)
     return any_changed(w, search.probe)
 

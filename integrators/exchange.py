@@ -37,7 +37,7 @@ from integrators.step_size import INFINITY
 from integrators.stepping import Clocks, next_tick
 from integrators.steps import LATEST, Motion, T, Vector
 
-__all__ = ["MOVED", "SWITCHES", "Exchange", "changed", "indicate", "observe", "restart", "settle"]
+__all__ = ["MOVED", "SWITCHES", "Exchange", "changed", "indicate", "observe", "settle"]
 __all__ += ["slope"]
 
 # Indices into Exchange.counts: switches since the start; whether the last `settle` moved the state.
@@ -57,27 +57,6 @@ class Exchange(NamedTuple):
     shift: Vector  # how far behind the crossing each indicator is zero, shape (r,)
     before: Vector  # scratch space: the state before `settle`
     signs: Vector  # scratch space: held signs
-    offset: Vector  # of each clock its first tick after the start, s
-
-
-def restart(b: Buffers, clocks: Clocks, x: Exchange) -> None:
-    """Begin at the time that is in the buffers now, which had another one.
-
-    Parameters
-    ----------
-    b : Buffers
-        Before the first call of `settle`.
-    clocks : Clocks
-        Set to the new start.
-    x : Exchange
-        With the offsets of the clocks.
-    """
-    clock, plan = b.now.clock, b.plan
-    for i in range(len(x.offset)):
-        clocks.start[i] = clock[T] + x.offset[i]
-        clocks.made[i] = 0
-    for _k in range(len(plan.jumps)):
-        next_tick(plan, clocks)
 
 
 def settle(

@@ -7,33 +7,62 @@ that the caller keeps everything up to that point.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 from integrators import advance as kernel
 from integrators import loop
 from integrators.advance import Output, Plan
-from integrators.crossings import listed, watched
+from integrators.crossings import watched
+from integrators.failures import (
+    Entangled,
+    HybridError,
+    Livelock,
+    NotFinite,
+    Refused,
+    StepTooSmall,
+    TooManySteps,
+    failure,
+    modes_of,
+)
 from integrators.loop import MOST_SWITCHES, Buffers, Memory, Switch
 from integrators.sliding import (
+    LIVE,
     MOST_SLIDING,
     Functions,
     Held,
     Surfaces,
     flow_on,
+    follow_on,
     margins_on,
     sliding_scratch,
 )
 from integrators.step_size import Control
-from integrators.steps import Dense, Flow, Margins, Motion, Now, Scratch, T, Vector, coefficients
+from integrators.steps import (
+    SEEN,
+    Dense,
+    Flow,
+    Margins,
+    Motion,
+    Now,
+    Scratch,
+    T,
+    Vector,
+    coefficients,
+    stays,
+)
 from integrators.tableaux import EULER, Tableau
+from integrators.ticks import Ticks
 
 __all__ = [
     "MOST_SWITCHES",
     "ROWS_AT_ONCE",
     "Arc",
     "Buffers",
+    "Entangled",
     "Equations",
     "Event",
     "Firing",
@@ -41,6 +70,7 @@ __all__ = [
     "Livelock",
     "NotFinite",
     "Options",
+    "Refused",
     "Slide",
     "StepTooSmall",
     "Stop",
@@ -48,7 +78,10 @@ __all__ = [
     "TooManySteps",
     "buffers",
     "events",
+    "failure",
+    "modes_of",
     "plan_of",
+    "relaxation_times",
     "run",
     "state_of",
     "take_rows",
@@ -90,12 +123,21 @@ class Equations:
         Times that steps may not jump over.
     jumps : list of float
         Times at which the flow jumps; the step size is chosen afresh there.
-    ticks : mapping of float to int
-        For each time at which something ticks what does, as bits: samplers, or discrete machines.
+    ticks : Ticks
+        What ticks when: samplers, or discrete machines.
     discrete : list of int
         For each machine the bit at whose ticks alone it is asked; 0 for one that may fire any time.
     seen : int
         Number of values that `integrators.columns.record` observes.
+    follow : callable
+        ``follow(t, y, mode, held, p)`` sets the components of y that others determine.
+    impulses : list of int
+        For each edge 1 if it changes the state far beyond rounding, 2 if it changes only what
+        guards read: others are asked again after both.
+    velocities : int
+        Number of values that `Switch.jolts` compares; 0 if nothing can be jolted.
+    leaps : bool
+        Whether these may jump at a crossing, without an edge.
     """
 
     flow: Flow
@@ -110,14 +152,18 @@ class Equations:
     surfaces: Surfaces
     knots: list[float] = field(default_factory=list)
     jumps: list[float] = field(default_factory=list)
-    ticks: Mapping[float, int] = field(default_factory=dict)
+    ticks: Ticks = field(default_factory=Ticks.none)
     discrete: list[int] = field(default_factory=list)
     seen: int = 0
+    follow: Callable[..., Any] = stays
+    impulses: list[int] = field(default_factory=list)
+    velocities: int = 0
+    leaps: bool = False
 
     def functions(self, located: bool) -> Functions:
         """Return the functions for a run with or without located crossings."""
         flow = self.flow if located else self.flow_live
-        return Functions(flow, self.arm, self.margins, self.normal, self.p)
+        return Functions(flow, self.arm, self.margins, self.normal, self.follow, self.p)
 
 
 @dataclass(frozen=True)
@@ -146,6 +192,12 @@ class Options:
         Requested rows; every accepted step if omitted.
     rows_at_once : int
         Maximum number of steps in each arc that is yielded.
+    floor : list of float, shape (m,), optional
+        Tolerances to begin with where `atol` is 0: they never fall below; those of `atol` if
+        omitted.
+    relaxing : list of list of float
+        For each machine in each of its modes, the relaxation time of the fastest component that
+        relaxes at a constant rate, s; 0 if there is none.
     """
 
     method: Tableau | type[Any]
@@ -158,6 +210,8 @@ class Options:
     located: bool
     times: Sequence[float] | Any | None
     rows_at_once: int = ROWS_AT_ONCE
+    floor: list[float] | None = None
+    relaxing: list[list[float]] = field(default_factory=list)
 
 
 # --------------------------------------------------------------------------- output
@@ -201,49 +255,10 @@ class Firing:
     mode_before: tuple[int, ...]
     y: Vector
     mode: tuple[int, ...]
+    seen: float  # the time at which the system shows it: t, or one clock tick before a jump at t
 
 
 Event = Arc | Stop | Slide | Firing
-
-
-class HybridError(Exception):
-    """The run cannot continue; carries the time, state and modes."""
-
-    def __init__(self, message: str, t: float, y: Vector, mode: Sequence[int]) -> None:
-        super().__init__(message)
-        self.t = t
-        self.y = list(y)
-        self.mode = tuple(mode)
-
-
-class Livelock(HybridError):
-    """Switches without progress in time, of one machine or of one relation."""
-
-    def __init__(
-        self,
-        t: float,
-        y: Vector,
-        mode: Sequence[int],
-        machine: int | None,
-        times: int,
-        relations: list[str],
-    ) -> None:
-        super().__init__(f"{times} switches without progress", t, y, mode)
-        self.machine = machine
-        self.times = times
-        self.relations = relations
-
-
-class StepTooSmall(HybridError):
-    """Error control requires steps below the clock's resolution."""
-
-
-class NotFinite(HybridError):
-    """The flow returned NaN or infinity."""
-
-
-class TooManySteps(HybridError):
-    """The maximum number of steps was reached before the end."""
 
 
 # --------------------------------------------------------------------------- the loop
@@ -276,11 +291,12 @@ def run(
     Yields
     ------
     Arc, Stop, Slide or Firing
-        Arcs contain the requested rows; each edge gives one firing, numbered from 1 at each time.
+        Arcs contain the requested rows, possibly none; each edge gives one firing, numbered from 1
+        at each time.
 
     Raises
     ------
-    Livelock, StepTooSmall, NotFinite, TooManySteps
+    Livelock, Entangled, StepTooSmall, NotFinite, TooManySteps
         If it cannot continue; everything before has been yielded.
     """
     return events(equations, switch, buffers(equations, t, y, mode, t_end, options), options)
@@ -310,8 +326,8 @@ def events(equations: Equations, switch: Switch, b: Buffers, options: Options) -
         from integrators.scipy_arcs import SciPyStepper
 
         solver = SciPyStepper(on, b, options)
-    plainly = Motion(functions.flow, functions.margins, functions.p)
-    along = Motion(flow_on, margins_on, on)
+    plainly = Motion(functions.flow, functions.margins, functions.p, functions.follow)
+    along = Motion(flow_on, margins_on, on, follow_on)
     counts, cursor, y = b.memory.counts, b.out.cursor, b.now.y
     before: tuple[Vector, tuple[int, ...]] = [], ()
     while True:
@@ -326,18 +342,19 @@ def events(equations: Equations, switch: Switch, b: Buffers, options: Options) -
                 yield take_rows(b)
             raise
         t, mode = b.now.clock[T], modes_of(b)
+        seen = min(t, b.now.clock[SEEN])
         if event == loop.ROWS:
-            if cursor[kernel.ROW]:
-                yield take_rows(b)
+            yield take_rows(b)
         elif event == loop.FIRING:
             before = list(y), mode
         elif event == loop.FIRED:
             machine, edge = counts[loop.MACHINE], counts[loop.EDGE]
-            yield Firing(t, counts[loop.MICROSTEP], machine, edge, *before, list(y), mode)
+            scenes = (*before, list(y), mode)
+            yield Firing(t, counts[loop.MICROSTEP], machine, edge, *scenes, seen=seen)
         elif event == loop.SLID:
             yield Slide(t, counts[loop.MICROSTEP], list(y), mode)
         elif event in (loop.STOPPED, loop.DONE):
-            yield Stop(t, list(y), mode)
+            yield Stop(seen, list(y), mode)
             if event == loop.DONE:
                 return
         elif event != loop.ADVANCE:
@@ -371,6 +388,11 @@ def buffers(
     # After the relations of the equations, those that end a slide: sigma <= 1 and sigma >= -1.
     strict = equations.strict + [False] * (2 * min(len(surfaces.sign), MOST_SLIDING))
     plan = plan_of(equations, t, t_end, options, n)
+    plan = plan._replace(
+        jumps=_as_list(plan.jumps),
+        before_jumps=_as_list(plan.before_jumps),
+        ticks=_as_list(plan.ticks),
+    )
     times = options.times
     if capacity is None:
         capacity = ROWS_AT_ONCE if times is None else len(times)
@@ -385,8 +407,8 @@ def buffers(
             y=list(y),
             f=vector(),
             mode=list(mode),
-            held=[0.0] * equations.held,
-            floor=list(options.atol),
+            held=[0.0 if options.located else LIVE] * equations.held,
+            floor=list(options.floor or options.atol),
         ),
         memory=Memory(
             counts=[0] * loop.PLACES,
@@ -395,9 +417,13 @@ def buffers(
             changes=[0] * len(strict),
             anchor=list(y),
             due=[0] * n,
+            was=[0.0] * equations.velocities,
+            jolt=[0] * n,
         ),
         relations=watched(strict, size),
-        sliding=sliding_scratch(surfaces, size, equations.held, len(strict), equations.seen),
+        sliding=sliding_scratch(
+            surfaces, size, equations.held, len(strict), equations.seen, machines=n
+        ),
         out=Output(
             times=[] if times is None else _as_list(times),
             every_step=times is None,
@@ -415,7 +441,7 @@ def buffers(
     )
 
 
-def _as_list(numbers: Sequence[float] | Any) -> Vector:
+def _as_list(numbers: Sequence[float] | Any) -> list[Any]:
     """Return Python numbers: those of numpy are slow one by one."""
     return numbers.tolist() if hasattr(numbers, "tolist") else list(numbers)
 
@@ -433,12 +459,16 @@ def plan_of(equations: Equations, t: float, t_end: float, options: Options, mach
     Returns
     -------
     Plan
-        Made of lists.
+        Made of lists, except for the jumps and ticks, of which there may be many: arrays.
     """
     # A SciPy solver needs no coefficients, but the loop's signature requires them.
     tableau = options.method if isinstance(options.method, Tableau) else EULER
-    ticks = {s: bits for s, bits in equations.ticks.items() if t <= s < t_end}
-    jumps = sorted({*(s for s in equations.jumps if options.located and t < s <= t_end), *ticks})
+    ticks = equations.ticks.between(t, t_end)
+    if jumps := [s for s in equations.jumps if options.located and t < s <= t_end]:
+        ticks = Ticks.of([ticks.times, np.array(jumps)], [ticks.bits, 0])
+    times: Any = ticks.times  # arrays, where the plan's type says lists
+    before: Any = np.nextafter(ticks.times, -math.inf)
+    bits: Any = ticks.bits
     control = Control(
         step=options.step or 0.0,
         origin=t,
@@ -453,13 +483,35 @@ def plan_of(equations: Equations, t: float, t_end: float, options: Options, mach
         t_end=t_end,
         located=options.located,
         foreign=tableau is not options.method,
-        jumps=jumps,
-        before_jumps=[math.nextafter(s, -math.inf) for s in jumps],
-        ticks=[ticks.get(s, 0) for s in jumps],
+        jumps=times,
+        before_jumps=before,
+        ticks=bits,
+        impulses=equations.impulses,
+        leaps=equations.leaps,
         discrete=equations.discrete or [0] * machines,
         knots=equations.knots if options.located else [],
+        relaxing=relaxation_times(options),
         max_steps=options.max_steps,
     )
+
+
+def relaxation_times(options: Options) -> Vector:
+    """Return the relaxation times of the modes of each machine, one machine after another.
+
+    Parameters
+    ----------
+    options : Options
+        Contains them by machine.
+
+    Returns
+    -------
+    list of float
+        As many for each machine, infinity where nothing relaxes.
+    """
+    rows = options.relaxing
+    modes = max((len(row) for row in rows), default=0)
+    padded = [row + [0.0] * (modes - len(row)) for row in rows]
+    return [time or math.inf for row in padded for time in row]
 
 
 def state_of(b: Buffers) -> dict[str, Any]:
@@ -490,68 +542,9 @@ def state_of(b: Buffers) -> dict[str, Any]:
     }
 
 
-def modes_of(b: Buffers) -> tuple[int, ...]:
-    """Return the mode of each machine, then for each surface whether the motion slides on it.
-
-    Parameters
-    ----------
-    b : Buffers
-        The buffers of a run.
-
-    Returns
-    -------
-    tuple of int
-        The modes stored with rows.
-    """
-    return (*b.now.mode, *b.sliding.flags)
-
-
 def beginning(t: float, t_end: float) -> Vector:
     """Return `Now.clock` for a run that has not started."""
-    return [t, 0.0, 1.0, t_end, t, -math.inf, math.inf, abs(t_end)]
-
-
-def failure(event: int, b: Buffers, relations: list[str]) -> HybridError:
-    """Return the error for an event that ends a run.
-
-    Parameters
-    ----------
-    event : int
-        The value returned by `integrators.loop.run_to_event`.
-    b : Buffers
-        The buffers of the run.
-    relations : list of str
-        Their names.
-
-    Returns
-    -------
-    HybridError
-        The error to raise.
-    """
-    memory = b.memory
-    counts = memory.counts
-    scene = b.now.clock[T], b.now.y, modes_of(b)
-    if event == kernel.TOO_SMALL:
-        return StepTooSmall("step size below the clock's resolution", *scene)
-    if event == loop.TOO_MANY_STEPS:
-        return TooManySteps(f"the maximum of {b.plan.max_steps} steps was reached", *scene)
-    if event == loop.MACHINE_LIVELOCK:
-        machine = counts[loop.MACHINE]
-        return Livelock(*scene, machine, memory.switches[machine], [])
-    if event == loop.RELATION_LIVELOCK:
-        # A relation in a guard may have changed once more than its machine has switched.
-        machine = max(range(len(b.now.mode)), key=lambda i: memory.switches[i])
-        if memory.switches[machine] >= MOST_SWITCHES // 2:
-            return Livelock(*scene, machine, memory.switches[machine], [])
-        names = [*relations, *["the pull onto a surface"] * (len(memory.changes) - len(relations))]
-        often = [name for r, name in enumerate(names) if memory.changes[r] >= MOST_SWITCHES]
-        return Livelock(*scene, None, MOST_SWITCHES, often)
-    w = listed(b.relations, counts[loop.ACTIVE])
-    undefined = [
-        name for r, name in enumerate(relations) if r in w.active and w.start[r] != w.start[r]
-    ]
-    text = f"{undefined[0]} compares NaN" if undefined else "NaN or infinity"
-    return NotFinite(text, *scene)
+    return [t, 0.0, 1.0, t_end, t, -math.inf, math.inf, abs(t_end), math.inf]
 
 
 def take_rows(b: Buffers) -> Arc:

@@ -8,8 +8,7 @@ each event to its caller, the compiled engine (`record`) writes it into columns.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from integrators.advance import (
     CROSSED,
@@ -28,20 +27,36 @@ from integrators.advance import (
     raise_floor,
     tick_at,
 )
-from integrators.crossings import FOR_A_GUARD, Watched, listed
-from integrators.sliding import (
-    Functions,
-    Held,
-    Sliding,
-    margins_on,
+from integrators.crossings import FOR_A_GUARD, FOR_A_SIGN, Watched, listed
+from integrators.jolts import (
+    JUMPED,
+    LET_GO,
+    arrived,
+    forget,
+    jolted,
+    moves_a_lock,
+    only_let_go,
+)
+from integrators.machines import Machines, Switch
+from integrators.seizing import (
+    crossed,
+    entangled,
+    leave,
+    let_go,
+    let_go_in_time,
+    look_back,
+    own_edge,
+    repels,
     seize,
 )
-from integrators.step_size import error_norm, starting_step
+from integrators.sliding import Functions, Held, Sliding, arm_on, margins_on, other_mode
+from integrators.step_size import INFINITY, error_norm, starting_step
 from integrators.steps import (
     ANCHOR,
     ERROR_BEFORE,
     LATEST,
     PAUSE,
+    SEEN,
     SWITCHED,
     T_STOP,
     H,
@@ -50,6 +65,7 @@ from integrators.steps import (
     Scratch,
     T,
     Vector,
+    time_of,
 )
 
 __all__ = [
@@ -73,6 +89,8 @@ STATE_STANDS = 0.1
 # Events (TOO_SMALL and NOT_FINITE are the kernel's).
 ROWS, FIRING, FIRED, STOPPED, DONE, SLID = 10, 11, 12, 13, 14, 15
 MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS, PAUSED = 16, 17, 18, 19, 20
+REFUSED = 22  # an edge would take a velocity that has jumped, and there is no other
+ENTANGLED = 23  # machines slide on surfaces that bear on each other
 NOTHING = -1  # no event yet
 # Indices into Memory.counts.
 PLACES = 12
@@ -81,28 +99,6 @@ PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, 
 )
 # Phases.
 START, ASK, PICK, FIRE, SETTLED, BEGIN, ARC, AFTER, JUMPING, FINISH, END = range(11)
-
-
-class Switch(Protocol):
-    """The interface of the machines to the loop."""
-
-    def ask(self, t: float, y: Vector, mode: list[int], p: Any, edges: list[int]) -> None:
-        """Fill the first enabled edge of each machine, or -1."""
-
-    def act(self, edge: int, machine: int, t: float, y: Vector, mode: list[int], p: Any) -> None:
-        """Take an edge: update mode, and y if the edge assigns something."""
-
-    def tick(self, bits: int, t: float, y: Vector, mode: list[int], p: Any) -> None:
-        """Update what ticks: samplers, and what discrete machines give out."""
-
-
-class Machines(NamedTuple):
-    """A `Switch` made of two functions, and a function that observes firings."""
-
-    ask: Callable[..., Any]
-    act: Callable[..., Any]
-    tick: Callable[..., Any]
-    observe: Callable[..., Any]  # observe(t, y, mode, signs, p, seen)
 
 
 class Memory(NamedTuple):
@@ -114,6 +110,8 @@ class Memory(NamedTuple):
     changes: list[int]  # changes of each relation since that time
     anchor: Vector  # the state at that time
     due: list[int]  # whether each discrete machine is to be asked
+    was: Vector  # velocities before this instant, where locks make them matter; else empty
+    jolt: list[int]  # JUMPED or LET_GO for each machine whose velocity has changed at once
 
 
 class Buffers(NamedTuple):
@@ -128,6 +126,7 @@ class Buffers(NamedTuple):
     scratch: Scratch
 
 
+# Long because each phase is one branch: the sequence is read in one place.
 def run_to_event(
     functions: Functions, switch: Switch, motion: Motion, b: Buffers, most_steps: int
 ) -> int:
@@ -154,37 +153,49 @@ def run_to_event(
         FIRING (before) and FIRED (after an edge), STOPPED (a crossing, either side of a jump),
         SLID (sliding started or ended), ADVANCE (a foreign solver must continue), PAUSED (settled
         at the time ``clock[PAUSE]``), DONE; or the error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK,
-        RELATION_LIVELOCK, TOO_MANY_STEPS.
+        RELATION_LIVELOCK, TOO_MANY_STEPS, ENTANGLED.
     """
     plan, now, memory = b.plan, b.now, b.memory
     relations, sliding, scratch = b.relations, b.sliding, b.scratch
     clock, counts, p = now.clock, memory.counts, functions.p
     out, cursor = b.out, b.out.cursor
+    on = Held(functions, now.held, sliding)
     while True:
         if cursor[ROW] > counts[TAKEN]:
             return ROWS
         phase, event = counts[PHASE], NOTHING
         if phase == ASK:
-            switch.ask(clock[T], now.y, now.mode, p, memory.edges)
+            left = _ask(switch, now, memory, sliding, p)
+            if left >= 0:  # an edge of the other mode is enabled: go there first
+                leave(on, now, relations, left)
+                return SLID
             _only_due(plan, memory)
             counts[MACHINE] = -1
             counts[FIRED_ONE] = 0
             counts[PHASE] = PICK
+            if len(memory.was) > 0:
+                refused = only_let_go(plan.located, memory.edges, memory.jolt)
+                if refused >= 0:
+                    _refuse(counts, refused, -2 - memory.edges[refused])
         elif phase == PICK:
-            event = _pick(plan, counts, memory.edges)
+            event = _pick(plan, memory)
         elif phase == FIRE:
-            switch.act(counts[EDGE], counts[MACHINE], clock[T], now.y, now.mode, p)
+            _act(switch, on, plan, now, memory, relations)
             event = _fired(plan, now, memory, scratch)
         elif phase == SETTLED:
             if clock[T] >= clock[PAUSE]:
                 return PAUSED
-            if counts[HOLD] > 0:  # discrete machines have fired: what they give out is held now
+            if clock[SEEN] < clock[T]:  # what is before the jump has switched
+                counts[PHASE] = JUMPING
+            elif counts[HOLD] > 0:  # discrete machines have fired: what they give out is held now
                 switch.tick(counts[HOLD], clock[T], now.y, now.mode, p)
                 event = _held(now, counts, out)
             else:
+                if plan.located:
+                    forget(memory.jolt, 0)
                 _choose_stop(plan, clock, counts)
             if event == NOTHING and plan.located and counts[PHASE] == BEGIN:
-                event = _rearm(functions, now, relations, sliding, counts)
+                event = _rearm(plan, on, now, relations, counts)
         elif phase == BEGIN:
             event = _begin_arc(motion, plan, now, cursor, scratch, counts)
         elif phase == ARC:
@@ -198,17 +209,30 @@ def run_to_event(
             if counts[STATUS] == CROSSED:
                 w = listed(relations, counts[ACTIVE])
                 often = _often_changed(motion, plan, now, w, sliding, memory, scratch)
+                let_go_in_time(on, now, relations)
+            if len(memory.was) > 0 and (counts[STATUS] == CROSSED or counts[STATUS] == REACHED):
+                arrived(switch, plan, now, memory.was, memory.jolt, counts[STATUS] == CROSSED, p)
             event = _end_arc(plan, clock, counts, often)
         elif phase == JUMPING:
-            now.clock[T] = plan.jumps[counts[JUMP]]
+            look_back(on, now, relations)
+            clock[T] = plan.jumps[counts[JUMP]]
+            clock[SEEN] = INFINITY
             if plan.ticks[counts[JUMP]] > 0:
                 switch.tick(plan.ticks[counts[JUMP]], clock[T], now.y, now.mode, p)
                 _make_due(plan, memory)
+            let_go(on, now, relations)
+            if len(memory.was) > 0:
+                jolted(switch, now, memory.was, memory.jolt, p)
             event = _jump(now, counts, out)
         elif phase == START:
             if len(plan.jumps) > 0 and plan.jumps[0] <= clock[T]:
                 switch.tick(plan.ticks[0], clock[T], now.y, now.mode, p)
                 _make_due(plan, memory)
+            if len(memory.was) > 0:
+                jolted(switch, now, memory.was, memory.jolt, p)
+                for i in range(len(memory.jolt)):
+                    if memory.jolt[i] == LET_GO:  # a start in a lock has been checked
+                        memory.jolt[i] = 0
             _start(plan, now, counts, out)
         elif phase == FINISH:
             _finish(now, counts, out)
@@ -228,8 +252,63 @@ def _start(plan: Plan, now: Now, counts: list[int], out: Output) -> None:
         put_row(out, now.clock[T], now.y)
 
 
-def _pick(plan: Plan, counts: list[int], edges: list[int]) -> int:
+def _ask(switch: Switch, now: Now, memory: Memory, sliding: Sliding, p: Any) -> int:
+    """Fill the enabled edges; return the surface of a machine whose other mode has one, or -1."""
+    surfaces, which, edges = sliding.surfaces, sliding.which, memory.edges
+    t, y, mode = time_of(now), now.y, now.mode
+    for i in surfaces.machine:
+        if i >= 0:
+            edges[i] = -1
+    for c in range(which[-1]):
+        i = surfaces.machine[which[c]]
+        if i >= 0:
+            edges[i] = own_edge(surfaces, which[c], mode[i])
+    switch.ask(t, y, mode, p, memory.jolt, edges)
+    left = -1
+    for c in range(which[-1]):
+        k = which[c]
+        i = surfaces.machine[k]
+        if i >= 0 and edges[i] < 0:
+            kept = mode[i]
+            mode[i] = other_mode(surfaces, k, kept)
+            for j in range(len(edges)):
+                sliding.edges[j] = -1
+            sliding.edges[i] = own_edge(surfaces, k, mode[i])
+            switch.ask(t, y, mode, p, memory.jolt, sliding.edges)
+            mode[i] = kept
+            if sliding.edges[i] >= 0:
+                left = k
+    return left
+
+
+def _refuse(counts: list[int], machine: int, edge: int) -> None:
+    """End the run at an edge that is refused."""
+    counts[MACHINE] = machine
+    counts[EDGE] = edge
+    counts[PHASE] = AFTER
+    counts[STATUS] = REFUSED
+
+
+def _act(
+    switch: Switch, on: Held, plan: Plan, now: Now, memory: Memory, relations: Watched
+) -> None:
+    """Take an edge; after some, the others are asked again."""
+    counts, p = memory.counts, on.functions.p
+    edge, machine = counts[EDGE], counts[MACHINE]
+    look_back(on, now, relations)
+    switch.act(edge, machine, time_of(now), now.y, now.mode, p)
+    let_go(on, now, relations)
+    crossed(on.sliding, machine, edge)
+    if len(plan.impulses) > 0 and plan.impulses[edge] > 0:
+        if len(memory.was) > 0 and plan.impulses[edge] == 1:
+            jolted(switch, now, memory.was, memory.jolt, p)
+        if plan.located:
+            forget(memory.edges, -1)
+
+
+def _pick(plan: Plan, memory: Memory) -> int:
     """Find the next machine with an enabled edge."""
+    counts, edges = memory.counts, memory.edges
     i = counts[MACHINE] + 1
     while i < len(edges) and edges[i] < 0:
         i += 1
@@ -238,7 +317,8 @@ def _pick(plan: Plan, counts: list[int], edges: list[int]) -> int:
         counts[EDGE] = edges[i]
         counts[PHASE] = FIRE
         return FIRING
-    counts[PHASE] = ASK if counts[FIRED_ONE] == 1 and plan.located else SETTLED
+    again = plan.located or moves_a_lock(memory.jolt)
+    counts[PHASE] = ASK if counts[FIRED_ONE] == 1 and again else SETTLED
     return NOTHING
 
 
@@ -249,6 +329,8 @@ def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
     counts[FIRED_ONE] = 1
     counts[FRESH] = 1
     counts[PHASE] = PICK
+    if memory.jolt[i] == LET_GO:
+        memory.jolt[i] = JUMPED if plan.located else 0
     _reset_if_advanced(now, memory)
     memory.switches[i] += 1
     if memory.switches[i] >= MOST_SWITCHES and _no_progress(plan, now, memory, scratch):
@@ -263,33 +345,47 @@ def _choose_stop(plan: Plan, clock: Vector, counts: list[int]) -> None:
     if t >= plan.t_end:
         counts[PHASE] = FINISH
         return
-    # A step that ends on a jump would see the value after it: stop one clock tick before.
     while counts[JUMP] < len(jumps) and jumps[counts[JUMP]] <= t:
         counts[JUMP] += 1
     clock[T_STOP] = plan.t_end
     if counts[JUMP] < len(jumps):
-        clock[T_STOP] = min(clock[T_STOP], plan.before_jumps[counts[JUMP]])
+        # A step that ends on a jump would see the value after it: it is asked one clock tick before
+        # its end. At a tick, or if steps are not ours, it ends there.
+        clock[SEEN] = plan.before_jumps[counts[JUMP]]
+        reached = plan.ticks[counts[JUMP]] == 0 and not plan.foreign
+        clock[T_STOP] = min(clock[T_STOP], jumps[counts[JUMP]] if reached else clock[SEEN])
     counts[STATUS] = FULL
     counts[PHASE] = BEGIN
 
 
-def _rearm(
-    functions: Functions, now: Now, relations: Watched, sliding: Sliding, counts: list[int]
-) -> int:
+def _rearm(plan: Plan, on: Held, now: Now, relations: Watched, counts: list[int]) -> int:
     """Freeze signs, choose what to watch and to slide on, store the truth values watched."""
+    functions, sliding = on.functions, on.sliding
     surfaces, watch, p = sliding.surfaces, relations.watch, functions.p
     t, y = now.clock[T], now.y
     mode, held = now.mode, now.held
     for a in range(counts[ACTIVE]):
         watch[relations.room[a]] = 0
-    functions.arm(t, y, mode, p, held, watch)
+    arm_on(on, t, y, mode, watch)
+    for k in range(len(surfaces.sign)):
+        if surfaces.machine[k] >= 0 and (sliding.flags[k] == 1 or sliding.arrived[k] == 1):
+            watch[surfaces.above[k]] |= FOR_A_SIGN
     w = _list(relations, counts)
     functions.margins(t, y, mode, p, watch, w.start)
     slid = False
     if len(surfaces.sign) > 0:
-        on = Held(functions, held, sliding)
+        begins = t == plan.control.origin and sliding.which[-1] == 0
+        if begins and repels(on, now, w):
+            counts[PHASE] = AFTER
+            counts[STATUS] = ENTANGLED
+            return NOTHING
         slid = seize(on, now, w)
+        functions.follow(t, y, mode, held, p)
         count = sliding.which[-1]
+        if count > 1 and entangled(on, t, y, mode):
+            counts[PHASE] = AFTER
+            counts[STATUS] = ENTANGLED
+            return NOTHING
         if count > 0:
             first = len(watch) - 2 * len(sliding.sigma)
             for c in range(count):
@@ -302,7 +398,7 @@ def _rearm(
         g = w.start[r]
         w.truth[r] = g > w.above[r]
     for k in range(len(surfaces.sign)):  # one met exactly is left on the side of its sign
-        sign = held[surfaces.sign[k]]
+        sign = held[surfaces.sign[k]] if surfaces.machine[k] < 0 else 0.0
         if watch[surfaces.above[k]] and sign != 0.0:
             for r in (surfaces.above[k], surfaces.at_least[k]):
                 # A guard that is false on the surface itself turns true just after it.
@@ -377,10 +473,10 @@ def _flowed(plan: Plan, counts: list[int], steps: int) -> int:
 def _end_arc(plan: Plan, clock: Vector, counts: list[int], often: bool) -> int:
     """Return the reason for the end of the arc."""
     status = counts[STATUS]
-    if status in (TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK):
+    if status in (TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, REFUSED, ENTANGLED):
         return status
     counts[PHASE] = ASK
-    if status == REACHED and clock[T] < plan.t_end:
+    if status == REACHED and (clock[T] < plan.t_end or clock[SEEN] < clock[T]):
         counts[PHASE] = JUMPING
         return STOPPED
     if status == FULL and not plan.located:
@@ -482,7 +578,8 @@ def _often_changed(
     """Count the relations that have just changed; return whether one has changed too often."""
     changes, probe, surfaces = memory.changes, w.search.probe, sliding.surfaces
     _reset_if_advanced(now, memory)
-    motion.margins(now.clock[T], now.y, now.mode, motion.p, w.watch, probe)
+    t = time_of(now)
+    motion.margins(t, now.y, now.mode, motion.p, w.watch, probe)
     often = False
     for r in w.active:
         g = probe[r]
@@ -494,6 +591,6 @@ def _often_changed(
             w.changed[r] = 0
     for k in range(len(surfaces.sign)):
         above, at_least = surfaces.above[k], surfaces.at_least[k]
-        if w.watch[above] and (w.changed[above] or w.changed[at_least]):
+        if surfaces.machine[k] < 0 and w.watch[above] and (w.changed[above] or w.changed[at_least]):
             sliding.arrived[k] = 1
     return often and _no_progress(plan, now, memory, scratch)

@@ -30,7 +30,7 @@ from integrators.advance import (
 )
 from integrators.crossings import NO_CHANGE, Path, copy_margins, first_change, listed
 from integrators.loop import ACTIVE, NEW_ARC, STATUS
-from integrators.sliding import Held, flow_on, margins_on
+from integrators.sliding import Held, flow_on, follow_on, margins_on
 from integrators.steps import T_STOP, Motion, T
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ class SciPyStepper:
         b, now, out = self.buffers, self.buffers.now, self.buffers.out
         clock, y = now.clock, now.y
         cursor, w = out.cursor, listed(b.relations, b.memory.counts[ACTIVE])
-        motion = Motion(flow_on, margins_on, self.on)
+        motion = Motion(flow_on, margins_on, self.on, follow_on)
         redone, ahead = False, math.inf
         while True:
             t = clock[T]
@@ -118,7 +118,7 @@ class SciPyStepper:
             tick = tick_at(max(abs(t), abs(t_new)))
             theta = NO_CHANGE
             if w.active:
-                path = Path(motion, now.mode, _interpolate, dense, t, t_new, y_new)
+                path = Path(motion, now.mode, _interpolate, dense, t, t_new, t_new, y_new)
                 theta = first_change(path, w, tick)
             if theta < REDO and not redone and theta * (t_new - t) > AT_ONCE * tick:
                 # As in the kernel: the solver's stages lay beyond the crossing.
@@ -132,12 +132,15 @@ class SciPyStepper:
                 copy_margins(w, w.end, w.start)
             while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
                 time = out.times[cursor[NEXT_TIME]]
-                put_row(out, time, dense(time).tolist())
+                row = dense(time).tolist()
+                motion.follow(time, row, now.mode, now.held, motion.p)
+                put_row(out, time, row)
                 cursor[NEXT_TIME] += 1
             if theta < 1.0:
                 _interpolate(dense, theta, y)
             else:
                 y[:] = y_new
+            motion.follow(t_new, y, now.mode, now.held, motion.p)
             clock[T] = t_new
             most_steps -= 1
             if out.every_step:

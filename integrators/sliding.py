@@ -8,6 +8,11 @@ which is the same where they are linear.
 
 Sliding on several surfaces at once takes as many sigmas, from a linear system of that size.
 
+A surface may also be where a machine changes between two of its modes and back. Such a machine
+would switch without end; on the surface its two modes take the part of the two signs. It keeps the
+mode entered last, and the two edges between them are not asked for until the motion has left. Two
+such machines, or one and a sign, that bear on each other have no unique motion.
+
 Alternatives considered: letting the sign chatter costs one switch per clock tick; smoothing it by a
 steep ramp changes the solution and makes the system stiff.
 """
@@ -17,8 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from integrators.crossings import Watched
-from integrators.steps import Flow, Margins, Now, T, Vector
+from integrators.steps import Flow, Follow, Margins, Vector
 
 __all__ = [
     "LIVE",
@@ -27,12 +31,18 @@ __all__ = [
     "Held",
     "Sliding",
     "Surfaces",
+    "arm_on",
     "flow_on",
+    "follow_on",
+    "go_back",
+    "go_to",
     "look",
+    "look_held",
     "margins_on",
-    "seize",
+    "other_mode",
     "sliding_scratch",
     "slope_on",
+    "to_neither",
 ]
 
 MOST_SLIDING = 32  # surfaces at once
@@ -52,6 +62,7 @@ class Functions(NamedTuple):
     arm: Callable[..., Any]  # arm(t, y, mode, p, held, watch): signs to hold, relations to watch
     margins: Margins
     normal: Callable[..., Any]  # normal(surface, t, y, mode, p, out): gradient over y, rate in t
+    follow: Follow
     p: Any
 
 
@@ -61,6 +72,13 @@ class Surfaces(NamedTuple):
     sign: list[int]  # the index of each one's sign among the held signs, shape (S,)
     above: list[int]  # its relation u > 0, shape (S,)
     at_least: list[int]  # its relation u >= 0, shape (S,)
+    # Of each one between two modes, shape (S,); the relations are those of the two edges, and u is
+    # the margin of the first.
+    machine: list[int]  # its machine; -1 where a sign changes
+    upper: list[int]  # the mode where u > 0
+    lower: list[int]  # the mode where u < 0
+    rise: list[int]  # the edge from the lower mode to the upper one
+    fall: list[int]  # the edge back
 
 
 class Sliding(NamedTuple):
@@ -71,7 +89,9 @@ class Sliding(NamedTuple):
     sigma: Vector  # replaces their signs, shape (MOST_SLIDING,)
     table: list[Vector]  # scratch space, see the rows above
     flags: list[int]  # whether the motion slides on each, shape (S,)
-    arrived: list[int]  # whether each has just been reached, shape (S,)
+    arrived: list[int]  # whether each has just been reached (-1: left), shape (S,)
+    before: Vector  # scratch space: u before something jumped, shape (S,)
+    edges: list[int]  # scratch space: enabled edges of the other modes, shape (n,)
     live: Vector  # signs, all set to LIVE
     watch: list[int]  # unused flags, shape (r,)
 
@@ -91,6 +111,7 @@ def sliding_scratch(
     relations: int,
     seen: int,
     flags: Sequence[int] = (),
+    machines: int = 0,
 ) -> Sliding:
     """Return scratch space for sliding; small if there are no surfaces.
 
@@ -106,6 +127,8 @@ def sliding_scratch(
         Number of observed values.
     flags : sequence of int, optional
         Whether the motion slides on each surface; on none if omitted.
+    machines : int, optional
+        Number of machines, if they are asked for edges.
 
     Returns
     -------
@@ -123,6 +146,8 @@ def sliding_scratch(
         table=[[0.0] * width for _ in range(3 * most + 7)],
         flags=list(flags) or [0] * number,
         arrived=[0] * number,
+        before=[0.0] * number,
+        edges=[-1] * machines,
         live=[LIVE] * signs,
         watch=[0] * relations,
     )
@@ -142,7 +167,7 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         Filled.
     """
     flow, normal, p = on.functions.flow, on.functions.normal, on.functions.p
-    held, sign = on.held, on.sliding.surfaces.sign
+    held, surfaces = on.held, on.sliding.surfaces
     which, sigma, table = on.sliding.which, on.sliding.sigma, on.sliding.table
     most = len(sigma)
     count = which[most]
@@ -150,9 +175,8 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
     first = 3 * most
     rates, gains = table[first + RATES], table[first + GAINS]
     upper, lower = table[first + UPPER], table[first + LOWER]
-    for c in range(count):
-        held[sign[which[c]]] = 0.0
-    # A mean that is exact for any sum of functions of one sign each.
+    to_neither(on.sliding, held)
+    # A mean that is exact for any sum of functions of one sign (or the modes of one machine) each.
     if count == 1:
         for j in range(size):
             dy[j] = 0.0
@@ -161,12 +185,11 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         for j in range(size):
             dy[j] = (1.0 - count) * dy[j]
     for c in range(count):
-        k = sign[which[c]]
-        held[k] = 1.0
+        kept = go_to(surfaces, which[c], 1.0, held, mode)
         flow(t, y, mode, held, p, upper)
-        held[k] = -1.0
+        go_to(surfaces, which[c], -1.0, held, mode)
         flow(t, y, mode, held, p, lower)
-        held[k] = 0.0
+        go_back(surfaces, which[c], kept, held, mode)
         column = table[COLUMN * most + c]
         for j in range(size):
             dy[j] += 0.5 * (upper[j] + lower[j])
@@ -187,7 +210,8 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         rates[r], gains[r] = rate, row[r]
     _solve(table, MATRIX * most, count, sigma)
     for c in range(count):
-        held[sign[which[c]]] = sigma[c]
+        if surfaces.machine[which[c]] < 0:
+            held[surfaces.sign[which[c]]] = sigma[c]
         column = table[COLUMN * most + c]
         for j in range(size):
             dy[j] += sigma[c] * column[j]
@@ -202,6 +226,35 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         if square > 0.0:
             for j in range(size):
                 dy[j] -= g[j] * (rate / square)
+
+
+def to_neither(sliding: Sliding, signs: Vector) -> None:
+    """Set the signs of the surfaces slid on to 0; machines keep their modes."""
+    which, surfaces = sliding.which, sliding.surfaces
+    for c in range(which[-1]):
+        if surfaces.machine[which[c]] < 0:
+            signs[surfaces.sign[which[c]]] = 0.0
+
+
+def go_to(surfaces: Surfaces, k: int, side: float, signs: Vector, mode: list[int]) -> int:
+    """Go to one side of a surface by its sign, or its machine's mode; return the mode before."""
+    i = surfaces.machine[k]
+    kept = 0
+    if i < 0:
+        signs[surfaces.sign[k]] = side
+    else:
+        kept = mode[i]
+        mode[i] = surfaces.upper[k] if side > 0.0 else surfaces.lower[k]
+    return kept
+
+
+def go_back(surfaces: Surfaces, k: int, kept: int, signs: Vector, mode: list[int]) -> None:
+    """Go back to a sign of 0, or to the mode before."""
+    i = surfaces.machine[k]
+    if i < 0:
+        signs[surfaces.sign[k]] = 0.0
+    else:
+        mode[i] = kept
 
 
 def _solve(table: list[Vector], first: int, count: int, out: Vector) -> None:
@@ -274,99 +327,44 @@ def margins_on(
         out[first + 2 * c + 1] = 1.0 + sigma[c]
 
 
-# --------------------------------------------------------------------------- start, end of sliding
-def seize(on: Held, now: Now, w: Watched) -> bool:
-    """Choose the surfaces to slide on from here, and put y onto them.
-
-    They are candidates that were slid on, have just been reached, or are met exactly. One that does
-    not attract, or whose sigma lies beyond 1, is released again: its sign is that of the side to
-    which the flow leads.
+def follow_on(t: float, y: Vector, mode: list[int], held: Vector, on: Held) -> None:
+    """Set the components of y that others determine.
 
     Parameters
     ----------
+    t, y, mode, held
+        As for `Functions.follow`.
     on : Held
-        The system, and what it slides on; the held signs of candidates are set.
-    now : Now
-        The state of the run; y is moved onto the surfaces, which it left only by rounding.
-    w : Watched
-        Armed, with ``w.start`` filled with margins.
-
-    Returns
-    -------
-    bool
-        Whether the set of sliding surfaces has changed.
+        The system, as the parameters.
     """
-    t, y, mode = now.clock[T], now.y, now.mode
-    held, sliding, surfaces = on.held, on.sliding, on.sliding.surfaces
-    which, sigma, table = sliding.which, sliding.sigma, sliding.table
-    most, size = len(sigma), len(y)
-    rates, gains = table[3 * most + RATES], table[3 * most + GAINS]
-    count = 0
-    for k in range(len(surfaces.sign)):
-        above = surfaces.above[k]
-        met = sliding.flags[k] == 1 or sliding.arrived[k] == 1 or w.start[above] == 0.0
-        sliding.arrived[k] = 0
-        if w.watch[above] and met and count < most:
-            which[count] = k
-            count += 1
-    candidates = count
-    while count > 0:
-        which[most] = count
-        slope_on(on, t, y, mode, table[3 * most + SLOPE])
-        worst, excess = -1, 0.0
-        for c in range(count):
-            beyond = abs(sigma[c]) - 1.0 if gains[c] < 0.0 else BEYOND
-            if beyond > excess:
-                worst, excess = c, beyond
-        if worst < 0:
-            break
-        k = which[worst]
-        u = w.start[surfaces.above[k]]
-        pushed = sigma[worst] if gains[worst] < 0.0 else rates[worst]
-        held[surfaces.sign[k]] = _sign(pushed if u == 0.0 or sliding.flags[k] == 1 else u)
-        count -= 1
-        which[worst], which[count] = which[count], k
-    which[most] = count
-    if candidates > count:
-        dy, g = table[3 * most + SLOPE], table[3 * most + RATES]
-        flow_on(t, y, mode, held, on, dy)
-        for c in range(count, candidates):
-            # On a surface on which another one keeps it, for example a mere corner at v = 0 next to
-            # sgn(v), it goes to neither side.
-            on.functions.normal(which[c], t, y, mode, on.functions.p, g)
-            rate = g[size]
-            for j in range(size):
-                rate += g[j] * dy[j]
-            u, square = w.start[surfaces.above[which[c]]], 0.0
-            for j in range(size):
-                square += g[j] * g[j]
-            if rate == 0.0 and u == 0.0:
-                held[surfaces.sign[which[c]]] = 0.0
-            elif sliding.flags[which[c]] == 1 and square > 0.0:  # left only by accumulated errors
-                for j in range(size):
-                    y[j] -= g[j] * (u / square)
-    changed = False
-    for k in range(len(surfaces.sign)):
-        slid = 0
-        for c in range(count):
-            if which[c] == k:
-                slid = 1
-        changed = changed or slid != sliding.flags[k]
-        sliding.flags[k] = slid
-    for c in range(count):
-        u, g, square = w.start[surfaces.above[which[c]]], table[NORMAL * most + c], 0.0
-        for j in range(size):
-            square += g[j] * g[j]
-        if u != 0.0 and square > 0.0:
-            for j in range(size):
-                y[j] -= g[j] * (u / square)
-    return changed
+    on.functions.follow(t, y, mode, held, on.functions.p)
 
 
-def _sign(u: float) -> float:
-    if u > 0.0:
-        return 1.0
-    return -1.0 if u < 0.0 else 0.0
+def arm_on(on: Held, t: float, y: Vector, mode: list[int], watch: list[int]) -> None:
+    """Hold signs, and flag relations to watch: on a machine's surface those of both its modes.
+
+    Parameters
+    ----------
+    on, t, y, mode
+        As for a slope.
+    watch : list of int
+        Flags are added.
+    """
+    arm, p, surfaces = on.functions.arm, on.functions.p, on.sliding.surfaces
+    arm(t, y, mode, p, on.held, watch)
+    for c in range(on.sliding.which[-1]):
+        k = on.sliding.which[c]
+        i = surfaces.machine[k]
+        if i >= 0:
+            kept = mode[i]
+            mode[i] = other_mode(surfaces, k, kept)
+            arm(t, y, mode, p, on.held, watch)
+            mode[i] = kept
+
+
+def other_mode(surfaces: Surfaces, k: int, mode: int) -> int:
+    """Return the mode on the other side of a machine's surface."""
+    return surfaces.upper[k] if mode == surfaces.lower[k] else surfaces.lower[k]
 
 
 # --------------------------------------------------------------------------- observing
@@ -387,33 +385,73 @@ def look(
         Filled.
     """
     p, sliding = on.functions.p, on.sliding
-    live, sign, which = sliding.live, sliding.surfaces.sign, sliding.which
-    sigma, table, most = sliding.sigma, sliding.table, len(sliding.sigma)
-    count = which[most]
+    live, surfaces, which = sliding.live, sliding.surfaces, sliding.which
+    slope, count = sliding.table[3 * len(sliding.sigma) + SLOPE], which[-1]
     if count == 0:
         observe(t, y, mode, live, p, out)
         return
-    on.functions.arm(t, y, mode, p, on.held, sliding.watch)
-    slope_on(on, t, y, mode, table[3 * most + SLOPE])
-    upper, lower = table[3 * most + SEEN_UPPER], table[3 * most + SEEN_LOWER]
+    arm_on(on, t, y, mode, sliding.watch)
+    slope_on(on, t, y, mode, slope)
+    to_neither(sliding, live)
+    _combine(observe, on, t, y, mode, live, False, out)
     for c in range(count):
-        live[sign[which[c]]] = 0.0
+        if surfaces.machine[which[c]] < 0:
+            live[surfaces.sign[which[c]]] = LIVE
+
+
+def look_held(
+    observe: Callable[..., Any], on: Held, t: float, y: Vector, mode: list[int], out: Vector
+) -> None:
+    """Observe a state with the signs as they are held, and with the shares of machines' modes.
+
+    Parameters
+    ----------
+    observe, on, t, y, mode, out
+        As in `look`.
+    """
+    machines = False
+    for c in range(on.sliding.which[-1]):
+        machines = machines or on.sliding.surfaces.machine[on.sliding.which[c]] >= 0
+    if machines:
+        slope_on(on, t, y, mode, on.sliding.table[3 * len(on.sliding.sigma) + SLOPE])
+        _combine(observe, on, t, y, mode, on.held, True, out)
+    else:
+        observe(t, y, mode, on.held, on.functions.p, out)
+
+
+def _combine(
+    observe: Callable[..., Any],
+    on: Held,
+    t: float,
+    y: Vector,
+    mode: list[int],
+    signs: Vector,
+    only_machines: bool,
+    out: Vector,
+) -> None:
+    """Observe both sides of the surfaces slid on, and combine them by the sigmas of the slope."""
+    p, sliding, surfaces = on.functions.p, on.sliding, on.sliding.surfaces
+    which, sigma, table, most = sliding.which, sliding.sigma, sliding.table, len(sliding.sigma)
+    upper, lower = table[3 * most + SEEN_UPPER], table[3 * most + SEEN_LOWER]
+    count = 0
+    for c in range(which[most]):
+        if surfaces.machine[which[c]] >= 0 or not only_machines:
+            count += 1
     if count == 1:
         for j in range(len(out)):
             out[j] = 0.0
     else:
-        observe(t, y, mode, live, p, out)
+        observe(t, y, mode, signs, p, out)
         for j in range(len(out)):
             out[j] = (1.0 - count) * out[j]
-    for c in range(count):
-        k, share = sign[which[c]], min(max(sigma[c], -1.0), 1.0)
-        live[k] = 1.0
-        observe(t, y, mode, live, p, upper)
-        live[k] = -1.0
-        observe(t, y, mode, live, p, lower)
-        live[k] = 0.0
-        for j in range(len(out)):
-            a, b = upper[j], lower[j]
-            out[j] += 0.5 * (a + b) + share * (0.5 * (a - b))
-    for c in range(count):
-        live[sign[which[c]]] = LIVE
+    for c in range(which[most]):
+        if surfaces.machine[which[c]] >= 0 or not only_machines:
+            share = min(max(sigma[c], -1.0), 1.0)
+            kept = go_to(surfaces, which[c], 1.0, signs, mode)
+            observe(t, y, mode, signs, p, upper)
+            go_to(surfaces, which[c], -1.0, signs, mode)
+            observe(t, y, mode, signs, p, lower)
+            go_back(surfaces, which[c], kept, signs, mode)
+            for j in range(len(out)):
+                a, b = upper[j], lower[j]
+                out[j] += 0.5 * (a + b) + share * (0.5 * (a - b))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from integrators.steps import T_STOP, Motion, Now, Scratch, T, Vector
+from integrators.steps import SEEN, T_STOP, Motion, Now, Scratch, T, Vector
 
 __all__ = [
     "Control",
@@ -256,7 +256,7 @@ def starting_step(
     h = min(h, room)
     for j in range(len(y)):
         y_try[j] = y[j] + h * f[j]
-    motion.flow(t + h, y_try, now.mode, now.held, motion.p, f_try)
+    motion.flow(min(t + h, now.clock[SEEN]), y_try, now.mode, now.held, motion.p, f_try)
     for j in range(len(y)):
         f_try[j] = (f_try[j] - f[j]) / h
     d2 = scaled_size(f_try, y, control, now.floor)

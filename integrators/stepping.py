@@ -29,7 +29,16 @@ from integrators.loop import (
     Machines,
     run_to_event,
 )
-from integrators.sliding import Functions, Held, flow_on, look, margins_on
+from integrators.seizing import let_go, look_back
+from integrators.sliding import (
+    Functions,
+    Held,
+    flow_on,
+    follow_on,
+    look,
+    look_held,
+    margins_on,
+)
 from integrators.step_size import INFINITY
 from integrators.steps import LATEST, PAUSE, Motion, T, Vector
 
@@ -42,6 +51,7 @@ __all__ = [
     "Clocks",
     "Sample",
     "next_tick",
+    "restart",
     "step_to",
 ]
 
@@ -49,13 +59,19 @@ FULL_LOG = 21  # the log is full: empty it, and call again
 # Indices into Sample.counts: switches in the log; whether this call continues one that returned
 # FULL_LOG; whether the mean is wanted; what was returned.
 SWITCHES, RESUMED, MEAN, CODE = range(4)
+EXACT = 2.0**53  # up to here every whole number is a float
 
 
 class Clocks(NamedTuple):
-    """What ticks: samplers, then discrete machines, each with its bit."""
+    """What ticks: samplers, then discrete machines, each with its bit.
 
-    start: Vector  # of each its first tick
+    Periods and offsets are whole numbers of units, so that no sum of them is rounded.
+    """
+
+    per_second: Vector  # [units in a second]
     period: Vector
+    offset: Vector  # of each its first tick, from the start
+    begin: Vector  # [time, units]: their sum is the start
     made: list[int]  # ticks in the plan, or past
 
 
@@ -98,7 +114,7 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
     clock, done = now.clock, sample.counts
     end = sample.end[0]
     on = Held(functions, now.held, b.sliding)
-    motion = Motion(flow_on, margins_on, on)
+    motion = Motion(flow_on, margins_on, on, follow_on)
     if done[RESUMED] == 0:
         _begin(functions, b, sample)
     done[CODE] = 0
@@ -144,10 +160,10 @@ def next_tick(plan: Plan, clocks: Clocks) -> None:
     plan.ticks[0] = plan.ticks[1]
     t = INFINITY
     for i in range(len(clocks.period)):
-        t = min(t, clocks.start[i] + clocks.made[i] * clocks.period[i])
+        t = min(t, _due(clocks, i))
     bits = 0
     for i in range(len(clocks.period)):
-        if clocks.start[i] + clocks.made[i] * clocks.period[i] <= t:
+        if _due(clocks, i) <= t:
             bits |= 1 << i
             clocks.made[i] += 1
     plan.jumps[1] = t
@@ -157,19 +173,55 @@ def next_tick(plan: Plan, clocks: Clocks) -> None:
     plan.before_jumps[1] = math.nextafter(t, -INFINITY)
 
 
+def _due(clocks: Clocks, i: int) -> float:
+    """Return the next tick of a clock."""
+    units = clocks.begin[1] + clocks.offset[i] + clocks.made[i] * clocks.period[i]
+    return clocks.begin[0] + units / clocks.per_second[0]
+
+
+def restart(b: Buffers, clocks: Clocks) -> None:
+    """Let all clocks begin at the time in the buffers, and put the first two ticks into the plan.
+
+    Parameters
+    ----------
+    b : Buffers
+        Their plan has room for two ticks, or for none if nothing ticks.
+    clocks : Clocks
+        What ticks.
+    """
+    t, plan = b.now.clock[T], b.plan
+    clocks.begin[0], clocks.begin[1] = t, 0.0
+    units = t * clocks.per_second[0]
+    if abs(units) < EXACT:
+        whole = int(units + 0.5) if units > 0.0 else int(units - 0.5)
+        if whole / clocks.per_second[0] == t:
+            clocks.begin[0], clocks.begin[1] = 0.0, float(whole)
+    for i in range(len(clocks.made)):
+        clocks.made[i] = 0
+    for _k in range(len(plan.jumps)):
+        next_tick(plan, clocks)
+
+
 def _begin(functions: Functions, b: Buffers, sample: Sample) -> None:
     """Write the straight lines; where an input jumps, guards are asked again."""
     clock, counts, end = b.now.clock, b.memory.counts, sample.end[0]
     _shared, _own, tables = functions.p
     first = 1 if clock[T] >= end else 0  # of a sample without length only its end matters
+    on, jumps = Held(functions, b.now.held, b.sliding), False
+    for k in range(len(tables) // 2):
+        jumps = jumps or tables[2 * k + 1][1] != sample.inputs[k][first]
+    jumps = jumps and counts[PHASE] != START
+    if jumps:
+        look_back(on, b.now, b.relations)
     for k in range(len(tables) // 2):
         times, values, given = tables[2 * k], tables[2 * k + 1], sample.inputs[k]
-        if values[1] != given[first] and counts[PHASE] != START:
-            counts[PHASE] = ASK
         times[0] = clock[T]
         times[1] = end
         values[0] = given[0]
         values[1] = given[1]
+    if jumps:
+        counts[PHASE] = ASK
+        let_go(on, b.now, b.relations)
     clock[PAUSE] = end
     clock[LATEST] = abs(end)
     b.plan.knots[0] = end
@@ -184,15 +236,15 @@ def _impulse(machines: Machines, motion: Motion, b: Buffers, sample: Sample, t: 
 
     The state in the middle is on the cubic through both ends.
     """
-    now, p, place = b.now, motion.p.functions.p, sample.wanted[0]
+    now, on, place = b.now, motion.p, sample.wanted[0]
     before, middle, slope, first = sample.before, sample.middle, sample.slope, b.scratch.k[0]
     h = now.clock[T] - t
     motion.flow(now.clock[T], now.y, now.mode, now.held, motion.p, slope)
     for j in range(len(now.y)):
         middle[j] = 0.5 * (before[j] + now.y[j]) + 0.125 * h * (first[j] - slope[j])
-    machines.observe(t, before, now.mode, now.held, p, sample.seen)
+    look_held(machines.observe, on, t, before, now.mode, sample.seen)
     total = sample.seen[place]
-    machines.observe(t + 0.5 * h, middle, now.mode, now.held, p, sample.seen)
+    look_held(machines.observe, on, t + 0.5 * h, middle, now.mode, sample.seen)
     total += 4.0 * sample.seen[place]
-    machines.observe(now.clock[T], now.y, now.mode, now.held, p, sample.seen)
+    look_held(machines.observe, on, now.clock[T], now.y, now.mode, sample.seen)
     return h * (total + sample.seen[place]) / 6.0

@@ -20,16 +20,19 @@ __all__ = [
     "Vector",
     "coefficients",
     "interpolate",
+    "stays",
     "take_step",
 ]
 
 Vector = list[float]
 Flow = Callable[..., Any]  # flow(t, y, mode, held, p, dy) -> None, fills dy
+Follow = Callable[..., Any]  # follow(t, y, mode, held, p) -> None, sets what others determine
 Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
 # Indices into Now.clock: the time, the next step, the controller's memory, the next stop; the time
 # since which switches are counted, and the time of the last one; the time at which the loop returns
-# once the states are settled, and the latest time that the clock must resolve.
-T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED, PAUSE, LATEST = range(8)
+# once the states are settled, and the latest time that the clock must resolve; the latest time at
+# which the system shows what is before the next jump. Beyond it, at the jump, it is asked there.
+T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED, PAUSE, LATEST, SEEN = range(9)
 
 
 class Coefficients(NamedTuple):
@@ -53,12 +56,17 @@ class Dense(NamedTuple):
     bump: Vector
 
 
+def stays(t: float, y: Vector, mode: list[int], held: Vector, p: Any) -> None:
+    """Set no component: none is determined by others."""
+
+
 class Motion(NamedTuple):
-    """The flow on an arc and what is watched meanwhile, with the parameters of both."""
+    """The flow on an arc, what is watched, and what follows, with the parameters of all."""
 
     flow: Flow
     margins: Margins
     p: Any
+    follow: Follow = stays
 
 
 class Now(NamedTuple):
@@ -70,6 +78,11 @@ class Now(NamedTuple):
     mode: list[int]  # of each machine, shape (n,); frozen within a step
     held: Vector  # signs; frozen within a step
     floor: Vector  # absolute tolerances, shape (m,); they grow for components without a scale
+
+
+def time_of(now: Now) -> float:
+    """Return the time at which the system shows the state: one clock tick before a jump."""
+    return min(now.clock[T], now.clock[SEEN])
 
 
 class Scratch(NamedTuple):
@@ -122,6 +135,7 @@ def take_step(
     k, y_new = scratch.k, scratch.y_new
     h = t_new - t
     size = len(y)
+    end = min(t_new, now.clock[SEEN])
     A = method.A
     B = method.B
     C = method.C
@@ -157,8 +171,8 @@ def take_step(
                     y_new[j] = y[j] + y_new[j]
         if i < stages:
             # Rounding must not put a stage beyond the end: another line of a record begins there.
-            flow(t + C[i] * h if C[i] < 1.0 else t_new, y_new, mode, held, p, k[i])
-    flow(t_new, y_new, mode, held, p, scratch.f_new)
+            flow(min(t + C[i] * h, end) if C[i] < 1.0 else end, y_new, mode, held, p, k[i])
+    flow(end, y_new, mode, held, p, scratch.f_new)
 
 
 def fit_dense(method: Coefficients, h: float, y: Vector, scratch: Scratch) -> None:

@@ -22,6 +22,7 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import parse_value
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import loaded
 from plots import formats, panels, presets
 from plots._excitation import Excited, excited
 from plots._mathtext import Formulas, formula
@@ -281,6 +282,8 @@ def _curve(model: Model, many: bool) -> list[tuple[str, str]]:
     text = model.stribeck.text
     tree = parse_value(text, ["v", *model.stribeck.numbers])
     curve = formula(tree)
+    if loaded(model):
+        return [("", rf"s{'_{i} = w_{i}' if many else ' = w'} \left({curve}\right) N")]
     if not many and (model.weights == 1.0).all():
         return [("", f"s = {curve}")]
     left = "s_{i} = w_{i}" if many else "s = w"

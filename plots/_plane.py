@@ -39,6 +39,7 @@ from gms_fsm.language import (
 )
 from gms_fsm.language._normal import renamed_in
 from gms_fsm.language._tree import walk
+from gms_fsm.systems.system import loaded
 from gms_fsm.traces.trace import Trace
 
 __all__ = ["Plane", "checked_axes", "linear_threshold", "plane_axes", "turning_points"]
@@ -180,7 +181,8 @@ class Plane:
         why = explain(trace, row, element)
         row = row % len(trace) - bool(why.left)
         start: dict[str, Value] = {}
-        if trace.model.stribeck is not None and "s" in chart.inputs:
+        # Under a load s is that of the row, also at other velocities.
+        if trace.model.stribeck is not None and "s" in chart.inputs and not loaded(trace.model):
             start["s"] = _threshold(trace.model.stribeck, trace.model.weights[element], names[0])
         return cls(
             chart,

@@ -66,19 +66,20 @@ class Dice:
 
     shape: Random
     numbers: Random
+    digits: int = 3
 
     def one_of(self, *options: Any) -> Any:
         """Choose a part of the shape."""
         return self.shape.choice(options)
 
     def spread(self, low: float, high: float) -> float:
-        """Draw a number with three digits, evenly over decades."""
+        """Draw a number with a few digits, evenly over decades."""
         value = math.exp(self.numbers.uniform(math.log(low), math.log(high)))
-        return float(f"{value:.3g}")
+        return float(f"{value:.{self.digits}g}")
 
     def even(self, low: float, high: float) -> float:
-        """Draw a number with three digits; it occasionally falls on a boundary."""
-        return float(f"{self.numbers.uniform(low, high):.3g}")
+        """Draw a number with a few digits; it occasionally falls on a boundary."""
+        return float(f"{self.numbers.uniform(low, high):.{self.digits}g}")
 
     def spreads(self, n: int, low: float, high: float) -> list[float]:
         """Draw several numbers."""

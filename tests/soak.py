@@ -2,9 +2,10 @@
 
 The three fuzz bodies for the given number of minutes each, 200 kills at random moments, a run of a
 million transitions, new random runs of tests/physics/test_hard_random_runs.py and of
-tests/trials.py, new records to step along, and new systems of tests/random_systems.py in all
-engines. Each part runs in separate processes, with limits on memory and time; findings are printed
-with the command that repeats them, and the exit code is then 1.
+tests/trials.py, new records to step along, new systems of tests/random_systems.py in all engines,
+and of tests/exact_systems.py against an exact reference. Each part runs in separate processes, with
+limits on memory and time; findings are printed with the command that repeats them, and the exit
+code is then 1.
 """
 
 from __future__ import annotations
@@ -262,14 +263,14 @@ def stepping(seed: int, count: int) -> bool:
     return good
 
 
-def systems(seed: int, count: int) -> bool:
-    """Compare new random systems in all engines; the child prints those that differ."""
+def systems(module: str, seed: int, count: int) -> bool:
+    """Compare new random systems, in all engines or with a reference; the child prints findings."""
     with tempfile.TemporaryDirectory() as folder:  # for machine code that is not needed again
         done = subprocess.run(
             [
                 sys.executable,
                 "-m",
-                "tests.random_systems",
+                f"tests.{module}",
                 "--count",
                 str(count),
                 "--seed",
@@ -282,7 +283,7 @@ def systems(seed: int, count: int) -> bool:
             text=True,
             check=False,
         )
-    print(f"random systems: {done.stdout}", end="", flush=True)
+    print(f"{module}: {done.stdout}", end="", flush=True)
     return done.returncode == 0
 
 
@@ -290,7 +291,7 @@ def systems(seed: int, count: int) -> bool:
 def main() -> None:
     """Run the requested parts; exit with 1 if there were findings."""
     parts = ("expression", "scenario", "trace", "kill", "million", "runs", "trials")
-    parts += ("stepping", "systems")
+    parts += ("stepping", "systems", "exact")
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0, help="for each of the three")
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(10**9))
@@ -300,6 +301,7 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=2000, help="random runs to judge")
     parser.add_argument("--records", type=int, default=1000, help="random records to step along")
     parser.add_argument("--systems", type=int, default=500, help="random systems to compare")
+    parser.add_argument("--exact", type=int, default=1000, help="random systems to judge")
     parser.add_argument("--only", choices=parts, action="append")
     parser.add_argument("--input", type=int, help="repeat this input of the one part given")
     parser.add_argument("--child", type=float, help=argparse.SUPPRESS)
@@ -326,7 +328,8 @@ def main() -> None:
         "runs": lambda: random_runs(given.seed, given.examples),
         "trials": lambda: trials(given.seed, given.trials),
         "stepping": lambda: stepping(given.seed, given.records),
-        "systems": lambda: systems(given.seed, given.systems),
+        "systems": lambda: systems("random_systems", given.seed, given.systems),
+        "exact": lambda: systems("exact_systems", given.seed, given.exact),
     }
     good = [work[part]() for part in given.only or parts]
     print("nothing found" if all(good) else "see FINDING above")

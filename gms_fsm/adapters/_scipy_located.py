@@ -13,7 +13,7 @@ from gms_fsm.adapters._scipy_parts import Caller, Carried, Solution, Switch
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
-from integrators import Arc, Firing, Functions, Held, HybridError, Livelock, NotFinite, hybrid, look
+from integrators import Arc, Firing, Held, HybridError, Livelock, NotFinite, hybrid, look
 
 __all__ = ["Located"]
 
@@ -36,7 +36,7 @@ class Located:
         self._seen = [0.0] * program.layout.observed.size
         self._gradient = [0.0] * (program.layout.y.size + 1)
         switch = IfElse(program)
-        self._act, self.tick = switch.act, switch.tick
+        self._act, self.tick, self.jolts = switch.act, switch.tick, switch.jolts
 
     def _full(self, y: Sequence[float]) -> list[float]:
         return self.driven.full(y[self._own], self.caller.velocities(np.array(y[self._host])))
@@ -114,8 +114,10 @@ class Located:
         self.program.ieee["observe"](t, self._full(y), mode, signs, p, out)
 
     # ------------------------------------------------------------------ as integrators.Switch
-    def ask(self, t: float, y: list[float], mode: list[int], p: Any, edges: list[int]) -> None:
-        self.program.ieee["switch"](t, self._full(y), mode, p, edges)
+    def ask(
+        self, t: float, y: list[float], mode: list[int], p: Any, jolt: list[int], edges: list[int]
+    ) -> None:
+        self.program.ieee["switch"](t, self._full(y), mode, p, jolt, edges)
 
     def act(
         self, edge: int, machine: int, t: float, y: list[float], mode: list[int], p: Any
@@ -174,7 +176,7 @@ class Located:
         sliding = integrators.sliding_scratch(
             whole.surfaces, len(y), whole.held, len(whole.strict), whole.seen, mode[layout.slides]
         )
-        functions = Functions(whole.flow, whole.arm, whole.margins, whole.normal, whole.p)
+        functions = whole.functions(located=True)
         look(
             self.observe,
             Held(functions, [0.0] * whole.held, sliding),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import Moment
 from gms_fsm.systems.models import GMS
-from gms_fsm.systems.system import Contact, System
+from gms_fsm.systems.system import Contact, System, loaded
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace, dwell_times
 
@@ -326,7 +326,7 @@ def _setting(value: Setting) -> str:
 
 
 def _held(trace: Trace) -> list[str]:
-    """Return a line on the intervals in which a sign was held between -1 and 1."""
+    """Return a line on the intervals in which the motion slid on a surface."""
     stretches = trace.sliding
     if not len(stretches):
         return []
@@ -334,7 +334,7 @@ def _held(trace: Trace) -> list[str]:
     names = " and ".join(f"{name} = 0" for name in dict.fromkeys(stretches.surface.tolist()))
     return [
         f"- held on {names}: {len(stretches)} times, {seconds:.4g} s in total, first at t = "
-        f"{float(stretches.t_start[0]):.6g} s (a sliding mode: the sign is a number from -1 to 1)"
+        f"{float(stretches.t_start[0]):.6g} s (a sliding mode: between two signs or two states)"
     ]
 
 
@@ -380,7 +380,12 @@ def _parameters(trace: Trace) -> str:
     numbers = [(each, model.values[each.name]) for each in model.chart.parameters]
     if model.stribeck is not None:
         own = model.stribeck.numbers
-        numbers += [(each, own[each.name]) for each in STRIBECK if each.name in own]
+        per = {"N": "N per N of load"} if loaded(model) else {}
+        numbers += [
+            (replace(each, unit=per.get(each.unit, each.unit)), own[each.name])
+            for each in STRIBECK
+            if each.name in own
+        ]
     if not (isinstance(model, Contact) and model.model is None):
         numbers.append((SIGMA_2, model.sigma_2))
     if model.stribeck is not None:

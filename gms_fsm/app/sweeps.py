@@ -18,9 +18,7 @@ from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import ParameterError, cut
 from gms_fsm.run.sweep import Sweep, sweep
-from gms_fsm.systems._varied import numbers_in
-from gms_fsm.systems.models import parameters_of
-from gms_fsm.systems.rigs import numbers_of
+from gms_fsm.systems.numbers import Adjustable
 
 __all__ = ["Axis", "axis", "sweep_scenario", "sweep_summary"]
 
@@ -158,10 +156,8 @@ def sweep_scenario(
 
 def _known(loaded: Loaded) -> tuple[Parameter, ...]:
     """Return the parameters that can be varied."""
-    if loaded.system is not None:
-        found = numbers_in(loaded.system).items()
-        return tuple(replace(each, name=name) for name, (each, _) in found)
-    return (*parameters_of(loaded.model), *numbers_of(loaded.rig))
+    what = Adjustable(loaded.system) if loaded.system else Adjustable(loaded.model, loaded.rig)
+    return tuple(replace(each, name=name) for name, (each, _) in what.known.items())
 
 
 def _check(axes: Sequence[Axis], known: Sequence[Parameter]) -> None:

@@ -57,6 +57,7 @@ class EdgeTable(Table):
     target: str = Field(alias="to")
     guard: str
     actions: dict[str, str] = Field({}, alias="do")
+    impulse: bool = False
 
 
 def _form(given: Any) -> str:

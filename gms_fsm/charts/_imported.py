@@ -58,6 +58,7 @@ class Texts:
     state_outputs: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     contact_outputs: Mapping[str, str] = field(default_factory=dict)
     locked: Iterable[str] = ()
+    impulses: Iterable[str] = ()
 
     @classmethod
     def of(cls, given: Mapping[str, Any], here: str) -> Texts:
@@ -92,6 +93,7 @@ class GivenTexts(TypedDict, total=False):
     state_outputs: Mapping[str, Mapping[str, str]]
     contact_outputs: Mapping[str, str]
     locked: Iterable[str]
+    impulses: Iterable[str]
 
 
 def built(states: list[str], edges: list[Edge], given: Texts, here: str) -> Chart:
@@ -137,6 +139,8 @@ def built(states: list[str], edges: list[Edge], given: Texts, here: str) -> Char
             )
     locked = dict.fromkeys(map(str, _several(given.locked, f"{here}: locked")))
     _check_known(locked, states, "state", f"{here}: locked")
+    impulses = dict.fromkeys(map(str, _several(given.impulses, f"{here}: impulses")))
+    _check_known(impulses, names, "edge", f"{here}: impulses")
     return Chart(
         given.name,
         given.inputs,
@@ -155,7 +159,12 @@ def built(states: list[str], edges: list[Edge], given: Texts, here: str) -> Char
         ),
         tuple(
             Transition(
-                edge.name, edge.sources, edge.target, guards[edge.name], actions.get(edge.name)
+                edge.name,
+                edge.sources,
+                edge.target,
+                guards[edge.name],
+                actions.get(edge.name),
+                impulse=edge.name in impulses,
             )
             for edge in edges
         ),

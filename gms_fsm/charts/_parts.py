@@ -83,6 +83,10 @@ class Transition:
     actions : mapping of str to str, optional
         Assignments ``variable: expression`` performed when it is taken. An assignment to a velocity
         is an impulse that keeps the momentum of the bodies.
+    impulse : bool
+        Whether an edge into a locked state takes the velocity that is left as an impulse, on
+        purpose: an engaging clutch, a rest speed. Other edges lock the contact where its velocity
+        passes 0, and are not taken at an instant in which it jumps.
 
     Examples
     --------
@@ -95,6 +99,7 @@ class Transition:
     target: str
     guard: str
     actions: Mapping[str, str]
+    impulse: bool = field(repr=False)
     sources: tuple[str, ...] = field(init=False, repr=False)
 
     def __init__(
@@ -104,6 +109,8 @@ class Transition:
         target: str,
         guard: str,
         actions: Mapping[str, str] | None = None,
+        *,
+        impulse: bool = False,
     ) -> None:
         if not isinstance(source, str) and not isinstance(source, Sequence):
             raise ChartError(
@@ -115,12 +122,17 @@ class Transition:
         if not sources:
             raise ChartError("it leaves no state", place=f"edge {shown(name)}")
         given = texts_of({} if actions is None else actions, f"edge {shown(name)}: actions")
+        if not isinstance(impulse, bool):
+            raise ChartError(
+                "it must be True or False", place=f"edge {shown(name)}: impulse", value=impulse
+            )
         for each, value in (
             ("name", name),
             ("source", sources[0]),
             ("target", target),
             ("guard", guard),
             ("actions", given),
+            ("impulse", impulse),
             ("sources", sources),
         ):
             object.__setattr__(self, each, value)

@@ -229,6 +229,13 @@ class Chart:
                         advice=f"states: {_listed(known)}",
                         key=("transitions", i, end),
                     )
+            if edge.impulse and not self.states[known.index(edge.target)].locked:
+                raise ChartError(
+                    f"it takes an impulse, but its target {edge.target!r} is not locked",
+                    place=f"{here}, edge {edge.name!r}",
+                    advice="leave impulse out; an action that sets the velocity is an impulse too",
+                    key=("transitions", i, "impulse"),
+                )
 
     def _check_rules(self) -> None:
         for i, each in enumerate(self.parameters):
@@ -258,6 +265,16 @@ class Chart:
         return any(state.locked for state in self.states)
 
     @property
+    def arrests(self) -> tuple[int, ...]:
+        """Numbers of the edges that lock the contact where its velocity passes 0."""
+        locked = {state.name for state in self.states if state.locked}
+        return tuple(
+            number
+            for number, edge in enumerate(self.transitions)
+            if edge.target in locked and edge.source not in locked and not edge.impulse
+        )
+
+    @property
     def sets_velocity(self) -> bool:
         """Whether an assignment sets a velocity of the contact."""
         return any({*self.velocities} & {*steps} for steps in self.assignments.values())
@@ -273,7 +290,8 @@ class Chart:
             With the keys ``name``, ``reference``, ``inputs``, ``velocities``, ``variables``,
             ``parameters`` (a list of names) or ``[[parameter]]`` (name, unit, rule, per_element,
             meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[[state]]`` (name,
-            flow, entry, exit, outputs, locked) and ``[[edge]]`` (name, from, to, guard, do).
+            flow, entry, exit, outputs, locked) and ``[[edge]]`` (name, from, to, guard, do,
+            impulse).
 
         Returns
         -------
@@ -315,7 +333,8 @@ class Chart:
             ``let``, ``velocities`` and ``contact_outputs`` as for `Chart`; a parameter may be a
             mapping of the fields of `Parameter`. By the name of an edge: ``guards``, all of them,
             and ``actions``. By the name of a state: ``flows``, ``entry``, ``exit`` and
-            ``state_outputs``. ``locked`` names the states that lock the contact.
+            ``state_outputs``. ``locked`` names the states that lock the contact, ``impulses`` the
+            edges that take an impulse to do so.
 
         Returns
         -------

@@ -34,7 +34,7 @@ DOG_CLUTCH = Chart(
         State("engaged", locked=True),
     ),
     transitions=(
-        Transition("engage", "open", "engaged", guard="t_on <= t < t_off"),
+        Transition("engage", "open", "engaged", guard="t_on <= t < t_off", impulse=True),
         Transition("disengage", "engaged", "open", guard="t >= t_off"),
     ),
     reference="Benveniste et al. (2019)",

@@ -37,7 +37,7 @@ END_STOP = Chart(
     ),
     transitions=(
         Transition("bounce", "free", "free", guard="x >= x_s and v > v_r", actions={"v": "-e * v"}),
-        Transition("settle", "free", "rest", guard="x >= x_s and 0 < v <= v_r"),
+        Transition("settle", "free", "rest", guard="x >= x_s and 0 < v <= v_r", impulse=True),
         Transition("lift", "rest", "free", guard="F < 0"),
     ),
     reference="Brogliato (2016)",

@@ -45,12 +45,19 @@ KARNOPP = Chart(
         Transition("release_forward", "stuck", "start_forward", guard="F > F_s"),
         Transition("release_backward", "stuck", "start_backward", guard="F < -F_s"),
         # The load fell below F_s before the contact left the window.
-        Transition("hold_forward", "start_forward", "stuck", guard="a < 0"),
-        Transition("hold_backward", "start_backward", "stuck", guard="a > 0"),
+        Transition(
+            "hold_forward", "start_forward", "stuck", guard="a < 0 and v <= D", impulse=True
+        ),
+        Transition(
+            "hold_backward", "start_backward", "stuck", guard="a > 0 and v >= -D", impulse=True
+        ),
         Transition("leave_forward", "start_forward", "forward", guard="v > D"),
         Transition("leave_backward", "start_backward", "backward", guard="v < -D"),
-        Transition("enter_forward", "forward", "stuck", guard="v < D"),
-        Transition("enter_backward", "backward", "stuck", guard="v > -D"),
+        Transition("enter_forward", "forward", "stuck", guard="-D < v < D", impulse=True),
+        Transition("enter_backward", "backward", "stuck", guard="-D < v < D", impulse=True),
+        # At an impact: the velocity has passed the window at once.
+        Transition("reverse_forward", "forward", "backward", guard="v <= -D"),
+        Transition("reverse_backward", "backward", "forward", guard="v >= D"),
     ),
     reference="Karnopp (1985)",
 )

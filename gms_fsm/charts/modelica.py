@@ -65,6 +65,9 @@ MODELICA = Chart(
         Transition("fail_backward", "start_backward", "stuck", guard="v >= 0 and a >= 0"),
         Transition("stop_forward", "forward", "stuck", guard="v <= 0"),
         Transition("stop_backward", "backward", "stuck", guard="v >= 0"),
+        # At an impact, which these edges survive and the two above do not.
+        Transition("reverse_forward", "forward", "backward", guard="v < 0"),
+        Transition("reverse_backward", "backward", "forward", guard="v > 0"),
         Transition("engage_forward", "free", "forward", guard="N > 0 and v > 0"),
         Transition("engage_backward", "free", "backward", guard="N > 0 and v < 0"),
         # At v = 0: the two edges above go first.

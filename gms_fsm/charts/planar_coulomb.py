@@ -56,7 +56,7 @@ PLANAR_COULOMB = Chart(
     transitions=(
         Transition("release", "stuck", "start", guard="F**2 + F_w**2 > F_s**2"),
         Transition("moves", "start", "slip", guard="v**2 + w**2 > v_c**2"),
-        Transition("arrest", "slip", "stuck", guard="v**2 + w**2 < 0.25 * v_c**2"),
+        Transition("arrest", "slip", "stuck", guard="v**2 + w**2 < 0.25 * v_c**2", impulse=True),
     ),
     reference="Goyal et al. (1991)",
 )

@@ -20,8 +20,10 @@ What it cannot show: true stiction. A contact under load always creeps, at least
 reversals. N is constant; a varying normal load would also change theta.
 
 Where v is small the force is a very stiff damper, of slope a N / |v| down to the scale of that
-creep. A mass that nearly rests therefore needs an implicit method, such as
-``method=scipy.integrate.Radau``.
+creep. A mass that nearly rests therefore needs an implicit method, and as no guard gives a scale,
+absolute tolerances: ``method=scipy.integrate.Radau, atol={"x": 1e-12, "v": 1e-12, "psi": 1e-8}``
+with the engine ``machines`` or ``ifelse``. If the run starts at rest, the tolerance of v has to be
+far below 2 V_0 exp(-mu_0 / a): ``"v": 1e-40`` if that is 2e-32 m/s. LSODA and BDF are less robust.
 
 References
 ----------

@@ -7,9 +7,9 @@ stuck contact is at rest exactly.
 It shows stiction, an exact rest, and stick-slip. It cannot show pre-sliding, a Stribeck effect
 other than the step from F_s to F_c, frictional lag, or a break-away force that depends on the rate.
 
-Limitation: where an impact at another contact reverses the velocity, this contact is arrested, and
-its lock takes the remaining velocity as an impulse; the chart cannot distinguish a reversal from
-a crossing of v = 0.
+Where an impact at another contact reverses the velocity, the contact is not arrested: it slides
+the other way. An impact on a stuck contact makes it slide, whatever the stiction: any friction
+force is too small against an impulse.
 
 References
 ----------
@@ -42,6 +42,9 @@ STICTION = Chart(
         Transition("release_backward", "stuck", "backward", guard="F < -F_s"),
         Transition("arrest_forward", "forward", "stuck", guard="v < 0"),
         Transition("arrest_backward", "backward", "stuck", guard="v > 0"),
+        # At an impact, which these edges survive and the two above do not.
+        Transition("reverse_forward", "forward", "backward", guard="v < 0"),
+        Transition("reverse_backward", "backward", "forward", guard="v > 0"),
     ),
     reference="Olsson et al. (1998)",
 )

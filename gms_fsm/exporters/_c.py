@@ -365,6 +365,7 @@ _KINDS = {
     "STEP_TOO_SMALL": "StepSizeError",
     "TOO_MANY_STEPS": "StepLimitError",
     "NOT_FINITE": "NotFiniteError",
+    "NOT_UNIQUE": "NotUniqueError",
 }
 
 

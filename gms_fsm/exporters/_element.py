@@ -35,13 +35,14 @@ from gms_fsm.language import (
 )
 from gms_fsm.language._normal import renamed_in
 from gms_fsm.lowering._plan import Computed, Plan, RoughCall, both_sides, plan_of
-from gms_fsm.systems._assembly import Assembly, Bank, Edge, assembled, of
+from gms_fsm.systems._assembly import CURVE_LOAD, Assembly, Bank, Edge, assembled, of
 
 __all__ = ["Element"]
 
 SUM = "F"  # what the sum over elements is called in `Element.total`
 MODEL = {  # what a model adds to its chart: name here, and its description
     "curve S": ("stribeck", Parameter("s", "N", meaning="Stribeck curve")),
+    CURVE_LOAD: ("load", Parameter("N", "N", meaning="what multiplies the curve")),
     "threshold weight": ("weight", WEIGHTS),
     "model sigma_2": ("sigma_2", SIGMA_2),
     **{f"curve {each.name}": (each.name, each) for each in STRIBECK},

@@ -17,7 +17,6 @@ from gms_fsm.exporters._fmu_variables import Variable, indicators_of, nominals_o
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import arguments_of
-from gms_fsm.run.start import clocks_of
 from gms_fsm.systems.system import System
 from integrators import exchange, stepping
 from integrators.compiled import INLINE, is_known
@@ -32,7 +31,7 @@ __all__ = ["Both", "Model", "both_of"]
 
 ENTRIES: Mapping[str, tuple[Any, str]] = {
     "step": (stepping.step_to, "functions machines buffers sample"),
-    "restart": (exchange.restart, "buffers sample.clocks exchange"),
+    "restart": (stepping.restart, "buffers sample.clocks"),
     "settle": (exchange.settle, "functions machines buffers sample.clocks exchange"),
     "slope": (exchange.slope, "functions buffers exchange"),
     "indicate": (exchange.indicate, "functions buffers exchange"),
@@ -220,6 +219,5 @@ def both_of(subject: Subject) -> Both:
         shift=[each.shift for each in indicators],
         before=[0.0] * size,
         signs=[0.0] * len(buffers.now.held),
-        offset=[offset for _, _, offset in clocks_of(start.system)],
     )
     return Both(functions, machines, buffers, sample, made)

@@ -24,7 +24,7 @@ from gms_fsm.exporters._charts import check_moved_from_outside
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.systems.system import Contact
+from gms_fsm.systems.system import LEAST_LOAD, Contact, loaded
 
 __all__: list[str] = []
 
@@ -194,9 +194,10 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
     curve = ""
     if contact is not None and contact.stribeck is not None:
         given = ", ".join(f"{name} = {value!r}" for name, value in contact.stribeck.numbers.items())
+        load = f" * max({contact.load}, {LEAST_LOAD!r})" if loaded(contact) else ""
         curve = (
-            f"\nThe host computes s = weight * ({contact.stribeck.text}) with {given}, weights "
-            f"{[float(each) for each in contact.weights]!r}."
+            f"\nThe host computes s = weight * ({contact.stribeck.text}){load} with {given}, "
+            f"weights {[float(each) for each in contact.weights]!r}."
         )
     kept = [name for name in _names(chart) if name in KEPT]
     warning = (

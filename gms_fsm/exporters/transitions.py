@@ -29,7 +29,7 @@ from gms_fsm.language import NAMESPACE, Condition, Node, Value, parse_value, sgn
 from gms_fsm.language._normal import renamed
 from gms_fsm.lowering._generated import bare
 from gms_fsm.run._steppable import other_inputs
-from gms_fsm.systems.system import Contact
+from gms_fsm.systems.system import LEAST_LOAD, LOAD, Contact, loaded
 
 __all__: list[str] = []
 
@@ -201,7 +201,10 @@ def _element(chart: Chart, contact: Contact | None) -> Iterator[str]:
         named = {name: f'STRIBECK["{name}"]' for name in contact.stribeck.numbers}
         moved = f"self.{chart.velocities[0]}"
         yield "    def _threshold(self):"
-        yield f"        return self._weight * ({spell(curve, rename={**named, 'v': moved})})"
+        strength = spell(curve, rename={**named, "v": moved})
+        if loaded(contact):
+            strength = f"({strength}) * max(self.{LOAD}, {LEAST_LOAD!r})"
+        yield f"        return self._weight * ({strength})"
         yield ""
     for name, tree in chart.lets.items():
         yield from text.function(f"_let_{name}", tree)

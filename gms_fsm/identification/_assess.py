@@ -22,7 +22,8 @@ from gms_fsm.identification._statistics import (
     correlation_time,
 )
 from gms_fsm.identification._task import Task, stretches
-from gms_fsm.identification._unknowns import Subject, Unknown
+from gms_fsm.identification._unknowns import Unknown
+from gms_fsm.systems.numbers import Adjustable
 from gms_fsm.systems.system import System
 
 __all__ = ["Assessed", "Estimate", "assessed", "sorted_elements", "unassessed"]
@@ -464,8 +465,8 @@ def _are(names: Sequence[str]) -> str:
 
 # --------------------------------------------------------------------------- order of elements
 def sorted_elements(
-    subject: Subject, unknowns: Sequence[Unknown], bounded: Collection[str]
-) -> Subject:
+    subject: Adjustable, unknowns: Sequence[Unknown], bounded: Collection[str]
+) -> Adjustable:
     """Return a bank with its elements in the order of their thresholds.
 
     Elements that may change places in a search are named from the first to slip to the last; all
@@ -473,7 +474,7 @@ def sorted_elements(
 
     Parameters
     ----------
-    subject : Subject
+    subject : Adjustable
         Fitted.
     unknowns : sequence of Unknown
         What was free.
@@ -482,7 +483,7 @@ def sorted_elements(
 
     Returns
     -------
-    Subject
+    Adjustable
         The same as given if elements cannot change places: a name stands for one element only, in
         `free` or in the bounds; or if no parameter is a threshold.
     """
@@ -503,5 +504,5 @@ def sorted_elements(
     return subject.varied({key: _each(subject, key, n)[order] for key, n in wide.items()})
 
 
-def _each(subject: Subject, key: str, n: int) -> FloatArray:
+def _each(subject: Adjustable, key: str, n: int) -> FloatArray:
     return np.broadcast_to(np.asarray(subject.value(key), dtype=float), n).copy()

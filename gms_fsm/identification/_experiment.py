@@ -17,7 +17,8 @@ from scipy.optimize import nnls
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError
 from gms_fsm.identification._runs import LOST, Course, Driver, Measured, Ran, with_numbers
-from gms_fsm.identification._unknowns import Coordinates, Subject, Unknown, values_by_key
+from gms_fsm.identification._unknowns import Coordinates, Unknown, values_by_key
+from gms_fsm.systems.numbers import Adjustable
 
 __all__ = ["MASS", "NUISANCE", "Experiment", "Point", "split_unknowns", "value_of"]
 
@@ -64,7 +65,7 @@ class Experiment:
 
     Parameters
     ----------
-    subject : Subject
+    subject : Adjustable
         The model with its start values.
     searched, solved : tuple of Unknown
         The unknowns that are searched, and those that are solved for.
@@ -82,7 +83,7 @@ class Experiment:
         One number: how many runs were made.
     """
 
-    subject: Subject
+    subject: Adjustable
     searched: tuple[Unknown, ...]
     solved: tuple[Unknown, ...]
     names: tuple[str, ...]
@@ -124,7 +125,7 @@ class Experiment:
         columns = [known[name] for name in self.nuisance]
         return np.stack(columns, axis=1) if columns else np.empty((course.t.size, 0))
 
-    def columns(self, subject: Subject, course: Course) -> tuple[Ran, FloatArray, FloatArray]:
+    def columns(self, subject: Adjustable, course: Course) -> tuple[Ran, FloatArray, FloatArray]:
         """Run a course; return the force without its linear parts, and one column for each part.
 
         The columns are differences of the force between two values of a parameter: exact, because
@@ -145,7 +146,7 @@ class Experiment:
         own = np.stack(columns, axis=1) if columns else np.empty((whole.size, 0))
         return ran, rest, np.concatenate([own, self.nuisance_columns(course)], axis=1)
 
-    def reference(self, numbers: FloatArray) -> Subject:
+    def reference(self, numbers: FloatArray) -> Adjustable:
         """Return the subject with what was searched; linear parameters keep their start values."""
         return self.subject.varied(self.coordinates.values(numbers))
 
@@ -213,7 +214,7 @@ class Experiment:
         return solved
 
     # ------------------------------------------------------------------ results
-    def fitted(self, point: Point) -> Subject:
+    def fitted(self, point: Point) -> Adjustable:
         """Return the subject with all numbers found."""
         subject = self.reference(self.coordinates.numbers(point.u))
         if not self.solved:
@@ -231,12 +232,12 @@ class Experiment:
         return self.at(self.coordinates.start)
 
 
-def value_of(subject: Subject, unknown: Unknown) -> float:
+def value_of(subject: Adjustable, unknown: Unknown) -> float:
     """Return the present value of an unknown.
 
     Parameters
     ----------
-    subject : Subject
+    subject : Adjustable
         Whose.
     unknown : Unknown
         Which.

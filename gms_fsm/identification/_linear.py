@@ -11,19 +11,19 @@ from collections.abc import Iterable, Iterator
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import SIGMA_2
-from gms_fsm.identification._unknowns import Subject
 from gms_fsm.language import Condition, Value, derivative, names_in, renamed
+from gms_fsm.systems.numbers import Adjustable
 from gms_fsm.systems.system import System
 
 __all__ = ["linear_names"]
 
 
-def linear_names(subject: Subject) -> tuple[str, ...]:
+def linear_names(subject: Adjustable) -> tuple[str, ...]:
     """Return the names of the parameters that the friction force is linear in.
 
     Parameters
     ----------
-    subject : Subject
+    subject : Adjustable
         A model driven by a record, or a system; of a system with a free body, a sampled value or a
         further state there are none, because its motion depends on the force.
 
@@ -35,7 +35,7 @@ def linear_names(subject: Subject) -> tuple[str, ...]:
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters
-    >>> linear_names(Subject(GMS(GMSParameters.paper("stick-slip"), law="signed")))
+    >>> linear_names(Adjustable(GMS(GMSParameters.paper("stick-slip"), law="signed")))
     ('k', 'sigma', 'sigma_2')
     """
     what = subject.what

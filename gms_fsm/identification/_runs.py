@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ParameterError, shown
-from gms_fsm.identification._unknowns import Subject
 from gms_fsm.lowering._compiled import check_llvmlite
 from gms_fsm.lowering.program import Program, arguments
 from gms_fsm.records.record import Record
@@ -28,6 +27,7 @@ from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
+from gms_fsm.systems.numbers import Adjustable
 from gms_fsm.systems.rigs import Prescribed
 from gms_fsm.systems.signals import Corners
 from gms_fsm.systems.system import System, system_of
@@ -87,7 +87,7 @@ class Measured:
     body: str = ""
 
     @classmethod
-    def of(cls, text: Any, subject: Subject) -> Measured:
+    def of(cls, text: Any, subject: Adjustable) -> Measured:
         """Read what is measured; a `ParameterError` if the subject has no such thing."""
         what = subject.what
         contacts = [each.name for each in what.contacts] if isinstance(what, System) else []
@@ -318,7 +318,7 @@ class Driver:
     budgets: int
     _own: threading.local = field(default_factory=threading.local, repr=False)
 
-    def run(self, subject: Subject, course: Course) -> Ran:
+    def run(self, subject: Adjustable, course: Course) -> Ran:
         """Run; a `GMSError` if the numbers break a rule or the run fails."""
         kept = self._runs.get(id(course))
         what = subject.what
@@ -349,7 +349,7 @@ class Driver:
         runs: dict[int, _Kept] = vars(self._own).setdefault("runs", {})
         return runs
 
-    def start(self, subject: Subject, course: Course) -> Start:
+    def start(self, subject: Adjustable, course: Course) -> Start:
         """Return the start of a run along a course."""
         settings = Settings(
             engine=engine(), rtol=self.rtol, t_eval=course.t, max_steps=course.budget * self.budgets
@@ -364,12 +364,12 @@ class Driver:
         return Start.of(what, rig, float(course.t[-1]), settings, t_start=float(first))
 
 
-def driver_of(subject: Subject, drive: str | None, rtol: float, budgets: int) -> Driver:
+def driver_of(subject: Adjustable, drive: str | None, rtol: float, budgets: int) -> Driver:
     """Return what runs a subject.
 
     Parameters
     ----------
-    subject : Subject
+    subject : Adjustable
         A model, or a system.
     drive : str or None
         As the user gave it.
@@ -418,7 +418,7 @@ def driver_of(subject: Subject, drive: str | None, rtol: float, budgets: int) ->
     )
 
 
-def with_numbers(program: Program, subject: Subject, course: Course, driver: Driver) -> Program:
+def with_numbers(program: Program, subject: Adjustable, course: Course, driver: Driver) -> Program:
     """Return a program with the numbers of a subject in place of its own."""
     what: Any = subject.what
     if not isinstance(what, System):

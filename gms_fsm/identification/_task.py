@@ -22,8 +22,9 @@ from gms_fsm.identification._runs import (
     driver_of,
 )
 from gms_fsm.identification._search import Best, de, hops, refine
-from gms_fsm.identification._unknowns import Subject, Unknown, unknowns_of, values_by_key
+from gms_fsm.identification._unknowns import Unknown, unknowns_of, values_by_key
 from gms_fsm.records.record import Record
+from gms_fsm.systems.numbers import Adjustable
 
 __all__ = ["Options", "Task", "Window", "inside", "training_rows"]
 
@@ -64,7 +65,7 @@ class Task:
 
     Parameters
     ----------
-    subject : Subject
+    subject : Adjustable
         With the start values.
     records : tuple of Record
         The records.
@@ -76,7 +77,7 @@ class Task:
         One number: how many runs were made.
     """
 
-    subject: Subject
+    subject: Adjustable
     records: tuple[Record, ...]
     options: Options
     begin: str = BEGINS[1]

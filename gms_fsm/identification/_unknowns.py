@@ -13,91 +13,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from gms_fsm.charts.parameters import (
-    SIGMA_2,
-    WEIGHTS,
-    FloatArray,
-    Parameter,
-    checked_scalar,
-)
+from gms_fsm.charts.parameters import FloatArray, Parameter, checked_scalar
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.systems._varied import numbers_in, with_numbers_of
-from gms_fsm.systems.models import Model, parameters_of, with_values
-from gms_fsm.systems.system import Contact, System
+from gms_fsm.systems.numbers import Adjustable
 from gms_fsm.traces.rows import column_name
 
-__all__ = ["Coordinates", "Subject", "Unknown", "unknowns_of", "values_by_key"]
+__all__ = ["Coordinates", "Unknown", "unknowns_of", "values_by_key"]
 
 SPAN = 1e3  # by default a positive number is searched from 1/1000 to 1000 times its start
 LEAST_EXCESS, MOST_EXCESS = 1e-3, 20.0  # of F_s over F_c, relative
 LINEAR_SPAN = 100.0  # times the start
-
-
-@dataclass(frozen=True, eq=False)
-class Subject:
-    """A model that the record's motion drives, or a system, whose numbers can be varied.
-
-    Parameters
-    ----------
-    what : Model or System
-        As the user gave it.
-    """
-
-    what: Model | System
-
-    @property
-    def known(self) -> dict[str, tuple[Parameter, int]]:
-        """By name: the parameter, and for how many elements it can differ (0: one number)."""
-        if isinstance(self.what, System):
-            return numbers_in(self.what)
-        values, n = self.what.values, self.what.n
-        return {
-            each.name: (
-                each,
-                n if each.name == WEIGHTS.name or np.ndim(values.get(each.name, 0.0)) > 0 else 0,
-            )
-            for each in parameters_of(self.what)
-        }
-
-    def value(self, name: str) -> float | FloatArray:
-        """Return the present value of a number by its name in `known`."""
-        if not isinstance(self.what, System):
-            return _value_in(self.what, name)
-        owner, _, own = name.partition(".")
-        if owner == "numbers":
-            return self.what.numbers[own]
-        return _value_in(self.what.contact(owner), own)
-
-    def varied(self, values: Mapping[str, ArrayLike]) -> Subject:
-        """Return the same with other numbers; a `ParameterError` if one breaks its rule."""
-        if not values:
-            return self
-        if isinstance(self.what, System):
-            return Subject(with_numbers_of(self.what, values))
-        return Subject(with_values(self.what, values))
-
-    @property
-    def title(self) -> str:
-        """The model's title, or the system's name."""
-        return self.what.name if isinstance(self.what, System) else self.what.title
-
-    @property
-    def contacts(self) -> tuple[Model | Contact, ...]:
-        """What has elements."""
-        return self.what.contacts if isinstance(self.what, System) else (self.what,)
-
-
-def _value_in(model: Model | Contact, name: str) -> float | FloatArray:
-    if name in model.values:
-        return model.values[name]
-    if name == WEIGHTS.name:
-        return model.weights
-    if name == SIGMA_2.name:
-        return model.sigma_2
-    assert model.stribeck is not None  # else the name would not be known
-    return float(getattr(model.stribeck, name))
 
 
 @dataclass(frozen=True)
@@ -152,7 +78,7 @@ class Unknown:
 
 
 def unknowns_of(
-    subject: Subject,
+    subject: Adjustable,
     free: Iterable[str],
     tied: Sequence[str],
     bounds: Mapping[str, tuple[float, float]],
@@ -161,7 +87,7 @@ def unknowns_of(
 
     Parameters
     ----------
-    subject : Subject
+    subject : Adjustable
         Whose numbers.
     free : iterable of str
         ``k`` for all elements, ``k2`` for one of them.
@@ -211,7 +137,7 @@ def unknowns_of(
 
 
 def _named(
-    subject: Subject, known: Mapping[str, tuple[Parameter, int]], name: str, tied: Sequence[str]
+    subject: Adjustable, known: Mapping[str, tuple[Parameter, int]], name: str, tied: Sequence[str]
 ) -> list[Unknown]:
     """Return the unknowns that one name stands for."""
     if name in known:
@@ -239,7 +165,12 @@ def _named(
 
 
 def _unknown(
-    subject: Subject, key: str, element: int | None, parameter: Parameter, start: float, name: str
+    subject: Adjustable,
+    key: str,
+    element: int | None,
+    parameter: Parameter,
+    start: float,
+    name: str,
 ) -> Unknown:
     lead = key.rpartition(".")[0]
     known = subject.known
@@ -289,13 +220,13 @@ class Coordinates:
 
     Parameters
     ----------
-    subject : Subject
+    subject : Adjustable
         Supplies all numbers that are not searched.
     unknowns : tuple of Unknown
         What is searched.
     """
 
-    subject: Subject
+    subject: Adjustable
     unknowns: tuple[Unknown, ...]
 
     def __len__(self) -> int:
@@ -395,13 +326,13 @@ class Coordinates:
 
 
 def values_by_key(
-    subject: Subject, unknowns: Sequence[Unknown], numbers: Iterable[float]
+    subject: Adjustable, unknowns: Sequence[Unknown], numbers: Iterable[float]
 ) -> dict[str, Any]:
     """Return values of unknowns by the names of their parameters.
 
     Parameters
     ----------
-    subject : Subject
+    subject : Adjustable
         Supplies the elements that are not among the unknowns.
     unknowns : sequence of Unknown
         Some unknowns.
@@ -413,13 +344,5 @@ def values_by_key(
     dict
         A number, or an array where elements differ.
     """
-    known, found = subject.known, dict[str, Any]()
-    for each, value in zip(unknowns, numbers, strict=True):
-        if each.element is None:
-            found[each.key] = float(value)
-        else:
-            if each.key not in found:
-                present = np.asarray(subject.value(each.key), dtype=float)
-                found[each.key] = np.broadcast_to(present, known[each.key][1]).copy()
-            found[each.key][each.element] = value
-    return found
+    pairs = zip(unknowns, numbers, strict=True)
+    return subject.joined((each.key, each.element, value) for each, value in pairs)

@@ -24,12 +24,13 @@ from gms_fsm.identification._runs import Pool
 from gms_fsm.identification._search import Best, refine
 from gms_fsm.identification._statistics import correlation_time
 from gms_fsm.identification._task import Options, Task, at_all_rows, bar, stretches, training_rows
-from gms_fsm.identification._unknowns import Subject, unknowns_of
+from gms_fsm.identification._unknowns import unknowns_of
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, Start
 from gms_fsm.identification.fit import check_model, fitted, options_of, task_of, window_of
 from gms_fsm.identification.result import Choice, ChoiceRow, Fit
 from gms_fsm.records._parts import only, thinned
 from gms_fsm.records.record import Record
+from gms_fsm.systems.numbers import Adjustable
 
 __all__ = ["choose", "period_of"]
 
@@ -191,7 +192,7 @@ def _checked_candidates(given: Any) -> list[Candidate]:
         names = (free,) if isinstance(free, str) else tuple(listed("free", free, "names"))
         check_model(model, f"model of candidate {shown(name)}")
         try:
-            unknowns_of(Subject(model), names, (), {})
+            unknowns_of(Adjustable(model), names, (), {})
         except GMSError as error:
             raise error.inside(f"candidate {shown(name)}") from None
         found.append(Candidate(name, "given", _given(Start(model, names))))

@@ -30,10 +30,11 @@ from gms_fsm.identification._linear import linear_names
 from gms_fsm.identification._runs import BEGINS, Pool
 from gms_fsm.identification._search import SEARCHES, Best
 from gms_fsm.identification._task import Options, Task, bar, inside, training_rows
-from gms_fsm.identification._unknowns import Subject, values_by_key
+from gms_fsm.identification._unknowns import values_by_key
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.numbers import Adjustable
 from gms_fsm.systems.system import System
 
 __all__ = ["check_model", "fit", "fitted", "options_of", "task_of", "window_of"]
@@ -255,7 +256,7 @@ def task_of(
     for each in every:
         checked_kind("records", each, Record, "a Record, for example Record.from_csv(path)")
     check_model(model, "model")
-    subject = _with_fixed(Subject(model), fixed, options.free)
+    subject = _with_fixed(Adjustable(model), fixed, options.free)
     task = Task(subject, tuple(every), options, begin=options.begin or BEGINS[1])
     _ = task.unknowns  # raises errors of names and bounds
     if MASS in options.nuisance and task.measured.column != "force":
@@ -300,7 +301,7 @@ def check_model(model: object, place: str) -> None:
     )
 
 
-def _with_fixed(subject: Subject, fixed: Any, free: tuple[str, ...]) -> Subject:
+def _with_fixed(subject: Adjustable, fixed: Any, free: tuple[str, ...]) -> Adjustable:
     checked_kind("fixed", fixed, Mapping, "a mapping, for example {'v_c': 1e-6}")
     for name in fixed:
         if name not in subject.known:

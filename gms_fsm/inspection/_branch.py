@@ -192,7 +192,7 @@ class Branch:
             return True
         here = self.raw(row)
         first = here.microstep == 0 and (row == 0 or self.raw(row - 1).t < here.t)
-        return first and bool(self.run.start.program.ticks.get(here.t, 0) & bit)
+        return first and bool(self.run.start.program.ticks.at(here.t) & bit)
 
     def next_tick(self, machine: int) -> float | None:
         """Return when the guards of an element are evaluated next, if not at the cursor."""
@@ -204,8 +204,7 @@ class Branch:
 
     def tick_after(self, t: float, clock: int) -> float | None:
         """Return the next tick of a clock: the samplers, then the contacts with a period."""
-        ticks = self.run.start.program.ticks.items()
-        return next((tick for tick, bits in ticks if tick > t and bits & 1 << clock), None)
+        return self.run.start.program.ticks.after(t, 1 << clock)
 
     # ------------------------------------------------------------------ firings
     def log(self) -> list[LogRecord]:

@@ -64,6 +64,8 @@ def _at_once(prover: Prover, pair: Sequence[Transition]) -> Answer:
     point = prover.example(names_of(*guards), *formulas, *prover.at_rest(pair[0].source))
     if point is None:
         return Answer("proved", "never enabled at the same time")
+    if _arrests(prover, pair[0]) and _is_hidden(prover, pair[1], pair[:1]):
+        return Answer("proved", f"{pair[1].name} is taken only where the velocity jumps")
     text = f"both are enabled at the same time; the machine takes the earlier, {first}"
     return by_example("settled by order", text, point, enabled(guards, point))
 
@@ -186,18 +188,35 @@ def _can_hold(prover: Prover, edge: Transition) -> Answer:
     prover.defined(reading)
     if prover.find(*formulas) is None:
         return Answer("refuted", f"its guard can never hold: {shown(subject.guard(edge))}")
-    earlier = []
-    for _, other in prover.chart.leaving(edge.source):
-        if other.name == edge.name:
-            break
-        earlier.append(other)
-    hidden = [reading.truth(Not(subject.guard(each)), prover.still) for each in earlier]
-    prover.defined(reading)
-    if prover.find(*formulas, *hidden) is None:
+    # Where the velocity has jumped, arrests are not taken.
+    earlier = [each for each in _earlier(prover, edge) if not _arrests(prover, each)]
+    if _is_hidden(prover, edge, earlier):
         names = ", ".join(each.name for each in earlier)
         text = f"never taken: wherever its guard holds, an earlier edge takes precedence ({names})"
         return Answer("refuted", text)
     return Answer("proved", "its guard can hold")
+
+
+def _arrests(prover: Prover, edge: Transition) -> bool:
+    """Return whether an edge locks the contact where its velocity passes 0."""
+    return any(
+        prover.chart.transitions[number].name == edge.name for number in prover.chart.arrests
+    )
+
+
+def _earlier(prover: Prover, edge: Transition) -> list[Transition]:
+    """Return the edges that leave the same state with precedence."""
+    leaving = [each for _, each in prover.chart.leaving(edge.source)]
+    return leaving[: [each.name for each in leaving].index(edge.name)]
+
+
+def _is_hidden(prover: Prover, edge: Transition, earlier: Sequence[Transition]) -> bool:
+    """Return whether one of these edges is enabled wherever another one is."""
+    subject, reading = prover.subject, Reading()
+    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.at_rest(edge.source)]
+    formulas += [reading.truth(Not(subject.guard(each)), prover.still) for each in earlier]
+    prover.defined(reading)
+    return prover.find(*formulas) is None
 
 
 def _entered(chart: Chart, edges: Sequence[Transition]) -> set[str]:
@@ -240,6 +259,11 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     decided to first order.
     """
     subject, z3 = prover.subject, prover.z3
+    for edge in (there, back):
+        arrests = [each for each in _earlier(prover, edge) if _arrests(prover, each)]
+        if arrests and _is_hidden(prover, edge, arrests):
+            text = f"{edge.name} is taken only where the velocity jumps: {arrests[0].name} has "
+            return Answer("proved", f"{text}precedence")
     jumps = subject.assigned(there) or subject.assigned(back)
     guards = [subject.guard(edge) for edge in (there, back)]
     resting = prover.at_rest(there.source, back.source)

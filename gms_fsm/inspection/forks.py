@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gms_fsm._arguments import checked_integer
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import SessionError, shown
-from gms_fsm.inspection._adjustable import Number, Subject
+from gms_fsm.inspection._adjustable import Number, number_of, numbers_of, with_numbers
 from gms_fsm.inspection._arguments import checked_settings
 from gms_fsm.inspection._branch import Row
 from gms_fsm.inspection._export import save_scenario
@@ -31,6 +31,7 @@ from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run, mounted
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.numbers import Adjustable
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 from gms_fsm.traces._between import interpolated
@@ -155,7 +156,7 @@ class Forks:
             options["engine"] = "compiled" if fast else "ifelse"
         self.settings = checked_settings(settings, options)
         on, self.t_end = mounted("Forks", model, rig, t_end)
-        self.subject = Subject(model, on)
+        self.subject = Adjustable(model, on)
         self.t_start, self.initial = t_start, initial
         self.branches: dict[int, Fork] = {0: Fork("original")}
         self.current, self._next = 0, 1
@@ -163,16 +164,20 @@ class Forks:
         self.trace(0)  # errors in the arguments belong here
 
     # ------------------------------------------------------------------ what runs
-    def made_of(self, branch: int | None = None) -> Subject:
+    def made_of(self, branch: int | None = None) -> Adjustable:
         """Return model and rig of a branch, by default the current one."""
         number = self._checked(branch)
         law, values = self._given(number)
         lawful = self.subject if law is None else self.subject.with_law(law)
-        return lawful.with_numbers(values)
+        return with_numbers(lawful, values)
 
     def numbers(self, branch: int | None = None) -> dict[str, Number]:
         """Return the numbers of a branch that `set` can change, by name."""
-        return self.made_of(branch).numbers
+        return numbers_of(self.made_of(branch))
+
+    def number(self, name: str, branch: int | None = None) -> Number:
+        """Return one of them; raise `ParameterError` if there is none of this name."""
+        return number_of(self.made_of(branch), name)
 
     def trace(self, branch: int | None = None) -> Trace:
         """Return the run of a branch; what there is of it, if it failed.
@@ -391,7 +396,7 @@ class Forks:
         """
         number = self._checked(branch)
         fork, start = self.branches[number], self.start(number)
-        if start.program.ticks and self._pokes(number):
+        if len(start.program.ticks) and self._pokes(number):
             raise SessionError(
                 "a scenario that begins at a poke would count its ticks from there",
                 advice="export a branch that is not poked",
@@ -409,7 +414,7 @@ class Forks:
     def _own_values(self, number: int, values: Mapping[str, float]) -> dict[str, float]:
         subject = self.made_of(number)
         for name in values:
-            subject.check(name)
+            number_of(subject, name)
         return {name: checked_scalar(name, value, "finite") for name, value in values.items()}
 
     def _merged(self, number: int, values: Mapping[str, float]) -> dict[str, float]:
@@ -461,18 +466,19 @@ class Forks:
                 found = self._poked(self._run(law, values, pokes[:-1]), pokes[-1])
             else:
                 subject = self.subject if law is None else self.subject.with_law(law)
-                found = self._from(subject.with_numbers(dict(values)), self.t_start, self.initial)
+                changed = with_numbers(subject, dict(values))
+                found = self._from(changed, self.t_start, self.initial)
             self._ran[key] = found
             while len(self._ran) > KEPT:
                 self._ran.popitem(last=False)
         self._ran.move_to_end(key)
         return self._ran[key]
 
-    def _from(self, subject: Subject, t: float, initial: Mapping[str, Any] | None) -> _Ran:
+    def _from(self, subject: Adjustable, t: float, initial: Mapping[str, Any] | None) -> _Ran:
         options: Any = {"t_start": t, "initial": initial}
         if t != self.t_start or initial is not self.initial:
             options["ticks_from"] = self.t_start
-        start = Start.of(subject.model, subject.rig, self.t_end, self.settings, **options)
+        start = Start.of(subject.what, subject.rig, self.t_end, self.settings, **options)
         compiled = self.settings.engine == "compiled"
         run: CompiledRun | Run = CompiledRun(start) if compiled else Run(start)
         failure: SimulationError | None = None
@@ -488,7 +494,7 @@ class Forks:
         """Return a run that goes on from a point of another with edits."""
         place, here = _place(before, poke)
         was = before.start
-        subject = Subject(was.given or was.model, None if was.given else was.rig)
+        subject = Adjustable(was.given or was.model, None if was.given else was.rig)
         after = self._from(subject, here.t, initial_with(poke.edits, was, here))
         shared = before.trace.rows.at(slice(place + 1))
         if here.t != shared.t[-1]:  # between two rows: the point is a row of this branch

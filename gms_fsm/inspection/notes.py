@@ -105,8 +105,8 @@ def _windows(trace: Trace) -> Iterator[str]:
             jumped &= (np.abs(v[:-1]) > c) & (np.abs(v[1:]) > c)
             for row in (np.flatnonzero(jumped) + 1)[:MOST_ROWS].tolist():
                 still = values_at(whole, row, i) | {"v": 0.0}
-                if whole.model.stribeck is not None:
-                    still["s"] = float(whole.model.weights[i]) * whole.model.stribeck.F_s
+                if (curve := whole.model.stribeck) is not None:  # under the load of that row
+                    still["s"] *= curve.F_s / float(curve(v[row]))
                 if holds(chart.guards[edge.name], still):
                     missed.append(float(t[row]))
         if missed:

@@ -28,6 +28,19 @@ class Forces(Writer):
         self.locks = Locks(self)
         self.locking = any(bank.chart.locks for bank in self.read.banks)
 
+    def followed(self) -> list[Line]:
+        """Write the velocities that locks determine."""
+        return self.locks.following() if self.locking else []
+
+    def rounded(self, name: str) -> list[Line]:
+        """Write that the velocity of a contact is zero where locks leave only rounding of it."""
+        rows = {
+            velocity: row
+            for bank in self.read.banks
+            for velocity, row in zip(bank.velocities, bank.jacobian, strict=True)
+        }
+        return self.locks.rounded(name, rows[name]) if self.locking and name in rows else []
+
     def forces(
         self, signs: Signs, *, wanted: bool, rates: bool = False, observed: bool = False
     ) -> list[Line]:

@@ -266,8 +266,13 @@ class Writer:
         return total([*self.sizes[:bank], element])
 
     # ------------------------------------------------------------------ functions
-    def function(self, signature: str, doc: str, body: list[Line], signs: Signs) -> list[str]:
-        """Assemble a function: signature, the values its body reads, then the body."""
+    def function(
+        self, signature: str, doc: str, body: list[Line], signs: Signs, *, within: bool = False
+    ) -> list[str]:
+        """Assemble a function: signature, the values its body reads, then the body.
+
+        Within a step velocities that locks determine are computed; elsewhere they are in y.
+        """
         at_once = self.closure(reads_of(body))
         lazy = dict.fromkeys(line.lazy for line in body if line.lazy and line.lazy not in at_once)
         found = {name: self.defined(name, signs) for name in lazy}
@@ -280,17 +285,31 @@ class Writer:
                 made = [Line(f"if {name} != {name}:"), *indented(found[line.lazy])]
                 lines += [each._replace(text=line.text + each.text) for each in made]
         first = [Line(f"{self.local(name)} = nan  # computed where it is read") for name in lazy]
-        head = self.head(reads_of(lines) - {*lazy}, signs)
+        head = self.head(reads_of(lines) - {*lazy}, signs, self.followed() if within else [])
         lines = [*head, *first, *lines] or [Line("pass")]
         return [f"def {signature}:", f'    """{doc}"""', *(f"    {line.text}" for line in lines)]
 
-    def head(self, reads: frozenset[str], signs: Signs) -> list[Line]:
+    def followed(self) -> list[Line]:
+        """Write the velocities that locks determine."""
+        return []
+
+    def rounded(self, name: str) -> list[Line]:
+        """Write that a value is zero if it is so but for rounding."""
+        del name
+        return []
+
+    def head(
+        self, reads: frozenset[str], signs: Signs, followed: list[Line] | None = None
+    ) -> list[Line]:
         """Write what is read before a body: numbers, states, and what is computed from them."""
-        needed = self.closure(reads) - self.late
+        needed = self.closure(reads | reads_of(followed or ())) - self.late
         values: list[Line] = []
         for name in self.read.defined:
+            if followed and "." in name:  # the first one of a contact
+                values, followed = values + followed, None
             if name in needed and name not in self.read.owner:
                 values += self.defined(name, signs)
+        values += followed or []
         needed = (needed | self.closure(reads_of(values))) - self.late
         shared = [(name, j) for j, name in enumerate(self.names.shared) if name in needed]
         own = [(name, j) for j, name in enumerate(self.names.own) if name in needed]
@@ -316,9 +335,9 @@ class Writer:
         target = self.local(name)
         value = self.plan.definitions.get(name)
         if value is not None:
-            if not name.endswith(".curve S"):
-                return self.computed(target, value, signs)
-            return self.curve(name, value, signs)
+            if name.endswith(".curve S"):
+                return self.curve(name, value, signs)
+            return [*self.computed(target, value, signs), *self.rounded(name)]
         if (name, "times") in self.plan.tables.shared:
             return [
                 Line(f"{target} = piecewise_linear(t, {self.table(name)})", frozenset({TABLES}))

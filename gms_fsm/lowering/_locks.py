@@ -7,8 +7,15 @@ the identity; so there is one text for every combination. Entries that are zero 
 left out: for chains and trees of bodies the text, and the time it takes, is linear.
 
 Where a lock would repeat those before it (its pivot is zero to rounding), the earlier contacts
-carry the force and the later one none. Last the dependent accelerations (or velocities) are set
-exactly, so that a stuck body is at rest to the last bit.
+carry the force and the later one none.
+
+Velocities that locks determine are not integrated: within a step they are computed from the others,
+and after it the state vector follows (`follow`). So are the accelerations; a stuck body is at rest
+to the last bit.
+
+An impulse is the same system with velocities on the right. A lock carries it unless a guard that
+leaves its state would hold with the impulse as F, times a number without limit: stiction lets go
+whatever its size, a stop lets go where it would have to pull.
 """
 
 from __future__ import annotations
@@ -16,16 +23,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
-from gms_fsm.language import Binary, Name, Negative, Number, Value
+from gms_fsm.language import Binary, Name, Negative, Number, Value, names_in, spell
 from gms_fsm.lowering._lines import Line, Writer, indented
 from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import times
 from gms_fsm.systems.system import Body
+from integrators import JUMPED, LET_GO
 
-__all__ = ["Lock", "Locks"]
+__all__ = ["ENDLESS", "Lock", "Locks"]
 
 # A pivot under this part of the diagonal is one that rounding has left of zero.
 DEPENDENT = 1e-9
+# A force without limit, in units of an impulse; squared it is still finite.
+ENDLESS = 1e100
+LAST_PLACES = 1e-15  # a difference of this part of what it is made from is rounding
+# A velocity, or a jump of one, that counts as none: parts of the speeds of the bodies, and of their
+# tolerances.
+ROUNDING = 1e-12
+UNFELT = 1e-3
 UNITS = (Number(1.0), Number(-1.0), Negative(Number(1.0)))
 
 
@@ -195,17 +210,12 @@ class Locks:
         self, name_of: Mapping[str, str], target: Mapping[int, str] | None = None
     ) -> list[Line]:
         """Set the dependent accelerations, or velocities, exactly."""
-        lines: list[Line] = []
-        for r, body in self.sequence():
+        loops, leaves = self.sequence()
+        goals = target or {}
+        lines = self.eliminated(loops, name_of, goals)
+        for r, body in leaves:
             row = self.rows[r].row
-            others = {name: value for name, value in row.items() if name != body}
-            goal = (target or {}).get(r, "0.0")
-            text, reads = goal, frozenset[str]()
-            if others:
-                tree = self.relative(others, name_of)
-                spelled = self.writer.spell(tree)
-                text = f"-({spelled})" if goal == "0.0" else f"{goal} - ({spelled})"
-                reads = computed_names(tree)
+            text, reads = self.rest(r, {body}, name_of, goals)
             coefficient = row[body]
             if coefficient != Number(1.0):
                 spelled = self.writer.spell(coefficient)
@@ -215,15 +225,85 @@ class Locks:
             lines += [Line(f"if l_{r} > 0.0:"), Line(f"    {local} = {text}", reads)]
         return lines
 
-    def sequence(self) -> list[tuple[int, str]]:
-        """Return the rows with the body that each sets, so that what a row reads was set before.
+    def rest(
+        self, r: int, without: Set[str], name_of: Mapping[str, str], goals: Mapping[int, str]
+    ) -> tuple[str, frozenset[str]]:
+        """Spell what a row leaves for some of its bodies."""
+        goal = goals.get(r, "0.0")
+        others = {name: value for name, value in self.rows[r].row.items() if name not in without}
+        if not others:
+            return goal, frozenset()
+        tree = self.relative(others, name_of)
+        spelled = self.writer.spell(tree)
+        text = f"-({spelled})" if goal == "0.0" else f"{goal} - ({spelled})"
+        return text, computed_names(tree)
+
+    def eliminated(
+        self, loops: list[int], name_of: Mapping[str, str], goals: Mapping[int, str]
+    ) -> list[Line]:
+        """Set what rows determine that close loops: by Gauss and Jordan, the largest one first.
+
+        The rows that hold are known only while it runs, so each has its pivot q found there.
+        """
+        bodies = [*dict.fromkeys(body for r in loops for body in self.free(self.rows[r].row))]
+        columns, lines = range(len(bodies)), list[Line]()
+
+        def minus(r: int, s: int, pivot: int) -> list[Line]:
+            others = [j for j in columns if j != pivot]
+            return [
+                Line(f"u = e_{r}_{pivot}"),
+                *(Line(f"e_{r}_{j} = e_{r}_{j} - u * e_{s}_{j}") for j in others),
+                Line(f"e_{r}_{pivot} = 0.0"),
+                Line(f"g_{r} = g_{r} - u * g_{s}"),
+            ]
+
+        for k, r in enumerate(loops):
+            free = self.free(self.rows[r].row)
+            for j, body in enumerate(bodies):
+                put = self.writer.put
+                lines.append(put(f"e_{r}_{j}", free.get(body, Number(0.0))))
+            text, reads = self.rest(r, free.keys(), name_of, goals)
+            size = " + ".join(f"abs(e_{r}_{j})" for j in columns)
+            lines += [Line(f"g_{r} = {text}", reads), Line(f"best = {DEPENDENT} * ({size})")]
+            for s in loops[:k]:
+                for j in columns:
+                    lines += [Line(f"if q_{s} == {j}:"), *indented(minus(r, s, j))]
+            lines.append(Line(f"q_{r} = -1"))
+            for j in columns:
+                lines += [
+                    Line(f"if l_{r} > 0.0 and abs(e_{r}_{j}) > best:"),
+                    Line(f"    best = abs(e_{r}_{j})"),
+                    Line(f"    q_{r} = {j}"),
+                ]
+            for j in columns:
+                inside = [Line(f"u = e_{r}_{j}"), Line(f"g_{r} = g_{r} / u")]
+                inside += [Line(f"e_{r}_{i} = e_{r}_{i} / u") for i in columns if i != j]
+                inside += [Line(f"e_{r}_{j} = 1.0")]
+                for s in loops[:k]:
+                    inside += minus(s, r, j)
+                lines += [Line(f"if q_{r} == {j}:"), *indented(inside)]
+        for r in loops:
+            for j, body in enumerate(bodies):
+                local = self.writer.local(name_of[body])
+                terms = [
+                    f" - e_{r}_{i} * {self.writer.local(name_of[other])}"
+                    for i, other in enumerate(bodies)
+                    if i != j
+                ]
+                reads = frozenset(name_of[other] for other in bodies)
+                inside = [Line(f"{local} = g_{r}{''.join(terms)}", reads)]
+                lines += [Line(f"if q_{r} == {j}:"), *indented(inside)]
+        return lines
+
+    def sequence(self) -> tuple[list[int], list[tuple[int, str]]]:
+        """Return the rows that close loops, then the others with the body that each sets.
 
         A body that only one row moves can follow its other bodies, and is taken off; so are those
-        that only one of the remaining rows moves. Where rows close a loop, these are gone through
-        as listed, and back again.
+        that only one of the remaining rows moves. In the order returned, what a row reads was set
+        before.
         """
         left = {r: list(self.free(each.row)) for r, each in enumerate(self.rows)}
-        last: list[tuple[int, str]] = []
+        leaves: list[tuple[int, str]] = []
         while ends := [
             (self.rows[r].row[body] not in UNITS, r, body)
             for r, bodies in left.items()
@@ -231,28 +311,50 @@ class Locks:
             if sum(body in others for others in left.values()) == 1
         ]:
             _, r, body = min(ends)
-            last.insert(0, (r, body))
+            leaves.insert(0, (r, body))
             del left[r]
-        loops = [(r, self.dependent(self.rows[r].row)) for r in left]
-        return [*loops, *reversed(loops[:-1]), *last]
+        return [*left], leaves
 
-    def dependent(self, row: Mapping[str, Value]) -> str:
-        """Choose the body that follows the others: one with coefficient 1 or -1 if there is one."""
-        free = self.free(row)
-        return next((name for name, value in free.items() if value in UNITS), next(iter(free)))
+    def followers(self) -> list[str]:
+        """Return the bodies whose velocities locks may determine."""
+        loops, leaves = self.sequence()
+        found = [body for r in loops for body in self.free(self.rows[r].row)]
+        return [*dict.fromkeys([*found, *(body for _, body in leaves)])]
 
     # ------------------------------------------------------------------ forces and impulses
-    def flags(self, *, kept: bool = False) -> list[Line]:
-        """Write which locks hold in the present modes; flags that are kept may be set already."""
-        lines = []
-        for r, each in enumerate(self.rows):
-            bank = self.read.banks[each.bank]
-            place, states = self.writer.mode(each.bank, "0"), self.writer.names.states[each.bank]
-            locked = [states[state.name] for state in bank.chart.states if state.locked]
-            text = " or ".join(f"{place} == {state}" for state in locked) or "False"
-            other = f"l_{r}" if kept else "0.0"
-            lines.append(Line(f"l_{r} = 1.0 if {text} else {other}"))
-        return lines
+    def locking(self, r: int) -> str:
+        """Spell whether the present mode locks a row."""
+        bank = self.read.banks[self.rows[r].bank]
+        place, states = self.writer.mode(bank.index, "0"), self.writer.names.states[bank.index]
+        return " or ".join(f"{place} == {states[each]}" for each in bank.locked) or "False"
+
+    def flags(self) -> list[Line]:
+        """Write which locks hold in the present modes."""
+        rows = range(len(self.rows))
+        return [Line(f"l_{r} = 1.0 if {self.locking(r)} else 0.0") for r in rows]
+
+    def speed(self, body: str, coefficient: Value) -> str:
+        """Spell the size of a term of a relative velocity."""
+        size = f"abs({self.writer.local(self.velocity(self.bodies[body]))})"
+        if coefficient in UNITS:
+            return size
+        return f"abs({self.writer.spell(coefficient)}) * {size}"
+
+    def rounded(self, name: str, row: Mapping[str, Value]) -> list[Line]:
+        """Write that a relative velocity is zero if it is so but for rounding."""
+        local = self.writer.local(name)
+        size = " + ".join(self.speed(body, coefficient) for body, coefficient in row.items())
+        reads = frozenset(self.velocity(self.bodies[body]) for body in row)
+        reads = reads.union(*(computed_names(coefficient) for coefficient in row.values()))
+        return [
+            Line(f"if abs({local}) <= {LAST_PLACES} * ({size}):", reads),
+            Line(f"    {local} = 0.0"),
+        ]
+
+    def following(self) -> list[Line]:
+        """Write the velocities that locks determine."""
+        names = {name: self.velocity(body) for name, body in self.bodies.items()}
+        return [*self.flags(), *self.exact(names)]
 
     def forces(self) -> list[Line]:
         """Write the forces of locked contacts, and the accelerations with them."""
@@ -261,30 +363,58 @@ class Locks:
         lines += self.solve({r: self.relative(each.row, names) for r, each in enumerate(self.rows)})
         for r, each in enumerate(self.rows):
             force = self.writer.local(self.read.banks[each.bank].forces[each.velocity])
-            inside = [Line(f"{force} = {force} + hold_{r}")]
-            for body, coefficient in self.free(each.row).items():
-                a = self.writer.local(names[body])
-                share = (
-                    "" if coefficient == Number(1.0) else f"({self.writer.spell(coefficient)}) * "
-                )
-                inertia = self.inertia(body)
-                reads = computed_names(coefficient) | computed_names(inertia)
-                inside.append(
-                    Line(f"{a} = {a} - {share}hold_{r} / ({self.writer.spell(inertia)})", reads)
-                )
+            inside = [Line(f"{force} = {force} + hold_{r}"), *self.shares(r, names)]
             lines += [Line(f"if l_{r} > 0.0:"), *indented(inside)]
-        return lines + self.exact(names)
+        return [*lines, *self.exact(names), *self.contradicted(names)]
 
+    def contradicted(self, names: Mapping[str, str]) -> list[Line]:
+        """Write that no force holds a contact where other locks, or what is driven, move it."""
+        lines: list[Line] = []
+        for r, each in enumerate(self.rows):
+            bank = self.read.banks[each.bank]
+            if not bank.locked or self.always_holds(r):
+                continue
+            tree = self.relative(each.row, names)
+            size = " + ".join(
+                f"abs({self.writer.spell(times(coefficient, Name(names[body])))})"
+                for body, coefficient in each.row.items()
+            )
+            force = self.writer.local(bank.forces[each.velocity])
+            reads = computed_names(tree)
+            lines += [
+                Line(f"if l_{r} == 0.0 and ({self.locking(r)}):"),
+                Line(f"    u = {self.writer.spell(tree)}", reads),
+                Line(f"    if abs(u) > {DEPENDENT} * ({size}):", reads),
+                Line(f"        {force} = {force} + u * {ENDLESS}"),
+            ]
+        return lines
+
+    def always_holds(self, r: int) -> bool:
+        """Return whether a row is independent of the others, whichever of them hold."""
+        return r not in self.sequence()[0] and self.joins_trees()
+
+    def shares(self, r: int, names: Mapping[str, str]) -> list[Line]:
+        """Write what the force, or impulse, of a row does to the bodies."""
+        lines = []
+        for body, coefficient in self.free(self.rows[r].row).items():
+            local, inertia = self.writer.local(names[body]), self.inertia(body)
+            share = "" if coefficient == Number(1.0) else f"({self.writer.spell(coefficient)}) * "
+            text = f"{local} = {local} - {share}hold_{r} / ({self.writer.spell(inertia)})"
+            own = frozenset() if names[body].endswith(" a") else frozenset({names[body]})
+            lines.append(Line(text, computed_names(coefficient) | computed_names(inertia) | own))
+        return lines
+
+    # ------------------------------------------------------------------ impulses
     def no_impulse(self) -> list[Line]:
         """Write that no velocity is to be set."""
         rows = range(len(self.rows))
         return [
             Line("hit = 0"),
-            *(Line(f"{name}_{r} = 0.0") for r in rows for name in ("l", "goal")),
+            *(Line(f"{name}_{r} = 0.0") for r in rows for name in ("goal", "set")),
         ]
 
-    def hit(self, bank: int, targets: Mapping[int, Line]) -> list[Line]:
-        """Write that the next impulse sets velocities of a contact.
+    def hit(self, bank: int, targets: Mapping[int, Line], *, impulse: bool) -> list[Line]:
+        """Write that velocities of a contact are set next.
 
         Parameters
         ----------
@@ -292,43 +422,101 @@ class Locks:
             The contact.
         targets : mapping of int to Line
             By velocity, its new value.
+        impulse : bool
+            Whether they may be far from it; else they have passed it by rounding only.
         """
-        lines = [Line("hit = 1")]
+        lines = [Line(f"hit = {2 if impulse else 1}")]
         for q, goal in targets.items():
             r = self.number(bank, q)
-            lines += [Line(f"l_{r} = 1.0"), Line(f"goal_{r} = {goal.text}", goal.reads)]
+            lines += [Line(f"set_{r} = 1.0"), Line(f"goal_{r} = {goal.text}", goal.reads)]
         return lines
 
     def impulse(self) -> list[Line]:
         """Write the impulse that sets the velocities asked for and keeps those of held locks."""
         names = {name: self.velocity(body) for name, body in self.bodies.items()}
         rows = range(len(self.rows))
-        lines = self.flags(kept=True)
+        keep = [Line(f"keep_{r} = 1.0 if {self.locking(r)} else set_{r}") for r in rows]
         right: dict[int, Value] = {}
         for r, each in enumerate(self.rows):
             right[r] = Binary("-", self.relative(each.row, names), Name(f"goal_{r}"))
-        lines += self.solve(right)
+        solved = [*(Line(f"l_{r} = keep_{r}") for r in rows), *self.solve(right)]
+        if letting := self.letting():
+            inside = [Line("again = 0"), *solved]
+            solved = [Line("again = 1"), Line("while again == 1:"), *indented(inside + letting)]
+        lines = [*keep, *solved]
         moved: dict[str, None] = {}
         for r, each in enumerate(self.rows):
-            inside = []
-            for body, coefficient in self.free(each.row).items():
-                v = self.writer.local(names[body])
-                moved[body] = None
-                share = (
-                    "" if coefficient == Number(1.0) else f"({self.writer.spell(coefficient)}) * "
-                )
-                inertia = self.inertia(body)
-                reads = computed_names(coefficient) | computed_names(inertia) | {names[body]}
-                inside.append(
-                    Line(f"{v} = {v} - {share}hold_{r} / ({self.writer.spell(inertia)})", reads)
-                )
-            lines += [Line(f"if l_{r} > 0.0:"), *indented(inside)]
+            moved |= dict.fromkeys(self.free(each.row))
+            lines += [Line(f"if l_{r} > 0.0:"), *indented(self.shares(r, names))]
         lines += self.exact(names, {r: f"goal_{r}" for r in rows})
         y = self.writer.layout.y
         lines += [
             Line(f"y[{y.text(names[body])}] = {self.writer.local(names[body])}") for body in moved
         ]
-        return [Line("if hit == 1:"), *indented(lines)]
+        return [Line("if hit > 0:"), *indented(lines)]
+
+    def letting(self) -> list[Line]:
+        """Write which lock lets go instead of carrying the impulse: the first one that does."""
+        lines: list[Line] = []
+        for bank in self.read.banks:
+            first = [r for r, each in enumerate(self.rows) if each.bank == bank.index]
+            place = self.writer.mode(bank.index, "0")
+            for edge in bank.edges:
+                if edge.source not in bank.locked or not names_in(edge.guard) & {*bank.forces}:
+                    continue
+                pushed = {
+                    force: f"(hold_{r} * {ENDLESS})"
+                    for force, r in zip(bank.forces, first, strict=True)
+                }
+                guard = spell(edge.guard, rename=dict(self.writer.names.texts) | pushed)
+                state = self.writer.names.states[bank.index][edge.source]
+                word = "elif" if lines else "if"
+                free = f"hit == 2 and keep_{first[0]} > 0.0 and set_{first[0]} == 0.0"
+                reads = computed_names(edge.guard) - {*bank.forces}
+                lines.append(Line(f"{word} {free} and {place} == {state} and ({guard}):", reads))
+                lines += [Line(f"    keep_{r} = 0.0") for r in first]
+                lines.append(Line("    again = 1"))
+        return lines
+
+    def jolts(self) -> list[Line]:
+        """Write which contacts have been moved by more than the motion itself moves them."""
+        lines: list[Line] = []
+        for bank in self.read.banks:
+            first = [r for r, each in enumerate(self.rows) if each.bank == bank.index]
+            if not bank.locked:
+                continue
+            lines += [Line("moved = 0"), Line("moves = 0")]
+            for r in first:
+                row = self.rows[r].row
+                v = bank.velocities[self.rows[r].velocity]
+                lines.append(Line("reach = 0.0"))
+                for body, coefficient in row.items():
+                    name = self.velocity(self.bodies[body])
+                    size = f"{ROUNDING} * abs({self.writer.local(name)})"
+                    if not self.bodies[body].driven:
+                        place = self.writer.layout.y.text(name)
+                        size = f"({size} + {UNFELT} * floor[{place}])"
+                    if coefficient != Number(1.0):
+                        size = f"abs({self.writer.spell(coefficient)}) * {size}"
+                    reads = computed_names(coefficient) | {name}
+                    lines.append(Line(f"reach = reach + {size}", reads))
+                local = self.writer.local(v)
+                lines += [
+                    Line(f"if abs({local} - was[{r}]) > reach:", frozenset({v})),
+                    Line("    moved = 1"),
+                    Line(f"if abs({local}) > reach:"),
+                    Line("    moves = 1"),
+                    Line(f"was[{r}] = {local}"),
+                ]
+            jolt = f"jolt[{self.writer.machine(bank.index, '0')}]"
+            lines += [
+                Line("if mark > 0:"),
+                Line(f"    if {self.locking(first[0])}:"),
+                Line(f"        {jolt} = {LET_GO} * moves"),
+                Line("    elif moved + moves == 2:"),
+                Line(f"        {jolt} = {JUMPED}"),
+            ]
+        return lines
 
     @staticmethod
     def velocity(body: Body) -> str:

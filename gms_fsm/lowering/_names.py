@@ -17,7 +17,7 @@ TEXT = frozenset(
     {"dS", "dy", "edge", "held", "i", "j", "len", "machine", "mode", "n", "nan", "out", "own", "p"}
     | {"piecewise_linear", "piecewise_slope", "range", "shared", "surface", "tables", "watch", "y"}
     | {"abs", "exp", "log", "sqrt", "sgn", "min", "max", "sin", "cos", "tanh", "atan", "asinh"}
-    | {"pow", "pi", "F_i", "t"}
+    | {"pow", "pi", "F_i", "t", "floor", "jolt", "mark", "skip", "was"}
 )
 
 
@@ -159,8 +159,12 @@ def _names_of_locks(read: Assembly) -> set[str]:
     """Return the names in the equations of locks: a row for each velocity that can be set."""
     setting = [bank for bank in read.banks if bank.chart.locks or bank.chart.sets_velocity]
     rows = range(sum(len(bank.velocities) for bank in setting))
-    names = {f"{name}_{r}" for r in rows for name in ("D", "W", "goal", "hold", "l", "w")}
-    return names | {f"L_{r}_{s}" for r in rows for s in rows} | {"hit"}
+    each = ("D", "W", "g", "goal", "hold", "keep", "l", "q", "set", "w")
+    names = {f"{name}_{r}" for r in rows for name in each} | {
+        f"L_{r}_{s}" for r in rows for s in rows
+    }
+    names |= {f"e_{r}_{j}" for r in rows for j in range(len(read.system.bodies))}
+    return names | {"again", "best", "hit", "moved", "moves", "reach", "u"} if rows else names
 
 
 _SHORT = {

@@ -14,7 +14,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import Program
-from integrators import Functions, Held, look, sliding_scratch, slope_on
+from integrators import Functions, Held, arm_on, look, sliding_scratch, slope_on
 
 __all__ = ["armed", "observe", "rate", "sigmas"]
 
@@ -83,7 +83,8 @@ def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> li
         -1, 0 or 1; for sliding surfaces this is not yet their sigma.
     """
     held = [0.0] * program.held
-    program.ieee["arm"](t, y, mode, program.p, held, [0] * len(program.strict))
+    watch = [0] * len(program.strict)
+    arm_on(_sliding(program, mode, held), t, y, list(mode), watch)
     return held
 
 
@@ -114,8 +115,9 @@ def rate(
 
 def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> Held:
     """Return the program restricted to the surfaces that a row slides on."""
-    names = ("flow", "arm", "margins", "normal")
-    flow, arm, margins, normal = (program.ieee[name] for name in names)
+    names = ("flow", "arm", "margins", "normal", "follow")
+    flow, arm, margins, normal, follow = (program.ieee[name] for name in names)
+    functions = Functions(flow, arm, margins, normal, follow, program.p)
     sliding = sliding_scratch(
         program.surfaces,
         program.layout.y.size,
@@ -124,4 +126,4 @@ def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> Held:
         program.layout.observed.size,
         mode[program.layout.slides],
     )
-    return Held(Functions(flow, arm, margins, normal, program.p), held, sliding)
+    return Held(functions, held, sliding)

@@ -6,8 +6,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 from gms_fsm.language import (
     Binary,
@@ -16,6 +17,7 @@ from gms_fsm.language import (
     Name,
     Negative,
     Number,
+    Requirement,
     Value,
     comparisons,
     derivative,
@@ -32,7 +34,7 @@ from gms_fsm.lowering.places import Block, Places
 from gms_fsm.systems._assembly import ONE, Assembly, Bank, of
 from gms_fsm.systems.signals import Corners, Function
 
-__all__ = ["BankPlan", "Computed", "Gradient", "Plan", "RoughCall", "StateFlow"]
+__all__ = ["BankPlan", "Computed", "Gradient", "Pair", "Plan", "RoughCall", "StateFlow"]
 __all__ += ["both_sides", "gradient_of", "plan_of", "times"]
 
 
@@ -119,12 +121,45 @@ class BankPlan:
 
 
 @dataclass(frozen=True)
+class Pair:
+    """Two edges of a chart, there and back, whose guards are the two sides of one surface.
+
+    Parameters
+    ----------
+    bank : int
+        The contact.
+    relation, back : Comparison
+        Of the edge there, and of the edge back. The margin of the first is zero on the surface.
+    upper, lower : str
+        The states where that margin is positive, and negative.
+    rise, fall : str
+        The edges from the lower state to the upper one, and back.
+    """
+
+    bank: int
+    relation: Comparison
+    back: Comparison
+    upper: str
+    lower: str
+    rise: str
+    fall: str
+
+    @property
+    def value(self) -> Value:
+        """The value that is zero on the surface."""
+        left, right = self.relation.left, self.relation.right
+        return left if right == Number(0.0) else Binary("-", left, right)
+
+
+@dataclass(frozen=True)
 class Gradient:
     """The nonzero derivatives of the value that is zero on a surface.
 
     Parameters
     ----------
-    surface : Value
+    surface : Value or Pair
+        The value, or the two edges that meet where it is zero.
+    value : Value
         The value.
     by_state : mapping of str to Value
         With respect to components of the state vector.
@@ -134,7 +169,8 @@ class Gradient:
         With respect to signals that are tables.
     """
 
-    surface: Value
+    surface: Value | Pair
+    value: Value
     by_state: Mapping[str, Value]
     by_t: Value | None
     by_signal: Mapping[str, Value]
@@ -167,7 +203,8 @@ class Plan:
     held : Places
         The values whose signs are held.
     surfaces : Places
-        Those among them on which the motion can slide.
+        Those among them on which the motion can slide, and the pairs of edges on whose surface it
+        can.
     relations : Places
         The comparisons that may be watched.
     always : tuple of Comparison
@@ -188,7 +225,7 @@ class Plan:
     accelerations: Mapping[str, Computed]
     flow: Mapping[str, Computed]
     held: Places[Value]
-    surfaces: Places[Value]
+    surfaces: Places[Value | Pair]
     relations: Places[Comparison]
     always: tuple[Comparison, ...]
     rough: tuple[Mapping[str, tuple[Value, ...]], ...]
@@ -224,11 +261,15 @@ def plan_of(read: Assembly) -> Plan:
     rough = tuple(_rough(read, bank) for bank in read.banks)
     found = [*outer, *(u for each in rough for row in each.values() for u in row)]
     held = _parted(dict.fromkeys(found), read)
-    surfaces = Places(
+    surfaces: Places[Value | Pair] = Places(
         tuple(u for u in held.shared if _can_be_slid_on(u, read)),
         tuple(
-            Block(tuple(u for u in block.names if _can_be_slid_on(u, read)), block.n, block.size)
-            for block in held.blocks
+            Block(
+                (*(u for u in block.names if _can_be_slid_on(u, read)), *_pairs(bank, read)),
+                block.n,
+                block.size,
+            )
+            for bank, block in zip(read.banks, held.blocks, strict=True)
         ),
     )
     landmarks = [r for bank in read.banks if _reads_curve(bank) for r in _landmarks(bank)]
@@ -260,7 +301,10 @@ def plan_of(read: Assembly) -> Plan:
         relations=_relations(read, held, landmarks),
         always=tuple(dict.fromkeys(always)),
         rough=rough,
-        gradients=tuple(gradient_of(u, read) for u in (*surfaces.shared, *surfaces.own)),
+        gradients=tuple(
+            replace(gradient_of(u.value if isinstance(u, Pair) else u, read), surface=u)
+            for u in (*surfaces.shared, *surfaces.own)
+        ),
     )
 
 
@@ -390,6 +434,55 @@ def _can_be_slid_on(u: Value, read: Assembly) -> bool:
     )
 
 
+def _pairs(bank: Bank, read: Assembly) -> Iterator[Pair]:
+    """Find the edges there and back, without actions, that meet on one surface.
+
+    The machine would switch without end where the flows of both states lead onto it. Locks are left
+    out: to enter one takes an impulse. So are forces, which jump with the state, and states that
+    are arrested: their other edges are for velocities that jump.
+    """
+    locked = {*bank.locked, *(edge.source for edge in bank.edges if edge.arrests)}
+    late = {name for each in read.banks for name in (*each.forces, *each.rates)}
+    late |= {each.rate(name) for each in read.banks for name in each.variables}
+    edges = [
+        (edge, part)
+        for edge in (() if bank.periodic else bank.edges)
+        if not edge.steps and edge.source != edge.target and edge.source not in locked
+        if edge.target not in locked and isinstance(part := split(edge.guard), Requirement)
+    ]
+    for (edge, there), (other, back) in combinations(edges, 2):
+        if (edge.source, edge.target) != (other.target, other.source):
+            continue
+        one, two = _difference(there.comparison), _difference(back.comparison)
+        if two not in (one, one[::-1]) or (there.holds == back.holds) != (two == one[::-1]):
+            continue  # not one margin, of which one edge needs the positive side, one the negative
+        if there.relation.op in (">=", "<=") and back.relation.op in (">=", "<="):
+            continue  # on the surface itself both hold
+        rise, fall = (edge, other) if there.holds else (other, edge)
+        pair = Pair(
+            bank.index,
+            there.comparison,
+            back.comparison,
+            rise.target,
+            fall.target,
+            rise.name,
+            fall.name,
+        )
+        if _can_be_slid_on(pair.value, read) and not names_in(read.expanded(pair.value)) & late:
+            yield pair
+
+
+def _difference(comparison: Comparison) -> tuple[Value, Value]:
+    """Return the two values whose difference is the margin of a comparison."""
+    zero = Number(0.0)
+    match comparison:
+        case Comparison(Binary("-", a, b), right=right) if right == zero:
+            return a, b
+        case Comparison(left=left, right=Binary("-", a, b)) if left == zero:
+            return b, a
+    return comparison.left, comparison.right
+
+
 def _moving(expanded: Value, read: Assembly) -> tuple[str, ...]:
     """Return the names in an expanded value that change while the motion flows."""
     system, order = read.system, dict[str, None]()
@@ -482,6 +575,7 @@ def gradient_of(u: Value, read: Assembly) -> Gradient:
     known = {name: slope for name, slope in slopes.items() if slope is not None}
     return Gradient(
         surface=u,
+        value=u,
         by_state={name: each for name, each in known.items() if name not in ("t", *signals)},
         by_t=known.get("t"),
         by_signal={name: each for name, each in known.items() if name in signals},

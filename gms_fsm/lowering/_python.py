@@ -18,13 +18,13 @@ from gms_fsm.language import (
     names_in,
     split,
 )
-from gms_fsm.lowering._forces import Forces
 from gms_fsm.lowering._lines import Line, Signs, indented, reads_of
+from gms_fsm.lowering._lock_functions import LockFunctions
 from gms_fsm.lowering._names import computed_names
-from gms_fsm.lowering._plan import Gradient, Plan, both_sides
+from gms_fsm.lowering._plan import Gradient, Pair, Plan, both_sides
 from gms_fsm.lowering.places import total
 from gms_fsm.systems._assembly import Bank, Edge, of
-from integrators import FOR_A_GUARD, FOR_A_SIGN, LIVE, WAITING
+from integrators import FOR_A_GUARD, FOR_A_SIGN, JUMPED, LIVE, WAITING
 
 __all__ = ["FUNCTIONS", "python"]
 
@@ -39,6 +39,8 @@ FUNCTIONS = (
     "margins",
     "values",
     "tick",
+    "follow",
+    "jolts",
 )
 
 
@@ -104,12 +106,14 @@ def python(plan: Plan) -> str:
         printer.margins(),
         printer.values(),
         printer.tick(),
+        printer.follow(),
+        printer.jolts(),
     ):
         lines += ["", "", *function]
     return "\n".join(lines) + "\n"
 
 
-class _Printer(Forces):
+class _Printer(LockFunctions):
     """Prints the functions of a plan."""
 
     # ------------------------------------------------------------------ the functions
@@ -117,24 +121,38 @@ class _Printer(Forces):
         lines = self.before_guards(
             computed_names(edge.guard) for bank in self.read.banks for edge in bank.edges
         )
+        lines += self.moved_locks()
+        slides = False
         for bank in self.read.banks:
+            pairs = [u for u in self.plan.surfaces.own if isinstance(u, Pair)]
+            skipped = {name for u in pairs if u.bank == bank.index for name in (u.rise, u.fall)}
+            slides = slides or bool(skipped)
             branches: dict[str, list[Line]] = {}
+            jolt = f"jolt[{self.machine(bank.index)}]"
             for state in bank.states:
                 rows: list[Line] = []
-                for edge, constant in self.leaving(bank, state):
-                    word = "elif" if rows else "if"
+                leaving = self.leaving(bank, state)
+                # Where the velocity has jumped, an arrest would take it: another edge, or none.
+                refused = [(edge, f"-2 - {constant}") for edge, constant in leaving if edge.arrests]
+                for edge, constant in (*leaving, *refused):
+                    word, guard = "elif" if rows else "if", self.spell(edge.guard)
+                    if edge.arrests and not constant.startswith("-"):
+                        guard = f"{jolt} != {JUMPED} and ({guard})"
+                    if edge.name in skipped:
+                        guard = f"skip != {constant} and {guard}"
                     rows += [
-                        Line(f"{word} {self.spell(edge.guard)}:", computed_names(edge.guard)),
+                        Line(f"{word} {guard}:", computed_names(edge.guard)),
                         Line(f"    edge = {constant}  # {state} -> {edge.target}"),
                     ]
                 branches[state] = rows
-            after = [Line(f"out[{self.machine(bank.index)}] = edge")]
-            lines += self.loop(
-                bank.index, "live", [Line("edge = -1")], branches if bank.edges else None, after
-            )
+            place = f"out[{self.machine(bank.index)}]"
+            before = [Line("edge = -1")] + [Line(f"skip = {place}")] * bool(skipped)
+            after = [Line(f"{place} = edge")]
+            lines += self.loop(bank.index, "live", before, branches if bank.edges else None, after)
+        doc = "out[i] = the first edge of element i whose guard holds, or -1"
         return self.function(
-            "switch(t, y, mode, p, out)",
-            "out[i] = the first edge of element i whose guard holds, or -1.",
+            "switch(t, y, mode, p, jolt, out)",
+            f"{doc}; not the one in out[i]." if slides else f"{doc}.",
             lines,
             "live",
         )
@@ -154,6 +172,12 @@ class _Printer(Forces):
             for bank in self.read.banks
             for edge in bank.edges
             for _, value in edge.steps
+        ]
+        steps += [
+            computed_names(edge.guard) - {*bank.forces}
+            for bank in self.read.banks
+            for edge in bank.edges
+            if edge.source in bank.locked
         ]
         lines, several = self.before_guards(steps), len(self.read.banks) > 1
         phases = [
@@ -213,15 +237,15 @@ class _Printer(Forces):
             else:
                 goal = Line(self.spell(tree), computed_names(tree))
                 targets = {bank.velocities.index(name): goal}
-                found.append(Phase([*lines, *self.locks.hit(bank.index, targets)], hits=True))
+                hit = self.locks.hit(bank.index, targets, impulse=True)
+                found.append(Phase([*lines, *hit], hits=True))
                 lines = []
         target = self.names.states[bank.index][edge.target]
         lines.append(Line(f"{self.mode(bank.index)} = {target}"))
-        arrests = edge.target in {state.name for state in bank.chart.states if state.locked}
-        if arrests:
+        if edge.locks:
             every = dict.fromkeys(range(len(bank.velocities)), Line("0.0"))
-            lines += self.locks.hit(bank.index, every)
-        return [*found, Phase(lines, hits=arrests)]
+            lines += self.locks.hit(bank.index, every, impulse=bank.is_impulse(edge))
+        return [*found, Phase(lines, hits=edge.locks)]
 
     def fresh(self, value: Value, bank: Bank, *, moved: bool) -> Value:
         """Return a value with what is computed from variables expanded; and from velocities."""
@@ -236,10 +260,14 @@ class _Printer(Forces):
     def velocities_again(self) -> list[Line]:
         """Write the relative velocities anew, after an impulse."""
         return [
-            self.put(self.local(name), self.plan.definitions[name].tree)
+            line
             for bank in self.read.banks
             for name in bank.velocities
             if name in self.plan.definitions
+            for line in (
+                self.put(self.local(name), self.plan.definitions[name].tree),
+                *self.rounded(name),
+            )
         ]
 
     def flow(self, signs: Signs) -> list[str]:
@@ -264,12 +292,14 @@ class _Printer(Forces):
                 "dy = dy/dt, all states frozen, corners and jumps evaluated live.",
                 lines,
                 signs,
+                within=True,
             )
         return self.function(
             "flow(t, y, mode, held, p, dy)",
             "dy = dy/dt, all states and all signs frozen.",
             lines,
             signs,
+            within=True,
         )
 
     def observe(self) -> list[str]:
@@ -297,9 +327,10 @@ class _Printer(Forces):
     def locks_seen(self, bank: Bank) -> list[Line]:
         """Store the force of a locked element, and whether others carry it."""
         seen, lines = self.layout.observed, []
-        locked = [state.name for state in bank.chart.states if state.locked]
         mode = self.mode(bank.index, "0")
-        states = " or ".join(f"{mode} == {self.names.states[bank.index][each]}" for each in locked)
+        states = " or ".join(
+            f"{mode} == {self.names.states[bank.index][each]}" for each in bank.locked
+        )
         for q, force in enumerate(bank.forces):
             r = self.locks.number(bank.index, q)
             _, more = self.at("out", seen, f"{force}_elements")
@@ -316,14 +347,15 @@ class _Printer(Forces):
         lines: list[Line] = []
         for each in self.plan.gradients:
             word, inner = "elif" if lines else "if", self.gradient(each)
-            surfaces, note = self.plan.surfaces, f"  # {self.spell(each.surface)}"
+            surfaces, note = self.plan.surfaces, f"  # {self.spell(each.value)}"
             sizes = frozenset(f"#{size}" for size in surfaces.sizes(each.surface))
             if each.surface in surfaces.shared:
                 place = surfaces.text(each.surface)
                 lines.append(Line(f"{word} surface == {place}:{note}"))
             else:
                 end, start = (surfaces.start_text(each.surface, k) for k in (1, 0))
-                bank = self.read.bank_of(each.surface)
+                u = each.surface
+                bank = u.bank if isinstance(u, Pair) else self.read.bank_of(each.value)
                 assert bank is not None
                 size = frozenset({f"#{self.sizes[bank]}"})
                 lines.append(Line(f"{word} surface < {end}:{note}", sizes | size))
@@ -475,6 +507,7 @@ class _Printer(Forces):
             "For each watched comparison, left - right.",
             lines,
             "live",
+            within=True,
         )
 
     def margin(self, comparison: Comparison) -> list[Line]:
@@ -504,7 +537,7 @@ class _Printer(Forces):
         shown, late = self.layout.shown, []
         for name in shown.shared:
             late.append(frozenset({name}) if name in self.late else frozenset())
-        lines = self.before_guards(late)
+        lines = [*self.before_guards(late), *self.moved_locks()]
         for bank in self.read.banks:
             start = of(bank.name, "")
             for name in shown.shared:
@@ -522,7 +555,7 @@ class _Printer(Forces):
                     rows.append(Line(line.text, line.reads | sizes))
             lines += self.loop(bank.index, "live", rows)
         return self.function(
-            "values(t, y, mode, p, out)",
+            "values(t, y, mode, p, jolt, out)",
             "out = what guards can read besides variables and parameters.",
             lines,
             "live",

@@ -8,8 +8,11 @@ The functions of a program
 --------------------------
 ``flow``       dy/dt with every state and every sign frozen (located crossings)
 ``flow_live``  the same with sgn, abs, min, max evaluated live (guards checked once per step)
-``switch``     for each element the first edge whose guard holds, or -1
+``switch``     for each element the first edge whose guard holds, or -1; not the one in ``out`` if
+               a motion can slide between two states
 ``act``        take an edge: its assignments and the new state
+``follow``     set the velocities in y that locked contacts determine
+``jolts``      store the velocities of contacts that lock, and mark those that have jumped
 ``observe``    v, F, and per element s, F_i, dz; signs as given or live
 ``normal``     the gradient of a surface that a motion can slide on (see `integrators.sliding`)
 ``arm``        the comparisons to watch until the next stop, and the signs to freeze
@@ -33,9 +36,9 @@ from typing import Any
 import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
-from gms_fsm.language import Binary, Requirement, Value, spell
+from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
 from gms_fsm.lowering._generated import ieee, load, load_careful
-from gms_fsm.lowering._plan import Plan, both_sides, plan_of
+from gms_fsm.lowering._plan import Pair, Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
 from gms_fsm.lowering.layout import Layout
 from gms_fsm.systems._numbers import numbers_of
@@ -85,14 +88,19 @@ class Program:
     surfaces : integrators.Surfaces
         The surfaces on which the motion can slide.
     surface_names : list of str
-        The value that is zero on each.
+        The value that is zero on each; with the states of a machine below it and above it.
     knots, jumps : list of float
         Times [s] where a signal has a corner, and where it jumps.
-    ticks : mapping of float to int
-        For each time [s] at which something ticks what does, as bits: the samplers, then the
-        contacts with a period.
+    ticks : integrators.Ticks
+        What ticks when: the samplers, then the contacts with a period.
     discrete : list of int
         For each machine the bit of its contact if this has a period, else 0.
+    impulses : list of int
+        For each edge 1 if it is an impulse, 2 if it lets go of a lock, else 0; empty if all are 0.
+    velocities : int
+        Number of velocities that locks may hold or impulses set; 0 if nothing locks.
+    leaps : bool
+        Whether a given velocity among these may jump at a crossing.
     """
 
     source: str
@@ -109,7 +117,15 @@ class Program:
     knots: list[float]
     jumps: list[float]
     discrete: list[int]
-    ticks: Mapping[float, int] = field(default_factory=dict)
+    impulses: list[int]
+    velocities: int
+    leaps: bool
+    ticks: integrators.Ticks = field(default_factory=integrators.Ticks.none)
+
+    @property
+    def calm(self) -> list[int]:
+        """The argument that says that no velocity has jumped."""
+        return [0] * self.layout.n
 
     @property
     def live(self) -> list[float]:
@@ -216,7 +232,26 @@ def _lowered(shape: _Shape) -> Program:
         knots=[],
         jumps=[],
         discrete=[bit for bank in plan.read.banks for bit in [plan.read.bit(bank)] * bank.n],
+        **_jolts(plan),
     )
+
+
+def _jolts(plan: Plan) -> dict[str, Any]:
+    """Return what a run has to know about impulses, and about velocities that jump."""
+    read = plan.read
+    impulses = [bank.changes_others(edge) for bank in read.banks for edge in bank.edges]
+    held = [bank for bank in read.banks if bank.chart.locks or bank.chart.sets_velocity]
+    velocities = [name for bank in held for name in bank.velocities]
+    if not any(bank.chart.locks for bank in held):
+        velocities = []
+    given = {body.v for body in read.system.bodies if body.driven}
+    behind = read.closure(read.closure(velocities) & given)
+    trees = [read.defined[name].tree for name in behind if name in read.defined]
+    return {
+        "impulses": impulses if any(impulses) else [],
+        "velocities": len(velocities),
+        "leaps": any(tree is not None and bool([*rough_points(tree)]) for tree in trees),
+    }
 
 
 def arguments(system: System) -> Arguments:
@@ -272,6 +307,10 @@ def equations(program: Program) -> integrators.Equations:
         ticks=program.ticks,
         discrete=program.discrete,
         seen=program.layout.observed.size,
+        follow=functions["follow"],
+        impulses=program.impulses,
+        velocities=program.velocities,
+        leaps=program.leaps,
     )
 
 
@@ -321,25 +360,46 @@ def _relation_names(plan: Plan) -> list[str]:
 
 def _surface_names(plan: Plan) -> list[str]:
     """Return the value that is zero on each surface, in words."""
-    return [spell(u, rename=plan.names.plain) + _of_element(plan, u, i) for u, i in plan.surfaces]
+    return [
+        spell(u, rename=plan.names.plain) + _of_element(plan, u, i)
+        if not isinstance(u, Pair)
+        else f"{spell(u.value, rename=plan.names.plain)} ({u.lower}, {u.upper})"
+        + _of_contact(plan, u.bank, i)
+        for u, i in plan.surfaces
+    ]
 
 
 def _of_element(plan: Plan, tree: Value, element: int | None) -> str:
     """Name an element, counted from 1 in texts; nothing where there is only one value."""
+    bank = plan.read.bank_of(tree)
+    return "" if bank is None else _of_contact(plan, bank, element)
+
+
+def _of_contact(plan: Plan, bank: int, element: int | None) -> str:
+    """Name an element of a contact."""
     if element is None:
         return ""
-    bank = plan.read.bank_of(tree)
-    assert bank is not None
     whose = "" if len(plan.banks) == 1 else f" of {plan.banks[bank].bank.name}"
     return f" of element {element + 1}{whose}"
 
 
 def _surface_table(plan: Plan) -> integrators.Surfaces:
-    """Return the places of the surfaces' signs and relations."""
-    surfaces = [*plan.surfaces.shared, *plan.surfaces.own]
-    pairs = [both_sides(u) for u in surfaces]
-    return integrators.Surfaces(
-        sign=[place for u in surfaces for place in plan.held.all_of(u)],
-        above=[place for above, _ in pairs for place in plan.relations.all_of(above)],
-        at_least=[place for _, at_least in pairs for place in plan.relations.all_of(at_least)],
-    )
+    """Return the places of the surfaces' signs and relations, or of their machines."""
+    table = integrators.Surfaces([], [], [], [], [], [], [], [])
+    for u, i in plan.surfaces:
+        if not isinstance(u, Pair):
+            above, at_least = both_sides(u)
+            sign, machine = plan.held.index(u, i or 0), [-1, 0, 0, -1, -1]
+        else:
+            (above, at_least), sign = (u.relation, u.back), -1
+            places, bank = plan.layout.banks[u.bank], plan.banks[u.bank].bank
+            edges = [edge.name for edge in bank.edges]
+            machine = [
+                places.first + (i or 0),
+                *(bank.states.index(state) for state in (u.upper, u.lower)),
+                *(places.first_edge + edges.index(edge) for edge in (u.rise, u.fall)),
+            ]
+        relations = (plan.relations.index(each, i or 0) for each in (above, at_least))
+        for column, value in zip(table, (sign, *relations, *machine), strict=True):
+            column.append(value)
+    return table

@@ -34,9 +34,10 @@ from gms_fsm.language import (
 )
 from gms_fsm.lowering._generated import load
 from gms_fsm.lowering.layout import held_of
+from gms_fsm.systems._assembly import CURVE_LOAD, Bank, of
 from gms_fsm.systems._texts import ByIdentity
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.system import Contact, System
+from gms_fsm.systems.system import LEAST_LOAD, Contact, System
 
 __all__ = ["Scales", "Setting", "SystemScales", "Tolerance", "scales_of", "scales_of_system"]
 
@@ -65,6 +66,9 @@ class Scales:
         m/s: the smallest speed in a guard, v_c for a GMS element.
     time : float
         s: relaxation time of the fastest flow, s / C for a slipping GMS element.
+    relaxing : tuple of tuple of float
+        s: for each element in each state of the chart, the relaxation time of the fastest variable
+        whose rate is constant, again s / C where a GMS element slips; 0 if there is none.
 
     Examples
     --------
@@ -78,6 +82,7 @@ class Scales:
     variables: Mapping[str, tuple[float, ...]]
     speed: float
     time: float
+    relaxing: tuple[tuple[float, ...], ...]
 
     def tolerances(self, rtol: float) -> dict[str, list[float]]:
         """Return the default absolute tolerances by name, one per element for variables.
@@ -96,13 +101,15 @@ class Scales:
         return {name: [SHARE * rtol * u for u in row] for name, row in scales.items()}
 
 
-def scales_of(model: Model | Contact) -> Scales:
+def scales_of(model: Model | Contact, N: float = 1.0) -> Scales:
     """Return the scales of a model, or of a contact.
 
     Parameters
     ----------
     model : Model or Contact
         Any of them.
+    N : float
+        What its curve is multiplied by; 0 if that is not known.
 
     Returns
     -------
@@ -116,18 +123,21 @@ def scales_of(model: Model | Contact) -> Scales:
     if not isinstance(model, Contact) and "s" in model.chart.inputs:
         curve = model.stribeck
     if curve is not None:
-        thresholds = as_floats(model.weights * curve.F_c)
+        thresholds = as_floats(model.weights * (curve.F_c * N))
     numbers = [
         as_floats(np.asarray(value)) if np.ndim(value) else [float(value)] * n
         for value in model.values.values()
     ]
     elements = tuple(zip(thresholds, *numbers, strict=True))
-    return _scales_of(ByIdentity(model.chart), elements, curve)
+    return _scales_of(ByIdentity(model.chart), elements, curve, N)
 
 
 @functools.lru_cache(maxsize=32)
 def _scales_of(
-    key: ByIdentity[Chart], elements: tuple[tuple[float, ...], ...], curve: Stribeck | None
+    key: ByIdentity[Chart],
+    elements: tuple[tuple[float, ...], ...],
+    curve: Stribeck | None,
+    N: float,
 ) -> Scales:
     chart = key.it
     sizes = _sizes(key)
@@ -139,7 +149,9 @@ def _scales_of(
             reaches = [_reach(at_rest, *margin) for margin in sizes.reach[name]]
             if curve is not None:
                 reaches += [
-                    abs(curve.F_c / at_rest[k]) for k in sizes.stiffness.get(name, ()) if at_rest[k]
+                    abs(curve.F_c * N / at_rest[k])
+                    for k in sizes.stiffness.get(name, ())
+                    if at_rest[k]
                 ]
             row.append(_least(reaches))
         for name, follows in sizes.follows.items():
@@ -151,11 +163,19 @@ def _scales_of(
     least_x = _least([*found["x"], *lengths])
     least_v = _least(v)
     speed = least_v if curve is None else curve.v_s
-    rates = [abs(rate) for values in elements for rate in sizes.paces((speed, *values))]
-    time = _divided(1.0, max(rates, default=0.0)) or _divided(least_x, speed)
+    paces = [sizes.paces((speed, *values)) for values in elements]
+    fastest = max((abs(rate) for rates in paces for rate in rates), default=0.0)
+    time = _divided(1.0, fastest) or _divided(least_x, speed)
+    relaxing = tuple(
+        tuple(
+            _divided(1.0, min([0.0, *(rates[k] for k in sizes.relaxes[state.name])]))
+            for state in chart.states
+        )
+        for rates in paces
+    )
     variables = {name: tuple(found[name]) for name in chart.variables}
     slowest = _least(speeds)
-    return Scales(least_x, least_v, variables, slowest, time)
+    return Scales(least_x, least_v, variables, slowest, time, relaxing)
 
 
 @dataclass(frozen=True)
@@ -168,10 +188,13 @@ class SystemScales:
         By name in the layout; one per element for variables.
     time : float
         s: relaxation time of the fastest flow; 0 if there is none.
+    relaxing : list of list of float
+        s: as in `Scales`, for each element of each contact.
     """
 
     sizes: Mapping[str, list[float]]
     time: float
+    relaxing: list[list[float]]
 
     def tolerances(self, rtol: float) -> dict[str, list[float]]:
         """Return the default absolute tolerances by name, as `Scales.tolerances` does."""
@@ -194,10 +217,12 @@ def scales_of_system(system: System) -> SystemScales:
     banks = list(zip(system.shape.assembly.banks, system.contacts, strict=True))
     sizes: dict[str, list[float]] = {}
     times: list[float] = []
+    relaxing: list[list[float]] = []
     moved: dict[str, tuple[list[float], list[float]]] = {b.name: ([], []) for b in system.bodies}
     for bank, contact in banks:
-        scales = scales_of(contact)
+        scales = scales_of(contact, _load(bank, system))
         times.append(scales.time)
+        relaxing += [list(row) for row in scales.relaxing]
         for name, plain in zip(bank.variables, bank.chart.variables, strict=True):
             sizes[name] = [*scales.variables[plain]]
         for row in bank.jacobian:
@@ -214,7 +239,18 @@ def scales_of_system(system: System) -> SystemScales:
             sizes |= {bank.held(force): [0.0] for force in bank.forces}
     for name in (*system.flow, *(u for sampler in system.sampled for u in sampler.updates)):
         sizes[name] = [0.0]
-    return SystemScales(sizes, _least(times))
+    return SystemScales(sizes, _least(times), relaxing)
+
+
+def _load(bank: Bank, system: System) -> float:
+    """Return what the curve of a contact is multiplied by at rest; 0 if that is not known."""
+    read = system.shape.assembly
+    if (given := read.defined.get(of(bank.name, CURVE_LOAD))) is None:
+        return 1.0
+    assert given.tree is not None
+    tree, states = read.expanded(given.tree), {"t", *(u for b in system.bodies for u in (b.x, b.v))}
+    N = _constant(renamed(tree, dict.fromkeys(states, Number(0.0))), system)
+    return N if N > LEAST_LOAD else 0.0
 
 
 def _constant(tree: Value, system: System) -> float:
@@ -264,7 +300,8 @@ class _Sizes:
     """Functions of a chart's parameters; the numbers are places in `at_rest`."""
 
     at_rest: _Numbers  # all at rest in the origin
-    paces: _Numbers  # relaxation rates of the variables and of v
+    paces: _Numbers  # rates of the variables: negative where one relaxes
+    relaxes: Mapping[str, Sequence[int]]  # by state, the places of constant rates in `paces`
     reach: Mapping[str, Sequence[tuple[int, ...]]]  # margins of guards, slopes and bends
     stiffness: Mapping[str, Sequence[int]]  # slopes of the forces
     follows: Mapping[str, Sequence[int]]  # slope of a variable with respect to x, by state
@@ -318,14 +355,17 @@ def _sizes(key: ByIdentity[Chart]) -> _Sizes:
         for name in chart.variables
     }
     moving = {name: zero for name, zero in rest.items() if name != "v"}
-    paces = [
-        spell(renamed(rate, moving))
-        for (_, name), flow in flows.items()
-        if (rate := derivative(flow, name)) is not None
-    ]
+    paces: dict[str, int] = {}
+    relaxes: dict[str, list[int]] = {state.name: [] for state in chart.states}
+    for (state, name), flow in flows.items():
+        if (rate := derivative(flow, name)) is not None:
+            k = paces.setdefault(spell(renamed(rate, moving)), len(paces))
+            if all(derivative(rate, each) == Number(0.0) for each in zero_at_rest):
+                relaxes[state].append(k)
     return _Sizes(
         _Numbers(title, arguments, [*places]),
-        _Numbers(title, f"v, {arguments}", list(dict.fromkeys(paces))),
+        _Numbers(title, f"v, {arguments}", [*paces]),
+        relaxes,
         reach,
         stiffness,
         {name: row for name, row in follows.items() if row},

@@ -13,13 +13,8 @@ from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._moment import Place, Recording
-from gms_fsm.run._recording import (
-    PATIENCE,
-    check_end,
-    check_pace,
-    explained,
-    interference_error,
-)
+from gms_fsm.run._pace import LATER, PATIENCE, check_pace
+from gms_fsm.run._recording import check_end, explained, interference_error
 from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
@@ -39,6 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CompiledRun"]
 
+WORTH_A_LOOK = 500_000  # steps: machine code takes fewer in less time than it takes to look ahead
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
 
 
@@ -58,6 +54,7 @@ class CompiledRun:
         self.columns = Columns(start)
         self.recorder: Recording = self.columns
         self.engine = machines
+        self.next_look = PATIENCE
 
     @property
     def buffers(self) -> hybrid.Buffers:
@@ -89,6 +86,7 @@ class CompiledRun:
             Of the same kind as the previous ones.
         """
         self.columns.reset(model, rig)
+        self.next_look = PATIENCE
 
     def advance(self) -> bool:
         """Run until a chunk of steps is complete.
@@ -120,7 +118,9 @@ class CompiledRun:
             check_end(columns)
             return False
         if event == loop.ROWS:
-            if b.out.cursor[STEPS] >= PATIENCE:
+            steps = int(b.out.cursor[STEPS])
+            if steps >= self.next_look and start.options.max_steps - steps >= WORTH_A_LOOK:
+                self.next_look = LATER * steps
                 check_pace(columns, columns.as_lists())
         elif event == loop.FIRING:
             self._replay(self.engine)
@@ -135,7 +135,8 @@ class CompiledRun:
         memory, (t, y, mode) = self.columns.buffers.memory, self.columns.latest
         start = self.columns.start
         if memory.counts[loop.FIRED_ONE] == 0:  # the values when the guards were evaluated
-            engine.show(t, y, list(mode[start.program.layout.elements]))
+            jolt: Any = memory.jolt
+            engine.show(t, y, list(mode[start.program.layout.elements]), jolt.tolist())
         try:
             engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
         except Interference as error:
@@ -232,7 +233,7 @@ class Columns:
         b: Any = self.buffers  # arrays
         b.now.clock[:] = hybrid.beginning(start.t_start, start.last)
         b.now.y[:], b.now.mode[:], b.memory.anchor[:] = start.y, start.mode, start.y
-        b.now.floor[:] = start.options.atol
+        b.now.floor[:] = start.options.floor or start.options.atol
 
     def empty(self) -> None:
         """Empty the columns and return to the start."""
@@ -245,6 +246,8 @@ class Columns:
             memory.counts,
             memory.switches,
             memory.changes,
+            memory.was,
+            memory.jolt,
             b.relations.watch,
             b.out.cursor,
             sliding.which,
@@ -255,6 +258,7 @@ class Columns:
         self._begin()
         sliding.live[:] = start.program.live
         b.plan.control.atol[:] = start.options.atol
+        b.plan.relaxing[:] = hybrid.relaxation_times(start.options)
         control = b.plan.control._replace(time_scale=start.options.time_scale)
         self.buffers = b._replace(plan=b.plan._replace(control=control))
         log.counts[:] = [0, min(1, len(log.stops_t))]
@@ -414,8 +418,8 @@ def _example(start: Start, flow: str) -> Run:
     made = compiled.functions(program)
     p: Any = compiled.packed(program.p)
     return example(
-        Functions(made[flow], made["arm"], made["margins"], made["normal"], p),
-        loop.Machines(made["switch"], made["act"], made["tick"], made["observe"]),
+        Functions(made[flow], made["arm"], made["margins"], made["normal"], made["follow"], p),
+        loop.Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
         hybrid.buffers(
             equations(program), start.t_start, start.y, start.mode, start.last, start.options, 0
         ),
@@ -428,12 +432,17 @@ def _example(start: Start, flow: str) -> Run:
 def _as_arrays(plan: Any, places: Any) -> Any:
     """Return a plan whose lists are arrays, those inside the block in their places."""
     places.control.atol[:], places.discrete[:] = plan.control.atol, plan.discrete
+    places.impulses[:] = plan.impulses
+    jumps = len(plan.jumps) > 0
+    places.relaxing[:] = plan.relaxing
     return plan._replace(
+        impulses=places.impulses,
         control=plan.control._replace(atol=places.control.atol),
         discrete=places.discrete,
-        jumps=_floats(plan.jumps) if plan.jumps else places.jumps,
-        before_jumps=_floats(plan.before_jumps) if plan.jumps else places.before_jumps,
-        ticks=_integers(plan.ticks) if plan.ticks else places.ticks,
+        relaxing=places.relaxing,
+        jumps=plan.jumps if jumps else places.jumps,
+        before_jumps=plan.before_jumps if jumps else places.before_jumps,
+        ticks=plan.ticks if jumps else places.ticks,
         knots=_floats(plan.knots) if plan.knots else places.knots,
     )
 

@@ -178,9 +178,7 @@ def _contact(given: Model | Contact, number: int, several: bool) -> Contact:
         name = f"{name}{number}"
     _refuse(contact)
     v = _name("v", name, several)
-    if contact.model is not None:
-        return Contact(name, contact.model, v=v, inputs=contact.inputs)
-    return Contact(name, contact.chart, contact.values, n=contact.n, v=v, inputs=contact.inputs)
+    return contact.replaced(name=name, v=(v,))
 
 
 def _body(contact: Contact, several: bool) -> Body:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import sys
+import threading
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -25,6 +26,7 @@ from gms_fsm.systems.system import Contact
 from gms_fsm.traces.failures import (
     LivelockError,
     NotFiniteError,
+    NotUniqueError,
     SimulationError,
     StepLimitError,
     StepSizeError,
@@ -35,6 +37,7 @@ from integrators.stepping import FULL_LOG, MEAN, RESUMED, SWITCHES
 from integrators.steps import T
 
 __all__ = [
+    "Alone",
     "Asked",
     "Joint",
     "Last",
@@ -42,6 +45,7 @@ __all__ = [
     "Switch",
     "check_inputs",
     "content_of",
+    "in_use",
     "later",
     "line_of",
     "made_again",
@@ -63,6 +67,7 @@ FAILURES: Mapping[int, tuple[type[SimulationError], str]] = {
     advance.TOO_SMALL: (StepSizeError, "the step size fell below the resolution of the clock"),
     loop.TOO_MANY_STEPS: (StepLimitError, f"one sample needs more than {MOST_STEPS:,} steps"),
     advance.NOT_FINITE: (NotFiniteError, "the flow is NaN or infinite"),
+    loop.ENTANGLED: (NotUniqueError, "it is between states on surfaces that cross: not unique"),
 }
 
 
@@ -72,6 +77,33 @@ class Switch(NamedTuple):
     t: float  # s
     element: int
     edge: str
+
+
+class Alone:
+    """Lets one thread at a time into a friction, and refuses the others at once.
+
+    The same thread may come in again: after Ctrl-C it may never have left.
+    """
+
+    def __init__(self) -> None:
+        lock = threading.RLock()
+        self.acquire, self.leave = lock.acquire, lock.release
+
+    def __enter__(self) -> None:
+        if not self.acquire(False):
+            raise in_use()
+
+    def __exit__(self, *_: object) -> None:
+        self.leave()
+
+
+def in_use() -> ParameterError:
+    """Return the error for a call while another thread's call is under way."""
+    return ParameterError(
+        "another thread is in a call of this friction",
+        advice="give each thread a friction of its own, or hold a lock during each call; nothing "
+        "has changed",
+    )
 
 
 class Asked(NamedTuple):
@@ -120,6 +152,7 @@ class Joint:
     ) -> None:
         self.given, self.asked, self.start, self.stepper = given, asked, start, stepper
         self.t = start.t_start
+        self.alone = Alone()
         self.last: Last | None = None
         self.more: list[Switch] = []  # that did not fit into the log
         (self._bank,) = start.program.layout.banks

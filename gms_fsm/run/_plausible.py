@@ -84,7 +84,7 @@ def bounds_of(start: Start, b: hybrid.Buffers, t_end: float = np.inf) -> dict[st
         "cursor": (cursor[0], cursor[1]),
         "which": (0, most_surfaces),
         "slid": (0, 1),
-        "arrived": (0, 1),
+        "arrived": (-1, 1),
     }
 
 

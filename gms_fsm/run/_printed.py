@@ -6,6 +6,7 @@ from pprint import pformat
 from typing import Any
 
 from gms_fsm.lowering._generated import standalone
+from gms_fsm.run._ticks import clocks_of
 from gms_fsm.run.start import Start
 
 __all__ = ["printed"]
@@ -44,9 +45,7 @@ def printed(start: Start) -> str:
 
 
 def _data(start: Start) -> dict[str, Any]:
-    program, system, layout = start.program, start.system, start.program.layout
-    clocks = [(each.period, each.offset) for each in system.sampled]
-    clocks += [(each.period, 0.0) for each in system.contacts if each.period is not None]
+    program, layout = start.program, start.program.layout
     several = len(layout.banks) > 1
     return {
         "t": start.t_start,
@@ -55,7 +54,7 @@ def _data(start: Start) -> dict[str, Any]:
         "mode": [int(each) for each in start.mode[layout.elements]],
         "p": program.p,
         "signs": program.live,
-        "clocks": clocks,
+        "clocks": [(each.period, each.offset) for each in clocks_of(start.system)],
         "discrete": list(program.discrete),
         "machines": [
             f"{bank.name}, element {i + 1}" if several else f"element {i + 1}"
@@ -89,21 +88,29 @@ HEAD = """\
 LOOP = '''\
 def _run(t_end, steps):
     """Return the switches, the last time, the last state, and how large its numbers became."""
+    from fractions import Fraction
+
     given = _demonstration
     t0, p, discrete = given["t"], given["p"], given["discrete"]
     y, mode, signs = list(given["y"]), list(given["mode"]), given["signs"]
     edges, dy, switches, size = [0] * len(mode), [0.0] * len(y), [], [0.0] * len(y)
     ticked = [0] * len(given["clocks"])  # how often each clock has ticked
+
+    def due(k):
+        """Return the next tick of a clock, the nearest number to a sum of decimal numbers."""
+        period, offset = (Fraction(repr(number)) for number in given["clocks"][k])
+        return float(Fraction(repr(t0)) + offset + ticked[k] * period)
+
     t, step = t0, 0
     while True:
         bits = 0
-        for k, (period, offset) in enumerate(given["clocks"]):
-            if t0 + offset + ticked[k] * period <= t and t < t_end:
+        for k in range(len(ticked)):
+            if due(k) <= t and t < t_end:
                 bits |= 1 << k
                 ticked[k] += 1
         if bits:
             tick(bits, t, y, mode, p)
-        switch(t, y, mode, p, edges)
+        switch(t, y, mode, p, [0] * len(mode), edges)
         asked = 0
         for i, edge in enumerate(edges):
             asked |= discrete[i] & bits
@@ -119,8 +126,8 @@ def _run(t_end, steps):
         if after + 1e-12 * abs(t_end) >= t_end:
             after = t_end
         stop = after
-        for k, (period, offset) in enumerate(given["clocks"]):
-            stop = min(stop, t0 + offset + ticked[k] * period)
+        for k in range(len(ticked)):
+            stop = min(stop, due(k))
         if stop >= after:
             stop = after
             step += 1

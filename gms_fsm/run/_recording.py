@@ -13,17 +13,19 @@ import numpy as np
 
 import integrators
 from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.language import rough_points
-from gms_fsm.lowering._observing import armed, rate
 from gms_fsm.lowering.layout import Layout
 from gms_fsm.lowering.log_columns import CONTACT, LogRecord
 from gms_fsm.run._moment import Place, Recording, scope_of
 from gms_fsm.run.machines import Interference
-from gms_fsm.run.start import Start
+from gms_fsm.run.start import STEPS_A_TICK, Start
 from gms_fsm.traces.failures import (
     CallbackError,
     LivelockError,
+    LockError,
     NotFiniteError,
+    NotUniqueError,
     SignalEndError,
     SimulationError,
     StepLimitError,
@@ -34,30 +36,27 @@ from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
 from integrators import (
     Arc,
+    Entangled,
     Firing,
     HybridError,
     Livelock,
     NotFinite,
+    Refused,
     Slide,
     StepTooSmall,
     TooManySteps,
-    hybrid,
 )
-from integrators.advance import STEPS
-from integrators.steps import H
 
 __all__ = [
-    "PATIENCE",
     "Recorder",
     "check_end",
-    "check_pace",
     "explained",
     "interference_error",
 ]
 
-POWERS = 12  # iterations of the power method
-STABLE = 1.5  # step times fastest rate; explicit methods are stable up to 2 or 3.3
-PATIENCE = 5_000  # steps between two pace checks
+SHRINKING = 4  # intervals that must shrink alike before they are said to shrink without end
+CLEAR = 1e6  # ticks of the clock: shorter intervals are known too roughly
+ALIKE = 0.01  # largest difference of their ratios, relative to what is missing to 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +112,8 @@ class Recorder:
                 self.rows.microstep.extend([0] * len(times))
                 self.rows.y.extend(states)
                 self.rows.mode.extend([mode] * len(times))
-                self.latest = (times[-1], states[-1], mode)
+                if times:
+                    self.latest = (times[-1], states[-1], mode)
             case Firing() | Slide():
                 # The log first: no row may show a firing that is not in it.
                 if isinstance(event, Firing):
@@ -170,7 +170,7 @@ class Recorder:
         bank, edge = start.edge(firing.machine, firing.edge)
         i, contact = firing.machine - bank.first, start.system.contact(bank.name)
         before, after = (
-            Scope.of(contact, start.program, firing.t, y, mode, bank.name)
+            Scope.of(contact, start.program, firing.seen, y, mode, bank.name)
             for y, mode in ((firing.y_before, firing.mode_before), (firing.y, firing.mode))
         )
         return LogRecord(
@@ -236,16 +236,68 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         )
     if isinstance(error, TooManySteps):
         reason, advice = _slow(recorder)
+        start = recorder.start
+        ticks = len(start.program.ticks)
+        besides = f", besides {STEPS_A_TICK} for each of {ticks:,} ticks," if ticks else ""
         return StepLimitError(
-            f"the run has taken max_steps = {recorder.start.options.max_steps} steps before "
-            f"reaching t_end = {recorder.start.t_end!r} s{reason}",
+            f"the run has taken max_steps = {start.chosen.max_steps} steps{besides} before "
+            f"reaching t_end = {start.t_end!r} s{reason}",
             trace,
             t=error.t,
             advice=advice,
         )
+    if isinstance(error, Refused):
+        return _refused(error, recorder.start, trace)
+    if isinstance(error, Entangled):
+        names = recorder.start.program.surface_names
+        crossing = " and ".join(f"{names[k]} = 0" for k in error.surfaces)
+        if len(error.surfaces) == 1:
+            return NotUniqueError(
+                f"it starts at {crossing}, from where the flows on both sides lead away: where it "
+                "goes is not unique",
+                trace,
+                t=error.t,
+                advice="start on one side, or look at the sign of a parameter",
+            )
+        return NotUniqueError(
+            f"the motion is pushed onto the surfaces {crossing} at once, and they depend on each "
+            "other: how it slides along where they cross is not unique",
+            trace,
+            t=error.t,
+            advice="separate the guards of one of them by a gap, or put both switches into one "
+            "chart",
+        )
     if not isinstance(error, Livelock):
         return SimulationError(str(error), trace, t=error.t)
     return _livelock(error, recorder.start, trace)
+
+
+def _refused(error: Refused, start: Start, trace: Trace) -> LockError:
+    """Say which lock would take a velocity, or cannot let go of it."""
+    bank = start.program.layout.bank(error.machine)
+    chart = start.system.contact(bank.name).chart
+    v = scope_of(start, error.t, error.y, error.mode, bank.name).v
+    if error.edge is None:
+        state = chart.states[error.mode[error.machine]].name
+        return LockError(
+            f"an impulse has moved it to v = {v:.6g} m/s, and no edge leaves its locked state "
+            f"{state!r}",
+            trace,
+            t=error.t,
+            place=f"contact {bank.name!r}",
+            advice="give the state an edge whose guard holds for a large F of either sign",
+        )
+    edge = chart.transitions[error.edge - bank.first_edge]
+    return LockError(
+        f"its velocity has jumped to {v:.6g} m/s at this instant, and to lock the contact would "
+        "take this velocity away",
+        trace,
+        t=error.t,
+        place=f"contact {bank.name!r}, edge {edge.name!r}",
+        advice=f"add an edge after it that leaves {edge.source!r} for the state of the opposite "
+        "motion with the same guard, or, if it takes the impulse on purpose, "
+        f"Transition({edge.name!r}, ..., impulse=True)",
+    )
 
 
 def _livelock(error: Livelock, start: Start, trace: Trace) -> LivelockError:
@@ -269,17 +321,23 @@ def _livelock(error: Livelock, start: Start, trace: Trace) -> LivelockError:
         last = taken[-1]
         guard = next(edge.guard for edge in chart.transitions if edge.name == last.edge)
         time = float(last.t - taken[0].t)
-        cause, advice = (
-            (
-                f"the flows on both sides of guard [{guard}] push back across it (chattering)",
-                "separate the guards of the two directions by a gap",
+        shrinking = _shrinking(log[mine].t)
+        if time == 0.0:
+            cause = f"guard [{guard}] {_opposite_edge(chart, taken)} hold together"
+            advice = "make the guards exclude each other"
+        elif shrinking is None:
+            cause = f"the flows on both sides of guard [{guard}] push back across it (chattering)"
+            advice = "separate the guards of the two directions by a gap"
+        else:
+            factor, end = shrinking
+            cause = (
+                f"the intervals between switches shrink, each to {factor:.4g} of the one before, "
+                f"and end at t = {end:.9g} s (Zeno): a state of rest is missing"
             )
-            if time > 0.0
-            else (
-                f"guard [{guard}] {_opposite_edge(chart, taken)} hold together",
-                "make the guards exclude each other",
+            advice = (
+                "add a locked state that is entered where the speed is below a rest speed, and left"
+                " by a force, as in the chart 'end-stop'"
             )
-        )
         return LivelockError(
             f"switched {len(taken)} times{f' in {time:.3g} s' if time else ''}, "
             f"last by {str(last.edge)!r} from {last.source} to {last.target} "
@@ -301,6 +359,26 @@ def _livelock(error: Livelock, start: Start, trace: Trace) -> LivelockError:
         place=place,
         advice=f"look at the parameters and at the flow of {state.name}",
     )
+
+
+def _shrinking(times: FloatArray) -> tuple[float, float] | None:
+    """Return the factor by which the intervals between times shrink, and where they end.
+
+    None if they do not shrink. Two in turn may have two lengths (a hit on either side), so each is
+    compared with the last but one. The shortest are no guide: rounding decides when they end.
+    """
+    times = np.unique(times)
+    gaps = np.diff(times)
+    clear = np.flatnonzero(gaps > CLEAR * np.spacing(times[1:]))
+    for last in clear[:SHRINKING:-1].tolist():  # rounding of the state blurs the shortest
+        seen = gaps[last - SHRINKING : last + 1]
+        ratios = seen[2:] / seen[:-2]
+        square = float(np.median(ratios))
+        alike = square < 1.0 and np.abs(ratios - square).max() < ALIKE * (1.0 - square)
+        if alike and gaps[last:].max() == gaps[last]:
+            rest = (gaps[last - 1] + gaps[last]) * square / (1.0 - square)
+            return math.sqrt(square), float(times[last + 1] + rest)
+    return None
 
 
 def _pushed_back(error: Livelock, start: Start) -> int:
@@ -326,60 +404,8 @@ def _slow(recorder: Recording) -> tuple[str, str]:
             f": {who} {element + 1} has switched {count} times (chattering)",
             "separate its guards for the two directions by a gap, or give a larger max_steps",
         )
-    return "", (
-        "give a larger max_steps, a larger rtol, or for a stiff run method=scipy.integrate.Radau"
-    )
-
-
-def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
-    """Stop a stiff run that cannot reach its end with the remaining steps.
-
-    A run is stiff if stability, not accuracy, keeps the steps small: if the step times the fastest
-    rate of the flow is of the order of one. That rate is found by a power iteration.
-
-    Parameters
-    ----------
-    recording : Recording
-        The run in progress.
-    buffers : integrators.hybrid.Buffers
-        Its current state.
-
-    Raises
-    ------
-    StepLimitError
-        With the advice to use an implicit method.
-    """
-    start = recording.start
-    t, y, mode = recording.latest
-    options = start.options
-    step, left = buffers.now.clock[H], options.max_steps - buffers.out.cursor[STEPS]
-    if options.step or not isinstance(options.method, integrators.Tableau):
-        return
-    if start.last - t <= step * left:
-        return
-    program = start.program
-    held = armed(program, t, y, mode)
-    slope = rate(program, t, y, mode, held)
-    size = np.maximum(np.abs(y), np.array(buffers.now.floor) / options.rtol)
-    direction, fastest = np.ones(len(y)), 0.0
-    for _ in range(POWERS):
-        moved = (np.array(y) + 1e-6 * size * direction).tolist()
-        change = (rate(program, t, moved, mode, held) - slope) / (1e-6 * size)
-        fastest = float(np.abs(change).max())
-        if not 0.0 < fastest < math.inf:
-            return
-        direction = change / fastest
-    if step * fastest < STABLE:
-        return
-    raise StepLimitError(
-        f"stiff: the flow has a rate of {fastest:.3g} /s, which limits the steps of "
-        f"this method to {step:.3g} s: to reach t_end = {start.t_end!r} s it would take "
-        f"{(start.t_end - t) / step:.3g} of them, but max_steps is {start.options.max_steps}",
-        recording.trace(),
-        t=t,
-        advice="use an implicit method (method=scipy.integrate.Radau; "
-        '[run] method = "Radau"), or check C and the thresholds',
-    )
+    implicit = recorder.start.implicit
+    return "", f"give a larger max_steps, a larger rtol, or for a stiff run {implicit}"
 
 
 def interference_error(error: Interference, recorder: Recording) -> CallbackError:

@@ -182,13 +182,12 @@ def alone(given: Model | Contact) -> Contact:
         )
     # Its x is the integral of the velocity given; the bodies of its system are not here.
     inputs = {name: text for name, text in given.inputs.items() if name != "x"}
-    if given.model is not None:
-        return Contact(given.name, given.model, inputs=inputs)
-    return Contact(given.name, chart, given.values, n=given.n, inputs=inputs)
+    return given.replaced(v=("v",), inputs=inputs)
 
 
 def other_inputs(contact: Contact) -> list[str]:
     """Return what the texts of a contact name, except what it knows by itself."""
-    texts = [contact.inputs.get(name, name) for name in contact.chart.inputs if name != "s"]
+    named = dict.fromkeys([*contact.chart.inputs, *contact.inputs])
+    texts = [contact.inputs.get(name, name) for name in named if name != "s"]
     found = dict.fromkeys(name for text in texts for name in WORD.findall(str(text)))
     return [name for name in found if name not in {*GIVEN, *FUNCTIONS, *CONSTANTS}]

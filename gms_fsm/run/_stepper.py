@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.program import equations
+from gms_fsm.run._ticks import EXACT, clocks_of, in_units
 from gms_fsm.run.machines import IfElse
-from gms_fsm.run.start import Start, clocks_of
+from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Corners
 from integrators import hybrid
 from integrators.loop import Buffers, Machines
 from integrators.sliding import Functions
-from integrators.stepping import Clocks, Sample, next_tick, step_to
+from integrators.stepping import Clocks, Sample, restart, step_to
 
 if TYPE_CHECKING:
     from integrators.compiled import Stepper as MachineCode
@@ -101,7 +102,7 @@ class Plain:
         switch = IfElse(program)
         self.functions = made.functions(located=True)
         observe = program.ieee["observe"]
-        self.machines = Machines(switch.ask, switch.act, switch.tick, observe)
+        self.machines = Machines(switch.ask, switch.act, switch.tick, switch.jolts, observe)
         self.buffers, self.sample = prepared(start)
         _, _, self.tables = self.functions.p
         self._kept = self._before = self.copy()
@@ -157,18 +158,13 @@ def prepared(start: Start) -> tuple[Buffers, Sample]:
     b = hybrid.buffers(
         made, start.t_start, start.y, start.mode, math.inf, start.options, capacity=1
     )
-    ticking = clocks_of(start.system)
-    clocks = Clocks(
-        start=[start.t_start + offset for _, _, offset in ticking],
-        period=[period for _, period, _ in ticking],
-        made=[0 for _ in ticking],
-    )
-    two = [0.0] * 2 if ticking else []
+    clocks = _clocks(start)
+    two = [0.0] * 2 if clocks.made else []
     plan = b.plan._replace(
         jumps=[*two], before_jumps=[*two], ticks=[0] * len(two), knots=[start.t_start]
     )
-    for _ in two:
-        next_tick(plan, clocks)
+    b = b._replace(plan=plan)
+    restart(b, clocks)
     lines = [each for each in start.system.signals.values() if isinstance(each, Corners)]
     sample = Sample(
         end=[start.t_start],
@@ -185,7 +181,21 @@ def prepared(start: Start) -> tuple[Buffers, Sample]:
         slope=[0.0] * size,
         clocks=clocks,
     )
-    return b._replace(plan=plan), sample
+    return b, sample
+
+
+def _clocks(start: Start) -> Clocks:
+    """Return what ticks, in units that make periods whole numbers if doubles can hold these."""
+    ticking = clocks_of(start.system)
+    units = in_units(ticking)
+    exact = units.largest < EXACT
+    return Clocks(
+        per_second=[float(units.per_second) if exact else 1.0],
+        period=[*map(float, units.period)] if exact else [each.period for each in ticking],
+        offset=[*map(float, units.first)] if exact else [each.offset for each in ticking],
+        begin=[0.0, 0.0],
+        made=[0 for _ in ticking],
+    )
 
 
 # --------------------------------------------------------------------------- machine code
@@ -306,7 +316,7 @@ def arguments_of(start: Start) -> Any:
     made = compiled.functions(start.program)
     p: Any = compiled.packed(start.program.p)
     return Step(
-        Functions(made["flow"], made["arm"], made["margins"], made["normal"], p),
-        Machines(made["switch"], made["act"], made["tick"], made["observe"]),
+        Functions(made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p),
+        Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
         *prepared(start),
     )

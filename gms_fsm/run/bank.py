@@ -13,6 +13,7 @@ from gms_fsm._arguments import listed
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.run._joint import (
+    Alone,
     Asked,
     Joint,
     Last,
@@ -41,7 +42,8 @@ __all__ = ["FrictionBank"]
 class FrictionBank:
     """The frictions of m joints, as `FrictionState` does it for one.
 
-    Joints whose models differ in numbers only are advanced by one call of machine code.
+    Joints whose models differ in numbers only are advanced by one call of machine code. One thread
+    at a time may call it, as with `FrictionState`.
 
     Parameters
     ----------
@@ -114,6 +116,7 @@ class FrictionBank:
         self._joints = [joints[i] for i in range(len(given))]
         self._inputs = sorted({name for joint in self._joints for name in joint.inputs})
         self._t = starts[0].t_start
+        self._alone = Alone()
         self._last: _Sample | None = None
 
     def __len__(self) -> int:
@@ -157,10 +160,11 @@ class FrictionBank:
             If a joint cannot continue. In both cases all joints are as they were before.
         """
         time = checked_scalar("dt", dt, ">= 0")
-        end = self._t + time
-        if end == self._t and time > 0.0:
-            raise too_short(time, end)
-        return self._commit(self._checked(v0, v1, end, inputs))
+        with self._alone:
+            end = self._t + time
+            if end == self._t and time > 0.0:
+                raise too_short(time, end)
+            return self._commit(self._checked(v0, v1, end, inputs))
 
     def advance_to(
         self, v0: ArrayLike, v1: ArrayLike, t: float, **inputs: tuple[ArrayLike, ArrayLike]
@@ -184,7 +188,8 @@ class FrictionBank:
         ParameterError, SimulationError
             As in `advance`, or if t is before the present time.
         """
-        return self._commit(self._checked(v0, v1, later(t, self._t), inputs))
+        with self._alone:
+            return self._commit(self._checked(v0, v1, later(t, self._t), inputs))
 
     def peek(
         self, v0: ArrayLike, v1: ArrayLike, dt: float, **inputs: tuple[ArrayLike, ArrayLike]
@@ -206,14 +211,15 @@ class FrictionBank:
         ParameterError, SimulationError
             As in `advance`.
         """
-        end = self._t + checked_scalar("dt", dt, ">= 0")
-        sample = self._checked(v0, v1, end, inputs)
-        before = [group.copy() for group in self._groups]
-        try:
-            return self._step(sample)
-        finally:
-            for group, copy in zip(self._groups, before, strict=True):
-                group.take(copy)
+        time = checked_scalar("dt", dt, ">= 0")
+        with self._alone:
+            sample = self._checked(v0, v1, self._t + time, inputs)
+            before = [group.copy() for group in self._groups]
+            try:
+                return self._step(sample)
+            finally:
+                for group, copy in zip(self._groups, before, strict=True):
+                    group.take(copy)
 
     def _commit(self, sample: _Sample) -> FloatArray:
         for group in self._groups:
@@ -288,12 +294,14 @@ class FrictionBank:
     @property
     def mean_force(self) -> FloatArray:
         """Of each joint the mean of its force over the last sample, N, shape (m,)."""
-        return np.array([joint.mean_force for joint in self._informed()])
+        with self._alone:
+            return np.array([joint.mean_force for joint in self._informed()])
 
     @property
     def dF_dv(self) -> FloatArray:
         """How each force depends on its velocity at the last end, Ns/m, shape (m,)."""
-        return np.array([joint.dF_dv for joint in self._informed()])
+        with self._alone:
+            return np.array([joint.dF_dv for joint in self._informed()])
 
     def _informed(self) -> list[Joint]:
         """Return the joints; each knows the last sample, and the state before it."""
@@ -329,7 +337,8 @@ class FrictionBank:
         Snapshot
             For this bank, or another one of the same models and engine.
         """
-        return Snapshot(self._t, self._identity, [group.copy() for group in self._groups])
+        with self._alone:
+            return Snapshot(self._t, self._identity, [group.copy() for group in self._groups])
 
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot.
@@ -345,9 +354,10 @@ class FrictionBank:
             If it is of other models; the state stays as it was.
         """
         content = content_of(snapshot, Snapshot, self._identity)
-        for group, copy in zip(self._groups, content, strict=True):
-            group.take(copy)
-        self._moved_to(snapshot.t)
+        with self._alone:
+            for group, copy in zip(self._groups, content, strict=True):
+                group.take(copy)
+            self._moved_to(snapshot.t)
 
     @functools.cached_property
     def _identity(self) -> tuple[str, str]:
@@ -362,7 +372,8 @@ class FrictionBank:
         ndarray, shape (k,)
             Those of the joints, one after the other.
         """
-        return np.concatenate([joint.to_array() for joint in self._joints])
+        with self._alone:
+            return np.concatenate([joint.to_array() for joint in self._joints])
 
     def from_array(self, array: ArrayLike) -> None:
         """Return to what `to_array` returned, also of another bank of the same models.
@@ -378,18 +389,19 @@ class FrictionBank:
             If it cannot be such an array; the state stays as it was.
         """
         sizes = [joint.length for joint in self._joints]
-        given, before = numbers_of(array, sum(sizes)), self.snapshot()
-        try:
-            for joint, part in zip(
-                self._joints, np.split(given, np.cumsum(sizes)[:-1]), strict=True
-            ):
-                joint.from_array(part)
-            if len({joint.t for joint in self._joints}) > 1:
-                raise ParameterError("its joints are at different times", place="array")
-        except ParameterError:
-            self.restore(before)
-            raise
-        self._moved_to(self._joints[0].t)
+        given = numbers_of(array, sum(sizes))
+        parts = np.split(given, np.cumsum(sizes)[:-1])
+        with self._alone:
+            before = self.snapshot()
+            try:
+                for joint, part in zip(self._joints, parts, strict=True):
+                    joint.from_array(part)
+                if len({joint.t for joint in self._joints}) > 1:
+                    raise ParameterError("its joints are at different times", place="array")
+            except ParameterError:
+                self.restore(before)
+                raise
+            self._moved_to(self._joints[0].t)
 
     def _moved_to(self, t: float) -> None:
         self._t, self._last = t, None

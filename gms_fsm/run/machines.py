@@ -8,7 +8,7 @@ that callbacks registered by a user (``on_enter_slip``, ``after`` ...) run once 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from transitions import Machine, MachineError
 
@@ -20,8 +20,9 @@ from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.scope import GuardValues, parameter_values
+from integrators import JUMPED
 
-__all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Interference"]
+__all__ = ["Element", "ElementMachines", "IfElse", "Interference"]
 
 
 class Element:
@@ -209,20 +210,6 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
 
 
 # --------------------------------------------------------------------------- engines
-class Engine(Protocol):
-    """The part of a run that evaluates the guards; satisfies `integrators.Switch`."""
-
-    def ask(
-        self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
-    ) -> None:
-        """Fill the first enabled edge of each element, or -1."""
-
-    def act(
-        self, edge: int, machine: int, t: float, y: list[float], mode: list[int], p: Arguments
-    ) -> None:
-        """Take an edge."""
-
-
 class Interference(Exception):
     """A callback changed something it may only read; the run turns this into a user's error."""
 
@@ -260,13 +247,19 @@ class MachineEngine:
         # Bypasses __setattr__ of the elements, which would cost time.
         self.seen_by = [vars(element) for element in self.elements]
         self.states = [""] * len(self.elements)
-        self.tick = program.ieee["tick"]
+        self.tick, self.jolts = program.ieee["tick"], program.ieee["jolts"]
+        self.arrests = {
+            bank.first_edge + number
+            for part, bank in zip(parts, self.banks, strict=True)
+            for number in part.model.chart.arrests
+        }
+        self.crossing = {*program.surfaces.rise, *program.surfaces.fall}
         self.set_states(mode)
 
     def restore(self, t: float, y: list[float], mode: Sequence[int]) -> None:
         """Put every element where it was when a run was interrupted."""
         self.set_states(mode)
-        self.show(t, y, list(mode))  # possibly between two firings of a set
+        self.show(t, y, list(mode), self.program.calm)  # possibly between two firings of a set
 
     def set_states(self, mode: Sequence[int]) -> None:
         """Put every element into a state, without callbacks."""
@@ -278,22 +271,34 @@ class MachineEngine:
         self.parts[machine].machine.set_state(state, self.elements[machine])
         self.states[machine] = state
 
-    def show(self, t: float, y: list[float], mode: list[int]) -> None:
+    def show(self, t: float, y: list[float], mode: list[int], jolt: list[int]) -> None:
         """Show the present values to every element."""
         program = self.program
-        program.ieee["values"](t, y, mode, program.p, self.shown)
+        program.ieee["values"](t, y, mode, program.p, jolt, self.shown)
         self.values.put(t, y, self.shown, self.seen_by)
 
     def ask(
-        self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
+        self,
+        t: float,
+        y: list[float],
+        mode: list[int],
+        p: Arguments,
+        jolt: list[int],
+        edges: list[int],
     ) -> None:
-        """Fill the first enabled edge of each element, or -1."""
+        """Fill the first enabled edge of each element, -1 for none, -2 - edge for one refused."""
         del p  # the program has the same values
-        self.show(t, y, mode)
+        self.show(t, y, mode, jolt)
         for i, element in enumerate(self.elements):
+            skip = edges[i]  # see `integrators.Switch`
             edges[i] = -1
             for edge, guard in self.tables[i][mode[i]]:
+                if edge == skip and edge in self.crossing:
+                    continue
                 if guard.holds(element):
+                    if jolt[i] == JUMPED and edge in self.arrests:
+                        edges[i] = -2 - edge if edges[i] == -1 else edges[i]
+                        continue
                     edges[i] = edge
                     break
 
@@ -362,4 +367,4 @@ class IfElse:
     def __init__(self, program: Program) -> None:
         self.ask = program.ieee["switch"]
         self.act = program.ieee["act"]
-        self.tick = program.ieee["tick"]
+        self.tick, self.jolts = program.ieee["tick"], program.ieee["jolts"]

@@ -68,7 +68,8 @@ class Settings:
     max_step : float
         Longest adaptive step, s. Not needed for accuracy.
     max_steps : int
-        Maximum number of attempted steps; a run that needs more ends in a `StepLimitError`.
+        Maximum number of attempted steps, besides four for each tick of a sampler or of a contact
+        with a period; a run that needs more ends in a `StepLimitError`.
     events : {"located", "step", "held"}
         ``"located"`` finds the exact point of each switch. ``"step"`` evaluates the guards once at
         the end of a step, at most one edge per element, like an if-else in a block diagram: it

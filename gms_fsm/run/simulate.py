@@ -14,14 +14,8 @@ from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._moment import Moment
 from gms_fsm.run._own_machines import engine_of, own_machines
-from gms_fsm.run._recording import (
-    PATIENCE,
-    Recorder,
-    check_end,
-    check_pace,
-    explained,
-    interference_error,
-)
+from gms_fsm.run._pace import LATER, PATIENCE, check_pace
+from gms_fsm.run._recording import Recorder, check_end, explained, interference_error
 from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.run.start import Start
@@ -294,6 +288,6 @@ class Run:
         self.event = event
         recorder.take(event)
         if isinstance(event, Arc) and self.buffers.out.cursor[STEPS] >= self.next_look:
-            self.next_look = self.buffers.out.cursor[STEPS] + PATIENCE
+            self.next_look = LATER * self.buffers.out.cursor[STEPS]
             check_pace(recorder, self.buffers)
         return True

@@ -15,11 +15,13 @@ from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.language import evaluate
+from gms_fsm.lowering._floor import floor_of
 from gms_fsm.lowering._pulses import waking_times
 from gms_fsm.lowering.layout import BankPlaces, Layout
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.lowering.program import Program, arguments, lower
 from gms_fsm.lowering.scales import Setting, Tolerance, scales_of_system
+from gms_fsm.run._ticks import clocks_of, ticks_of
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
@@ -31,8 +33,9 @@ from gms_fsm.traces.scope import GuardValues, parameter_values
 from gms_fsm.traces.trace import Trace
 from integrators import Options
 
-__all__ = ["Start", "clocks_of"]
+__all__ = ["STEPS_A_TICK", "Start"]
 
+STEPS_A_TICK = 4  # after each tick the steps begin anew
 LATEST = 1e9  # s; one tick of a double is then 1e-7 s
 
 
@@ -118,6 +121,12 @@ class Start:
         assert self.chosen.output is not None  # Settings fills it in
         return self.chosen.output
 
+    @property
+    def implicit(self) -> str:
+        """An implicit method and the tolerances that it needs, as one writes them."""
+        missing = _without_scale(self.program.layout, self.options.atol)
+        return f"method=scipy.integrate.Radau{f', atol={missing}' if missing else ''}"
+
     @classmethod
     def of(
         cls,
@@ -165,10 +174,11 @@ class Start:
         tolerances, used = _tolerances(program.layout, chosen.atol, default)
         method = chosen.method
         if not isinstance(method, str) and min(tolerances) == 0.0:
+            missing = _without_scale(program.layout, tolerances)
             raise ParameterError(
                 f"method {method.__name__} needs an absolute tolerance, and the chart "
-                "gives no scale for some component",
-                advice="give one, for example atol=1e-9, or by name atol={'x': 1e-9}",
+                f"gives no scale for {', '.join(missing)}",
+                advice=f"give one far below the values that matter, for example atol={missing}",
             )
         options = Options(
             integrators.METHODS[method] if isinstance(method, str) else method,
@@ -181,14 +191,19 @@ class Start:
             chosen.events != "step",
             [] if chosen.output == "end" else _wanted(chosen, t_start, t_end),
             rows_at_once,
+            relaxing=scales.relaxing,
         )
         last = _covered(system, t_start, t_end)
         program = _with_waking_times(program, system, t_start, last)
         origin = t_start if ticks_from is None else ticks_from
-        if ticks := _ticks(system, origin, t_start, last):
-            program = replace(program, ticks=ticks)
+        if clocks := clocks_of(system):
+            program = replace(program, ticks=ticks_of(clocks, origin, t_start, last))
+            most = chosen.max_steps + STEPS_A_TICK * len(program.ticks)
+            options = replace(options, max_steps=most)
         initial = {} if initial is None else initial
         y, mode = _initial(system, program, t_start, initial)
+        floor = floor_of(system, program, tolerances, (t_start, last), y, mode)
+        options = replace(options, floor=floor)
         made: tuple[Any, Any] = origin_of(system) if isinstance(model, System) else (model, rig)
         return cls(
             system=system,
@@ -233,6 +248,8 @@ class Start:
         program, y = replace(self.program, p=arguments(system)), self.y
         if _enters(system):
             y, _ = _initial(system, program, self.t_start, self.initial)
+        span = self.t_start, self.last
+        floor = floor_of(system, program, tolerances, span, y, self.mode)
         return replace(
             self,
             system=system,
@@ -240,7 +257,13 @@ class Start:
             rig=rig,
             program=program,
             y=y,
-            options=replace(self.options, atol=tolerances, time_scale=scales.time),
+            options=replace(
+                self.options,
+                atol=tolerances,
+                time_scale=scales.time,
+                relaxing=scales.relaxing,
+                floor=floor,
+            ),
             settings={**self.settings, "atol": used},
         )
 
@@ -338,6 +361,17 @@ def _tolerances(
     return places.joined(found), used
 
 
+def _without_scale(layout: Layout, tolerances: list[float]) -> dict[str, float]:
+    """Return the components without an absolute tolerance, each with an example of one."""
+    places = layout.y
+    names = [*places.shared, *places.own]
+    return {
+        layout.label(name): 1e-12
+        for name in names
+        if not all(tolerances[k] for k in places.all_of(name))
+    }
+
+
 def _component(layout: Layout, key: object, owner: str) -> str:
     """Return the name in the layout of what a user calls a component."""
     if not isinstance(key, str) or key not in layout.keys:
@@ -360,48 +394,6 @@ def _with_waking_times(program: Program, system: System, t_start: float, t_end: 
 
 
 ROUNDING = 1e-9  # of a velocity, relative to those of the bodies
-MOST_TICKS = 10_000_000  # of a run: their times are kept
-
-
-def _ticks(system: System, origin: float, t_start: float, t_end: float) -> dict[float, int]:
-    """Return what ticks when: the samplers, then the contacts with a period, each as a bit.
-
-    Ticks are counted from the origin, which is earlier than t_start if the run continues another.
-    """
-    found: dict[float, int] = {}
-    for bit, (name, period, offset) in enumerate(clocks_of(system)):
-        count = math.ceil((t_end - origin - offset) / period)
-        first = max(0, math.floor((t_start - origin - offset) / period) - 1)
-        if count - first > MOST_TICKS:
-            raise ParameterError(
-                f"its period of {period!r} s makes {count:.4g} ticks",
-                place=name,
-                advice=f"at most {MOST_TICKS:,} fit into a run",
-            )
-        done = origin < t_start and bit < len(system.sampled)  # a tick at t_start itself
-        times = origin + offset + np.arange(first, count) * period
-        begun = times > t_start if done else times >= t_start
-        for time in times[begun & (times < t_end)].tolist():
-            found[time] = found.get(time, 0) | 1 << bit
-    return dict(sorted(found.items()))
-
-
-def clocks_of(system: System) -> list[tuple[str, float, float]]:
-    """Return what ticks: the samplers, then the contacts with a period.
-
-    Parameters
-    ----------
-    system : System
-        What runs.
-
-    Returns
-    -------
-    list of (str, float, float)
-        Name, period and offset [s]; bit k of a tick stands for the k-th of them.
-    """
-    found = [(each.name, each.period, each.offset) for each in system.sampled]
-    found += [(each.name, each.period, 0.0) for each in system.contacts if each.period is not None]
-    return found
 
 
 def _covered(system: System, t_start: float, t_end: float) -> float:
@@ -502,7 +494,7 @@ def _check_locks(
     ]
     if not locked:
         return
-    program.ieee["values"](t_start, y, mode, program.p, out)
+    program.ieee["values"](t_start, y, mode, program.p, program.calm, out)
     free = [body for body in system.bodies if not body.driven]
     fastest = max((abs(y[layout.y.index(body.v)]) for body in free), default=0.0)
     for bank, chart, state in locked:
@@ -545,7 +537,7 @@ def _entered(
     layout, out = program.layout, [0.0] * program.layout.shown.size
     if not _enters(system):
         return y
-    program.ieee["values"](t_start, y, mode, program.p, out)
+    program.ieee["values"](t_start, y, mode, program.p, program.calm, out)
     found: list[dict[str, Any]] = [{} for _ in mode]
     GuardValues(layout).put(t_start, y, out, found)
     new = list(y)

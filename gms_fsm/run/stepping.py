@@ -17,6 +17,7 @@ from gms_fsm.run._joint import (
     Switch,
     check_inputs,
     content_of,
+    in_use,
     later,
     line_of,
     made_again,
@@ -52,7 +53,8 @@ class FrictionState:
     """The friction of one contact, advanced by somebody else's loop.
 
     In each sample the velocity is a straight line, along which every switch is located. The result
-    is that of `simulate` with ``Prescribed((t, v))``, to the last bit.
+    is that of `simulate` with ``Prescribed((t, v))``, to the last bit. One thread at a time may
+    call it; a call from another one meanwhile is refused and changes nothing.
 
     Parameters
     ----------
@@ -132,7 +134,8 @@ class FrictionState:
         Raises
         ------
         ParameterError
-            If a number is not finite, an input is missing, or the clock does not resolve dt.
+            If a number is not finite, an input is missing, the clock does not resolve dt, or
+            another thread's call is under way.
         SimulationError
             If it cannot continue. In both cases the friction is as it was before.
         """
@@ -140,10 +143,15 @@ class FrictionState:
         v0, v1, dt = _checked(v0, v1, dt)
         if inputs or joint.inputs:
             inputs = self._lines(inputs)
-        end = _sum(joint.t, dt)
-        if end == joint.t and dt > 0.0:
-            raise too_short(dt, end)
-        return joint.commit(v0, v1, end, inputs)
+        if not joint.alone.acquire(False):  # as `with joint.alone`, in a third of the time
+            raise in_use()
+        try:
+            end = _sum(joint.t, dt)
+            if end == joint.t and dt > 0.0:
+                raise too_short(dt, end)
+            return joint.commit(v0, v1, end, inputs)
+        finally:
+            joint.alone.leave()
 
     def advance_to(self, v0: float, v1: float, t: float, **inputs: Line) -> float:
         """Advance to a time; see `advance`.
@@ -165,9 +173,10 @@ class FrictionState:
         ParameterError, SimulationError
             As in `advance`, or if t is before the present time.
         """
-        t = later(t, self._joint.t)
         v0, v1, _ = _checked(v0, v1, 0.0)
-        return self._joint.commit(v0, v1, _sum(t, 0.0), self._lines(inputs))
+        with self._joint.alone:
+            t = later(t, self._joint.t)
+            return self._joint.commit(v0, v1, _sum(t, 0.0), self._lines(inputs))
 
     def peek(self, v0: float, v1: float, dt: float, **inputs: Line) -> float:
         """Return what `advance` would return, and stay: for the stages of a Runge-Kutta step.
@@ -191,7 +200,12 @@ class FrictionState:
         v0, v1, dt = _checked(v0, v1, dt)
         if inputs or joint.inputs:
             inputs = self._lines(inputs)
-        return joint.peek(v0, v1, _sum(joint.t, dt), inputs)
+        if not joint.alone.acquire(False):
+            raise in_use()
+        try:
+            return joint.peek(v0, v1, _sum(joint.t, dt), inputs)
+        finally:
+            joint.alone.leave()
 
     def _lines(self, inputs: Mapping[str, Any]) -> dict[str, Line]:
         check_inputs(inputs, self._joint.inputs)
@@ -229,7 +243,8 @@ class FrictionState:
         It is computed when asked for. A host that applies this force throughout the sample
         exchanges the right impulse.
         """
-        return self._joint.mean_force
+        with self._joint.alone:
+            return self._joint.mean_force
 
     @property
     def dF_dv(self) -> float:
@@ -238,7 +253,8 @@ class FrictionState:
         For hosts that solve for the velocity. It is computed when asked for, from samples with
         slightly other velocities at the end; deflections and switches within the sample follow.
         """
-        return self._joint.dF_dv
+        with self._joint.alone:
+            return self._joint.dF_dv
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how to make a copy: memory of machine code is not copied."""
@@ -256,7 +272,8 @@ class FrictionState:
             For this friction, or another one of the same model and engine.
         """
         joint = self._joint
-        return Snapshot(joint.t, joint.identity, joint.stepper.copy())
+        with joint.alone:
+            return Snapshot(joint.t, joint.identity, joint.stepper.copy())
 
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot.
@@ -272,8 +289,9 @@ class FrictionState:
             If it is of another model; the state stays as it was.
         """
         joint = self._joint
-        joint.stepper.take(content_of(snapshot, Snapshot, joint.identity))
-        joint.moved_to(snapshot.t)
+        with joint.alone:
+            joint.stepper.take(content_of(snapshot, Snapshot, joint.identity))
+            joint.moved_to(snapshot.t)
 
     def to_array(self) -> FloatArray:
         """Return the present state as finite numbers, for hosts that keep all states in a vector.
@@ -283,7 +301,8 @@ class FrictionState:
         ndarray, shape (m,)
             Its length depends on the model only. It cannot be interpolated.
         """
-        return self._joint.to_array()
+        with self._joint.alone:
+            return self._joint.to_array()
 
     def from_array(self, array: ArrayLike) -> None:
         """Return to what `to_array` returned, also of another friction of the same model.
@@ -299,7 +318,8 @@ class FrictionState:
             If it cannot be such an array; the state stays as it was.
         """
         joint = self._joint
-        joint.from_array(numbers_of(array, joint.length))
+        with joint.alone:
+            joint.from_array(numbers_of(array, joint.length))
 
 
 def _checked(v0: Any, v1: Any, dt: Any) -> tuple[float, float, float]:

@@ -10,13 +10,13 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm._arguments import checked_kind
-from gms_fsm.charts.parameters import WEIGHTS, FloatArray
+from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.lowering._compiled import check_llvmlite
 from gms_fsm.lowering._observing import observe
@@ -26,9 +26,9 @@ from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
-from gms_fsm.systems._varied import numbers_in, with_numbers_of
-from gms_fsm.systems.models import Model, parameter_names, with_values
-from gms_fsm.systems.rigs import Rig, with_numbers
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import Contact, System
 from gms_fsm.traces._firings import Firings
 from gms_fsm.traces._log import Log
@@ -143,10 +143,10 @@ def sweep(
     return collected.sweep(values)
 
 
-def _arguments(model: Any, rig: Any, t_end: Any, parameters: Any) -> tuple[_What, float, Any]:
+def _arguments(model: Any, rig: Any, t_end: Any, parameters: Any) -> tuple[Adjustable, float, Any]:
     """Return what is run, the end of the runs, and the parameters; a system has no rig."""
     if not isinstance(model, System):
-        return _OnRig(model, rig), t_end, parameters
+        return Adjustable(model, rig), t_end, parameters
     if not isinstance(rig, float | int) or parameters is not None:
         raise ParameterError(
             "a system has no rig",
@@ -154,79 +154,16 @@ def _arguments(model: Any, rig: Any, t_end: Any, parameters: Any) -> tuple[_What
             value=rig,
             advice="write sweep(system, t_end, parameters)",
         )
-    return _OfSystem(model), rig, t_end
-
-
-# --------------------------------------------------------------------------- what is run
-@dataclass(frozen=True, eq=False)
-class _OnRig:
-    """A model on a rig."""
-
-    model: Model
-    rig: Rig
-
-    @property
-    def contacts(self) -> tuple[Model, ...]:
-        """What has elements."""
-        return (self.model,)
-
-    @property
-    def known(self) -> dict[str, tuple[int, bool]]:
-        """By name of a parameter: how many elements there are, and whether each can have one."""
-        n, values = self.model.n, self.model.values
-        names = (*parameter_names(self.model), *self.rig.numbers)
-        return {
-            name: (n, name == WEIGHTS.name or np.ndim(values.get(name, 0.0)) > 0) for name in names
-        }
-
-    @property
-    def part_names(self) -> list[str]:
-        """Names of the values of the rest."""
-        return []
-
-    def varied(self, values: Mapping[str, ArrayLike]) -> _OnRig:
-        """Return the same with other numbers."""
-        return _OnRig(with_values(self.model, values), with_numbers(self.rig, values))
-
-
-@dataclass(frozen=True, eq=False)
-class _OfSystem:
-    """A system."""
-
-    system: System
-
-    @property
-    def contacts(self) -> tuple[Contact, ...]:
-        """What has elements."""
-        return self.system.contacts
-
-    @property
-    def known(self) -> dict[str, tuple[int, bool]]:
-        """By name of a parameter: how many elements there are, and whether each can have one."""
-        return {name: (n, n > 0) for name, (_, n) in numbers_in(self.system).items()}
-
-    @property
-    def part_names(self) -> list[str]:
-        """Names of the values of the rest: bodies, further states, sampled values."""
-        bodies = [f"{each.name}.{which}" for each in self.system.bodies for which in "xv"]
-        sampled = [name for each in self.system.sampled for name in each.updates]
-        return [*bodies, *self.system.flow, *sampled]
-
-    def varied(self, values: Mapping[str, ArrayLike]) -> _OfSystem:
-        """Return the same with other numbers."""
-        return _OfSystem(with_numbers_of(self.system, values))
-
-
-_What: TypeAlias = _OnRig | _OfSystem
+    return Adjustable(model), rig, t_end
 
 
 # --------------------------------------------------------------------------- parameters
 def _values(
-    what: _What, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
+    what: Adjustable, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
 ) -> dict[str, FloatArray]:
     """Check the names and shapes of the parameters."""
     if not hasattr(parameters, "keys"):
-        called = "model, rig" if isinstance(what, _OnRig) else "system"
+        called = "system" if what.rig is None else "model, rig"
         raise ParameterError(
             "it must give values by name, for example {'k': [1.0, 2.0]}: "
             f"sweep({called}, t_end, parameters)",
@@ -249,9 +186,9 @@ def _values(
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"parameters[{name!r}] is not an array of numbers") from None
-        n, wide = known[name]
-        if array.shape[1:] not in (((), (n,)) if wide else ((),)) or array.ndim == 0:
-            wanted = f"(runs,) or (runs, {n})" if wide else "(runs,)"
+        _, n = known[name]
+        if array.shape[1:] not in (((), (n,)) if n else ((),)) or array.ndim == 0:
+            wanted = f"(runs,) or (runs, {n})" if n else "(runs,)"
             raise ParameterError(
                 f"parameters[{name!r}] has shape {array.shape}", advice=f"it must be {wanted}"
             )
@@ -266,11 +203,11 @@ def _values(
 
 
 def _elements_joined(
-    columns: Mapping[str, Any], known: Mapping[str, tuple[int, bool]]
+    columns: Mapping[str, Any], known: Mapping[str, tuple[Parameter, int]]
 ) -> dict[str, Any]:
     """Join the columns k1, k2 ... of a DataFrame into an array of shape (runs, n)."""
     joined: dict[str, Any] = {}
-    for name, (n, _) in known.items():
+    for name, (_, n) in known.items():
         parts = [column_name(name, i) for i in range(n)]
         if any(part in columns for part in parts) and name not in columns:
             missing = [part for part in parts if part not in columns]
@@ -280,7 +217,7 @@ def _elements_joined(
                     f"{', '.join(missing)}"
                 )
             joined[name] = np.stack([np.asarray(columns[part]) for part in parts], axis=1)
-    taken = {column_name(name, i) for name in joined for i in range(known[name][0])}
+    taken = {column_name(name, i) for name in joined for i in range(known[name][1])}
     return {name: value for name, value in columns.items() if name not in taken} | joined
 
 
@@ -306,10 +243,10 @@ class _Common:
     initial: Mapping[str, Any] | None
     settings: Settings
 
-    def start(self, what: _What) -> Start:
+    def start(self, what: Adjustable) -> Start:
         return Start.of(
-            what.model if isinstance(what, _OnRig) else what.system,
-            what.rig if isinstance(what, _OnRig) else None,
+            what.what,
+            what.rig,
             self.t_end,
             self.settings,
             t_start=self.t_start,
@@ -335,7 +272,7 @@ def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
 
 
 def _run_chunk(
-    what: _What,
+    what: Adjustable,
     begin: _Common,
     part: Mapping[str, FloatArray],
     _sweep: str,
@@ -351,10 +288,11 @@ def _run_chunk(
             its = what.varied(values)
             if (
                 compiled is not None
-                and isinstance(its, _OnRig)
-                and compiled.start.has_texts_of(its.model, its.rig)
+                and its.rig is not None
+                and not isinstance(its.what, System)
+                and compiled.start.has_texts_of(its.what, its.rig)
             ):
-                compiled.reset(its.model, its.rig)  # the same buffers and machine code
+                compiled.reset(its.what, its.rig)  # the same buffers and machine code
                 run = compiled
             elif begin.settings.engine == "compiled":
                 run = compiled = CompiledRun(begin.start(its))
@@ -422,11 +360,19 @@ def _of_contacts(trace: Trace) -> dict[str, FloatArray]:
     return found | {"z": np.concatenate([part.z for part in parts], axis=1)}
 
 
+def _part_names(what: Model | System) -> list[str]:
+    """Return the names of the rest of a system: bodies, further states, sampled values."""
+    if not isinstance(what, System):
+        return []
+    bodies = [f"{each.name}.{which}" for each in what.bodies for which in "xv"]
+    return [*bodies, *what.flow, *(name for each in what.sampled for name in each.updates)]
+
+
 def _of_parts(trace: Trace) -> dict[str, FloatArray]:
     """Return the columns of the bodies, and the further states and sampled values."""
     assert trace.system is not None
     found: dict[str, FloatArray] = {}
-    for name in _OfSystem(trace.system).part_names:
+    for name in _part_names(trace.system):
         body, _, which = name.rpartition(".")
         found[name] = getattr(trace.body(body), which) if body else trace.value(name)
     return found
@@ -459,7 +405,7 @@ def _results(future: Future[list[_Result]], count: int) -> list[_Result]:
 class _Collected:
     """Preallocated columns, filled in any order."""
 
-    def __init__(self, what: _What, runs: int, t_eval: ArrayLike | None) -> None:
+    def __init__(self, what: Adjustable, runs: int, t_eval: ArrayLike | None) -> None:
         self.what = what
         n, several = sum(each.n for each in what.contacts), len(what.contacts)
         columns = (several,) if several > 1 else ()
@@ -468,7 +414,7 @@ class _Collected:
         self.t = np.full(runs, np.nan)
         self.end = {name: np.full((runs, *columns), np.nan) for name in ("x", "v", "F")}
         self.end["z"] = np.full((runs, n), np.nan)
-        parts = what.part_names
+        parts = _part_names(what.what)
         self.ends = {name: np.full(runs, np.nan) for name in parts}
         self.mode = np.full((runs, n), -1, dtype=np.int64)
         self.logs: list[NDArray[Any]] = [np.empty(0, dtype=LOG)] * runs
@@ -505,7 +451,7 @@ class _Collected:
             owners += [name] * each.n
             lead = f"{name}." if len(contacts) > 1 else ""
             edges += [f"{lead}{edge.name}" for edge in each.chart.transitions]
-        of_system = isinstance(self.what, _OfSystem)
+        of_system = isinstance(self.what.what, System)
         return Sweep(
             parameters,
             np.array(self.outcome),

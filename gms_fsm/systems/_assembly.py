@@ -30,12 +30,15 @@ from gms_fsm.language import (
     renamed,
 )
 from gms_fsm.language._normal import renamed_in
+from gms_fsm.systems._definitions import Definition, Edge
 from gms_fsm.systems._given import derivative_free, is_positive
 from gms_fsm.systems._numbers import numbers_of, of
-from gms_fsm.systems.signals import Formula, Signal
+from gms_fsm.systems._parts import LEAST_LOAD, LOAD
+from gms_fsm.systems.signals import Formula
 from gms_fsm.systems.system import Body, Contact, System
 
 __all__ = [
+    "CURVE_LOAD",
     "Assembly",
     "Bank",
     "Definition",
@@ -46,49 +49,7 @@ __all__ = [
 ]
 
 ZERO, ONE = Number(0.0), Number(1.0)
-
-
-@dataclass(frozen=True)
-class Definition:
-    """A quantity computed from others.
-
-    Parameters
-    ----------
-    name : str
-        In the trees.
-    tree : Value or None
-        What it is; None for a signal that is a table or a Python function.
-    bank : int or None
-        The contact whose elements have one value each; None if there is one value.
-    signal : Signal or None
-        The signal, where it is one.
-    """
-
-    name: str
-    tree: Value | None
-    bank: int | None = None
-    signal: Signal | None = None
-
-
-@dataclass(frozen=True)
-class Edge:
-    """An edge of a chart.
-
-    Parameters
-    ----------
-    name, source, target : str
-        As in the chart.
-    guard : Condition
-        When it is taken.
-    steps : tuple of (str, Value)
-        Assignments to variables and velocities, in the order of computation.
-    """
-
-    name: str
-    source: str
-    target: str
-    guard: Condition
-    steps: tuple[tuple[str, Value], ...]
+CURVE_LOAD = "curve load"
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +121,22 @@ class Bank:
     def states(self) -> tuple[str, ...]:
         """Names of the chart's states."""
         return tuple(state.name for state in self.chart.states)
+
+    @property
+    def locked(self) -> tuple[str, ...]:
+        """Names of the states that lock it."""
+        return tuple(state.name for state in self.chart.states if state.locked)
+
+    def is_impulse(self, edge: Edge) -> bool:
+        """Return whether an edge changes velocities by an impulse."""
+        sets = any(name in self.velocities for name, _ in edge.steps)
+        return sets or (edge.locks and not edge.arrests and edge.source not in self.locked)
+
+    def changes_others(self, edge: Edge) -> int:
+        """Return 1 for an impulse, 2 for an edge that lets go of a lock: forces change at once."""
+        if self.is_impulse(edge):
+            return 1
+        return 2 if edge.source in self.locked and not edge.locks else 0
 
     @property
     def weight(self) -> str:
@@ -375,13 +352,15 @@ class Reader:
             velocities.append(known.id)
             if len(velocities) == 1:
                 where = renamed(tree, {v: Name(body.x) for v, body in moved.items()})
+                if "x" in contact.inputs:
+                    where = self.text_of_input(contact, "x", owner)
                 position = self.defined(of(c, "x"), where)
                 names["x"] = position
         for name in chart.inputs:
             if name not in names and not (name == "s" and model is not None):
                 names[name] = self.input(contact, name, owner)
         curved = model is not None and model.stribeck is not None
-        threshold = self.curve(contact, index, names) if curved else ""
+        threshold = self.curve(contact, index, names, owner) if curved else ""
         for name in chart.variables:
             names[name], names[f"d{name}"] = Name(of(c, name)), Name(of(c, f"d{name}"))
             own_names[name] = of(c, name)
@@ -398,6 +377,7 @@ class Reader:
                 for name, tree in chart.assignments[key].items()
             )
 
+        locked = {state.name for state in chart.states if state.locked}
         totals = {
             of(c, name): renamed(tree, names | {name: Name(of(c, name))})
             for name, tree in chart.totals.items()
@@ -433,8 +413,10 @@ class Reader:
                     renamed_in(chart.guards[edge.name], names),
                     # Stateflow's order: exit of the source, action, entry of the target.
                     steps(("exit", edge.source), ("action", edge.name), ("entry", edge.target)),
+                    edge.target in locked,
+                    number in chart.arrests,
                 )
-                for edge in chart.transitions
+                for number, edge in enumerate(chart.transitions)
             ),
             start=steps(("entry", chart.default_state.name)),
             means=names,
@@ -442,7 +424,7 @@ class Reader:
 
     def check_inputs(self, index: int, contact: Contact) -> None:
         for name in contact.inputs:
-            if name not in contact.chart.inputs:
+            if name not in contact.chart.inputs and (name != LOAD or contact.load is None):
                 raise ParameterError(
                     f"inputs has {shown(name)}, which its chart does not read",
                     place=f"{self.here.words}, contact {contact.name!r}",
@@ -529,11 +511,15 @@ class Reader:
                 advice=f"give inputs={{{name!r}: ...}} over {', '.join(self.system.names)}",
                 key=owner.key,
             )
-        text = contact.inputs.get(name, name)
-        tree = self.value(text, self.system.names, owner.of(f"input {name!r}", "inputs", name))
+        tree = self.text_of_input(contact, name, owner)
         return tree if isinstance(tree, Number) else self.defined(of(contact.name, name), tree)
 
-    def curve(self, contact: Contact, index: int, names: dict[str, Value]) -> str:
+    def text_of_input(self, contact: Contact, name: str, owner: Part) -> Value:
+        """Read what an input is."""
+        text = contact.inputs.get(name, name)
+        return self.value(text, self.system.names, owner.of(f"input {name!r}", "inputs", name))
+
+    def curve(self, contact: Contact, index: int, names: dict[str, Value], owner: Part) -> str:
         """Define the Stribeck curve of a model and the thresholds; return their name."""
         c = contact.name
         given = contact.stribeck
@@ -542,8 +528,14 @@ class Reader:
         numbers: dict[str, Value] = {name: Name(of(c, f"curve {name}")) for name in given.numbers}
         curve = of(c, "curve S")
         self.definitions.append(Definition(curve, renamed(tree, numbers | {"v": names["v"]})))
+        strength: Value = Name(curve)
+        if contact.load is not None:
+            least = parse_value(f"max({LOAD}, {LEAST_LOAD!r})", [LOAD])
+            load = renamed(least, {LOAD: self.text_of_input(contact, LOAD, owner)})
+            self.definitions.append(Definition(of(c, CURVE_LOAD), load))
+            strength = Binary("*", strength, Name(of(c, CURVE_LOAD)))
         threshold = of(c, "s")
-        weighted = Binary("*", Name(of(c, "threshold weight")), Name(curve))
+        weighted = Binary("*", Name(of(c, "threshold weight")), strength)
         self.definitions.append(Definition(threshold, weighted, index))
         names["s"] = Name(threshold)
         return threshold

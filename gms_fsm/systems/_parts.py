@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gms_fsm._display import displayed
 from gms_fsm.charts.chart import Chart
@@ -22,9 +23,12 @@ from gms_fsm.systems._given import (
     several,
     texts_of,
 )
-from gms_fsm.systems.models import Model, check_bank
+from gms_fsm.systems.models import Model, check_bank, with_values
 
-__all__ = ["Body", "Contact", "Sampled"]
+__all__ = ["LEAST_LOAD", "LOAD", "Body", "Contact", "Sampled", "loaded"]
+
+LOAD = "N"  # the input of a contact that multiplies its Stribeck curve
+LEAST_LOAD = 1e-9  # N; charts divide by thresholds
 
 
 @dataclass(frozen=True)
@@ -104,7 +108,11 @@ class Contact:
         Number of elements.
     inputs : mapping of str to str or float
         For an input of the chart what it is, over the names of the system; those of the same name
-        need not be given.
+        need not be given. A model with a Stribeck curve has the input N, a load in newtons, if it
+        is given: F_c and F_s are then coefficients of friction, and the thresholds are
+        ``weight * s(v) * N``. A load below 1e-9 N counts as 1e-9 N, since a threshold must be
+        positive. What the contact supplies itself cannot be given: t, its velocities, and the s of
+        a model.
     period : float, optional
         s: the machines are asked at these ticks only, and what the chart gives out is held between
         them. Without a period the contact is continuous.
@@ -162,6 +170,16 @@ class Contact:
                 f"{', '.join(chart.velocities)}",
                 place=here,
             )
+        given = texts_of({} if inputs is None else inputs, f"{here}: inputs")
+        by_itself = {"t": "it is the time", **dict.fromkeys(chart.velocities, "give v=... instead")}
+        if model is not None:
+            by_itself["s"] = "its model has thresholds; a load on them is inputs={'N': ...}"
+        if taken := [each for each in given if each in by_itself]:
+            raise ParameterError(
+                f"inputs has {shown(taken[0])}, which the contact supplies itself",
+                place=here,
+                advice=by_itself[taken[0]],
+            )
         if period is not None:
             period = checked_scalar(f"{here}: period", period, "> 0")
         for each, value in {
@@ -170,7 +188,7 @@ class Contact:
             "values": values,
             "v": velocities,
             "n": n,
-            "inputs": texts_of({} if inputs is None else inputs, f"{here}: inputs"),
+            "inputs": given,
             "period": period,
             "model": model,
         }.items():
@@ -182,10 +200,21 @@ class Contact:
 
     def with_model(self, model: Model) -> Contact:
         """Return the same contact with another model of the same shape."""
-        new = object.__new__(Contact)
         check_bank(model.chart, model.n, f"contact {shown(self.name)}")
-        changed = {"model": model, "chart": model.chart, "values": model.values, "n": model.n}
-        vars(new).update(vars(self) | changed)
+        return self.replaced(model=model, chart=model.chart, values=model.values, n=model.n)
+
+    def with_values(self, values: Mapping[str, ArrayLike]) -> Contact:
+        """Return the same contact with some of its numbers replaced."""
+        if self.model is not None:
+            return self.with_model(with_values(self.model, values))
+        given = {**self.values, **values}
+        place = f"contact {shown(self.name)}"
+        return self.replaced(values=checked_numbers(self.chart, given, self.n, place))
+
+    def replaced(self, **fields: Any) -> Contact:
+        """Return the same contact with other fields, which fit together."""
+        new = object.__new__(Contact)
+        vars(new).update(vars(self) | fields)
         return new
 
     # What a `Model` has, so that everything that reads models reads contacts too.
@@ -205,9 +234,21 @@ class Contact:
         return None if self.model is None else self.model.stribeck
 
     @property
+    def load(self) -> Text | None:
+        """What its Stribeck curve is multiplied by, if its input N is no input of the chart."""
+        chart = self.chart
+        own = {*chart.inputs, *chart.variables, *chart.parameter_names, *chart.let}
+        return None if self.stribeck is None or LOAD in own else self.inputs.get(LOAD)
+
+    @property
     def sigma_2(self) -> float:
         """Viscous friction of its model, Ns/m."""
         return 0.0 if self.model is None else self.model.sigma_2
+
+
+def loaded(model: Model | Contact) -> bool:
+    """Return whether thresholds follow a load besides the velocity."""
+    return isinstance(model, Contact) and model.load is not None
 
 
 @dataclass(frozen=True)
@@ -226,7 +267,9 @@ class Sampled:
     initial : mapping of str to float, optional
         Values before the first tick; 0 where not given.
     offset : float
-        s: the first tick is at t_start + offset.
+        s: the first tick is at t_start + offset. Period, offset and start count as the decimal
+        numbers that are written, so that ticks of several rates coincide exactly: ten periods of
+        0.1 ms are one of 1 ms. What ticks at one instant does so in the order listed.
 
     Examples
     --------

@@ -122,7 +122,9 @@ class Corners:
     @property
     def jumps(self) -> FloatArray:
         """Times [s] at which the value jumps."""
-        found: FloatArray = self.times[1:][np.diff(self.times) == 0]
+        times, first = np.unique(self.times, return_index=True)
+        last = np.append(first[1:], self.times.size) - 1
+        found: FloatArray = times[self.values[first] != self.values[last]]
         return found
 
 
@@ -229,6 +231,7 @@ def as_signal(given: SignalLike) -> Signal:
 def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) -> float:
     """Interpolate corners linearly at t; values are held outside, right-continuous at jumps.
 
+    One clock tick before a corner the value is that of the corner: what a jump there comes from.
     Written as plain loops because the compiled engine runs this same function.
 
     Parameters
@@ -261,8 +264,11 @@ def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) 
         return values[0]
     if low == len(times):
         return values[low - 1]
-    t0 = times[low - 1]
-    share = (t - t0) / (times[low] - t0)
+    t0, end = times[low - 1], times[low]
+    halfway = t + 0.5 * (end - t)
+    if t0 < t and (halfway <= t or halfway >= end):  # no number lies between them
+        return values[low]
+    share = (t - t0) / (end - t0)
     return values[low - 1] + share * (values[low] - values[low - 1])
 
 

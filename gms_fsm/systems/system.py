@@ -38,7 +38,7 @@ from gms_fsm.systems._given import (
     several,
     texts_of,
 )
-from gms_fsm.systems._parts import Body, Contact, Sampled
+from gms_fsm.systems._parts import LEAST_LOAD, LOAD, Body, Contact, Sampled, loaded
 from gms_fsm.systems._texts import texts_of_system
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
@@ -47,7 +47,18 @@ from gms_fsm.systems.signals import Signal, as_signal
 if TYPE_CHECKING:
     from gms_fsm.systems._assembly import Assembly
 
-__all__ = ["Body", "Contact", "Mounting", "Sampled", "Several", "System", "system_of"]
+__all__ = [
+    "LEAST_LOAD",
+    "LOAD",
+    "Body",
+    "Contact",
+    "Mounting",
+    "Sampled",
+    "Several",
+    "System",
+    "loaded",
+    "system_of",
+]
 
 
 Key = tuple[str | int, ...]

@@ -104,12 +104,13 @@ def _show_one_side(program: Program, rows: Rows, kept: range, table: FloatArray)
     arc, and is what the log has for that edge.
     """
     t, slid = rows.t, rows.mode[:, program.layout.slides]
+    of_signs = np.array(program.surfaces.machine) < 0  # of machines the modes say it
     turns = np.flatnonzero((np.diff(slid, axis=0) != 0).any(axis=1) & (np.diff(t) == 0.0))
     for turn in turns.tolist():
         before, after = np.searchsorted(t, t[turn]) - 1, np.searchsorted(t, t[turn], "right")
         change = np.diff(slid[turn : turn + 2], axis=0)[0]
         for row, other, joined in ((turn, before, 1), (turn + 1, after, -1)):
-            changed = np.flatnonzero(change == joined)
+            changed = np.flatnonzero((change == joined) & of_signs)
             of_an_arc = abs(other - row) == 1 and 0 <= other < len(rows)
             if slid[row].any() or not changed.size or not of_an_arc:
                 continue

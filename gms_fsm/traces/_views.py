@@ -144,7 +144,7 @@ _SLIDING = np.dtype(
     [
         ("t_start", "f8"),
         ("t_end", "f8"),
-        ("surface", "U64"),
+        ("surface", "U128"),
         ("sigma_start", "f8"),
         ("sigma_end", "f8"),
     ]
@@ -152,7 +152,7 @@ _SLIDING = np.dtype(
 
 
 def sliding_of(trace: Trace) -> Any:
-    """Return the intervals of a run in which a sign is held between -1 and 1."""
+    """Return the intervals of a run in which the motion slides on a surface."""
     table = merged(trace.rows, trace.stops)
     found: list[tuple[Any, ...]] = []
     if len(table) < 2:

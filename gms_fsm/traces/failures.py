@@ -8,7 +8,9 @@ from gms_fsm.traces.trace import Trace
 __all__ = [
     "CallbackError",
     "LivelockError",
+    "LockError",
     "NotFiniteError",
+    "NotUniqueError",
     "SignalEndError",
     "SimulationError",
     "StepLimitError",
@@ -62,6 +64,14 @@ class SimulationError(GMSError, RuntimeError):
 
 class LivelockError(SimulationError):
     """States keep switching without progress in time, or in time and state."""
+
+
+class LockError(SimulationError):
+    """A lock would take a velocity that has jumped, or what moved it leaves no way out."""
+
+
+class NotUniqueError(SimulationError):
+    """Several surfaces attract the motion at once: how it goes on there is not unique."""
 
 
 class StepSizeError(SimulationError):

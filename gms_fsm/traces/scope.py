@@ -399,7 +399,7 @@ def _read(
     if names <= {places.of("s")}:
         return {}
     out = [0.0] * shown.size
-    program.ieee["values"](t, y, mode, program.p, out)
+    program.ieee["values"](t, y, mode, program.p, program.calm, out)
     every = shown.named(out)
     return {name.removeprefix(start): every[name] for name in names}
 
@@ -429,7 +429,7 @@ def guard_columns(trace: Trace, names: Iterable[str]) -> dict[str, Any]:
         for row, (t, y) in enumerate(zip(rows.t.tolist(), rows.y.tolist(), strict=True)):
             out = [0.0] * shown.size
             with contextlib.suppress(SignalError):  # a Python function failed, or is lost
-                program.ieee["values"](t, y, modes[row], program.p, out)
+                program.ieee["values"](t, y, modes[row], program.p, program.calm, out)
                 table[row] = out
         every = shown.named(table.T)
         found |= {name: every[places.of(name)] for name in missing}

@@ -34,6 +34,7 @@ from gms_fsm.systems.system import System, system_of
 from gms_fsm.traces._between import between
 from gms_fsm.traces._columns import columns_of
 from gms_fsm.traces._firings import Firings
+from gms_fsm.traces._impulses import impulses_of
 from gms_fsm.traces._observed import Observed
 from gms_fsm.traces._parts import held_period
 from gms_fsm.traces._views import (
@@ -156,6 +157,8 @@ class Trace:
         """The log as a record array, made from the codes when it is first read."""
         return self.firings.records
 
+    impulses = cached_property(impulses_of)
+
     # ------------------------------------------------------------------ systems
     @cached_property
     def places(self) -> BankPlaces:
@@ -214,12 +217,9 @@ class Trace:
             If there is no such body.
         """
         body = (self.system or system_of(self.model, self.rig)).body(name)
-        if not body.driven:
-            velocity = self._named(body.v)
-        elif body.v in self.stored:
-            velocity = self.stored[body.v]
-        else:
-            velocity = driven_velocity(self, body)
+        velocity = self.stored.get(body.v)
+        if velocity is None or not body.driven:
+            velocity = driven_velocity(self, body) if body.driven else self._named(body.v)
         return BodyTrace(name, self._named(body.x), velocity)
 
     def value(self, name: str) -> FloatArray:
@@ -353,11 +353,13 @@ class Trace:
 
     @property
     def sliding(self) -> Any:
-        """Intervals in which a sign is held between -1 and 1 (see `integrators.sliding`).
+        """Intervals in which the motion slides on a surface (see `integrators.sliding`).
 
-        Records with ``t_start, t_end`` [s], ``surface`` (the quantity that is zero there, such as
-        ``v``) and ``sigma_start, sigma_end``, the sign held at both ends. They are found from the
-        rows and the stops; a run of which only the end was kept has none.
+        There a sign is held between -1 and 1, or an element between two states: `states` has the
+        one entered last. Records with ``t_start, t_end`` [s], ``surface`` (the quantity that is
+        zero there, such as ``v``, or with both states ``p - q (below, above) of element 1``) and
+        ``sigma_start, sigma_end``, the sign held at both ends; between two states -1 is the first.
+        They are found from the rows and the stops; a run of which only the end was kept has none.
         """
         return sliding_of(self)
 

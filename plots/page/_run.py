@@ -21,6 +21,7 @@ from gms_fsm.language import (
     spell,
     values_of,
 )
+from gms_fsm.systems.system import loaded
 from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.scope import Scope, guard_columns, watch_names
 from gms_fsm.traces.system_scope import SystemScope
@@ -89,7 +90,7 @@ def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) 
     values = _values(trace, stored, pool)
     modes = trace.modes
     rows, elements = np.nonzero(np.diff(modes, axis=0, prepend=modes[:1]))
-    curve = model.stribeck
+    curve = None if loaded(model) else model.stribeck  # else s is that of the row
     return {
         "name": trace.places.name if trace.system is not None else "",
         "chart": picture,

@@ -113,7 +113,7 @@ def ribbons(
     list of Artist
         One collection per state and element; then the names, each drawn only if it fits, and none
         of more than six elements; then a band for each interval in which a sign is held, for
-        example on v = 0.
+        example on v = 0, or in which an element is between two states.
     """
     chosen = checked_elements(trace, elements)
     begin, end = checked_window(trace, window)
@@ -143,14 +143,27 @@ def ribbons(
         names += [_SpanName(ax, a, b, row + 1.0, name) for name, a, b in wide]
     lanes(ax, chosen)
     time_axis(ax, begin, end)
-    return [*drawn, *names, *_held_bands(ax, trace, (begin, end))]
+    return [*drawn, *names, *_held_bands(ax, trace, chosen, (begin, end))]
 
 
-def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
-    """Mark the intervals on a surface; if only microseconds long, they appear as a line."""
+def _held_bands(ax: Axes, trace: Trace, chosen: Sequence[int], window: Window) -> Artists:
+    """Mark the intervals on a surface, of an element between two states in its row only.
+
+    If only microseconds long, they appear as a line.
+    """
     drawn: dict[str, Artists] = {}
+    names, machines = trace.program.surface_names, trace.program.surfaces.machine
+    first, last = ax.get_ylim()
     for stretch in trace.sliding:
         begin, end = max(window[0], float(stretch.t_start)), min(window[1], float(stretch.t_end))
+        machine, low, high = machines[names.index(stretch.surface)], 0.0, 1.0
+        if machine >= 0:
+            element = machine - trace.places.first
+            if element not in chosen:
+                continue
+            row = [*chosen].index(element) + 1.0
+            ends = [(row + side * LANE / 2 - first) / (last - first) for side in (-1.0, 1.0)]
+            low, high = min(ends), max(ends)
         if begin <= end:
             label = f"held on {stretch.surface} = 0"
             text = "" if label in drawn else label
@@ -158,6 +171,8 @@ def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
                 ax.axvspan(
                     begin,
                     end,
+                    low,
+                    high,
                     facecolor="none",
                     edgecolor=INK,
                     hatch="xxx",

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
+from gms_fsm.systems.system import loaded
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes
 from plots._window import Window
@@ -55,6 +56,11 @@ def stribeck(
     if model.stribeck is None:
         raise ParameterError(
             "its chart has no input s, and therefore no Stribeck curve to draw", place=model.title
+        )
+    if loaded(model):
+        raise ParameterError(
+            "its thresholds follow a load besides the velocity: they are no curve over v",
+            place=model.title,
         )
     points = None if measured is None else checked_points(measured)
     speeds = np.abs(part.v)

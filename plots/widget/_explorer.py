@@ -430,7 +430,7 @@ def _checked_sliders(
         )
     found = {}
     for name, ends in sliders.items():
-        number = forks.subject.check(name)
+        number = forks.number(name, 0)
         try:
             low, high = (checked_scalar(f"sliders[{name!r}]", end, "finite") for end in ends)
         except (TypeError, ValueError) as error:

@@ -114,7 +114,7 @@ def test_machines_and_generated_text_have_the_same_truth_table(law: str, weight:
                 wanted = oracle(state, z, s, v)
                 asked = [names[edge] for edge, guard in table[state] if guard.holds(element)]
                 out = [0]
-                program.functions["switch"](0.0, [0.0, z], [mode], program.p, out)
+                program.functions["switch"](0.0, [0.0, z], [mode], program.p, [0], out)
                 assert asked == ([wanted] if wanted else [])
                 assert (names[out[0]] if out[0] >= 0 else None) == wanted
 

@@ -13,6 +13,7 @@ from gms_fsm import GMS, Body, Contact, GMSParameters, LuGre, Model, Stribeck, S
 from gms_fsm.app.scenario import load_system
 from gms_fsm.charts.karnopp import KARNOPP
 from gms_fsm.systems.models import ChartModel
+from tests.physics.test_sliding_between_states import follower
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 Case = tuple[Model | System, np.ndarray, Mapping[str, np.ndarray]]
@@ -84,12 +85,19 @@ def servo(random: np.random.Generator) -> Case:
     return replace(system, numbers=numbers, signals={"ref": "0"}), t, {"ref": reference}
 
 
+def between_states(random: np.random.Generator) -> Case:
+    """Return a deflection that is driven back to 0 from two states, and slides there."""
+    t = times(random, 20.0)
+    return follower(), t, {"v": 1.5 * np.sin(3.0 * t) + walk(random, t, 0.3)}
+
+
 CASES: Mapping[str, Callable[[np.random.Generator], Case]] = {
     "GMS 4": gms(4),
     "GMS 16": gms(16),
     "LuGre": lugre,
     "Karnopp": karnopp,
     "servo": servo,
+    "between states": between_states,
 }
 
 

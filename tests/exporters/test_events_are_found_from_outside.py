@@ -20,7 +20,7 @@ from gms_fsm.charts.karnopp import KARNOPP
 from gms_fsm.exporters import Subject
 from gms_fsm.exporters._fmu_model import Both, both_of
 from gms_fsm.systems.models import ChartModel
-from integrators import exchange
+from integrators import exchange, stepping
 from integrators.exchange import MOVED, SWITCHES
 from integrators.steps import T
 
@@ -160,7 +160,7 @@ def test_another_start_moves_the_ticks() -> None:
     both = both_of(Subject.of(servo(), "fmu2"))
     importer = Importer(both)
     importer.go_to(3.0, list(importer.b.now.y))
-    exchange.restart(importer.b, importer.clocks, importer.x)
+    stepping.restart(importer.b, importer.clocks)
     importer.settle()
     assert importer.x.next[0] == 3.0 + 1e-3
     assert math.isclose(importer.b.now.clock[T], 3.0)

@@ -137,6 +137,22 @@ def test_a_contact_whose_load_comes_from_outside(tmp_path: Path) -> None:
     assert taken == [(float(each.t), str(each.edge)) for each in trace.transitions]
 
 
+def test_a_load_on_the_thresholds_of_a_model(tmp_path: Path) -> None:
+    contact = Contact("pad", stick_slip("signed"), inputs={"N": "1 + 0.5 * sin(t)"})
+    system = System(
+        "brake",
+        bodies=(Body("body", velocity="v"),),
+        contacts=(contact,),
+        signals={"v": "0.15 * sin(2 * pi * t / 25)"},
+    )
+    path, *_ = export(contact, "transitions", tmp_path, name="file")
+    switches, rows = run_of(imported(path), "0.15 * sin(2 * pi * t / 25)", 25.0, 5e-3)
+    trace = simulate(system, 25.0, method="euler", step=5e-3, events="step", engine="ifelse")
+    assert len(switches) > 2
+    assert switches == log_of(trace)
+    assert rows[-1][2] == trace.contact("pad").F[-1]
+
+
 # --------------------------------------------------------------------------- by itself
 ISOLATED = """
 import runpy, sys

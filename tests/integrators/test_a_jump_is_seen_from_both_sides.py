@@ -5,8 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import Prescribed, Slider, simulate
-from tests.helpers import non_drifting, one_element
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    FrictionState,
+    Prescribed,
+    Slider,
+    State,
+    Transition,
+    simulate,
+)
+from tests.helpers import FASTEST, non_drifting, one_element
+
+ENGINES = ("machines", "ifelse", *(("compiled",) if FASTEST == "compiled" else ()))
 
 
 def test_velocity_step_moves_z_exactly() -> None:
@@ -29,6 +40,30 @@ def test_force_step_keeps_the_order_of_the_method() -> None:
         abs(simulate(model, rig, 1.0, method="rk4", step=h).x[-1] - exact) for h in (0.02, 0.01)
     ]
     assert errors[1] < errors[0] / 12
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_the_value_before_a_jump_switches_is_switched(engine: str) -> None:
+    """v falls to 0 and jumps to 0.9 at t = 1.5: the chart halts, and starts again."""
+    chart = Chart(
+        "halts at rest",
+        inputs=("v",),
+        variables=("z",),
+        parameters=(),
+        states=(State("go", flow={"z": "v"}), State("rest", flow={"z": "v / 2"})),
+        transitions=(Transition("halt", "go", "rest", guard="v <= 0"),
+                     Transition("start", "rest", "go", guard="v > 0")),
+        outputs={"F": "z + v / 10"},
+    )  # fmt: skip
+    model = ChartModel(chart, {})
+    trace = simulate(model, Prescribed(([0, 1.5, 1.5, 3], [1, 0, 0.9, 0.9])), 3.0, engine=engine)
+    log = [(float(each.t), str(each.edge), float(each.v)) for each in trace.transitions]
+    assert log == [(1.5, "halt", 0.0), (1.5, "start", 0.9)]
+    assert trace.v[np.abs(trace.t - 1.5) < 1e-12].tolist() == [0.0, 0.9, 0.9, 0.9]
+    friction = FrictionState(model, engine=None if engine == FASTEST else "ifelse")
+    friction.advance(1.0, 0.0, 1.5)
+    assert [each.edge for each in friction.switches] == ["halt"]
+    assert friction.advance(0.9, 0.9, 1.5) == trace.F[-1]
 
 
 def test_a_requested_time_on_a_jump_is_right_continuous() -> None:

@@ -53,7 +53,7 @@ class _Run:
             held=0,
             strict=[False],
             relations=["g"],
-            surfaces=Surfaces([], [], []),
+            surfaces=Surfaces(*[[]] * 8),
             knots=list(knots),
         )
         method = RK4 if step else DP45

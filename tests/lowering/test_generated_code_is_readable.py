@@ -183,7 +183,8 @@ def _stepped(program: Program, name: str, *arguments: Any) -> list[str]:
 def test_a_debugger_steps_through_a_decision() -> None:
     program = lower(stick_slip("signed"), Prescribed("0.2"))
     out = [-1] * 4
-    seen = _stepped(program, "switch", 0.0, [0.0, 0.5, 0.1, 0.1, 0.1], [0] * 4, program.p, out)
+    y, mode = [0.0, 0.5, 0.1, 0.1, 0.1], [0] * 4
+    seen = _stepped(program, "switch", 0.0, y, mode, program.p, program.calm, out)
     assert out[0] == 0
     assert seen.count("if z >= s and v > v_c:") == 4
     assert seen.count("edge = BREAK_AWAY_FORWARD  # stick -> slip") == 1

@@ -49,7 +49,7 @@ results = []
 for t, y, mode, held in STATES:
     dy, edges, seen = [0.0] * len(y), [0] * len(mode), [0.0] * SEEN
     flow(t, y, mode, held, P, dy)
-    switch(t, y, mode, P, edges)
+    switch(t, y, mode, P, [0] * len(mode), edges)
     observe(t, y, mode, LIVE, P, seen)
     live = [0.0] * len(y)
     flow_live(t, y, mode, held, P, live)
@@ -78,7 +78,7 @@ def _engine(program: Program, states: list[list[Any]], seen: int) -> list[Any]:
     for t, y, mode, held in states:
         dy, edges, out, live = [0.0] * len(y), [0] * len(mode), [0.0] * seen, [0.0] * len(y)
         f["flow"](t, y, mode, held, p, dy)
-        f["switch"](t, y, mode, p, edges)
+        f["switch"](t, y, mode, p, program.calm, edges)
         f["observe"](t, y, mode, program.live, p, out)
         f["flow_live"](t, y, mode, held, p, live)
         results.append([[float(u).hex() for u in part] for part in (dy, edges, out, live)])

@@ -70,6 +70,15 @@ def test_the_scales_of_a_bank_are_its_thresholds_its_stiffness_and_its_velocitie
     assert scales.time == pytest.approx(0.02 / 0.02)  # s / C of the faster element
 
 
+def test_only_what_relaxes_at_a_constant_rate_has_a_relaxation_time():
+    bank = pulled_mass()[0]
+    p = bank.parameters
+    slip = p.weights * p.stribeck.F_c / p.C
+    assert scales_of(bank).relaxing == tuple((0.0, pytest.approx(time)) for time in slip)
+    lugre = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))
+    assert scales_of(lugre).relaxing == ((0.0,),)  # its rate grows with v
+
+
 def test_without_guards_the_scale_is_the_deflection_that_carries_the_friction():
     lugre = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))
     assert scales_of(lugre).variables["z"] == pytest.approx((1e-3,))

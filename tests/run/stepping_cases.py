@@ -64,3 +64,16 @@ def record(rng: np.random.Generator, speed: float, rows: int = 300) -> tuple[Flo
     if rng.random() < 0.3:
         v[0] = 0.0
     return t, v
+
+
+def jumping(rng: np.random.Generator, v: Floats, speed: float) -> Floats:
+    """Return velocities after jumps at some samples, whose velocities before them may change.
+
+    To rest, from rest, to the opposite, to anything; v itself is what is before them.
+    """
+    after = v.copy()
+    for j in rng.choice(np.arange(1, v.size - 1), size=int(rng.integers(1, 9)), replace=False):
+        after[j] = rng.choice([0.0, -v[j], 3.0 * speed * rng.normal()])
+        if rng.random() < 0.4:
+            v[j] = rng.choice([0.0, speed * rng.normal()])
+    return after

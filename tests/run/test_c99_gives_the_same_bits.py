@@ -18,6 +18,7 @@ from integrators import compiled as machine
 from integrators.machine_code import objects
 from integrators.machine_code.c99 import c99_text
 from tests.helpers import open_loop, pulled_mass, same_bits, stick_slip
+from tests.physics.test_sliding_between_states import FALLING, relay
 from tests.systems_cases import CASES, same_system_bits
 
 pytestmark = [
@@ -100,3 +101,10 @@ def test_a_python_function_is_called(by_c: list[str]) -> None:
     ours, theirs = _runs(stick_slip("signed"), rig, 15.0)
     same_bits(ours, theirs)
     assert "callbacks[0](" in by_c[0]
+
+
+def test_sliding_between_states(by_c: list[str]) -> None:
+    ours, theirs = _runs(relay(FALLING), Prescribed("0"), 5.0, initial={"p": [-0.1], "q": [0.0]})
+    same_bits(ours, theirs)
+    assert len(ours.sliding) == 1
+    assert by_c

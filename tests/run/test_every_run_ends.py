@@ -10,20 +10,24 @@ from scipy.integrate import Radau
 
 from gms_fsm import (
     GMS,
+    Body,
     Chart,
     ChartModel,
+    Contact,
     GMSParameters,
     Prescribed,
     Session,
     Slider,
     State,
     Stribeck,
+    System,
     Transition,
     simulate,
 )
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.failures import LivelockError, StepLimitError
 from tests.helpers import ROOT, banging, pulled_mass, stick_slip
+from tests.systems.test_sampled_controllers_tick_exactly import servo
 
 ENGINES = ["machines", "ifelse", "compiled"]
 
@@ -143,6 +147,49 @@ def test_a_mildly_stiff_run_that_can_end_ends():
     trace = simulate(stiff(0.02), Prescribed("1e-3*sin(t)"), 2.0, engine="ifelse")
     assert trace.t[-1] == 2.0
     assert len(trace) > 5000
+
+
+@pytest.mark.parametrize("engine", ["ifelse", "compiled"])
+@pytest.mark.parametrize("output", [{"output": "end"}, {"t_eval": [5.0]}])
+def test_the_verdict_is_the_same_with_any_output(output, engine):
+    with pytest.raises(StepLimitError, match="stiff: the flow has a rate"):
+        simulate(stiff(200.0), Prescribed("1e-3*sin(t)"), 10.0, engine=needs(engine), **output)
+
+
+def positioned(C: float) -> System:
+    """A mass that a PID controller moves by 2 mm in a second, and that then hunts rarely."""
+    k, share = np.array([4e4, 3e4, 2e4, 1e4]), np.array([0.4, 0.3, 0.2, 0.1])
+    curve = Stribeck(1.0, 1.5, 1e-3)
+    bank = GMSParameters(
+        k, np.zeros(4), C * share / k, v_c=1e-6, weights=share / k, sigma_2=0.0, stribeck=curve
+    )
+    return System(
+        "positioned",
+        bodies=(Body("m", inertia=1.0, force="400 * (2e-3 - x) + 500 * I - 40 * v", x="x", v="v"),),
+        contacts=(Contact("friction", GMS(bank, law="signed"), v="v"),),
+        flow={"I": "2e-3 - x"},
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("output", ["all", "end"])
+@pytest.mark.parametrize("C", [1e5, 1e6])
+def test_a_run_that_is_stiff_at_first_and_then_rests_ends(C, output):
+    """Nearly all steps are taken in the first seconds: 450,000 with C = 1e6."""
+    trace = simulate(positioned(C), 40.0, engine=needs("compiled"), output=output)
+    assert trace.t[-1] == 40.0
+    assert len(trace.transitions) == 120
+
+
+@pytest.mark.slow
+def test_ticks_do_not_count_as_steps():
+    """500,000 ticks take a million steps, which is the default limit."""
+    trace = simulate(servo(), 500.0, engine=needs("compiled"), output="end")
+    assert trace.t[-1] == 500.0
+    with pytest.raises(
+        StepLimitError, match="max_steps = 1 steps, besides 4 for each of 100 ticks"
+    ):
+        simulate(servo(), 0.1, engine="ifelse", max_steps=1, max_step=1e-4)
 
 
 def test_a_session_ends_with_the_same_message():

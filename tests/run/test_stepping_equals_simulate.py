@@ -1,7 +1,7 @@
-"""Stepping through a record gives the bits of `simulate` over it: forces, and switch times.
+"""Stepping through a record gives the bits of `simulate` over it: forces, states, switch times.
 
-Also after looking ahead and going back. `python -m tests.run.test_stepping_equals_simulate SEED
-COUNT` repeats a case, or tries others.
+Also where the velocity jumps, and after looking ahead and going back. `python -m
+tests.run.test_stepping_equals_simulate SEED COUNT` repeats a case, or tries others.
 """
 
 from __future__ import annotations
@@ -14,37 +14,47 @@ import pytest
 from gms_fsm import FrictionState, Prescribed, simulate
 from gms_fsm.errors import GMSError
 from tests.helpers import FASTEST
-from tests.run.stepping_cases import friction, record
+from tests.run.stepping_cases import friction, jumping, record
 
 CASES = 60  # make soak takes 1,000
 ENGINES = ("compiled", "ifelse") if FASTEST == "compiled" else ("ifelse",)
 
 
-def differences(seed: int, index: int) -> tuple[str, int]:
+def differences(seed: int, index: int, *, jumps: bool = False) -> tuple[str, int]:
     """Return what differs in one random case, and the number of switches."""
     rng = np.random.default_rng([seed, index])
     model, speed = friction(rng)
     t, v = record(rng, speed, rows=150)
+    after = jumping(rng, v, speed) if jumps else v
+    both = np.stack([v, after], axis=1).ravel(), np.repeat(t, 2)
+    once = np.append(True, np.diff(both[1]) > 0) | np.append(True, np.diff(both[0]) != 0)
+    signal = Prescribed((both[1][once], both[0][once]))
     try:
-        trace = simulate(model, Prescribed((t, v)), t[-1], t_start=t[0], engine=FASTEST, t_eval=t)
+        trace = simulate(model, signal, t[-1], t_start=t[0], engine=FASTEST, t_eval=t)
     except GMSError as error:
         trace, failed = None, type(error)
     for engine in ENGINES:
         friction_state = FrictionState(model, t=t[0], engine=engine)
         forces, log = [friction_state.peek(v[0], v[0], 0.0)], []
+        variables = [[*friction_state.variables.values()]]
         try:
             for j in range(1, len(t)):
                 aside = float(speed * rng.normal())
                 if rng.random() < 0.1:
                     before = friction_state.snapshot()
-                    friction_state.advance(v[j - 1], aside, t[j] - t[j - 1])
+                    friction_state.advance(after[j - 1], aside, t[j] - t[j - 1])
                     friction_state.restore(before)
                 if rng.random() < 0.1:
-                    friction_state.peek(v[j - 1], aside, t[j] - t[j - 1])
+                    friction_state.peek(after[j - 1], aside, t[j] - t[j - 1])
                 if rng.random() < 0.1:
                     friction_state.from_array(friction_state.to_array())
-                forces.append(friction_state.advance_to(v[j - 1], v[j], t[j]))
+                force = friction_state.advance_to(after[j - 1], v[j], t[j])
                 log += friction_state.switches
+                if after[j] != v[j]:
+                    force = friction_state.advance(after[j], after[j], 0.0)
+                    log += friction_state.switches
+                forces.append(force)
+                variables.append([*friction_state.variables.values()])
         except GMSError as error:
             if trace is not None or type(error) is not failed:
                 return f"{model.title}, {engine}: {error}", 0
@@ -57,13 +67,18 @@ def differences(seed: int, index: int) -> tuple[str, int]:
         wrong = np.flatnonzero(np.array(forces) != trace.F)
         if wrong.size:
             return f"{model.title}, {engine}: the force at sample {wrong[0]}", 0
+        layout = trace.program.layout
+        own = [layout.y.all_of(layout.banks[0].of(name)) for name in layout.banks[0].variables]
+        if any((trace.rows.y[:, list(places)] != np.array([row[k] for row in variables])).any()
+               for k, places in enumerate(own)):  # fmt: skip
+            return f"{model.title}, {engine}: the variables", 0
     return "", 0 if trace is None else len(trace.transitions)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(2))
-def test_random_records(part: int) -> None:
-    found = {k: differences(1, k) for k in range(part, CASES, 2)}
+@pytest.mark.parametrize("jumps", [False, True])
+def test_random_records(jumps: bool) -> None:
+    found = {k: differences(1, k, jumps=jumps) for k in range(int(jumps), CASES, 2)}
     wrong = {k: text for k, (text, _) in found.items() if text}
     assert not wrong, f"python -m tests.run.test_stepping_equals_simulate 1 {CASES}: {wrong}"
     assert sum(count for _, count in found.values()) > 300
@@ -71,7 +86,7 @@ def test_random_records(part: int) -> None:
 
 def main() -> None:
     seed, count = map(int, sys.argv[1:])
-    found = [differences(seed, k) for k in range(count)]
+    found = [differences(seed, k, jumps=k % 2 == 1) for k in range(count)]
     for k, (text, _) in enumerate(found):
         if text:
             print(k, text)

@@ -40,8 +40,9 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     def run(self, most_steps, *, pause):
         code = self.start.program.ieee
         flow = code["flow" if self.start.options.located else "flow_live"]
-        functions = Functions(flow, code["arm"], code["margins"], code["normal"], self.p)
-        machines = Machines(*(code[name] for name in ("switch", "act", "tick", "observe")))
+        names = ("arm", "margins", "normal", "follow")
+        functions = Functions(flow, *(code[name] for name in names), self.p)
+        machines = Machines(*(code[name] for name in ("switch", "act", "tick", "jolts", "observe")))
         recorded = self.run_of.recorded
         with np.errstate(all="ignore"):
             event = columns.record(

@@ -178,12 +178,13 @@ def elasto_plastic_on_paper() -> list[Switch]:
 
     def ways(modes: Modes) -> list[Way]:
         turn = Way(0, "elastic", lambda t, y: -v(t) * y[0])
-        beyond = lambda t, y: min(abs(y[0]) - limit(t), v(t) * y[0] - SMALLER)  # noqa: E731
+        past = lambda t, y, way: abs(y[0]) - p["z_ba"] - way * (limit(t) - p["z_ba"])  # noqa: E731
+        beyond = lambda t, y: min(past(t, y, 0.9999), v(t) * y[0] - SMALLER)  # noqa: E731
         bent = lambda t, y: min(abs(y[0]) - p["z_ba"], v(t) * y[0] - SMALLER)  # noqa: E731
         return {
             "elastic": [Way(0, "mixed", bent)],
             "mixed": [Way(0, "plastic", beyond), turn],
-            "plastic": [turn, Way(0, "mixed", lambda t, y: limit(t) - abs(y[0]) - SMALLER)],
+            "plastic": [turn, Way(0, "mixed", lambda t, y: -past(t, y, 0.9998) - SMALLER)],
         }[modes[0]]
 
     return reference(flow, ways, [0.0], ("elastic",), 6.0, max_step=1e-3)[0]

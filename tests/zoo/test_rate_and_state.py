@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import Radau
+from scipy.integrate import Radau, solve_ivp
 
 from gms_fsm import ChartModel, Prescribed, PulledSlider, Trace, simulate
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.registry import entry
+from gms_fsm.errors import ParameterError
+from gms_fsm.traces.failures import StepLimitError
 from tests.helpers import FASTEST
 
 LAWS = ("ageing", "slip")
@@ -96,3 +98,78 @@ def test_an_implicit_method_takes_few_steps_where_the_mass_rests() -> None:
     explicit, implicit = (pulled("ageing", 0.5, 1.0, each) for each in ("dp45", Radau))
     assert implicit.v.min() == pytest.approx(explicit.v.min(), rel=1e-2)
     assert 10 * len(implicit) < len(explicit)
+
+
+# --------------------------------------------------------------------------- stiff
+# Of each: parameters; mass, spring and speed of the rig; start; end [s]; the tolerance of v.
+STIFF: dict[str, tuple[dict[str, float], PulledSlider, dict[str, float], float, float]] = {
+    "from rest past the break-away": (P, PulledSlider(1.0, 2.0, 0.1), {"v": 0.0}, 6.0, 1e-12),
+    "from rest, with a creep of 2e-32 m/s": (
+        {"N": 1e3, "mu_0": 0.6, "a": 0.01, "b": 0.015, "D_c": 1e-5, "V_0": 1e-6},
+        PulledSlider(100.0, 2e5, 1e-6),
+        {"v": 0.0},
+        500.0,
+        1e-40,
+    ),
+    "a stiff spring": (
+        {"N": 1e3, "mu_0": 0.6, "a": 0.01, "b": 0.015, "D_c": 1e-5, "V_0": 1e-6},
+        PulledSlider(1.0, 1e7, 1e-6),
+        {"v": 1e-6, "x": -6.12e-5},
+        100.0,
+        1e-12,
+    ),
+    "slip events, then nearly at rest": (
+        {"N": 1e3, "mu_0": 0.6, "a": 0.01, "b": 0.015, "D_c": 1e-5, "V_0": 1e-6},
+        PulledSlider(100.0, 2e5, 1e-6),
+        {"v": 1e-6, "x": -3.06e-3},
+        100.0,
+        1e-12,
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("name", STIFF)
+def test_radau_with_absolute_tolerances_follows_a_stiff_run(name: str, law: str) -> None:
+    values, rig, start, t_end, least_v = STIFF[name]
+    n, mu_0, a, b, d_c, v_0 = (values[each] for each in ("N", "mu_0", "a", "b", "D_c", "V_0"))
+
+    def flow(t: float, state: np.ndarray) -> list[float]:
+        """Return the derivatives, written by hand."""
+        x, v, psi = state
+        force = a * n * np.arcsinh(v / (2 * v_0) * np.exp((mu_0 + b * psi) / a))
+        slip, theta = abs(v) / d_c, d_c / v_0 * np.exp(psi)
+        change = 1 / theta - slip
+        if law == "slip":
+            change = -slip * math.log(slip * theta) if v else 0.0
+        return [v, (rig.stiffness * (rig.speed * t - x) - force) / rig.mass, change]
+
+    first = [start.get("x", 0.0), start["v"], 0.0]
+    atol = [1e-15, 1e-4 * least_v, 1e-11]
+    wanted = solve_ivp(flow, (0.0, t_end), first, method="Radau", rtol=1e-10, atol=atol)
+    assert wanted.success
+    trace = simulate(
+        ChartModel(CHARTS[f"rate-state-{law}"], values),
+        rig,
+        t_end,
+        initial=start,
+        engine="ifelse",
+        method=Radau,
+        atol={"x": 1e-12, "v": least_v, "psi": 1e-8},
+    )
+    assert len(trace) < 2000
+    np.testing.assert_allclose(trace.rows.y[-1], wanted.y[:, -1], rtol=1e-4, atol=1e-9)
+    assert trace.v[-1] == pytest.approx(wanted.y[1, -1], rel=1e-3)
+
+
+def test_an_explicit_run_that_is_stiff_names_the_method_and_its_tolerances() -> None:
+    rig = PulledSlider(1.0, 2.0, 0.1)
+    with pytest.raises(StepLimitError) as caught:
+        simulate(model("ageing"), rig, 20.0, engine="ifelse", max_steps=20_000)
+    atol = {"x": 1e-12, "v": 1e-12, "psi": 1e-12}
+    assert f"method=scipy.integrate.Radau, atol={atol}" in str(caught.value)
+    with pytest.raises(ParameterError, match=r"no scale for x, v, psi; .*atol={'x': 1e-12"):
+        simulate(model("ageing"), rig, 20.0, method=Radau, engine="ifelse")
+    trace = simulate(model("ageing"), rig, 20.0, engine="ifelse", method=Radau, atol=atol)
+    assert trace.t[-1] == 20.0

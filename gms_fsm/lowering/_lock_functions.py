@@ -1,0 +1,47 @@
+"""Writes the functions that only locks need: what follows them, and what has moved them."""
+
+from __future__ import annotations
+
+from gms_fsm.lowering._forces import Forces
+from gms_fsm.lowering._lines import Line
+from gms_fsm.lowering._locks import ENDLESS
+from integrators import LET_GO
+
+__all__ = ["LockFunctions"]
+
+
+class LockFunctions(Forces):
+    """Writes these functions; without locks they are empty."""
+
+    def moved_locks(self) -> list[Line]:
+        """Write that the force on a locked contact that an impulse has moved has no limit."""
+        lines: list[Line] = []
+        for bank in self.read.banks if self.locking else ():
+            if bank.locked:
+                lines.append(Line(f"if jolt[{self.machine(bank.index, '0')}] == {LET_GO}:"))
+                for force, v in zip(bank.forces, bank.velocities, strict=True):
+                    text = f"    {self.local(force)} = {self.local(v)} * {ENDLESS}"
+                    lines.append(Line(text, frozenset({v})))
+        return lines
+
+    def follow(self) -> list[str]:
+        y, lines = self.layout.y, list[Line]()
+        if self.locking:
+            lines = self.locks.following()
+            for each in self.locks.followers():
+                v = self.locks.velocity(self.locks.bodies[each])
+                lines.append(Line(f"y[{y.text(v)}] = {self.local(v)}", frozenset({v})))
+        return self.function(
+            "follow(t, y, mode, held, p)",
+            "y = the velocities that locked contacts determine.",
+            lines,
+            "given",
+        )
+
+    def jolts(self) -> list[str]:
+        return self.function(
+            "jolts(t, y, mode, p, floor, mark, was, jolt)",
+            "was = velocities of contacts that lock; mark the ones that differ from it.",
+            self.locks.jolts() if self.locking else [],
+            "live",
+        )

@@ -1,0 +1,156 @@
+"""The input N of a contact multiplies its Stribeck curve, in every model that has one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from gms_fsm import GMS, Body, Contact, FrictionState, GMSParameters, LuGre, Stribeck, System
+from gms_fsm import simulate as run
+from gms_fsm.charts import CHARTS
+from gms_fsm.charts.registry import entry
+from gms_fsm.errors import ParameterError
+from gms_fsm.systems.models import Model, demonstration, with_values
+from gms_fsm.systems.signals import Corners
+from tests.helpers import FASTEST
+
+PAPER = GMSParameters.paper("stick-slip")
+LUGRE = LuGre(sigma_0=10.0, sigma_1=0.2, sigma_2=0.1, stribeck=Stribeck(0.3, 0.5, 0.01))
+MODELS: dict[str, tuple[Model, float]] = {
+    "signed": (GMS(PAPER, law="signed"), 3.0),
+    "published": (GMS(PAPER, law="published"), 3.0),
+    "lugre": (LUGRE, 0.2),
+    "elasto-plastic": (demonstration(entry("elasto-plastic")), 1e-3),
+}
+ENGINES = ("machines", "ifelse", *(("compiled",) if FASTEST == "compiled" else ()))
+
+
+def moved(model: Model, v: str, N: str | None = None, **signals: Any) -> System:
+    inputs = None if N is None else {"N": N}
+    return System(
+        "moved",
+        bodies=(Body("body", velocity="v"),),
+        contacts=(Contact("pad", model, v="v", inputs=inputs),),
+        signals={"v": v, **signals},
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODELS)
+def test_a_constant_load_is_a_factor_of_both_strengths(name: str) -> None:
+    """N = 5 and a curve of five times the height: the same switches and forces in all engines."""
+    model, speed = MODELS[name]
+    assert model.stribeck is not None
+    F_c, F_s = 5.0 * model.stribeck.F_c, 5.0 * model.stribeck.F_s
+    v = f"{speed} * (sin(t) + 0.7 * sin(3 * t))"
+    t = np.linspace(0.0, 6.0, 31)
+    strong = run(moved(with_values(model, {"F_c": F_c, "F_s": F_s}), v), 6.0, rtol=1e-9, t_eval=t,
+                 engine=FASTEST)  # fmt: skip
+    found = [run(moved(model, v, "5"), 6.0, rtol=1e-9, t_eval=t, engine=e) for e in ENGINES]
+    pad, other = found[0].contact("pad"), strong.contact("pad")
+    for each, its in zip(*(trace.settings["atol"].values() for trace in (found[0], strong)),
+                         strict=True):  # fmt: skip
+        assert each == pytest.approx(its, rel=1e-12)
+    np.testing.assert_allclose(pad.s, other.s, rtol=1e-12)
+    np.testing.assert_allclose(pad.F, other.F, rtol=0, atol=1e-6 * np.abs(other.F).max())
+    assert found[0].transitions.edge.tolist() == strong.transitions.edge.tolist()
+    for each in found[1:]:
+        np.testing.assert_array_equal(each.contact("pad").F, pad.F)
+        np.testing.assert_array_equal(each.transitions.t, found[0].transitions.t)
+
+
+def test_a_load_that_varies_agrees_with_scipy() -> None:
+    """LuGre under N = 2 + 1.5 sin(3 t), as equations of its own."""
+
+    def v(t: Any) -> Any:
+        return 0.2 * np.sin(t)
+
+    def flow(t: float, z: Any) -> Any:
+        s = (0.3 + 0.2 * np.exp(-((v(t) / 0.01) ** 2))) * (2.0 + 1.5 * np.sin(3.0 * t))
+        return v(t) - 10.0 * abs(v(t)) * z / s
+
+    t = np.linspace(0.0, 6.0, 61)
+    exact = solve_ivp(flow, (0.0, 6.0), [0.0], t_eval=t, rtol=1e-11, atol=1e-13, max_step=0.01)
+    trace = run(moved(LUGRE, "0.2*sin(t)", "2 + 1.5*sin(3*t)"), 6.0, rtol=1e-8, t_eval=t)
+    np.testing.assert_allclose(trace.contact("pad").z[:, 0], exact.y[0], rtol=0, atol=1e-7)
+
+
+def test_break_away_is_where_the_deflection_meets_the_loaded_threshold() -> None:
+    """At constant v, z = v t, and s = w S(v) (1 + t): they meet at w S / (v - w S)."""
+    model = GMS(PAPER, law="signed")
+    trace = run(moved(model, "1.0", "1 + t"), 3.0)
+    assert model.stribeck is not None
+    s = model.weights * float(model.stribeck(1.0))
+    np.testing.assert_allclose(np.sort(trace.transitions.t), np.sort(s / (1.0 - s)), rtol=1e-12)
+
+
+def test_a_load_below_the_least_one_counts_as_the_least_one() -> None:
+    trace = run(moved(GMS(PAPER, law="signed"), "0.0", "1 - t"), 3.0, t_eval=[0.5, 1.0, 2.0, 3.0])
+    np.testing.assert_allclose(trace.contact("pad").s[:, 0] / 1.5, [0.5, 1e-9, 1e-9, 1e-9])
+
+
+@pytest.mark.parametrize("name", ["s", "v", "t"])
+def test_what_the_contact_supplies_itself_is_refused(name: str) -> None:
+    with pytest.raises(ParameterError, match=f"inputs has '{name}', which the contact supplies"):
+        Contact("p", GMS(PAPER, law="signed"), inputs={name: "5"})
+
+
+def test_a_load_is_kept_in_a_file(tmp_path: Path) -> None:
+    system = moved(LUGRE, "0.2*sin(t)", "2 + 1.5*sin(3*t)")
+    again = System.load(system.save(tmp_path / "moved.toml"))
+    forces = [run(each, 2.0).contact("pad").F.tolist() for each in (system, again)]
+    assert forces[0] == forces[1]
+
+
+def test_a_load_without_a_curve_is_refused() -> None:
+    pad = Contact("p", CHARTS["dahl"], {"sigma_0": 1.0, "F_c": 1.0}, inputs={"N": "5"})
+    with pytest.raises(ParameterError, match="inputs has 'N', which its chart does not read"):
+        System("one", bodies=(Body("b", inertia=1.0),), contacts=(pad,))
+
+
+def test_an_input_x_is_the_position_that_the_contact_reads() -> None:
+    """The potential of Prandtl and Tomlinson, shifted by a tenth of a metre."""
+    model = demonstration(entry("prandtl-tomlinson"))
+
+    def trace(inputs: dict[str, str]) -> Any:
+        pad = Contact("pad", model, v="v", inputs=inputs)
+        return run(System("one", bodies=(Body("b", inertia=1.0),), contacts=(pad,)), 0.1)
+
+    assert trace({}).contact("pad").x[0] == 0.0
+    assert trace({"x": "x + 0.1"}).contact("pad").x[0] == 0.1
+    assert trace({"x": "x"}).contact("pad").F.tolist() == trace({}).contact("pad").F.tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES[1:])
+def test_a_friction_state_takes_the_load_and_gives_the_bits_of_a_record(engine: str) -> None:
+    """Also where velocity and load jump, together and alone."""
+    rng = np.random.default_rng(5)
+    for name in ("signed", "lugre"):
+        model, speed = MODELS[name]
+        t = np.linspace(0.0, 10.0, 41)
+        v0, v1 = speed * rng.normal(size=(2, 40))
+        N0, N1 = rng.uniform(1.0, 4.0, (2, 40))
+        v0[10:20], N0[20:30] = v1[9:19], N1[19:29]  # one of them goes on
+        v1[5], v1[25] = 0.0, 0.0
+        both = np.ravel(np.stack([t[:-1], t[1:]], axis=1))
+        records = {
+            key: Corners(both, np.ravel(np.stack(each, axis=1)), held=False)
+            for key, each in {"v": (v0, v1), "N": (N0, N1)}.items()
+        }
+        pad = Contact("pad", model, v="v", inputs={"N": "N"})
+        system = System("moved", bodies=(Body("body", velocity="v"),), contacts=(pad,),
+                        signals=records)  # fmt: skip
+        trace = run(system, 10.0, engine=engine)
+        state, log = FrictionState(pad, engine=engine), []
+        assert state.inputs == ("N",)
+        for j in range(40):
+            force = state.advance_to(v0[j], v1[j], t[j + 1], N=(N0[j], N1[j]))
+            log += [(each.t, each.element, each.edge) for each in state.switches]
+        assert force == trace.contact("pad").F[-1]
+        assert log == [(float(r.t), int(r.element), str(r.edge)) for r in trace.transitions]
+        assert log or name == "lugre"

@@ -1,0 +1,346 @@
+"""Locks are exact at rest, take no momentum by accident, and every impulse is accounted for.
+
+The closed forms are those of a momentum balance: an impact between two bodies with restitution e,
+on which a friction force of any size has no influence.
+"""
+
+import importlib.util
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gms_fsm import Body, Chart, Contact, LockError, State, System, Trace, Transition, simulate
+from gms_fsm.charts import CHARTS
+from gms_fsm.errors import ChartError
+from tests.helpers import FASTEST
+from tests.random_systems import bits
+
+ENGINES = ["ifelse", "machines", "compiled"]
+if not importlib.util.find_spec("llvmlite"):
+    ENGINES.remove("compiled")
+
+
+def mass(name: str, m: float, force: str = "0") -> Body:
+    return Body(name, inertia=repr(m), force=force, x=f"x_{name}", v=f"v_{name}")
+
+
+def pad(name: str, v: str, F_c: float, F_s: float) -> Contact:
+    return Contact(name, CHARTS["stiction"], {"F_c": F_c, "F_s": F_s, "b": 0.0}, v=v)
+
+
+def stop(name: str, v: str, x_s: float = 0.5, e: float = 0.6, v_r: float = 1e-3) -> Contact:
+    return Contact(name, CHARTS["end-stop"], {"x_s": x_s, "e": e, "v_r": v_r}, v=v)
+
+
+def edges(trace: Trace) -> list[tuple[str, str]]:
+    return [(str(row.contact), str(row.edge)) for row in trace.transitions]
+
+
+def everywhere(system: System, t_end: float, **how: Any) -> Trace:
+    """Run in all engines, which must agree to the bit."""
+    first, *others = [simulate(system, t_end, engine=engine, **how) for engine in ENGINES]
+    for other in others:
+        assert bits(other) == bits(first)
+    return first
+
+
+def kinetic(trace: Trace, masses: Mapping[str, float], row: int) -> float:
+    return sum(0.5 * m * trace.body(name).v[row] ** 2 for name, m in masses.items())
+
+
+# --------------------------------------------------------------------------- impacts
+def test_a_pad_does_not_swallow_the_velocity_after_an_impact() -> None:
+    bodies, contacts = [mass("a", 1.0)], [stop("stop", "v_a"), pad("pad", "v_a", 0.01, 0.01)]
+    system = System("thrown", bodies=bodies, contacts=contacts)
+    trace = everywhere(system, 3.0, initial={"v_a": 1.0, "pad.states": ["forward"]})
+    assert edges(trace) == [("stop", "bounce"), ("pad", "reverse_forward")]
+    v, t = np.sqrt(1.0 - 2 * 0.01 * 0.5), float(trace.transitions.t[0])
+    assert t == pytest.approx((1.0 - v) / 0.01, abs=1e-12)
+    assert trace.body("a").v[-1] == pytest.approx(-0.6 * v + 0.01 * (3.0 - t), abs=1e-9)
+
+
+@pytest.mark.parametrize("stiction", [2e-6, 0.3, 1e6])
+def test_a_stuck_pad_is_no_wall_whatever_its_stiction(stiction: float) -> None:
+    contacts = [stop("stop", "v_a - v_b"), pad("pad", "v_b", min(stiction, 1.0), stiction)]
+    system = System("struck", bodies=[mass("a", 1.0), mass("b", 1.0)], contacts=contacts)
+    trace = everywhere(system, 0.6, initial={"v_a": 1.0})
+    assert edges(trace)[:2] == [("stop", "bounce"), ("pad", "release_forward")]
+    at = np.flatnonzero(trace.t == trace.transitions.t[0])
+    assert trace.body("a").v[at[-1]] == pytest.approx(0.2, abs=1e-12)
+    assert trace.body("b").v[at[-1]] == pytest.approx(0.8, abs=1e-12)
+
+
+def test_a_stop_at_rest_carries_what_pushes_and_lets_go_of_what_pulls() -> None:
+    """A body rests on a stop; another one strikes it towards the stop, or away from it."""
+    for sign, last in ((1.0, [-0.6, 0.0]), (-1.0, [-0.2, -0.8])):
+        bodies = [mass("a", 1.0), mass("b", 1.0, "0.5")]
+        hit = stop("hit", f"{sign} * (v_a - v_b)", x_s=0.5)
+        system = System("rest", bodies=bodies, contacts=[hit, stop("wall", "v_b", x_s=0.0)])
+        start = {"v_a": sign, "wall.states": ["rest"]}
+        trace = everywhere(system, 0.5 + 1e-9, initial=start)
+        assert [edge for edge in edges(trace) if edge[1] == "lift"] == [("wall", "lift")] * (
+            sign < 0
+        )
+        found = [trace.body(name).v[-1] for name in "ab"]
+        assert found == pytest.approx(last, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["karnopp", "modelica", "stiction"])
+def test_an_impact_turns_every_stiction_of_the_zoo_round(kind: str) -> None:
+    entry = CHARTS[kind]
+    values = {
+        "karnopp": {"F_c": 0.1, "F_s": 0.2, "sigma_2": 0.0, "D": 1e-4},
+        "modelica": {
+            "mu_c": 0.1,
+            "mu_s": 0.2,
+            "v_s": 1e-3,
+            "delta": 2.0,
+            "peak": 1.0,
+            "sigma_2": 0.0,
+        },
+        "stiction": {"F_c": 0.1, "F_s": 0.2, "b": 0.0},
+    }[kind]
+    inputs = {"N": "1"} if kind == "modelica" else {}
+    friction = Contact("pad", entry, values, v="v_a", inputs=inputs)
+    system = System("turned", bodies=[mass("a", 1.0)], contacts=[stop("stop", "v_a"), friction])
+    trace = everywhere(system, 1.0, initial={"v_a": 1.0, "pad.states": ["forward"]})
+    assert edges(trace)[:2] == [("stop", "bounce"), ("pad", "reverse_forward")]
+    v = np.sqrt(1.0 - 2 * 0.1 * 0.5)
+    t = float(trace.transitions.t[0])
+    assert trace.body("a").v[-1] == pytest.approx(-0.6 * v + 0.1 * (1.0 - t), abs=1e-7)
+
+
+OLD = Chart(
+    "no way back",
+    (),
+    parameters=("F_c",),
+    states=(State("forward", outputs={"F": "F_c"}), State("stuck", locked=True)),
+    transitions=(
+        Transition("arrest", "forward", "stuck", "v < 0"),
+        Transition("release", "stuck", "forward", "F > F_c"),
+    ),
+)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_arrest_that_would_take_an_impact_is_refused(engine: str) -> None:
+    contacts = [stop("stop", "v_a"), Contact("pad", OLD, {"F_c": 0.1}, v="v_a")]
+    system = System("refused", bodies=[mass("a", 1.0)], contacts=contacts)
+    with pytest.raises(LockError) as caught:
+        simulate(system, 3.0, initial={"v_a": 1.0}, engine=engine)
+    assert caught.value.place == "contact 'pad', edge 'arrest'"
+    assert caught.value.t == pytest.approx(0.5132, abs=1e-4)
+    assert "impulse=True" in caught.value.advice
+    assert [str(each) for each in caught.value.trace.transitions.edge] == ["bounce"]
+
+
+def test_a_lock_that_is_moved_and_has_no_way_out_is_refused() -> None:
+    """It lets go of a large F > 0 only, and is struck the other way."""
+    contacts = [stop("stop", "v_b - v_a", x_s=0.5), Contact("pad", OLD, {"F_c": 0.1}, v="v_a")]
+    system = System("refused", bodies=[mass("a", 1.0), mass("b", 1.0)], contacts=contacts)
+    start = {"v_b": 1.0, "pad.states": ["stuck"]}
+    assert simulate(system, 3.0, initial=start).transitions.edge[1] == "release"
+    backward = System(
+        "refused", bodies=system.bodies, contacts=[stop("stop", "v_a - v_b"), contacts[1]]
+    )
+    trace = simulate(backward, 3.0, initial={**start, "v_b": -1.0})
+    assert [str(each) for each in trace.transitions.edge] == ["bounce"], "it carries the impulse"
+    assert trace.body("b").v[-1] == pytest.approx(0.6)
+
+
+def test_only_edges_into_locked_states_take_impulses() -> None:
+    states = (State("a", outputs={"F": "0"}), State("b", locked=True))
+    edge = Transition("e", "b", "a", "F > 1", impulse=True)
+    with pytest.raises(ChartError, match="'a' is not locked"):
+        Chart("wrong", states=states, transitions=(edge,))
+
+
+def test_a_belt_that_jumps_lets_its_load_slide() -> None:
+    belt = Body("belt", velocity="V", x="x_b", v="V")
+    for signal in (([0.0, 1.0, 1.0, 3.0], [0.5, 0.5, -0.5, -0.5]), "0.5 * sgn(1 - t)"):
+        system = System(
+            "belt",
+            bodies=[belt, mass("a", 1.0)],
+            signals={"V": signal},
+            contacts=[pad("pad", "v_a - V", 0.5, 0.7)],
+        )
+        trace = everywhere(system, 2.9, initial={"v_a": 0.5})
+        assert edges(trace) == [("pad", "release_forward")]
+        assert trace.transitions.t[0] == pytest.approx(1.0, abs=1e-12)
+        assert trace.body("a").v[-1] == pytest.approx(0.5 - 0.5 * 1.9, abs=1e-9)
+
+
+@pytest.mark.parametrize("pads", [False, True])
+def test_newtons_cradle_passes_the_impact_on(pads: bool) -> None:
+    """With restitution e nearly 1, the last ball leaves with ((1 + e) / 2)**3 of the velocity."""
+    e, names = 0.999, ["a", "b", "c", "d"]
+    contacts = [
+        stop(f"hit_{k}", f"v_{one} - v_{other}", x_s=0.0, e=e, v_r=1e-9)
+        for k, (one, other) in enumerate(pairwise(names))
+    ]
+    friction = [pad(f"pad_{name}", f"v_{name}", 0.1, 0.2) for name in names]
+    system = System(
+        "cradle", bodies=[mass(n, 1.0) for n in names], contacts=contacts + friction * pads
+    )
+    start = {"v_a": 1.0, "x_a": -0.1} | ({"pad_a.states": ["forward"]} if pads else {})
+    trace = everywhere(system, 0.1006, initial=start)
+    at = np.flatnonzero(trace.t == trace.transitions.t[0])[-1]
+    v = np.sqrt(1.0 - 2 * 0.1 * 0.1) if pads else 1.0
+    assert trace.body("d").v[at] == pytest.approx(v * (0.5 * (1 + e)) ** 3, rel=1e-9)
+    assert sum(trace.body(name).v[at] for name in names) == pytest.approx(v, rel=1e-12)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    m=st.lists(st.floats(0.1, 10.0), min_size=3, max_size=3),
+    v=st.lists(st.integers(-2000, 2000).map(lambda u: u / 1000), min_size=3, max_size=3),
+    ratio=st.floats(-3.0, 3.0).filter(lambda r: abs(r) > 0.1),
+    e=st.floats(0.0, 0.9),
+    F_s=st.floats(1e-6, 1e3),
+)
+def test_momentum_and_energy_of_every_impulse_are_accounted_for(
+    m: list[float], v: list[float], ratio: float, e: float, F_s: float
+) -> None:
+    names = ["a", "b", "c"]
+    contacts = [
+        stop("hit", "v_a - v_b", x_s=0.05, e=e),
+        pad("pad", "v_b", min(F_s, 0.5), F_s),
+        Contact("gear", CHARTS["dog-clutch"], {"t_on": 0.05, "t_off": 0.5}, v="v_b - r * v_c"),
+    ]
+    bodies = [mass(name, each) for name, each in zip(names, m, strict=True)]
+    system = System("audit", bodies=bodies, contacts=contacts, numbers={"r": ratio})
+    start = dict(zip(("v_a", "v_b", "v_c"), v, strict=True))
+    if v[1] != 0.0:
+        start["pad.states"] = ["forward" if v[1] > 0.0 else "backward"]
+    trace = simulate(system, 0.4, initial=start, engine=FASTEST)
+    rows: dict[str, dict[str, float]] = {
+        "hit": {"a": 1.0, "b": -1.0}, "pad": {"b": 1.0}, "gear": {"b": 1.0, "c": -ratio},
+    }  # fmt: skip
+    masses = dict(zip(names, m, strict=True))
+    for t, step in {(each.t, each.microstep) for each in trace.impulses}:
+        here = [each for each in trace.impulses if (each.t, each.microstep) == (t, step)]
+        (row,) = np.flatnonzero((trace.t == t) & (trace.microstep == step))
+        scale = max(abs(each) for each in v) * max(m)
+        for name in names:
+            taken = sum(rows[each.carrier].get(name, 0.0) * each.P for each in here)
+            change = masses[name] * (trace.body(name).v[row] - trace.body(name).v[row - 1])
+            assert change == pytest.approx(-taken, abs=1e-12 * scale)
+        lost = kinetic(trace, masses, row - 1) - kinetic(trace, masses, row)
+        assert lost == pytest.approx(sum(each.energy for each in here), abs=1e-11 * scale)
+        assert lost >= -1e-12 * scale
+        assert not any(each.carrier == "pad" for each in here), "stiction carries no impulse"
+
+
+def test_a_stuck_pad_beside_a_wall_carries_nothing_of_what_the_wall_takes() -> None:
+    for order in (1, -1):
+        locked = [stop("wall", "v_b", x_s=0.0), pad("pad", "v_b", 1.0, 2.0)][::order]
+        bodies = [mass("a", 1.0), mass("b", 1.0, "0.5")]
+        system = System("beside", bodies=bodies, contacts=[stop("hit", "v_a - v_b"), *locked])
+        start = {"v_a": 1.0, "wall.states": ["rest"], "pad.states": ["stuck"]}
+        trace = simulate(system, 0.6, initial=start, engine=FASTEST)
+        found = {str(each.carrier): float(each.P) for each in trace.impulses}
+        assert found == {"hit": pytest.approx(1.6), "wall": pytest.approx(1.6)}
+
+
+# --------------------------------------------------------------------------- rest
+def test_runs_of_locked_bodies_reach_their_end_in_few_steps() -> None:
+    three = System(
+        "three",
+        bodies=[mass(name, m, "3 * t") for name, m in (("a", 0.7), ("b", 2.3), ("c", 1.1))],
+        contacts=[
+            pad("p0", "v_a", 1.0, 1.5),
+            pad("p1", "v_b - v_a", 1.0, 1.5),
+            pad("p2", "v_c - v_b", 1.0, 1.5),
+            stop("stop", "v_b - v_a"),
+        ],
+    )
+    trace = everywhere(three, 0.1)
+    assert len(trace.t) < 30
+    assert trace.transitions.size == 0
+    assert not any(trace.body(name).v.any() for name in "abc")
+    trace = everywhere(three, 0.2)  # all loads together pull with 9 t, until it is 1.5 N
+    assert edges(trace) == [("p0", "release_forward")]
+    assert trace.transitions.t[0] == pytest.approx(1.5 / 9.0, abs=1e-12)
+
+
+def test_two_gears_on_the_same_bodies_hold_them_exactly_at_zero() -> None:
+    two = System(
+        "two",
+        bodies=[mass("a", 0.4, "-20 * x_a"), mass("b", 4.77, "sin(t)")],
+        contacts=[pad("p", "v_b - 3 * v_a", 4.0, 5.0), pad("q", "v_b - v_a", 4.0, 5.0)],
+    )
+    trace = everywhere(two, 10.0)
+    assert len(trace.t) < 100
+    assert not trace.rows.y.any(), "nothing has moved, not even by rounding"
+
+
+@pytest.mark.parametrize("first", ["belt", "ground"])
+def test_locks_that_contradict_each_other_are_no_scale_and_let_go(first: str) -> None:
+    """A body sticks to a belt that starts to move, and to the ground: it follows the belt."""
+    contacts = {
+        "belt": pad("belt", "v_a - v_w", 0.5, 0.7),
+        "ground": pad("ground", "v_a", 0.2, 0.3),
+    }
+    order = [contacts[first], *(each for name, each in contacts.items() if name != first)]
+    bodies = [Body("w", velocity="0.1 * sin(t)", x="x_w", v="v_w"), mass("a", 1.0)]
+    trace = everywhere(System("both at once", bodies=bodies, contacts=order), 2.0)
+    assert trace.body("a").v[-1] == pytest.approx(0.1 * np.sin(2.0), abs=1e-9)
+    assert trace.contact("belt").states[-1, 0] == "stuck"
+    assert trace.contact("ground").states[-1, 0] == "forward"
+
+
+BELT = ([0.0, 1.0, 1.3, 3.0], [0.0, 0.1, -1.0, -1.0])
+
+
+@pytest.mark.parametrize("method", ["dp45", "bs23", "rk4"])
+def test_a_slider_on_a_belt_is_released_once(method: str) -> None:
+    system = System(
+        "belt",
+        bodies=[Body("belt", velocity="V", x="x_b", v="V"), mass("a", 1.0)],
+        signals={"V": BELT},
+        contacts=[pad("pad", "v_a - V", 0.5, 0.7)],
+    )
+    step = {"step": 3.7e-3} if method == "rk4" else {}
+    trace = everywhere(system, 2.9, method=method, **step)
+    assert edges(trace) == [("pad", "release_forward")]
+    assert trace.transitions.t[0] == pytest.approx(1.0, abs=1e-12)
+    stuck = trace.states[:, 0] == "stuck"
+    assert (trace.v[stuck] == 0.0).all()
+    assert trace.body("a").v[-1] == pytest.approx(0.1 - 0.5 * 1.9, abs=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [3.0, -0.7, 0.3])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_geared_locks_log_no_ghosts(ratio: float, rtol: float) -> None:
+    """A gear and a belt hold three bodies; the load rises until one of them lets go."""
+    system = System(
+        "gears",
+        bodies=[
+            Body("belt", velocity="W * cos(3 * t)", x="x_w", v="v_w"),
+            mass("a", 1.0), mass("b", 2.0), mass("c", 0.5, "0.3 * t"),
+        ],
+        numbers={"W": 0.01, "r": ratio},
+        contacts=[
+            pad("p", "v_a - v_w", 4.0, 5.0),
+            pad("q", "v_b - r * v_a", 4.0, 5.0),
+            pad("s", "0.7 * v_c - v_b", 0.4, 0.5),
+        ],
+    )  # fmt: skip
+    trace = simulate(system, 2.0, rtol=rtol, initial=_on_the_belt(ratio), engine=FASTEST)
+    log = edges(trace)
+    assert log[0] == ("s", "release_forward")
+    assert len(log) == 1
+    before = trace.t < trace.transitions.t[0]
+    w = 0.01 * np.cos(3 * trace.t[before])
+    for name, share in (("a", 1.0), ("b", ratio), ("c", ratio / 0.7)):
+        np.testing.assert_allclose(trace.body(name).v[before], share * w, rtol=0, atol=1e-17)
+    assert not trace.contact("q").v.any()
+
+
+def _on_the_belt(ratio: float) -> dict[str, float]:
+    return {"v_a": 0.01, "v_b": 0.01 * ratio, "v_c": 0.01 * ratio / 0.7}

@@ -1,0 +1,49 @@
+"""Random systems agree with an exact reference; `tests.exact_systems` draws many more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tests import exact_systems
+from tests.exact_systems import trial, verdict
+
+SEED, SHAPES, COUNT = 7, 40, 40
+
+
+@pytest.mark.slow
+def test_what_is_well_conditioned_is_right() -> None:
+    trials = [trial(SEED, index, SHAPES) for index in range(COUNT)]
+    found = [verdict(one, engine="ifelse") for one in trials]
+    wrong = [
+        f"{each.kind}: {each.what}; repeat with: {one.again}"
+        for one, each in zip(trials, found, strict=True)
+        if each.kind not in ("right", "ill-conditioned", "no answer")
+    ]
+    assert not wrong, "\n".join(wrong)
+    assert sum(each.kind == "right" for each in found) > 0.9 * COUNT
+    assert sum(each.transitions for each in found) > 5 * COUNT
+
+
+def test_the_same_arguments_give_the_same_system() -> None:
+    one, same, other = (trial(SEED, index, SHAPES) for index in (3, 3, 3 + SHAPES))
+    assert one.plain == same.plain
+    assert [each.kind for each in one.plain.touches] == [each.kind for each in other.plain.touches]
+    assert one.plain.masses != other.plain.masses
+
+
+@pytest.mark.slow
+def test_another_motion_is_found() -> None:
+    one = trial(SEED, 0, SHAPES)
+    assert verdict(one, engine="ifelse").kind == "right"
+    heavier = replace(one.plain, masses=[1.0001 * m for m in one.plain.masses])
+    other, _ = exact_systems.as_system(heavier)
+    found = verdict(replace(one, system=other), engine="ifelse")
+    assert found.kind in ("wrong times", "wrong end", "wrong sequence"), found
+
+
+def test_a_run_that_stops_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exact_systems, "run", lambda trial, **how: (None, "StepLimitError: 1"))
+    found = verdict(trial(SEED, 0, SHAPES))
+    assert (found.kind, found.what) == ("failed", "StepLimitError: 1")
