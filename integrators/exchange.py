@@ -32,7 +32,7 @@ from integrators.loop import (
     Machines,
     run_to_event,
 )
-from integrators.sliding import Functions, Held, flow_on, look, margins_on
+from integrators.sliding import Functions, Held, flow_on, follow_on, look, margins_on
 from integrators.step_size import INFINITY
 from integrators.stepping import Clocks, next_tick
 from integrators.steps import LATEST, Motion, T, Vector
@@ -112,7 +112,7 @@ def _quiet(
 ) -> int:
     """Run the loop until a solver would have to go on."""
     counts, plan, clock = b.memory.counts, b.plan, b.now.clock
-    motion = Motion(flow_on, margins_on, Held(functions, b.now.held, b.sliding))
+    motion = Motion(flow_on, margins_on, Held(functions, b.now.held, b.sliding), follow_on)
     event = ROWS
     while event != ADVANCE:
         event = run_to_event(functions, machines, motion, b, 1)

@@ -66,7 +66,7 @@ class Motion(NamedTuple):
     flow: Flow
     margins: Margins
     p: Any
-    follow: Follow = stays
+    follow: Follow
 
 
 class Now(NamedTuple):

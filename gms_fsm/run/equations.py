@@ -253,7 +253,7 @@ class FrictionEquations:
         b.now.clock[PAUSE] = t
         functions, switch = made.functions(located=True), IfElse(program)
         taken: list[Switch] = []
-        motion = Motion(functions.flow, functions.margins, functions.p)
+        motion = Motion(functions.flow, functions.margins, functions.p, functions.follow)
         while (event := run_to_event(functions, switch, motion, b, 1)) != PAUSED:
             if event == FIRED:
                 machine, edge = b.memory.counts[MACHINE], b.memory.counts[EDGE]
