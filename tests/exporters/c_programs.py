@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm import GMSError, Model, Prescribed, System, Trace, export, simulate
+from gms_fsm import GMSError, Model, Prescribed, Settings, System, Trace, export, simulate
 from gms_fsm.exporters import Subject
 from gms_fsm.exporters._c import Engine, engine_of
+from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Corners
 
 FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
@@ -68,6 +69,7 @@ def same_bits(
     # What ticks at the very end of a run does not tick in it, but it does in a call.
     wanted, options = t[:-1], {"t_eval": t[:-1], "output": "t_eval"}
     trace: Trace | None
+    settings = Settings()
     if isinstance(given, System):
         records = {name: Corners(t, each, held=False) for name, each in inputs.items()}
         given = replace(given, signals={**given.signals, **records})
@@ -76,13 +78,23 @@ def same_bits(
             # Steps end at the rows of a record; without one, give one that nobody reads.
             rows = {} if inputs else {"nothing": Corners(t, 0.0 * t, held=False)}
             stopped = replace(given, signals={**given.signals, **rows})
-            trace = simulate(stopped, t[-1], t_start=t[0], initial=initial, **options)
+            # What a step knows of the forces to come is another floor: give both the same.
+            places = Start.of(stopped, None, t[-1], t_start=t[0], initial=initial)
+            floor = places.options.floor
+            if floor is not None:
+                names = places.program.layout.y.shared
+                known = {name: each for name, each in zip(names, floor, strict=False) if each}
+                settings = Settings(atol=known)
+            trace = simulate(
+                stopped, t[-1], t_start=t[0], initial=initial, settings=settings, **options
+            )
         else:
             trace = simulate(given, Prescribed((t, inputs["v"])), t[-1], **options)
     except GMSError:
         trace = None
-    export(given, "c99", folder, name="it", initial=initial, t_start=t[0])
-    made = engine_of(Subject.of(given, "c99", name="it", initial=initial, t_start=t[0]))
+    begun: Any = {"name": "it", "initial": initial, "t_start": t[0], "settings": settings}
+    export(given, "c99", folder, **begun)
+    made = engine_of(Subject.of(given, "c99", **begun))
     for compiler in compilers:
         found = run(built(folder, "it", compiler), t, **inputs)
         if trace is None:

@@ -62,6 +62,7 @@ def texts_of(chart: Chart) -> dict[str, Any]:
         "exit": {state.name: state.exit for state in chart.states},
         "state_outputs": {state.name: state.outputs for state in chart.states},
         "locked": [state.name for state in chart.states if state.locked],
+        "impulses": [edge.name for edge in chart.transitions if edge.impulse],
         "guards": {edge.name: edge.guard for edge in chart.transitions},
         "actions": {edge.name: edge.actions for edge in chart.transitions},
     }
