@@ -24,6 +24,7 @@ from integrators import (
     advance,
     columns,
     crossings,
+    jolts,
     loop,
     seizing,
     sliding,
@@ -73,6 +74,8 @@ __all__ = [
     "stepper",
 ]
 
+# What is translated: the loop, and what it calls.
+LOOPS = (steps, step_size, crossings, advance, sliding, seizing, jolts, loop, columns, stepping)
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8
 
@@ -180,12 +183,11 @@ def edition() -> str:
     >>> len(edition())
     16
     """
-    loops = (steps, step_size, crossings, advance, sliding, seizing, loop, columns, stepping)
     front = (sources, work, bindings, passing, expressions, statements, translate)
     tools = (*front, values, tree, layouts, llvm, objects)
     functions: list[Callable[..., Any]] = []
     constants: list[tuple[str, Any]] = []
-    for module in (*loops, *tools):
+    for module in (*LOOPS, *tools):
         for name, found in vars(module).items():
             value = getattr(found, "__wrapped__", found)  # inside a cache
             if isinstance(value, FunctionType) and value.__module__ == module.__name__:
@@ -195,8 +197,8 @@ def edition() -> str:
                 functions += [each for each in members if isinstance(each, FunctionType)]
             if isinstance(value, int | float | str) and not name.startswith("__"):
                 constants.append((name, value))
-            elif isinstance(value, dict) and all(isinstance(u, str | bool) for u in value.values()):
-                constants.append((name, sorted(value.values())))
+            elif isinstance(value, dict) and {*map(type, value.values())} in ({str}, {bool}):
+                constants.append((name, sorted(value.values())))  # an empty one is filled later
             else:
                 constants.append((name, getattr(value, "_fields", None)))
     return digest(*functions, text=repr((sys.version, constants)))

@@ -187,14 +187,15 @@ def store() -> Store | None:
 
 
 def notify(text: str) -> None:
-    """Print a message about a slow step to stderr.
+    """Print a message about a slow step to stderr, if somebody waits there.
 
     Parameters
     ----------
     text : str
         What is being compiled, or how long that took.
     """
-    print(f"gms-fsm: {text}", file=sys.stderr)
+    if sys.stderr.isatty():
+        print(f"gms-fsm: {text}", file=sys.stderr)
 
 
 def observe_rows(

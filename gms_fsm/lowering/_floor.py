@@ -11,6 +11,7 @@ from gms_fsm.language import evaluate
 from gms_fsm.lowering._locks import ENDLESS
 from gms_fsm.lowering._observing import armed, observe, rate
 from gms_fsm.lowering.program import Program
+from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import System
 
 __all__ = ["floor_of"]
@@ -32,13 +33,16 @@ def floor_of(
     The forces over the masses, for the whole run, give the largest motion there can be. What locks
     leave of a motion that they hold lies below its rounding, and is no scale.
     """
-    places, bodies = program.layout.y, system.bodies
+    places, bodies = program.layout.y, system.shape.assembly.free
     scaleless = [name for each in bodies for name in (each.x, each.v) if name in places.shared]
     scaleless = [name for name in scaleless if atol[places.index(name)] == 0.0]
     if not scaleless:
         return None
     start, end = span
-    most = max(_fastest(system, program, start + part * (end - start), y, mode) for part in LOOKS)
+    # A user's own function is not asked ahead of time.
+    asked = any(isinstance(each, Function) for each in system.signals.values())
+    looks = [start + part * (end - start) for part in LOOKS[: 1 if asked else None]]
+    most = max(_fastest(system, program, t, y, mode) for t in looks)
     speeds = {each.v for each in bodies}
     floor = [*atol]
     for name in scaleless:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.run.start import Start
-from integrators import FOR_A_GUARD, FOR_A_SIGN, WAITING, hybrid, loop
+from integrators import FOR_A_GUARD, FOR_A_SIGN, LET_GO, WAITING, hybrid, loop
 from integrators.advance import NEXT_KNOT, NEXT_TIME
 from integrators.steps import T
 
@@ -80,6 +80,7 @@ def bounds_of(start: Start, b: hybrid.Buffers, t_end: float = np.inf) -> dict[st
         "watch": (0, FOR_A_SIGN | FOR_A_GUARD | WAITING),
         "truth": (0, 1),
         "due": (0, 1),
+        "jolt": (0, LET_GO),
         "counts": (counts[0], counts[1]),
         "cursor": (cursor[0], cursor[1]),
         "which": (0, most_surfaces),

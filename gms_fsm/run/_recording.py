@@ -55,6 +55,7 @@ __all__ = [
 ]
 
 SHRINKING = 4  # intervals that must shrink alike before they are said to shrink without end
+STEEP = 0.01  # ratio of each second interval below which there are fewer, and fewer will do
 CLEAR = 1e6  # ticks of the clock: shorter intervals are known too roughly
 ALIKE = 0.01  # largest difference of their ratios, relative to what is missing to 1
 
@@ -370,11 +371,12 @@ def _shrinking(times: FloatArray) -> tuple[float, float] | None:
     times = np.unique(times)
     gaps = np.diff(times)
     clear = np.flatnonzero(gaps > CLEAR * np.spacing(times[1:]))
-    for last in clear[:SHRINKING:-1].tolist():  # rounding of the state blurs the shortest
-        seen = gaps[last - SHRINKING : last + 1]
+    for last in clear[:2:-1].tolist():  # rounding of the state blurs the shortest
+        seen = gaps[max(last - SHRINKING, 0) : last + 1]
         ratios = seen[2:] / seen[:-2]
         square = float(np.median(ratios))
-        alike = square < 1.0 and np.abs(ratios - square).max() < ALIKE * (1.0 - square)
+        largest = 1.0 if len(seen) > SHRINKING else STEEP
+        alike = square < largest and np.abs(ratios - square).max() < ALIKE * (1.0 - square)
         if alike and gaps[last:].max() == gaps[last]:
             rest = (gaps[last - 1] + gaps[last]) * square / (1.0 - square)
             return math.sqrt(square), float(times[last + 1] + rest)

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 SHIPPED = sorted((ROOT / "scenarios").glob("*.toml"))
 # Systems with the number of their transitions; tests/zoo and tests/systems run them.
 SYSTEMS = {
-    "ball_screw_table": 137,
+    "ball_screw_table": 312,
     "belt_driven_mass": 124,
     "brake_squeal": 54,
     "drill_string": 25,

@@ -17,7 +17,7 @@ import pytest
 
 pytest.importorskip("llvmlite")
 
-from integrators import advance, columns, crossings, loop, sliding, step_size, stepping
+from integrators import advance, columns, crossings, loop, seizing, sliding, step_size, stepping
 from integrators.compiled import INLINE
 from integrators.machine_code import llvm, objects
 from integrators.machine_code.c99 import c99_text
@@ -514,7 +514,7 @@ def test_an_error_names_the_line(function, line):
 
 def test_what_is_said_about_putting_inline_is_said_about_functions_that_exist():
     """Those of the loop are in its modules, the others in every generated program."""
-    modules = (advance, columns, crossings, loop, sliding, step_size, stepping)
+    modules = (advance, columns, crossings, loop, seizing, sliding, step_size, stepping)
     known = {name for module in modules for name in vars(module)}
     program = {"arm", "flow", "flow_live", "jolts", "normal", "observe", "switch", "tick"}
     assert INLINE.keys() - known == program

@@ -16,6 +16,10 @@ from integrators.steps import ERROR_BEFORE, T_STOP, H, Motion, T
 from integrators.tableaux import DP45, RK4
 
 
+def nothing_follows(t: float, y: list, mode: list, held: list, p: None) -> None:
+    """Set no component: none is determined by others."""
+
+
 class _Run:
     """A run of y' = slope(t, y), y(0) = 1, without machines, called directly."""
 
@@ -59,7 +63,7 @@ class _Run:
         method = RK4 if step else DP45
         options = Options(method, step, tolerance, [tolerance], max_step, 0.0, 10**6, True, times)
         self.b: Buffers = buffers(equations, origin, [1.0], [], 100.0, options, capacity)
-        self.motion, self.y = Motion(flow, margins, None), self.b.now.y
+        self.motion, self.y = Motion(flow, margins, None, nothing_follows), self.b.now.y
         self.b.now.clock[T], self.b.now.f[0] = t, slope(t, 1.0)
         if margin is not None:
             w = self.b.relations

@@ -13,6 +13,7 @@ import random
 import subprocess
 import sys
 import textwrap
+import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -38,8 +39,10 @@ pytest.importorskip("llvmlite", reason="needs the extra fast")
 OPEN_LOOP = Prescribed("0.2*sin(2*pi*t/20)")
 NOTE = "gms-fsm: compiling, once for each chart and method"
 
-# A whole run, by both engines. With an empty cache this takes some 4 s.
+# A whole run, by both engines. With an empty cache this takes some 4 s, which a terminal explains.
 RUN = """
+    import sys
+    sys.stderr.isatty = lambda: True
     from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     rig = Prescribed("0.2*sin(2*pi*t/20)")
@@ -52,6 +55,7 @@ RUN = """
 # One function of one program: a second. The velocities are chosen so that a mix-up is visible.
 ROWS = """
     import sys
+    sys.stderr.isatty = lambda: True
     import numpy as np
     from gms_fsm import GMS, GMSParameters, Prescribed
     from gms_fsm.lowering import _compiled as compiled
@@ -112,6 +116,11 @@ def test_the_first_process_compiles_and_says_so(warm: tuple[Path, str]) -> None:
     folder, said = warm
     assert NOTE in said, "the wait is explained"
     assert sorted(path.name.partition("-")[0] for path in _kept(folder)) == ["each_row", "record"]
+
+
+def test_where_nobody_waits_nothing_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    compiled.notify("compiling ...")
+    assert capsys.readouterr() == ("", "")
 
 
 def test_two_processes_that_start_at_once_both_succeed(tmp_path: Path) -> None:
@@ -290,6 +299,12 @@ def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
         "a limit": lambda: patch.setattr(loop, "MOST_SWITCHES", 99),
         "Python": lambda: patch.setattr(sys, "version", "4.0"),
     }
+
+
+def test_the_edition_covers_every_module_whose_functions_are_translated() -> None:
+    named = [each for module in machine.LOOPS for each in vars(module).values()]
+    modules = {each.__module__ for each in named if isinstance(each, types.FunctionType)}
+    assert modules <= {module.__name__ for module in machine.LOOPS}
 
 
 def test_changed_source_changes_the_edition() -> None:

@@ -35,7 +35,7 @@ def located(*functions, t=0.0, h=1.0, strict=None):
     for j in range(r):
         w.watch[j], w.truth[j], w.start[j] = 1, truth[j], low[j]
         w.active.append(j)
-    path = Path(Motion(None, margins, None), [], interpolate, None, t, t + h, t + h, [1.0])
+    path = Path(Motion(None, margins, None, None), [], interpolate, None, t, t + h, t + h, [1.0])
     return first_change(path, w, RESOLUTION * h)
 
 

@@ -30,7 +30,7 @@ def ball(e: float) -> ChartModel:
     return ChartModel(chart, {"e": e})
 
 
-@pytest.mark.parametrize("e", [0.01, 0.2, 0.5, 0.8, 0.95])
+@pytest.mark.parametrize("e", [0.005, 0.01, 0.2, 0.5, 0.8, 0.95])
 def test_the_factor_is_the_restitution_and_the_end_the_sum_of_all_flights(e: float) -> None:
     with pytest.raises(LivelockError) as caught:
         simulate(ball(e), Slider(1.0, str(GRAVITY)), 100.0, initial={"v": -THROWN}, engine="ifelse")
