@@ -303,8 +303,9 @@ def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
 
 def test_the_edition_covers_every_module_whose_functions_are_translated() -> None:
     named = [each for module in machine.LOOPS for each in vars(module).values()]
-    modules = {each.__module__ for each in named if isinstance(each, types.FunctionType)}
-    assert modules <= {module.__name__ for module in machine.LOOPS}
+    functions = [each for each in named if isinstance(each, types.FunctionType)]
+    modules = {each.__module__ for each in functions} - {"typing"}  # NamedTuple
+    assert modules == {module.__name__ for module in machine.LOOPS}
 
 
 def test_changed_source_changes_the_edition() -> None:
