@@ -57,6 +57,18 @@ def run(program: Path, t: np.ndarray, **inputs: np.ndarray) -> Output:
     return Output(columns, switches, done.stderr)
 
 
+def known_floors(
+    system: System, t: np.ndarray, initial: Mapping[str, Any] | None = None
+) -> Settings:
+    """Return settings whose tolerances are what a run knows of forces to come, and a step not."""
+    places = Start.of(system, None, t[-1], t_start=t[0], initial=initial)
+    floor = places.options.floor
+    if floor is None:
+        return Settings()
+    names = places.program.layout.y.shared
+    return Settings(atol={name: each for name, each in zip(names, floor, strict=False) if each})
+
+
 def same_bits(
     given: Model | System,
     folder: Path,
@@ -78,13 +90,7 @@ def same_bits(
             # Steps end at the rows of a record; without one, give one that nobody reads.
             rows = {} if inputs else {"nothing": Corners(t, 0.0 * t, held=False)}
             stopped = replace(given, signals={**given.signals, **rows})
-            # What a step knows of the forces to come is another floor: give both the same.
-            places = Start.of(stopped, None, t[-1], t_start=t[0], initial=initial)
-            floor = places.options.floor
-            if floor is not None:
-                names = places.program.layout.y.shared
-                known = {name: each for name, each in zip(names, floor, strict=False) if each}
-                settings = Settings(atol=known)
+            settings = known_floors(stopped, t, initial)
             trace = simulate(
                 stopped, t[-1], t_start=t[0], initial=initial, settings=settings, **options
             )

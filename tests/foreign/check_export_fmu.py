@@ -20,11 +20,12 @@ import pytest
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
 
-from gms_fsm import Body, Contact, FrictionState, Prescribed, System, simulate
+from gms_fsm import Body, Contact, FrictionState, Prescribed, Settings, System, simulate
 from gms_fsm.charts.karnopp import KARNOPP
 from gms_fsm.charts.registry import registered
 from gms_fsm.systems.models import ChartModel, demonstration
 from tests.exporters.c_cases import CASES, case
+from tests.exporters.c_programs import known_floors
 from tests.exporters.fmus import (
     END,
     FORMATS,
@@ -165,13 +166,15 @@ def test_co_simulation_on_random_records(name: str, form: str, tmp_path: Path, r
     given, t, inputs = case(name, 3)
     t = np.arange(t.size) * 2.0 ** np.round(np.log2(t[-1] / (t.size - 1)))  # exact lines
     inputs = {key: np.round(each * 2**30) / 2**30 for key, each in inputs.items()}
+    known: dict[str, Settings] = {}
     if isinstance(given, System):
         signals = {key: (t, each) for key, each in inputs.items()}
         given = replace(given, signals={**given.signals, **signals})
-        trace, seen = simulate(given, t[-1], t_eval=t), f"{given.contacts[0].name}.F"
+        known["settings"] = known_floors(given, t)
+        trace, seen = simulate(given, t[-1], t_eval=t, **known), f"{given.contacts[0].name}.F"
     else:
         trace, seen = simulate(given, Prescribed((t, inputs["v"])), t[-1], t_eval=t), "F"
-    slave = Slave(written(given, form, tmp_path, name="it"))
+    slave = Slave(written(given, form, tmp_path, name="it", **known))
     force = slave.run(t, [seen], **inputs)[:, 0]
     np.testing.assert_array_equal(force[:-1], trace.F[1:-1])
     ran(form, FMPY, f"{name} on a random record, Co-Simulation", "all bits of F")
