@@ -27,7 +27,7 @@ from integrators.advance import (
     raise_floor,
     tick_at,
 )
-from integrators.crossings import FOR_A_GUARD, FOR_A_SIGN, Watched, listed
+from integrators.crossings import FOR_A_GUARD, FOR_A_SIGN, JUST_BELOW, Watched, listed
 from integrators.jolts import (
     JUMPED,
     LET_GO,
@@ -394,6 +394,9 @@ def _rearm(plan: Plan, on: Held, now: Now, relations: Watched, counts: list[int]
                 watch[first + 2 * c] = watch[first + 2 * c + 1] = 1
             w = _list(relations, counts)
             margins_on(t, y, mode, on, watch, w.start)
+    for k in range(len(surfaces.sign)):
+        if surfaces.machine[k] < 0:
+            w.above[surfaces.above[k]], w.above[surfaces.at_least[k]] = 0.0, JUST_BELOW
     for r in w.active:
         g = w.start[r]
         w.truth[r] = g > w.above[r]
@@ -404,6 +407,9 @@ def _rearm(plan: Plan, on: Held, now: Now, relations: Watched, counts: list[int]
                 # A guard that is false on the surface itself turns true just after it.
                 if not watch[r] & FOR_A_GUARD or w.start[r] != 0.0:
                     w.truth[r] = sign > 0.0
+                    # A difference of large velocities may stay 0 for some ticks.
+                    if w.start[r] == 0.0:
+                        w.above[r] = JUST_BELOW if sign > 0.0 else 0.0
     if _undefined(w):
         counts[PHASE] = AFTER
         counts[STATUS] = NOT_FINITE

@@ -121,6 +121,7 @@ class Arc:
     place: Mapping[tuple[int, int, str], int]  # (contact, element, comparison) -> row
     watched: tuple[int, ...]
     accelerations: np.ndarray
+    broken: np.ndarray  # (locks, N): what locks that repeat others ask of them in vain, must be 0
 
 
 # --------------------------------------------------------------------------- edges
@@ -326,6 +327,8 @@ class Simulation:
             hold = np.linalg.solve(self.W[np.ix_(kept, kept)], goal)
             F[kept] = hold
             a -= self.inverse[:, None] * (self.Jf[kept].T @ hold)
+        others = [c for c in self.locked() if c not in kept]
+        broken = self.Jf[others] @ a + self.J[others][:, self.free :] @ driven
         A[self.bodies : self.bodies + self.free] = a
         A[self.bodies + self.free : 2 * self.bodies] = driven
         place, rows = {}, []
@@ -345,7 +348,7 @@ class Simulation:
         for k in range(1, ORDER + 1):
             taylor[k] = A @ taylor[k - 1] * (h / k)
         margins = R @ taylor
-        return Arc(h, taylor, R, margins, np.abs(margins), place, watched, a)
+        return Arc(h, taylor, R, margins, np.abs(margins), place, watched, a, broken)
 
     def _force(self, c: int, touch: Touch, A: np.ndarray) -> np.ndarray:
         """Return the force of a contact that is not locked, and write the flow of its elements."""
@@ -561,6 +564,8 @@ class Simulation:
             count += 1
             if count > MOST_MICROSTEPS:
                 raise Undecided(f"at t = {self.t!r}: {self.run.firings[-8:]}")
+        if np.any(np.abs(self.arc().broken @ self.s) > 1e-9):
+            raise Undecided(f"at t = {self.t!r}: locks contradict one another")
         if len(self.run.firings) > MOST_EVENTS:
             raise Endless(f"{MOST_EVENTS} events until t = {self.t!r}")
 

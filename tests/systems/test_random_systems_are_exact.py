@@ -26,6 +26,11 @@ def test_what_is_well_conditioned_is_right() -> None:
     assert sum(each.transitions for each in found) > 5 * COUNT
 
 
+def test_a_slip_at_its_limit_ends_where_large_velocities_differ_by_nothing() -> None:
+    found = verdict(trial(77, 379, exact_systems.SHAPES), engine="ifelse")
+    assert found.kind == "right", found
+
+
 def test_the_same_arguments_give_the_same_system() -> None:
     one, same, other = (trial(SEED, index, SHAPES) for index in (3, 3, 3 + SHAPES))
     assert one.plain == same.plain
