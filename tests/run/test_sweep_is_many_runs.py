@@ -742,5 +742,5 @@ def test_memory_grows_with_the_results_only() -> None:
     (few, few_rows), (many, many_rows) = peak(50), peak(500)
     steps = len(simulate(model, rig, 20.0, engine="compiled", rtol=1e-9))
     all_rows = 450 * steps * 8 * (2 + 6 + 4)
-    allowed = 2 * (many_rows - few_rows) + 450 * 1000
+    allowed = 2 * (many_rows - few_rows) + 450 * 2000  # of bookkeeping, per run
     assert many - few < allowed < 0.1 * all_rows
