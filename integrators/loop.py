@@ -376,15 +376,13 @@ def _rearm(plan: Plan, on: Held, now: Now, relations: Watched, counts: list[int]
     if len(surfaces.sign) > 0:
         begins = t == plan.control.origin and sliding.which[-1] == 0
         if begins and repels(on, now, w):
-            counts[PHASE] = AFTER
-            counts[STATUS] = ENTANGLED
+            counts[PHASE], counts[STATUS] = AFTER, ENTANGLED
             return NOTHING
         slid = seize(on, now, w)
         functions.follow(t, y, mode, held, p)
         count = sliding.which[-1]
         if count > 1 and entangled(on, t, y, mode):
-            counts[PHASE] = AFTER
-            counts[STATUS] = ENTANGLED
+            counts[PHASE], counts[STATUS] = AFTER, ENTANGLED
             return NOTHING
         if count > 0:
             first = len(watch) - 2 * len(sliding.sigma)

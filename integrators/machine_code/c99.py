@@ -376,6 +376,7 @@ class _Writer:
             type_ = _TYPES["f" if op == "float" else "i"]
             return f"({type_}){self.value(expr.operands[0], _UNARY)}", _UNARY
         names = {"abs": "fabs" if kind == "f" else "abs_i", "sqrt": "sqrt", "%": "mod_i"}
+        names["copysign"] = "copysign"
         names |= {"//": "div_i", "min": f"min_{kind}", "max": f"max_{kind}"}
         return f"{names[op]}({', '.join(map(self.value, expr.operands))})", _WHOLE
 

@@ -369,8 +369,8 @@ def _known_call(work: Work, function: Any, parts: list[Expr]) -> Expr:
         return Callback(function.number, tuple(as_kind(work, each, "f") for each in parts))
     if function in FOREIGN:
         return Foreign(FOREIGN[function], tuple(as_kind(work, each, "f") for each in parts))
-    if function is math.sqrt:
-        return Op("f", "sqrt", (as_kind(work, parts[0], "f"),))
+    if function in (math.sqrt, math.copysign):
+        return Op("f", function.__name__, tuple(as_kind(work, each, "f") for each in parts))
     if function is float:
         return as_kind(work, parts[0], "f")
     if function is int:

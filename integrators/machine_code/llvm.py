@@ -80,6 +80,7 @@ def llvm_text(module: Module) -> str:
     if module.callbacks:
         lines.append(f"@callbacks = global [{module.callbacks} x ptr] zeroinitializer")
     lines += ["declare double @llvm.sqrt.f64(double)", "declare double @llvm.fabs.f64(double)"]
+    lines += ["declare double @llvm.copysign.f64(double, double)"]
     for name, count in foreign.items():
         arguments = ", ".join(["double"] * count)
         lines.append(f"declare double @{name}({arguments}) nounwind memory(none)")
@@ -416,9 +417,10 @@ class _Writer:
         if kind == "f":
             if op == "neg":
                 return self.new(f"fneg double {a}")
-            if op in ("abs", "sqrt"):
+            if op in ("abs", "sqrt", "copysign"):
                 name = "fabs" if op == "abs" else op
-                return self.new(f"call double @llvm.{name}.f64(double {a})")
+                given = ", ".join(f"double {each}" for each in parts)
+                return self.new(f"call double @llvm.{name}.f64({given})")
             return self.new(f"{_FLOATS[op]} double {a}, {b}")
         if op == "neg":
             return self.new(f"sub i64 0, {a}")

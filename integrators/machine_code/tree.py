@@ -86,8 +86,8 @@ class Op:
     """An operation on evaluated operands.
 
     ``+ - * /``, integer ``// % & | ^ << >>``, comparisons, ``neg``, ``not``, ``abs``, ``sqrt``,
-    ``min`` and ``max`` (as Python's: the first operand unless the second is smaller or larger),
-    ``float`` and ``int`` (conversions).
+    ``copysign``, ``min`` and ``max`` (as Python's: the first operand unless the second is smaller
+    or larger), ``float`` and ``int`` (conversions).
     """
 
     kind: str
