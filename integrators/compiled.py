@@ -24,6 +24,7 @@ from integrators import (
     advance,
     columns,
     crossings,
+    elementary,
     jolts,
     loop,
     seizing,
@@ -75,7 +76,10 @@ __all__ = [
 ]
 
 # What is translated: the loop, and what it calls.
-LOOPS = (steps, step_size, crossings, advance, sliding, seizing, jolts, loop, columns, stepping)
+LOOPS = (
+    elementary, steps, step_size, crossings, advance, sliding, seizing, jolts, loop, columns,
+    stepping,
+)  # fmt: skip
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8
 

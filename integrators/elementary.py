@@ -65,11 +65,11 @@ def _in_four(value: int) -> tuple[float, ...]:
 
 def _odd_series(top: int, bottom: int, sign: int, bits: int = BITS) -> int:
     """Return atanh (sign 1) or atan (sign -1) of a ratio, times 2**bits."""
-    total, power, k = 0, (abs(top) << bits) // bottom, 0
-    while power:
-        term = power // (2 * k + 1)
-        total += term if sign > 0 or k % 2 == 0 else -term
-        power, k = power * top * top // (bottom * bottom), k + 1
+    total, term, k = 0, (abs(top) << bits) // bottom, 0
+    while term:
+        part = term // (2 * k + 1)
+        total += part if sign > 0 or k % 2 == 0 else -part
+        term, k = term * top * top // (bottom * bottom), k + 1
     return total if top > 0 else -total
 
 
@@ -88,10 +88,10 @@ def _roots() -> tuple[tuple[float, float], ...]:
     root = 2 << BITS
     for _ in range(5):
         root = math.isqrt(root << BITS)
-    rows, power = [], 1 << BITS
+    rows, value = [], 1 << BITS
     for _ in range(32):
-        rows.append(_in_two(power))
-        power = power * root >> BITS
+        rows.append(_in_two(value))
+        value = value * root >> BITS
     return tuple(rows)
 
 

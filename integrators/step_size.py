@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from integrators.elementary import power
 from integrators.steps import SEEN, T_STOP, Motion, Now, Scratch, T, Vector
 
 __all__ = [
@@ -199,7 +200,7 @@ def retry_factor(error: float, order: int) -> float:
     """
     if not error < INFINITY:
         return LEAST
-    factor: float = SAFETY * error ** (-1.0 / order)
+    factor: float = SAFETY * power(error, -1.0 / order)
     return max(LEAST, factor)
 
 
@@ -263,5 +264,5 @@ def starting_step(
     if not d2 < INFINITY:
         return LEAST * h  # the trial step went too far
     steepest = max(time_scale * d1, time_scale * time_scale * d2)
-    better = 1e-3 * h if steepest <= 1e-15 else time_scale * (0.01 / steepest) ** (1.0 / order)
+    better = 1e-3 * h if steepest <= 1e-15 else time_scale * power(0.01 / steepest, 1.0 / order)
     return min(100.0 * h, better, longest)

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import STRIBECK, FloatArray, checked_values
 from gms_fsm.language import Value, parse_value, values_of
+from integrators import elementary
 
 __all__ = ["Stribeck", "dip_of", "flat_of", "stribeck_text"]
 
@@ -205,7 +206,7 @@ def flat_of(F_c: float, F_s: float, v_s: float, delta: float) -> float:
     share = (F_s - F_c) / F_c * FINEST
     if not share < INFINITY:
         return INFINITY
-    width: float = math.log(max(share, 1.0)) ** (1.0 / delta)
+    width: float = elementary.power(elementary.log(max(share, 1.0)), 1.0 / delta)
     return width * v_s * (1.0 + 1e-9)
 
 

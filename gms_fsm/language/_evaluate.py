@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gms_fsm.language._fold import fold
-from gms_fsm.language._functions import COMPARISONS, FUNCTIONS, OPERATIONS
+from gms_fsm.language._functions import COMPARISONS, FUNCTIONS, NAMESPACE, OPERATIONS
 from gms_fsm.language._powers import product_power
 from gms_fsm.language._tree import Binary, Both, Call, Either, Negative, Node, Not, Relation
 
@@ -60,7 +59,7 @@ class _Numbers:
     def power(self, node: Binary, parts: Iterator[float]) -> float:
         whole = product_power(node.left, node.right)
         if whole is None:
-            return math.pow(*parts)
+            return NAMESPACE["pow"](*parts)
         if whole == 0:
             return 1.0
         product = factor = next(parts)

@@ -7,6 +7,8 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from integrators import elementary
+
 __all__ = [
     "COMPARISONS",
     "CONSTANTS",
@@ -45,23 +47,22 @@ def sgn(u: float) -> float:
     return 0.0
 
 
-# Scalar functions on purpose: numpy's array exp sometimes differs from math.exp in the last bit,
-# and the readable and the compiled engine must agree bit for bit.
+# Our own, not those of `math` or NumPy: these differ in the last bit between C libraries.
 FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "abs": abs,
-    "exp": math.exp,
-    "log": math.log,
+    "exp": elementary.exp,
+    "log": elementary.log,
     "sqrt": math.sqrt,
     "sgn": sgn,
     "min": min,
     "max": max,
-    "sin": math.sin,
-    "cos": math.cos,
-    "tanh": math.tanh,
-    "atan": math.atan,
-    "asinh": math.asinh,
+    "sin": elementary.sin,
+    "cos": elementary.cos,
+    "tanh": elementary.tanh,
+    "atan": elementary.atan,
+    "asinh": elementary.asinh,
 }
-NAMESPACE: Mapping[str, Callable[..., float]] = {**FUNCTIONS, "pow": math.pow}  # of printed code
+NAMESPACE: Mapping[str, Callable[..., float]] = {**FUNCTIONS, "pow": elementary.power}
 CONSTANTS: Mapping[str, float] = {"pi": math.pi}
 SEVERAL = ("min", "max")  # functions of two or more arguments; the others take one
 ROUGH = ("sgn", "abs", "min", "max")  # functions whose flow has a corner or a jump

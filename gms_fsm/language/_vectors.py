@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.language._evaluate import evaluate
 from gms_fsm.language._fold import fold
-from gms_fsm.language._functions import COMPARISONS, FUNCTIONS, OPERATIONS
+from gms_fsm.language._functions import COMPARISONS, FUNCTIONS, NAMESPACE, OPERATIONS
 from gms_fsm.language._powers import product_power
 from gms_fsm.language._tree import (
     Binary,
@@ -130,7 +130,7 @@ class _Arrays:
     def power(self, node: Binary, parts: Iterator[Any]) -> Any:
         factor, whole = next(parts), product_power(node.left, node.right)
         if whole is None:
-            return self.one_by_one(math.pow, factor, next(parts))
+            return self.one_by_one(NAMESPACE["pow"], factor, next(parts))
         if whole == 0:
             return np.float64(1.0)
         product = factor

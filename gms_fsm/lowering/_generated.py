@@ -13,7 +13,7 @@ import hashlib
 import inspect
 import linecache
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import CodeType, SimpleNamespace
 from typing import Any
 
@@ -23,6 +23,7 @@ from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.language import NAMESPACE
 from gms_fsm.language._parser import PARSER
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
+from integrators import elementary
 
 __all__ = ["bare", "ieee", "load", "load_careful", "standalone"]
 
@@ -124,9 +125,59 @@ def standalone(source: str) -> str:
         )
     borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
     parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []
-    parts += ["\n" + bare(known[name]) for name in missing if name not in borrowed]
+    ours = {
+        name for name in missing if getattr(known[name], "__module__", "") == elementary.__name__
+    }
+    if ours:
+        parts.insert(0, elementary_text(ours))
+    parts += ["\n" + bare(known[name]) for name in missing if name not in {*borrowed, *ours}]
     head, body = _split_head(source)
     return "\n".join([head, *parts, "\n" + body.lstrip("\n")])
+
+
+def elementary_text(names: Iterable[str]) -> str:
+    """Return the text of elementary functions of the language, and of all that they use.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Such as ``exp``; ``pow`` is one, too.
+
+    Returns
+    -------
+    str
+        Python text that depends only on the standard library.
+
+    Examples
+    --------
+    >>> program = {}
+    >>> exec(elementary_text(["pow"]), program)
+    >>> program["pow"](2.0, 0.5) == 2.0 ** 0.5
+    True
+    """
+    tree = _tree(inspect.getsource(elementary))
+    parts: dict[str, ast.stmt] = {}
+    for part in tree.body:
+        match part:
+            case ast.FunctionDef(name=name):
+                parts[name] = part
+            case ast.Assign(targets=targets):
+                for each in ast.walk(ast.Tuple(targets)):
+                    if isinstance(each, ast.Name):
+                        parts[each.id] = part
+    waiting = [NAMESPACE[name].__name__ for name in names]
+    used = set[ast.stmt]()
+    while waiting:
+        found = parts.get(waiting.pop())
+        if found is not None and found not in used:
+            used.add(found)
+            waiting += [each.id for each in ast.walk(found) if isinstance(each, ast.Name)]
+    lines = ["import math\n"]
+    for part in tree.body:
+        if part in used:
+            lines.append(("\n\n" if isinstance(part, ast.FunctionDef) else "") + _unannotated(part))
+    renamed = {NAMESPACE[name].__name__: name for name in names}
+    return "\n".join([*lines, *(f"\n{b} = {a}" for a, b in renamed.items() if a != b), ""])
 
 
 def _tree(source: str) -> ast.Module:
@@ -144,7 +195,10 @@ def _split_head(source: str) -> tuple[str, str]:
 
 def bare(function: Callable[..., Any]) -> str:
     """Return a function's text without annotations, with its docstring cut to the first line."""
-    tree = _tree(inspect.getsource(function))
+    return _unannotated(_tree(inspect.getsource(function))) + "\n"
+
+
+def _unannotated(tree: ast.AST) -> str:
     for node in ast.walk(tree):
         if isinstance(node, ast.arg):
             node.annotation = None
@@ -152,7 +206,7 @@ def bare(function: Callable[..., Any]) -> str:
             node.returns = None
             first = (ast.get_docstring(node) or "").partition("\n")[0]
             node.body[0] = ast.Expr(ast.Constant(first))
-    return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
+    return ast.unparse(ast.fix_missing_locations(tree))
 
 
 @functools.lru_cache(maxsize=256)
@@ -234,28 +288,16 @@ def _wide(argument: Any) -> Any:
     return argument
 
 
-def _without_raising(
-    function: Callable[..., float], replacement: Callable[..., Any]
-) -> Callable[..., Any]:
-    """Return a function of `math` that falls back on NumPy where it would raise."""
-
-    def computed(*arguments: Any) -> Any:
-        try:
-            return np.float64(function(*arguments))
-        except (ArithmeticError, ValueError):
-            return replacement(*map(np.float64, arguments))
-
-    return computed
+def _wide_result(function: Callable[..., float]) -> Callable[..., Any]:
+    """Return a function whose result does not raise when it is used."""
+    return lambda *arguments: np.float64(function(*map(float, arguments)))
 
 
 _IEEE: Mapping[str, Callable[..., Any]] = {
-    "exp": _without_raising(math.exp, np.exp),
-    "log": _without_raising(math.log, np.log),
-    "sqrt": _without_raising(math.sqrt, np.sqrt),
-    "sin": _without_raising(math.sin, np.sin),
-    "cos": _without_raising(math.cos, np.cos),
-    "tanh": _without_raising(math.tanh, np.tanh),
-    "atan": _without_raising(math.atan, np.arctan),
-    "asinh": _without_raising(math.asinh, np.arcsinh),
-    "pow": _without_raising(math.pow, np.power),
+    **{
+        name: _wide_result(function)
+        for name, function in NAMESPACE.items()
+        if function.__module__ == elementary.__name__
+    },
+    "sqrt": np.sqrt,
 }

@@ -45,11 +45,9 @@ __all__ = [
     "operation", "steady", "value",
 ]  # fmt: skip
 
-FOREIGN: Mapping[Any, str] = {
-    getattr(math, name): name
-    for name in ("exp", "log", "sin", "cos", "tan", "tanh", "sinh", "cosh", "atan", "asinh", "pow",
-                 "atan2", "asin", "acos", "nextafter")
-}  # fmt: skip
+# Called as the C library has it, which is exact. What is rounded there differs from one library to
+# the next; instead of exp, sin ... of `math` there are those of `integrators.elementary`.
+FOREIGN: Mapping[Any, str] = {math.nextafter: "nextafter"}
 _OPERATORS: Mapping[type[ast.AST], tuple[str, Callable[[Any, Any], Any]]] = {
     ast.Add: ("+", operator.add),
     ast.Sub: ("-", operator.sub),
@@ -245,7 +243,7 @@ def _power(work: Work, a: Expr, b: Expr) -> Expr:
         if isinstance(a, Const) and isinstance(b, Const) and b.value >= 0:
             return _constant(a.value**b.value)
         raise work.error("a power of integers is not part of the subset")
-    return Foreign("pow", (as_kind(work, a, "f"), as_kind(work, b, "f")))
+    raise work.error("a power of floats is not part of the subset: call elementary.power")
 
 
 def _minus(work: Work, expr: Expr) -> Expr:

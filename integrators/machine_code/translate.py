@@ -2,9 +2,9 @@
 
 The subset: numbers, arrays of one or two dimensions, named tuples (also new ones), ``for`` over
 ranges and arrays, ``while``, ``if``, the usual operators, ``abs``, ``min``, ``max``, ``len``, the
-functions of `math`, and calls of other functions of the subset, which may be passed as arguments.
-Integers have 64 bits. What a function does to numbers is exactly what Python does, operation by
-operation, except that nothing raises: a division by zero gives inf or NaN.
+functions of `integrators.elementary`, and calls of other functions of the subset, which may be
+passed as arguments. Integers have 64 bits. What a function does to numbers is exactly what Python
+does, operation by operation, except that nothing raises: a division by zero gives inf or NaN.
 
 A named tuple is never built in memory. Its fields are known while translating; a function that
 takes one is translated once for each kind of it, and receives the few addresses that its fields are
@@ -63,13 +63,13 @@ class Translator:
     Examples
     --------
     >>> from integrators.machine_code.values import Number
-    >>> from integrators.step_size import retry_factor
+    >>> from integrators.step_size import root_of
     >>> translator = Translator()
     >>> arguments = [Number(Local("f", "error")), Number(Local("i", "order"))]
-    >>> translator.entry("retry", retry_factor, arguments).results
+    >>> translator.entry("root", root_of, arguments).results
     'f'
     >>> [function.name for function in translator.module.functions]
-    ['retry_factor', 'retry']
+    ['root_of', 'root']
     """
 
     def __init__(self, inline: Mapping[str, bool] | None = None) -> None:

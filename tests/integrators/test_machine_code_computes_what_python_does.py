@@ -17,8 +17,19 @@ import pytest
 
 pytest.importorskip("llvmlite")
 
-from integrators import advance, columns, crossings, loop, seizing, sliding, step_size, stepping
+from integrators import (
+    advance,
+    columns,
+    crossings,
+    elementary,
+    loop,
+    seizing,
+    sliding,
+    step_size,
+    stepping,
+)
 from integrators.compiled import INLINE
+from integrators.elementary import asinh, atan, atan2, cos, exp, log, power
 from integrators.machine_code import llvm, objects
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.layout import Block, Column, Layout
@@ -99,8 +110,8 @@ def undefined(g):
 def functions(g):
     for j in range(len(g.out)):
         u = abs(g.x[j]) + 0.1
-        a = math.exp(-u) + math.log(u) + math.sin(g.x[j]) + math.cos(g.y[j]) + math.tanh(g.x[j])
-        g.out[j] = a + math.atan(u) + math.asinh(u) + math.sqrt(u) + u**0.5 + math.pow(u, 2.0)
+        a = exp(-u) + log(u) + elementary.sin(g.x[j]) + cos(g.y[j]) + elementary.tanh(g.x[j])
+        g.out[j] = a + atan(u) + asinh(u) + math.sqrt(u) + power(u, 0.5) + power(u, 2.0)
     return 0
 
 
@@ -209,7 +220,7 @@ def lengths(g):
 
 
 def signs_of(zero, out, j):
-    out[j] = 1.0 / (zero if zero < 0.0 else math.atan2(zero, -1.0))
+    out[j] = 1.0 / (zero if zero < 0.0 else atan2(zero, -1.0))
 
 
 def zeros(g):
@@ -219,7 +230,7 @@ def zeros(g):
     w = Window(g.x, 0.0, 0)
     if g.flags[0]:
         w = Window(g.x, -0.0, 0)
-    g.out[2] = math.atan2(w.factor, -1.0)
+    g.out[2] = atan2(w.factor, -1.0)
     return 0
 
 
