@@ -126,6 +126,8 @@ def _quarters() -> tuple[tuple[float, ...], ...]:
 ROOTS, LOGS, ANGLES, QUARTERS = _roots(), _logs(), _angles(), _quarters()
 LOW = tuple(2.0**k for k in range(-31, 32))
 HIGH = tuple(2.0 ** (32 * k) for k in range(-33, 32))
+GROWTH = tuple(2.0 ** (512 >> j) for j in range(10))
+DECAY = tuple(2.0 ** -(512 >> j) for j in range(10))
 STEP_HI, STEP_LO = _cut(LN2 >> 5, 37)  # ln 2 / 32
 STEPS = _ratio((32 << 2 * BITS) // LN2)
 LN2_HI, LN2_LO = _cut(LN2, 42)
@@ -172,13 +174,12 @@ def _ratio_of(a: float, b: float, c: float, d: float) -> tuple[float, float]:
 
 def _exponent(x: float) -> int:
     """Return k such that 2**(k - 1) <= x < 2**k, for a normal x."""
-    k, step = 1, 512
-    while step > 0:
-        if x >= _scaled(1.0, step):
-            x, k = _scaled(x, -step), k + step
-        elif x < _scaled(1.0, 1 - step):
-            x, k = _scaled(x, step), k - step
-        step = step >> 1
+    k = 1
+    for j in range(5 if 2e-5 < x < 6e4 else 0, 10):
+        if x >= GROWTH[j]:
+            x, k = x * DECAY[j], k + (512 >> j)
+        elif x < 2.0 * DECAY[j]:
+            x, k = x * GROWTH[j], k - (512 >> j)
     return k
 
 

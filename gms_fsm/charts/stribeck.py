@@ -175,7 +175,7 @@ def dip_of(v_s: float, delta: float) -> float:
     >>> round(dip_of(1e-3, 2.0), 6)
     0.0061
     """
-    width: float = DIP_WIDTH ** (GAUSSIAN / delta)
+    width: float = elementary.power(DIP_WIDTH, GAUSSIAN / delta)
     return width * v_s
 
 

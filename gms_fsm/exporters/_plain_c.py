@@ -20,7 +20,12 @@ from gms_fsm.exporters._plain_form import (
     plain_form,
 )
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import FUNCTIONS, Name, Node
+from gms_fsm.language import FUNCTIONS, NAMESPACE, Name, Node
+from gms_fsm.lowering._generated import ELEMENTARY
+from integrators.machine_code.c99 import c99_text
+from integrators.machine_code.translate import Translator
+from integrators.machine_code.tree import Local
+from integrators.machine_code.values import Number
 
 __all__ = ["C_WORDS", "plain_c", "plain_c_notes"]
 
@@ -43,7 +48,8 @@ C_WORDS = frozenset(
     """,
     )
 )
-LIBRARY = {name: f"{name}({{0}})" for name in FUNCTIONS if name not in ("sgn", "min", "max")}
+LIBRARY = {"abs": "fabs({0})", "sqrt": "sqrt({0})"}
+OWN = {name: 2 if name == "pow" else 1 for name in NAMESPACE if name in ELEMENTARY}  # arguments
 HELPERS = {
     "sgn": "(double u)\n{\n    return u > 0.0 ? 1.0 : u < 0.0 ? -1.0 : 0.0;\n}",
     "min": "(double a, double b)\n{\n    return b < a ? b : a;\n}",
@@ -103,8 +109,8 @@ def plain_c_notes(subject: Subject) -> str:
     F = {name}_plain_step(&friction, v, dt);    /* once a step */
 
 Each call looks at every guard once, returns the force, and then takes one explicit Euler step of
-length dt with this velocity. There is no heap and no global variable; math.h is used only where the
-friction law calls its functions. Compile it with any C99 compiler, for example
+length dt with this velocity. There is no heap and no global variable; exp, sin and the like are in
+the file itself and have the same bits on every platform. Compile it with any C99 compiler, such as
 
     gcc -std=c99 -O2 -ffp-contract=off -c {name}_plain.c
 
@@ -121,17 +127,14 @@ class _Printer:
     """Prints the plain form of a friction."""
 
     def __init__(self, subject: Subject) -> None:
-        words = {*C_WORDS, *LIBRARY, "fabs"}
+        words = {*C_WORDS, *FUNCTIONS, "fabs"}
         self.element = Element.of(subject, words)
         self.form: Plain = plain_form(self.element)
         self.name = f"{subject.name}_plain"
         self.refuse_own_names()
-        helpers = {
-            name: f"{self.name}_{name}({{0}}{', {1}' * (name != 'sgn')})" for name in HELPERS
-        }
-        self.notation = Notation(
-            " && ", " || ", "!", "1", {**LIBRARY, "abs": "fabs({0})", **helpers}, "pow({0}, {1})"
-        )
+        own = {name: f"{self.name}_{name}({{0}})" for name in (*OWN, *HELPERS)}
+        own |= {name: f"{self.name}_{name}({{0}}, {{1}})" for name in ("min", "max", "pow")}
+        self.notation = Notation(" && ", " || ", "!", "1", {**own, **LIBRARY}, own["pow"])
         # The machine's own names give way to those of the chart.
         self.me = self.element.free("friction")
         # One element needs no arrays and no loop.
@@ -213,14 +216,24 @@ class _Printer:
         ]
         if self.element.reference:
             lines.append(f"/* {_plain_text(self.element.reference)} */")
-        if any(re.search(rf"(?<!\w){each.split('(')[0]}\(", text) for each in (
-            *LIBRARY.values(), "fabs(", "pow(")):  # fmt: skip
+        used = [name for name in OWN if f"{self.name}_{name}(" in text]
+        if used:
+            lines.append(self.elementary(used))
+        elif any(f"{each.split('(')[0]}(" in text for each in LIBRARY.values()):
             lines += ["#include <math.h>", ""]
         lines += [f'#include "{self.name}.h"']
         for name, helper in HELPERS.items():
             if f"{self.name}_{name}(" in text:
                 lines += ["", f"static double {self.name}_{name}{helper}"]
         return "\n".join([*lines, "", *start, "", *body]) + "\n"
+
+    def elementary(self, names: Iterable[str]) -> str:
+        """Return the functions that are the same on every platform."""
+        translator = Translator()
+        for name in names:
+            numbers = [Number(Local("f", each)) for each in "xy"[: OWN[name]]]
+            translator.entry(f"{self.name}_{name}", NAMESPACE[name], numbers)
+        return c99_text(translator.module, [self.name, *self.element.names], hidden=True)
 
     def start(self) -> list[str]:
         element, lines = self.element, list[str]()

@@ -27,7 +27,7 @@ from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import NAMESPACE, Condition, Node, Value, parse_value, sgn, spell
 from gms_fsm.language._normal import renamed
-from gms_fsm.lowering._generated import bare
+from gms_fsm.lowering._generated import ELEMENTARY, bare, elementary_text
 from gms_fsm.run._steppable import other_inputs
 from gms_fsm.systems.system import LEAST_LOAD, LOAD, Contact, loaded
 
@@ -65,11 +65,13 @@ def _head(chart: Chart) -> str:
 def _imports(source: str) -> str:
     """Return the imports of a program, and the functions of the language that it uses."""
     used = [each for each in NAMESPACE if re.search(rf"(?<![\w.]){each}\(", source)]
-    borrowed = sorted({*(each for each in used if hasattr(math, each)), "sin"})
+    ours = [each for each in used if each in ELEMENTARY]
+    borrowed = ["sin", *(each for each in used if each not in ours and hasattr(math, each))]
     lines = ["", "import sys", f"from math import {', '.join(borrowed)}", ""]
     lines += ["from transitions import Machine", ""]
     if "sgn" in used:
         lines += ["", bare(sgn)]
+    lines += [elementary_text(ours)] if ours else []
     return "\n".join(lines) + "\n"
 
 

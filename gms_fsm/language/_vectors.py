@@ -1,14 +1,13 @@
 """Evaluation of a condition at many rows at once, bit for bit as row by row.
 
-Sums, products and comparisons round in numpy as they do in Python. Functions that do not (`exp`,
-`sin` ...) are computed with `math`, one number at a time. Where Python would raise (1/0), numpy
-continues with inf; such places are recorded and then decided by `evaluate`.
+Sums, products and comparisons round in numpy as they do in Python. `exp`, `sin` ... are those of
+`integrators.elementary`, in machine code where arrays are long. Where Python would raise (1/0),
+numpy continues with inf; such places are recorded and then decided by `evaluate`.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -29,6 +28,7 @@ from gms_fsm.language._tree import (
     Relation,
     Value,
 )
+from integrators import quick
 
 __all__ = ["truths", "values_of"]
 
@@ -130,7 +130,7 @@ class _Arrays:
     def power(self, node: Binary, parts: Iterator[Any]) -> Any:
         factor, whole = next(parts), product_power(node.left, node.right)
         if whole is None:
-            return self.one_by_one(NAMESPACE["pow"], factor, next(parts))
+            return quick.each(NAMESPACE["pow"], factor, next(parts))
         if whole == 0:
             return np.float64(1.0)
         product = factor
@@ -155,7 +155,7 @@ class _Arrays:
                 return np.where(others[0] < u, others[0], u)
             case "max":
                 return np.where(others[0] > u, others[0], u)
-        return self.one_by_one(FUNCTIONS[node.function], u, *others)
+        return quick.each(FUNCTIONS[node.function], u, *others)
 
     def relation(self, node: Relation, parts: Iterator[Any]) -> Any:
         return COMPARISONS[node.op](*parts)
@@ -173,20 +173,3 @@ class _Arrays:
 
     def either(self, _: Either, parts: Iterator[Any]) -> Any:
         return np.logical_or.reduce(np.broadcast_arrays(*parts))
-
-    def one_by_one(self, function: Callable[..., float], *arguments: Any) -> Any:
-        """Compute with the Python function; where it raises, store NaN and record the place."""
-        arrays = np.broadcast_arrays(*arguments)
-        shape, lists = arrays[0].shape, [array.ravel().tolist() for array in arrays]
-        try:
-            return np.array(list(map(function, *lists))).reshape(shape)
-        except (ArithmeticError, ValueError):
-            values = np.full(arrays[0].size, math.nan)
-        raised = np.zeros(values.size, dtype=np.bool_)
-        for i, numbers in enumerate(zip(*lists, strict=True)):
-            try:
-                values[i] = function(*numbers)
-            except (ArithmeticError, ValueError):
-                raised[i] = True
-        self.doubt(raised.reshape(shape))
-        return values.reshape(shape)

@@ -23,9 +23,22 @@ from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.language import NAMESPACE
 from gms_fsm.language._parser import PARSER
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
-from integrators import elementary
+from integrators import elementary, quick
 
-__all__ = ["bare", "ieee", "load", "load_careful", "standalone"]
+__all__ = [
+    "ELEMENTARY",
+    "bare",
+    "elementary_text",
+    "ieee",
+    "load",
+    "load_careful",
+    "quickened",
+    "standalone",
+]
+
+ELEMENTARY = frozenset(
+    name for name, each in NAMESPACE.items() if each.__module__ == elementary.__name__
+)
 
 
 def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -52,6 +65,37 @@ def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dic
     """
     namespace: dict[str, Any] = {**NAMESPACE, **(names or {})}
     exec(_compiled(title, source), namespace)
+    return namespace
+
+
+def quickened(namespace: dict[str, Any]) -> dict[str, Any]:
+    """Let a namespace replace its elementary functions by machine code when they are called often.
+
+    Parameters
+    ----------
+    namespace : dict
+        From `load`; changed in place.
+
+    Returns
+    -------
+    dict
+        The same.
+    """
+
+    def counted(name: str, function: Callable[..., float], count: int) -> Callable[..., float]:
+        left = quick.FREE
+
+        def call(*arguments: float) -> float:
+            nonlocal left
+            left -= 1
+            if left == 0:
+                namespace[name] = quick.scalar(function, count)
+            return function(*arguments)
+
+        return call
+
+    for name in ELEMENTARY:
+        namespace[name] = counted(name, NAMESPACE[name], 2 if name == "pow" else 1)
     return namespace
 
 
@@ -125,10 +169,7 @@ def standalone(source: str) -> str:
         )
     borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
     parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []
-    ours = {
-        name for name in missing if getattr(known[name], "__module__", "") == elementary.__name__
-    }
-    if ours:
+    if ours := ELEMENTARY.intersection(missing):
         parts.insert(0, elementary_text(ours))
     parts += ["\n" + bare(known[name]) for name in missing if name not in {*borrowed, *ours}]
     head, body = _split_head(source)
@@ -294,10 +335,6 @@ def _wide_result(function: Callable[..., float]) -> Callable[..., Any]:
 
 
 _IEEE: Mapping[str, Callable[..., Any]] = {
-    **{
-        name: _wide_result(function)
-        for name, function in NAMESPACE.items()
-        if function.__module__ == elementary.__name__
-    },
+    **{name: _wide_result(NAMESPACE[name]) for name in ELEMENTARY},
     "sqrt": np.sqrt,
 }

@@ -37,7 +37,7 @@ import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
-from gms_fsm.lowering._generated import ieee, load, load_careful
+from gms_fsm.lowering._generated import ieee, load, load_careful, quickened
 from gms_fsm.lowering._plan import Pair, Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
 from gms_fsm.lowering.layout import Layout
@@ -216,7 +216,8 @@ def _lowered(shape: _Shape) -> Program:
         "nan": math.nan,
     }
     names |= {f"{name}_signal": guarded(name, call) for name, call in callables.items()}
-    namespace, careful = load(plan.title, source, names), load_careful(plan.title, source, names)
+    namespace = quickened(load(plan.title, source, names))
+    careful = load_careful(plan.title, source, names)
     return Program(
         source=source,
         functions={name: namespace[name] for name in FUNCTIONS},

@@ -1,12 +1,13 @@
 """The printer of C99, for people and for other tools.
 
 Compiled without contraction (``-ffp-contract=off``) it computes the same bits as LLVM's machine
-code, if the mathematical functions come from the same library.
+code: nothing is called but sqrt, fabs, copysign and nextafter, which are exact.
 """
 
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 
 from integrators.machine_code.tree import (
@@ -129,8 +130,8 @@ def _structure(kinds: str) -> str:
 
 
 def _table(table: Table) -> str:
-    entries = ", ".join(map(number_text, table.values))
-    return f"static const double {table.name}[] = {{{entries}}};"
+    entries = textwrap.fill(", ".join(map(number_text, table.values)), 92)
+    return f"static const double {table.name}[] = {{\n{textwrap.indent(entries, '    ')}\n}};"
 
 
 def number_text(value: float) -> str:
