@@ -12,7 +12,8 @@ from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import Binary, comparisons, names_in, split
 from gms_fsm.lowering._plan import plan_of
-from gms_fsm.lowering.scales import SHARE, scales_of_system
+from gms_fsm.lowering.adapting import SHARE
+from gms_fsm.lowering.scales import scales_of_system
 from gms_fsm.run.start import Start
 from gms_fsm.systems.system import System
 from integrators.sliding import MOST_SLIDING
@@ -285,7 +286,7 @@ def _free(name: str, taken: Iterable[str]) -> str:
 
 def _sizes(start: Start) -> Mapping[str, float]:
     """Return the smallest scale of each name of the state vector, and of the velocities."""
-    sizes = scales_of_system(start.system).sizes
+    sizes = scales_of_system(start.program).sizes
     return {name: min((u for u in row if u > 0.0), default=0.0) for name, row in sizes.items()}
 
 

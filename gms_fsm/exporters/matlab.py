@@ -16,7 +16,8 @@ from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import Node, Relation, names_in
 from gms_fsm.lowering._plan import RoughCall, both_sides
-from gms_fsm.lowering.scales import SHARE, scales_of
+from gms_fsm.lowering.adapting import SHARE
+from gms_fsm.lowering.scales import scales_of
 
 __all__ = ["WORDS", "matlab"]
 

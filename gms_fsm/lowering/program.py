@@ -40,8 +40,10 @@ from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
 from gms_fsm.lowering._generated import ieee, load, load_careful, quickened
 from gms_fsm.lowering._plan import Pair, Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
+from gms_fsm.lowering.adapting import Adaptive, adaptive
 from gms_fsm.lowering.layout import Layout
 from gms_fsm.systems._numbers import numbers_of
+from gms_fsm.systems._texts import ByIdentity
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (
@@ -79,6 +81,8 @@ class Program:
         argument of all functions.
     layout : Layout
         The layout of the state vector, of the output of ``observe`` and of the modes.
+    plan : Plan
+        What the text was printed from.
     held : int
         Number of frozen signs.
     strict : list of bool
@@ -109,6 +113,7 @@ class Program:
     callables: Mapping[str, Callable[[float], float]]
     p: Arguments
     layout: Layout
+    plan: Plan = field(repr=False)
     held: int
     strict: list[bool]
     relations: list[str]
@@ -126,6 +131,11 @@ class Program:
     def calm(self) -> list[int]:
         """The argument that says that no velocity has jumped."""
         return [0] * self.layout.n
+
+    @property
+    def adaptive(self) -> Adaptive:
+        """The functions of what follows from the numbers."""
+        return _adaptive(ByIdentity(self.plan), ByIdentity(self.ieee))
 
     @property
     def live(self) -> list[float]:
@@ -225,6 +235,7 @@ def _lowered(shape: _Shape) -> Program:
         callables=callables,
         p=([], [], []),
         layout=plan.layout,
+        plan=plan,
         held=plan.held.size,
         strict=[relation.strict for relation, _ in plan.relations],
         relations=_relation_names(plan),
@@ -235,6 +246,13 @@ def _lowered(shape: _Shape) -> Program:
         discrete=[bit for bank in plan.read.banks for bit in [plan.read.bit(bank)] * bank.n],
         **_jolts(plan),
     )
+
+
+@functools.lru_cache(maxsize=64)
+def _adaptive(
+    plan: ByIdentity[Plan], functions: ByIdentity[Mapping[str, Callable[..., Any]]]
+) -> Adaptive:
+    return adaptive(plan.it, functions.it)
 
 
 def _jolts(plan: Plan) -> dict[str, Any]:

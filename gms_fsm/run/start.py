@@ -14,7 +14,6 @@ import integrators
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
-from gms_fsm.language import evaluate
 from gms_fsm.lowering._floor import floor_of
 from gms_fsm.lowering._pulses import waking_times
 from gms_fsm.lowering.layout import BankPlaces, Layout
@@ -29,7 +28,6 @@ from gms_fsm.systems.signals import Corners, Formula
 from gms_fsm.systems.system import Mounting, System, origin_of, system_of, with_model
 from gms_fsm.traces._firings import Firings
 from gms_fsm.traces.rows import Rows
-from gms_fsm.traces.scope import GuardValues, parameter_values
 from gms_fsm.traces.trace import Trace
 from integrators import Options
 
@@ -169,7 +167,7 @@ class Start:
         t_start, t_end = _times(t_start, t_end)
         _check_resolution(chosen, t_start, t_end)
         program = lower(system)
-        scales = scales_of_system(system)
+        scales = scales_of_system(program)
         default = scales.tolerances(chosen.rtol)
         tolerances, used = _tolerances(program.layout, chosen.atol, default)
         method = chosen.method
@@ -202,7 +200,7 @@ class Start:
             options = replace(options, max_steps=most)
         initial = {} if initial is None else initial
         y, mode = _initial(system, program, t_start, initial)
-        floor = floor_of(system, program, tolerances, (t_start, last), y, mode)
+        floor = floor_of(program, tolerances, (t_start, last), y, mode)
         options = replace(options, floor=floor)
         made: tuple[Any, Any] = origin_of(system) if isinstance(model, System) else (model, rig)
         return cls(
@@ -242,14 +240,14 @@ class Start:
             With the tolerances of the new model, and its entry of the default state.
         """
         system = with_model(self.system, model, rig)
-        scales = scales_of_system(system)
+        program, y = replace(self.program, p=arguments(system)), self.y
+        scales = scales_of_system(program)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
-        program, y = replace(self.program, p=arguments(system)), self.y
         if _enters(system):
             y, _ = _initial(system, program, self.t_start, self.initial)
         span = self.t_start, self.last
-        floor = floor_of(system, program, tolerances, span, y, self.mode)
+        floor = floor_of(program, tolerances, span, y, self.mode)
         return replace(
             self,
             system=system,
@@ -534,32 +532,21 @@ def _entered(
 
     What the initial values give stays.
     """
-    layout, out = program.layout, [0.0] * program.layout.shown.size
     if not _enters(system):
         return y
-    program.ieee["values"](t_start, y, mode, program.p, program.calm, out)
-    found: list[dict[str, Any]] = [{} for _ in mode]
-    GuardValues(layout).put(t_start, y, out, found)
-    new = list(y)
+    layout = program.layout
     for bank, contact in zip(layout.banks, system.contacts, strict=True):
         chart = contact.chart
-        steps = chart.assignments["entry", chart.default_state.name]
-        elements = zip(found[bank.elements], mode[bank.elements], strict=True)
-        for i, (seen, state) in enumerate(elements):
-            if state != 0:
-                continue
-            values = seen | parameter_values(contact, i)
-            for name, tree in steps.items():
-                if name in chart.velocities:
-                    raise ParameterError(
-                        f"the entry of the default state {chart.states[0].name!r} sets {name!r}",
-                        place=f"chart {chart.name!r}",
-                        advice="give the initial velocity instead",
-                    )
-                if bank.of(name) not in given:
-                    values[name] = new[layout.y.index(bank.of(name), i)] = float(
-                        evaluate(tree, values)
-                    )
+        for name in chart.assignments["entry", chart.default_state.name]:
+            if name in chart.velocities and 0 in mode[bank.elements]:
+                raise ParameterError(
+                    f"the entry of the default state {chart.states[0].name!r} sets {name!r}",
+                    place=f"chart {chart.name!r}",
+                    advice="give the initial velocity instead",
+                )
+    kept = [int(name in given) for name, _ in layout.y]
+    new = list(y)
+    program.adaptive.functions["enter"](t_start, new, [*layout.not_sliding(mode)], program.p, kept)
     return new
 
 
