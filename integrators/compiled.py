@@ -27,6 +27,7 @@ from integrators import (
     elementary,
     jolts,
     loop,
+    observing,
     seizing,
     sliding,
     step_size,
@@ -55,7 +56,7 @@ from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
 from integrators.machine_code.values import Number
-from integrators.sliding import Functions
+from integrators.sliding import Functions, Held, Sliding
 from integrators.stepping import Sample
 from integrators.steps import Coefficients
 
@@ -78,7 +79,7 @@ __all__ = [
 # What is translated: the loop, and what it calls.
 LOOPS = (
     elementary, steps, step_size, crossings, advance, sliding, seizing, jolts, loop, columns,
-    stepping,
+    stepping, observing,
 )  # fmt: skip
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8
@@ -121,14 +122,15 @@ class Step(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """The arguments of `each_row`."""
+    """The arguments of `integrators.observing.observe_rows`, without the last two."""
 
+    functions: Functions
     observe: Callable[..., Any]
+    held: Any
+    sliding: Sliding
     t: Any
     y: Any
     mode: Any
-    live: Any
-    p: Any
     seen: Any
     table: Any
 
@@ -505,41 +507,16 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
     return Run(functions, machines, b._replace(plan=plan, out=out), log, recorded)
 
 
-def each_row(observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, seen: Any, table: Any,
-             start: int) -> int:  # fmt: skip
-    """Observe many rows.
-
-    Parameters
-    ----------
-    observe, t, y, mode, live, p, seen, table
-        See `observer`; the table is filled with the observed values of each row, from one on.
-    start : int
-        The place of the first observed value that is kept.
-
-    Returns
-    -------
-    int
-        Their number.
-    """
-    for row in range(len(t)):
-        observe(t[row], y[row], mode[row], live, p, seen)
-        kept = table[row]
-        for k in range(len(kept)):
-            kept[k] = seen[start + k]
-    return len(t)
-
-
 def observer(
     text: str,
     observe: Callable[..., Any],
-    live: list[float],
-    p: Any,
+    on: Held,
     widths: tuple[int, int, int],
     calls: Sequence[Callable[[float], float]],
     store: Store | None,
     notify: Callable[[str], None],
 ) -> tuple[Engine, Rows]:
-    """Return machine code that observes many rows.
+    """Return `integrators.observing.observe_rows` as machine code for one system.
 
     Parameters
     ----------
@@ -547,30 +524,33 @@ def observer(
         As in `engine`.
     observe : callable
         ``observe(t, y, mode, signs, p, out)``.
-    live : list of float
-        The signs.
-    p : tuple of ndarray
-        Parameters.
+    on : Held
+        The system's functions, with arrays as parameters, and scratch space.
     widths : (int, int, int)
-        Number of states, of modes and of observed values.
+        Number of states, of modes of a row and of observed values.
 
     Returns
     -------
     Engine
-        To be called with a block, and with the place of the first observed value that is kept.
+        To be called with a block, the place of the first observed value that is kept, and the
+        number of rows.
     Rows
         The example that its block begins with.
     """
+    p: Any = on.functions.p
     shared, own, _ = p
     size, modes, seen = widths
+    table: Any = Column(table=True)
     rows = Rows(
+        functions=on.functions._replace(p=(shared, own, table)),
         observe=observe,
+        held=on.held,
+        sliding=on.sliding,
         t=Column(),
         y=Column("f", size),
         mode=Column("i", modes),
-        live=live,
-        p=(shared, own, Column(table=True)),
         seen=[0.0] * seen,
-        table=Column(table=True),
+        table=table,
     )
-    return _made(text, each_row, rows, ("start",), calls, store, notify), rows
+    extra = "start", "count"
+    return _made(text, observing.observe_rows, rows, extra, calls, store, notify), rows

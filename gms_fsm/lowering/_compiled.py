@@ -20,6 +20,7 @@ from gms_fsm._extras import missing
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.language._functions import sgn
 from gms_fsm.lowering._generated import load
+from gms_fsm.lowering._observing import held_of
 from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import Arguments, Program, guarded
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
@@ -219,6 +220,7 @@ def observe_rows(
     """
     made = _observer(program)
     block = made.block()
+    functions = block.contents.functions
     table = np.empty((t.size, len(kept)))
     shared, own, tables = packed(program.p)
     rows = block.contents._replace(
@@ -226,11 +228,11 @@ def observe_rows(
         y=np.ascontiguousarray(y),
         mode=np.ascontiguousarray(mode),
         table=table,
-        p=(*block.contents.p[:2], tables),
+        functions=functions._replace(p=(*functions.p[:2], tables)),
     )
-    rows.p[0][...], rows.p[1][...] = shared, own
+    functions.p[0][...], functions.p[1][...] = shared, own
     block.update(rows)
-    made.engine(block, kept.start)
+    made.engine(block, kept.start, t.size)
     made.take_back(block)
     return table
 
@@ -294,8 +296,7 @@ def _observer(program: Program) -> Prepared:
         made = compiled.observer(
             text_of(program),
             functions(program)["observe"],
-            program.live,
-            packed(program.p),
+            held_of(program, functions(program), packed(program.p)),
             (layout.y.size, layout.modes, layout.observed.size),
             _calls(program),
             store(),

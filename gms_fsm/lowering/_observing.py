@@ -8,7 +8,8 @@ by a number from -1 to 1.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import Program
 from integrators import Functions, Held, arm_on, look, sliding_scratch, slope_on
 
-__all__ = ["armed", "observe", "rate", "sigmas"]
+__all__ = ["armed", "held_of", "observe", "rate", "sigmas"]
 
 
 def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
@@ -42,8 +43,7 @@ def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> 
     if not any(mode[program.layout.slides]):
         program.ieee["observe"](t, y, mode, program.live, program.p, out)
     else:
-        on = _sliding(program, mode, [0.0] * program.held)
-        look(program.ieee["observe"], on, t, y, list(mode), out)
+        look(program.ieee["observe"], _on(program, mode), t, y, list(mode), out)
     return out
 
 
@@ -62,7 +62,7 @@ def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> l
     """
     found = [math.nan] * program.layout.surfaces
     if any(mode[program.layout.slides]):
-        on = _sliding(program, mode, armed(program, t, y, mode))
+        on = _on(program, mode)._replace(held=armed(program, t, y, mode))
         slope_on(on, t, y, list(mode), [0.0] * program.layout.y.size)
         for c in range(on.sliding.which[-1]):
             found[on.sliding.which[c]] = min(max(on.sliding.sigma[c], -1.0), 1.0)
@@ -82,10 +82,9 @@ def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> li
     list of float
         -1, 0 or 1; for sliding surfaces this is not yet their sigma.
     """
-    held = [0.0] * program.held
-    watch = [0] * len(program.strict)
-    arm_on(_sliding(program, mode, held), t, y, list(mode), watch)
-    return held
+    on = _on(program, mode)
+    arm_on(on, t, y, list(mode), on.sliding.watch)
+    return on.held
 
 
 def rate(
@@ -109,21 +108,43 @@ def rate(
     if not any(mode[program.layout.slides]):
         program.ieee["flow"](t, y, mode, held, program.p, dy)
     else:
-        slope_on(_sliding(program, mode, held), t, y, list(mode), dy)
+        slope_on(_on(program, mode)._replace(held=held), t, y, list(mode), dy)
     return np.array(dy)
 
 
-def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> Held:
-    """Return the program restricted to the surfaces that a row slides on."""
-    names = ("flow", "arm", "margins", "normal", "follow")
-    flow, arm, margins, normal, follow = (program.ieee[name] for name in names)
-    functions = Functions(flow, arm, margins, normal, follow, program.p)
+def held_of(program: Program, made: Mapping[str, Any], p: Any, flags: Sequence[int] = ()) -> Held:
+    """Return the functions of a program, and what it slides on, with scratch space of their own.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    made : mapping of str to callable
+        Its functions, by name.
+    p : tuple
+        Their parameters.
+    flags : sequence of int, optional
+        Whether the motion slides on each surface.
+
+    Returns
+    -------
+    Held
+        For `integrators.sliding`.
+    """
+    functions = Functions(
+        made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p
+    )
     sliding = sliding_scratch(
         program.surfaces,
         program.layout.y.size,
         program.held,
         len(program.strict),
         program.layout.observed.size,
-        mode[program.layout.slides],
+        flags,
     )
-    return Held(functions, held, sliding)
+    return Held(functions, [0.0] * program.held, sliding)
+
+
+def _on(program: Program, mode: Sequence[int]) -> Held:
+    """Return the program on the surfaces that a row slides on."""
+    return held_of(program, program.ieee, program.p, mode[program.layout.slides])

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SignalError
 from gms_fsm.lowering._compiled import observe_rows
-from gms_fsm.lowering._observing import armed, observe
+from gms_fsm.lowering._observing import held_of
 from gms_fsm.lowering.program import Program
 from gms_fsm.traces.rows import Rows
-from integrators import LIVE
+from integrators.observing import is_turn, observe_beside, observe_row
 
 __all__ = ["Observed"]
 
@@ -69,57 +70,30 @@ def _observed_rows(program: Program, rows: Rows, kept: range, *, compiled: bool)
     """Return the observed quantities at some places at all rows, shape (rows, kept)."""
     if compiled:
         try:
-            table = observe_rows(program, rows.t, rows.y, rows.mode, kept)
+            return observe_rows(program, rows.t, rows.y, rows.mode, kept)
         except SignalError:  # a Python function failed at some row
-            return _observed_rows(program, rows, kept, compiled=False)
-    else:
-        table = _one_by_one(program, rows, kept)
-    slides = rows.mode[:, program.layout.slides]
-    if slides.any():
-        if compiled:
-            slid = np.flatnonzero(slides.any(axis=1))
-            table[slid] = _one_by_one(program, rows.at(slid), kept)
-        _show_one_side(program, rows, kept, table)
-    return table
+            pass
+    return _one_by_one(program, rows, kept)
 
 
 def _one_by_one(program: Program, rows: Rows, kept: range) -> FloatArray:
     # With scalar functions, as in the run itself.
-    table = np.empty((len(rows), len(kept)))
-    modes = rows.mode.tolist()
-    for row, (t, y) in enumerate(zip(rows.t.tolist(), rows.y.tolist(), strict=True)):
+    table, seen = np.empty((len(rows), len(kept))), [0.0] * program.layout.observed.size
+    t, y, mode = rows.t.tolist(), rows.y.tolist(), rows.mode.tolist()
+    on, observe = held_of(program, program.ieee, program.p), program.ieee["observe"]
+    for row in range(len(rows)):
         try:
-            table[row] = observe(program, t, y, modes[row])[kept.start : kept.stop]
+            observe_row(observe, on, t[row], y[row], mode[row], seen)
+            table[row] = seen[kept.start : kept.stop]
         except SignalError:  # a Python function failed at this row
             table[row] = np.nan
+            on = held_of(program, program.ieee, program.p)  # it may be in the midst of a slide
+    if rows.mode[:, program.layout.slides].any():
+        rows_of: Any = table
+        for row in range(len(rows) - 1):
+            if is_turn(on.sliding, t, mode, row):
+                for each, side in ((row, 1), (row + 1, -1)):
+                    observe_beside(
+                        observe, on, t, y, mode, len(rows), each, side, seen, rows_of, kept.start
+                    )
     return table
-
-
-def _show_one_side(program: Program, rows: Rows, kept: range, table: FloatArray) -> None:
-    """Observe the rows next to a slide with the signs held by the arc they belong to.
-
-    These rows lie on the surface or a rounding error past it, so the sign computed from the state
-    is not the held one: before a slide it is that of the preceding arc, after it that of the
-    following arc. Where an edge fires at the same time, the row next to the slide belongs to no
-    arc, and is what the log has for that edge.
-    """
-    t, slid = rows.t, rows.mode[:, program.layout.slides]
-    of_signs = np.array(program.surfaces.machine) < 0  # of machines the modes say it
-    turns = np.flatnonzero((np.diff(slid, axis=0) != 0).any(axis=1) & (np.diff(t) == 0.0))
-    for turn in turns.tolist():
-        before, after = np.searchsorted(t, t[turn]) - 1, np.searchsorted(t, t[turn], "right")
-        change = np.diff(slid[turn : turn + 2], axis=0)[0]
-        for row, other, joined in ((turn, before, 1), (turn + 1, after, -1)):
-            changed = np.flatnonzero((change == joined) & of_signs)
-            of_an_arc = abs(other - row) == 1 and 0 <= other < len(rows)
-            if slid[row].any() or not changed.size or not of_an_arc:
-                continue
-            mode, signs = rows.mode[row].tolist(), program.live
-            held = armed(program, float(t[other]), rows.y[other].tolist(), mode)
-            for place in (program.surfaces.sign[k] for k in changed):
-                signs[place] = held[place] or LIVE
-            out = [0.0] * program.layout.observed.size
-            program.ieee["observe"](
-                float(t[row]), rows.y[row].tolist(), mode, signs, program.p, out
-            )
-            table[row] = out[kept.start : kept.stop]

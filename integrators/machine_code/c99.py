@@ -41,7 +41,7 @@ from integrators.machine_code.tree import (
     parts_of,
 )
 
-__all__ = ["c99_text", "number_text"]
+__all__ = ["Names", "Writer", "c99_text", "calls", "number_text"]
 
 _TYPES = {"f": "double", "i": "int64_t", "b": "bool", "p": "char *"}
 HEAD = """\
@@ -115,9 +115,9 @@ def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False)
         parts.append(f"double (*callbacks[{module.callbacks}])(double);")
     results = {f.name: f.results for f in module.functions}
     known = {*RESERVED.split(), *taken, *(table.name for table in module.tables)}
-    functions = _Names(known - {f.name for f in module.functions if f.entry})
+    functions = Names(known - {f.name for f in module.functions if f.entry})
     known |= {functions(f.name) for f in module.functions}
-    writers = [_Writer(f, results, functions, _Names(known)) for f in module.functions]
+    writers = [Writer(f, results, functions, Names(known)) for f in module.functions]
     parts += [each.text(static=hidden or not each.function.entry) for each in writers]
     text = "\n".join(parts)
     used = [each for name, each in HELPERS.items() if re.search(rf"\b{name}\b", text)]
@@ -165,7 +165,7 @@ def _result(kinds: str) -> str:
     return _TYPES[kinds] if kinds else "void"
 
 
-class _Names:
+class Names:
     """Names of C, each for one name of the module."""
 
     def __init__(self, taken: Iterable[str]) -> None:
@@ -195,7 +195,7 @@ RESERVED = """
 """
 
 
-def _calls(expr: Expr) -> bool:
+def calls(expr: Expr) -> bool:
     """Return whether an expression calls a function, which may have effects."""
     return any(isinstance(part, Invoke | Callback) for part in parts_of(expr))
 
@@ -211,11 +211,11 @@ def _loops(body: Iterable[Statement]) -> Iterator[For]:
             yield from _loops(each.orelse)
 
 
-class _Writer:
+class Writer:
     """Writes one function."""
 
     def __init__(
-        self, function: Function, results: dict[str, str], functions: _Names, locals_: _Names
+        self, function: Function, results: dict[str, str], functions: Names, locals_: Names
     ) -> None:
         self.function, self.results = function, results
         self.functions, self.name = functions, locals_
@@ -270,7 +270,7 @@ class _Writer:
         match statement:
             case Set(target=target, value=value):
                 if target.name in self.unread:
-                    return [f"{space}{self.value(value)};"] if _calls(value) else []
+                    return [f"{space}{self.value(value)};"] if calls(value) else []
                 return [f"{space}{self.name(target.name)} = {self.value(value)};"]
             case SetMany(targets=targets, call=call):
                 self.counter += 1
