@@ -10,39 +10,37 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gms_fsm._version import __version__
-from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
 from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._adapting import ADAPTED, adapting_of
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._plain_c import C_WORDS
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import names_in, spell
+from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import MOST_SWITCHES, arguments_of
 from gms_fsm.run.start import LATEST, Start
-from gms_fsm.systems._numbers import numbers_of
 from gms_fsm.systems.system import System
 from integrators.compiled import INLINE, is_known
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Block, Layout
 from integrators.machine_code.translate import Translator
-from integrators.machine_code.tree import Local
-from integrators.machine_code.values import Number
 from integrators.stepping import FULL_LOG, RESUMED, SWITCHES, step_to
 
 __all__ = [
     "PLACES",
+    "STEPPED",
     "TAKES",
     "TEMPLATES",
     "WORDS",
     "Engine",
     "check_entries",
-    "curves_of",
     "engine_of",
     "filled",
     "image_of",
@@ -54,6 +52,17 @@ TEMPLATES = Path(__file__).parent / "_templates"
 TAKES = ("initial", "t_start", "settings")  # what the engine uses
 WORDS = C_WORDS | {*FIELDS, "INFINITY", "NAN", "NULL"}
 BAD_ARGUMENT = -1
+STEPPED = "functions machines buffers sample"  # the arguments of a step, in the block
+
+
+class Stepped(NamedTuple):
+    """The arguments of both entries."""
+
+    functions: Any
+    machines: Any
+    buffers: Any
+    sample: Any
+    adapting: Adapting
 
 
 @dataclass(frozen=True)
@@ -168,7 +177,8 @@ class _Text:
 
     def __init__(self, made: Engine, start: Start, title: str) -> None:
         self.made, self.start, self.title, self.name = made, start, title, made.name
-        self.arguments = arguments_of(start)
+        step: tuple[Any, Any, Any, Any] = arguments_of(start)
+        self.arguments = Stepped(*step, adapting_of(start))
         self.layout = Layout(self.arguments, is_known)
 
     def header(self) -> str:
@@ -208,7 +218,7 @@ class _Text:
     def source(self) -> str:
         """Return the source."""
         name, made, place = self.name, self.made, self.layout.offset
-        counts, curves = place("sample.counts"), curves_of(self.start, self.layout)
+        counts = place("sample.counts")
         given = [
             f"    w[{place('sample.inputs') + 2 * k + j}].f = {each}{j};"
             for k, each in enumerate(made.inputs)
@@ -229,7 +239,7 @@ class _Text:
             name=name,
             title=safe(self.title),
             version=__version__,
-            engine=self._translated(bool(curves)),
+            engine=self._translated(),
             clock=place("buffers.now.clock"),
             shown=self._shown(),
             image=image_of(self.layout, self.arguments),
@@ -245,7 +255,7 @@ class _Text:
             switches=counts + SWITCHES,
             full_log=FULL_LOG,
             spans=" || ".join(spans),
-            curves=curves,
+            time_scale=place("buffers.plan.control.time_scale"),
             log_t=place("sample.t"),
             log_element=place("sample.machine"),
             log_edge=place("sample.edge"),
@@ -253,14 +263,11 @@ class _Text:
             messages="\n".join(messages),
         )
 
-    def _translated(self, curves: bool) -> str:
+    def _translated(self) -> str:
         """Return the functions of the integrator and of the system."""
         translator = Translator(INLINE)
-        translator.entry("step", step_to, list(self.layout.value.fields.values()))
-        if curves:
-            for each, function, count in (("dip", dip_of, 2), ("flat", flat_of, 4)):
-                numbers = [Number(Local("f", letter)) for letter in "abcd"[:count]]
-                translator.entry(each, function, numbers)
+        for name, function, parts in (("step", step_to, STEPPED), ("adapt", adapt, ADAPTED)):
+            translator.entry(name, function, [self.layout.part(each) for each in parts.split()])
         public = ("init", "advance", "advance_to", "get", "set", "switch", "edge", "message")
         own = [f"{self.name}_{each}" for each in (*public, "state", "word")]
         return c99_text(translator.module, [*own, "show", "is_number", "is_parameter"], hidden=True)
@@ -322,34 +329,6 @@ def image_of(layout: Layout, arguments: Any) -> str:
             truths = block.words[k : k + 1].view(np.bool_)
             lines += [f"    w[{k}].b[{j}] = true;{note}" for j in np.flatnonzero(truths)]
     return "\n".join(lines)
-
-
-def curves_of(start: Start, layout: Layout) -> str:
-    """Return C text that computes what depends on the numbers of Stribeck curves.
-
-    Parameters
-    ----------
-    start : Start
-        What is exported.
-    layout : Layout
-        Of the block, which the text calls ``w``.
-
-    Returns
-    -------
-    str
-        Calls of ``dip`` and ``flat``; empty if there is no curve.
-    """
-    shared, _ = numbers_of(start.system)
-    first, lines = layout.offset(PLACES["shared"]), []
-    where = {label: f"w[{first + k}].f" for k, label in enumerate(shared)}
-    for contact in start.system.contacts:
-        curve = f"{contact.name}.curve "
-        if f"{curve}v dip" in where:
-            F_c, F_s, v_s = (where[curve + each] for each in ("F_c", "F_s", "v_s"))
-            delta = where.get(f"{curve}delta", repr(GAUSSIAN))
-            lines.append(f"    {where[f'{curve}v dip']} = dip({v_s}, {delta});\n")
-            lines.append(f"    {where[f'{curve}v flat']} = flat({F_c}, {F_s}, {v_s}, {delta});\n")
-    return "".join(lines)
 
 
 PLACES: Mapping[str, str] = {

@@ -11,10 +11,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from gms_fsm._version import __version__
-from gms_fsm.charts.stribeck import dip_of, flat_of
-from gms_fsm.exporters._c import PLACES, TEMPLATES, curves_of, filled, image_of, safe
+from gms_fsm.exporters._adapting import ADAPTED, adapting_of
+from gms_fsm.exporters._c import PLACES, STEPPED, TEMPLATES, filled, image_of, safe
 from gms_fsm.exporters._fmu_variables import Variable, indicators_of, nominals_of, types_of
 from gms_fsm.exporters._subject import Subject
+from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import arguments_of
 from gms_fsm.systems.system import System
@@ -24,13 +25,12 @@ from integrators.exchange import Exchange
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Layout
 from integrators.machine_code.translate import Translator
-from integrators.machine_code.tree import Local
-from integrators.machine_code.values import Number, Record, Value
 
 __all__ = ["Both", "Model", "both_of"]
 
 ENTRIES: Mapping[str, tuple[Any, str]] = {
-    "step": (stepping.step_to, "functions machines buffers sample"),
+    "step": (stepping.step_to, STEPPED),
+    "adapt": (adapt, ADAPTED),
     "restart": (stepping.restart, "buffers sample.clocks"),
     "settle": (exchange.settle, "functions machines buffers sample.clocks exchange"),
     "slope": (exchange.slope, "functions buffers exchange"),
@@ -50,6 +50,7 @@ class Both(NamedTuple):
     buffers: Any
     sample: Any
     exchange: Exchange
+    adapting: Adapting
 
 
 class Model:
@@ -104,15 +105,10 @@ class Model:
     def engine(self) -> str:
         """Return the functions on the block of memory, and its contents at the start."""
         name, translator = self.subject.name, Translator(INLINE)
-        fields, curves = self.layout.value.fields, curves_of(self.subject.start, self.layout)
         for each, (function, names) in ENTRIES.items():
             translator.entry(
-                f"fmu_{each}", function, [_part(fields, field) for field in names.split()]
+                f"fmu_{each}", function, [self.layout.part(part) for part in names.split()]
             )
-        if curves:
-            for each, function, count in (("dip", dip_of, 2), ("flat", flat_of, 4)):
-                numbers = [Number(Local("f", letter)) for letter in "abcd"[:count]]
-                translator.entry(each, function, numbers)
         taken = [f"{name}_{each}" for each in (*ENTRIES, "start", "derive")]
         return filled(
             "fmu_engine.c",
@@ -122,7 +118,7 @@ class Model:
             engine=c99_text(translator.module, [*taken, *self._constants(), *OWN], hidden=True),
             words=self.layout.words,
             image=image_of(self.layout, self.arguments),
-            curves=curves,
+            time_scale=self.layout.offset("buffers.plan.control.time_scale"),
         )
 
     # ------------------------------------------------------------------ model.h
@@ -167,9 +163,11 @@ class Model:
             "FOREIGN": place("buffers.plan.foreign"),
             "TABLES": place("functions.p.2"),
             "Y": place("buffers.now.y"),
+            "LENGTH": len(self.arguments.buffers.now.y),
             "OBSERVED": place("exchange.seen"),
             "SLOPE": place("exchange.slope"),
             "INDICATORS_AT": place("exchange.indicators"),
+            "GIVEN": place("adapting.given"),
             "SWITCHED": place("exchange.counts") + exchange.SWITCHES,
             "MOVED": place("exchange.counts") + exchange.MOVED,
             "NEXT": place("exchange.next"),
@@ -179,16 +177,6 @@ class Model:
             "SAMPLE_RESUMED": place("sample.counts") + stepping.RESUMED,
             "FULL_LOG": stepping.FULL_LOG,
         }
-
-
-def _part(fields: Mapping[str, Value], name: str) -> Value:
-    """Return a field, or a field of it."""
-    first, _, rest = name.partition(".")
-    found = fields[first]
-    if not rest:
-        return found
-    assert isinstance(found, Record)
-    return _part(found.fields, rest)
 
 
 def both_of(subject: Subject) -> Both:
@@ -220,4 +208,4 @@ def both_of(subject: Subject) -> Both:
         before=[0.0] * size,
         signs=[0.0] * len(buffers.now.held),
     )
-    return Both(functions, machines, buffers, sample, made)
+    return Both(functions, machines, buffers, sample, made, adapting_of(start))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import importlib.util
-import math
 import os
 import sys
 import threading
@@ -19,8 +18,8 @@ from numpy.typing import NDArray
 from gms_fsm._extras import missing
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.language._functions import sgn
-from gms_fsm.lowering._generated import load
-from gms_fsm.lowering._observing import held_of
+from gms_fsm.lowering._generated import SIGNALS, load
+from gms_fsm.lowering._observing import on_surfaces
 from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import Arguments, Program, guarded
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
@@ -160,12 +159,7 @@ def functions(program: Program) -> Mapping[str, Any]:
 def _loaded(source: str, callables: tuple[str, ...]) -> dict[str, Any]:
     from integrators.machine_code.translate import HostFunction
 
-    names: dict[str, Any] = {
-        "piecewise_linear": piecewise_linear,
-        "piecewise_slope": piecewise_slope,
-        "nan": math.nan,
-        "__name__": __name__,
-    }
+    names: dict[str, Any] = {**SIGNALS, "__name__": __name__}
     names |= {f"{name}_signal": HostFunction(k) for k, name in enumerate(callables)}
     return load("compiled program", source, names)
 
@@ -296,7 +290,7 @@ def _observer(program: Program) -> Prepared:
         made = compiled.observer(
             text_of(program),
             functions(program)["observe"],
-            held_of(program, functions(program), packed(program.p)),
+            on_surfaces(program, functions(program), packed(program.p)),
             (layout.y.size, layout.modes, layout.observed.size),
             _calls(program),
             store(),

@@ -27,6 +27,7 @@ from integrators import elementary, quick
 
 __all__ = [
     "ELEMENTARY",
+    "SIGNALS",
     "bare",
     "elementary_text",
     "ieee",
@@ -39,6 +40,13 @@ __all__ = [
 ELEMENTARY = frozenset(
     name for name, each in NAMESPACE.items() if each.__module__ == elementary.__name__
 )
+
+# What generated text calls besides the functions of the expression language.
+SIGNALS: Mapping[str, Any] = {
+    "piecewise_linear": piecewise_linear,
+    "piecewise_slope": piecewise_slope,
+    "nan": math.nan,
+}
 
 
 def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -154,12 +162,7 @@ def standalone(source: str) -> str:
                 used.add(name)
             case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name):
                 own.add(name)
-    known: dict[str, Any] = {
-        **NAMESPACE,
-        "piecewise_linear": piecewise_linear,
-        "piecewise_slope": piecewise_slope,
-        "nan": math.nan,
-    }
+    known: dict[str, Any] = {**NAMESPACE, **SIGNALS}
     missing = sorted(used - own - set(dir(builtins)))
     if foreign := [name for name in missing if name not in known]:
         raise ParameterError(

@@ -17,7 +17,7 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import Program
 from integrators import Functions, Held, arm_on, look, sliding_scratch, slope_on
 
-__all__ = ["armed", "held_of", "observe", "rate", "sigmas"]
+__all__ = ["armed", "observe", "on_surfaces", "rate", "sigmas"]
 
 
 def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
@@ -112,7 +112,9 @@ def rate(
     return np.array(dy)
 
 
-def held_of(program: Program, made: Mapping[str, Any], p: Any, flags: Sequence[int] = ()) -> Held:
+def on_surfaces(
+    program: Program, made: Mapping[str, Any], p: Any, flags: Sequence[int] = ()
+) -> Held:
     """Return the functions of a program, and what it slides on, with scratch space of their own.
 
     Parameters
@@ -147,4 +149,4 @@ def held_of(program: Program, made: Mapping[str, Any], p: Any, flags: Sequence[i
 
 def _on(program: Program, mode: Sequence[int]) -> Held:
     """Return the program on the surfaces that a row slides on."""
-    return held_of(program, program.ieee, program.p, mode[program.layout.slides])
+    return on_surfaces(program, program.ieee, program.p, mode[program.layout.slides])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -70,7 +71,7 @@ def known(least: float) -> float:
 
 
 HELPERS: Mapping[str, object] = {
-    "sgn": sign_from_above, "finite": finite, "divided": divided, "reach": reach,
+    "sign_from_above": sign_from_above, "finite": finite, "divided": divided, "reach": reach,
     "reach_bent": reach_bent, "nearer": nearer, "known": known, "inf": INF,
 }  # fmt: skip
 
@@ -102,7 +103,7 @@ def _sizes(key: ByIdentity[Chart]) -> _Sizes:
     places: dict[str, int] = {}
 
     def place(tree: Value) -> int:
-        return places.setdefault(spell(renamed(tree, rest)), len(places))
+        return places.setdefault(_spelled(renamed(tree, rest)), len(places))
 
     guards = chart.guards.values()
     late = {*chart.force_names, *chart.rate_names} - {*chart.parameter_names}
@@ -139,7 +140,7 @@ def _sizes(key: ByIdentity[Chart]) -> _Sizes:
     relaxes: dict[str, list[int]] = {state.name: [] for state in chart.states}
     for (state, name), flow in flows.items():
         if (rate := derivative(flow, name)) is not None:
-            k = paces.setdefault(spell(renamed(rate, moving)), len(paces))
+            k = paces.setdefault(_spelled(renamed(rate, moving)), len(paces))
             if all(derivative(rate, each) == Number(0.0) for each in zero_at_rest):
                 relaxes[state].append(k)
     return _Sizes(
@@ -150,6 +151,11 @@ def _sizes(key: ByIdentity[Chart]) -> _Sizes:
         stiffness,
         {name: row for name, row in follows.items() if row},
     )
+
+
+def _spelled(tree: Value) -> str:
+    """Spell a value at rest, or the limit that it has as all grow from rest."""
+    return re.sub(r"\bsgn\(", "sign_from_above(", spell(tree))
 
 
 def scale_text(chart: Chart, name: str, own: frozenset[str], *, curved: bool) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
 from gms_fsm.language import Number, Value, names_in, renamed, spell
-from gms_fsm.lowering._generated import ieee, load, load_careful
+from gms_fsm.lowering._generated import SIGNALS, ieee, load, load_careful
 from gms_fsm.lowering._lines import Line, indented
 from gms_fsm.lowering._lock_functions import LockFunctions
 from gms_fsm.lowering._locks import ENDLESS
@@ -25,7 +25,7 @@ from gms_fsm.systems._assembly import CURVE_LOAD, Bank, of
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import LEAST_LOAD
 from integrators.loop import PHASE, START, Buffers
-from integrators.steps import Vector
+from integrators.steps import T, Vector
 
 __all__ = ["FUNCTIONS", "SHARE", "Adapting", "Adaptive", "adapt", "adaptive", "bind"]
 
@@ -227,11 +227,8 @@ def bind(source: str, functions: Mapping[str, Callable[..., Any]]) -> dict[str, 
 
 
 def _names(functions: Mapping[str, Callable[..., Any]]) -> dict[str, Any]:
-    names = {name: functions[name] for name in ("arm", "flow", "observe")}
-    return {
-        **HELPERS, **names, "dip_of": dip_of, "flat_of": flat_of, "larger": larger,
-        "nan": math.nan, "__name__": __name__,
-    }  # fmt: skip
+    own = {**HELPERS, "dip_of": dip_of, "flat_of": flat_of, "larger": larger}
+    return {**SIGNALS, **functions, **own, "__name__": __name__}
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,8 +255,8 @@ class Adapting(NamedTuple):
     enter: Callable[..., Any]
     raise_floor: Callable[..., Any]
     chosen: Vector  # absolute tolerances that the user has given; 0 for the others
-    y: Vector  # initial values, and which of them are given
-    given: list[int]
+    y: Vector  # initial values before any entry
+    given: list[int]  # which of those in the block stay
     span: Vector  # s
     sizes: Vector
     times: Vector
@@ -282,8 +279,9 @@ def adapt(functions: Any, b: Buffers, seen: Vector, live: Vector, a: Adapting) -
             control.atol[j] = SHARE * control.rtol * a.sizes[j]
     if b.memory.counts[PHASE] == START:
         for j in range(len(a.y)):
-            now.y[j] = a.y[j]
-        a.enter(now.clock[0], now.y, now.mode, p, a.given)
+            if a.given[j] == 0:
+                now.y[j] = a.y[j]
+        a.enter(now.clock[T], now.y, now.mode, p, a.given)
         for j in range(len(a.y)):
             b.memory.anchor[j] = now.y[j]
         a.raise_floor(

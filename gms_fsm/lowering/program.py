@@ -28,7 +28,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -37,7 +36,7 @@ import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
-from gms_fsm.lowering._generated import ieee, load, load_careful, quickened
+from gms_fsm.lowering._generated import SIGNALS, ieee, load, load_careful, quickened
 from gms_fsm.lowering._plan import Pair, Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
 from gms_fsm.lowering.adapting import Adaptive, adaptive
@@ -51,8 +50,6 @@ from gms_fsm.systems.signals import (
     Formula,
     Function,
     Signal,
-    piecewise_linear,
-    piecewise_slope,
 )
 from gms_fsm.systems.system import System, system_of
 from integrators import LIVE
@@ -135,7 +132,7 @@ class Program:
     @property
     def adaptive(self) -> Adaptive:
         """The functions of what follows from the numbers."""
-        return _adaptive(ByIdentity(self.plan), ByIdentity(self.ieee))
+        return _adaptive(*map(ByIdentity, (self.plan, self.ieee, self.callables)))
 
     @property
     def live(self) -> list[float]:
@@ -220,12 +217,7 @@ def _lowered(shape: _Shape) -> Program:
     callables = {
         name: signal.call for name, signal in system.signals.items() if isinstance(signal, Function)
     }
-    names: dict[str, Any] = {
-        "piecewise_linear": piecewise_linear,
-        "piecewise_slope": piecewise_slope,
-        "nan": math.nan,
-    }
-    names |= {f"{name}_signal": guarded(name, call) for name, call in callables.items()}
+    names = _names(callables)
     namespace = quickened(load(plan.title, source, names))
     careful = load_careful(plan.title, source, names)
     return Program(
@@ -250,9 +242,17 @@ def _lowered(shape: _Shape) -> Program:
 
 @functools.lru_cache(maxsize=64)
 def _adaptive(
-    plan: ByIdentity[Plan], functions: ByIdentity[Mapping[str, Callable[..., Any]]]
+    plan: ByIdentity[Plan],
+    functions: ByIdentity[Mapping[str, Callable[..., Any]]],
+    callables: ByIdentity[Mapping[str, Callable[[float], float]]],
 ) -> Adaptive:
-    return adaptive(plan.it, functions.it)
+    return adaptive(plan.it, {**functions.it, **_names(callables.it)})
+
+
+def _names(callables: Mapping[str, Callable[[float], float]]) -> dict[str, Any]:
+    """Return what the text calls for the values of signals."""
+    signals = {f"{name}_signal": guarded(name, call) for name, call in callables.items()}
+    return {**SIGNALS, **signals}
 
 
 def _jolts(plan: Plan) -> dict[str, Any]:

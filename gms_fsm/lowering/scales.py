@@ -126,9 +126,10 @@ def _scales_of(
     x, v, speed, time = map(
         float, function(n, N, F_c, v_s, weights, *numbers, 0, sizes, 0, states, relaxing)
     )
-    rows = {name: tuple(sizes[k * n : k * n + n]) for k, name in enumerate(chart.variables)}
-    relaxation = tuple(tuple(relaxing[i * states : (i + 1) * states]) for i in range(n))
-    return Scales(x, v, rows, speed, time, relaxation)
+    rows = np.reshape(sizes, (len(chart.variables), n)).tolist()
+    relaxation = np.reshape(relaxing, (n, states)).tolist()
+    variables = dict(zip(chart.variables, map(tuple, rows), strict=True))
+    return Scales(x, v, variables, speed, time, tuple(map(tuple, relaxation)))
 
 
 @functools.lru_cache(maxsize=64)
@@ -183,8 +184,9 @@ def scales_of_system(program: Program) -> SystemScales:
     sizes, times, relaxing = [0.0] * layout.y.size, [0.0], [0.0] * (most * len(widths))
     program.adaptive.functions["scale"](program.p, sizes, times, relaxing)
     names = (*layout.y.shared, *layout.y.own)
+    by_element = np.reshape(relaxing, (len(widths), most)).tolist()
     return SystemScales(
         {name: [sizes[k] for k in layout.y.all_of(name)] for name in names},
         times[0],
-        [relaxing[most * i : most * i + width] for i, width in enumerate(widths)],
+        [row[:width] for row, width in zip(by_element, widths, strict=True)],
     )

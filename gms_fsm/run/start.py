@@ -84,6 +84,20 @@ class Start:
         """The system, if it is the user's and not a model on a rig."""
         return self.system if isinstance(self.rig, Mounting) else None
 
+    def before_entry(self) -> tuple[list[float], list[int]]:
+        """Return the state vector before any entry, and 1 for what the initial values give."""
+        layout = self.program.layout
+        y, _, given = _given(self.system, layout, self.initial)
+        return y, [int(name in given) for name, _ in layout.y]
+
+    def chosen_tolerances(self) -> list[float]:
+        """Return the absolute tolerance of each component that was given; 0 for the others."""
+        layout = self.program.layout
+        none = {
+            name: [0.0] * len(layout.y.all_of(name)) for name in (*layout.y.shared, *layout.y.own)
+        }
+        return _tolerances(layout, self.chosen.atol, none)[0]
+
     def trace(self, rows: Rows, stops: Rows, firings: Firings) -> Trace:
         """Return the trace of a run.
 
@@ -416,6 +430,16 @@ def _initial(
     layout = program.layout
     if initial == {} and _is_plain(system.shape):
         return [0.0] * layout.y.size, [0] * layout.n
+    y, mode, given = _given(system, layout, initial)
+    y = _entered(system, program, t_start, y, mode, given)
+    _check_locks(system, program, t_start, y, mode)
+    return y, mode
+
+
+def _given(
+    system: System, layout: Layout, initial: Mapping[str, Any]
+) -> tuple[list[float], list[int], set[str]]:
+    """Return the state vector and the modes before any entry, and what has been given."""
     if not isinstance(initial, Mapping):
         raise ParameterError(
             "it must be a mapping, for example {'x': 0}", place="initial", value=initial
@@ -467,9 +491,7 @@ def _initial(
                 f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
             )
         mode += [chart.state_index(str(name)) for name in wanted]
-    state = _entered(system, program, t_start, state, mode, {*given})
-    _check_locks(system, program, t_start, state, mode)
-    return state, mode
+    return state, mode, {*given}
 
 
 @functools.lru_cache(maxsize=64)

@@ -10,7 +10,7 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SignalError
 from gms_fsm.lowering._compiled import observe_rows
-from gms_fsm.lowering._observing import held_of
+from gms_fsm.lowering._observing import on_surfaces
 from gms_fsm.lowering.program import Program
 from gms_fsm.traces.rows import Rows
 from integrators.observing import is_turn, observe_beside, observe_row
@@ -80,14 +80,14 @@ def _one_by_one(program: Program, rows: Rows, kept: range) -> FloatArray:
     # With scalar functions, as in the run itself.
     table, seen = np.empty((len(rows), len(kept))), [0.0] * program.layout.observed.size
     t, y, mode = rows.t.tolist(), rows.y.tolist(), rows.mode.tolist()
-    on, observe = held_of(program, program.ieee, program.p), program.ieee["observe"]
+    on, observe = on_surfaces(program, program.ieee, program.p), program.ieee["observe"]
     for row in range(len(rows)):
         try:
             observe_row(observe, on, t[row], y[row], mode[row], seen)
             table[row] = seen[kept.start : kept.stop]
         except SignalError:  # a Python function failed at this row
             table[row] = np.nan
-            on = held_of(program, program.ieee, program.p)  # it may be in the midst of a slide
+            on = on_surfaces(program, program.ieee, program.p)  # it may be in the midst of a slide
     if rows.mode[:, program.layout.slides].any():
         rows_of: Any = table
         for row in range(len(rows) - 1):

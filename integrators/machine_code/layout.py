@@ -129,6 +129,25 @@ class Layout:
         """
         return self.offsets[name]
 
+    def part(self, name: str) -> Value:
+        """Return a part of the block, to be passed to a function.
+
+        Parameters
+        ----------
+        name : str
+            As in `offset`.
+
+        Returns
+        -------
+        Value
+            A number, an array or a record.
+        """
+        found: Value = self.value
+        for each in name.split("."):
+            assert isinstance(found, Record)
+            found = found.fields[each]
+        return found
+
     @functools.cached_property
     def offsets(self) -> Mapping[str, int]:
         """The first words of all numbers and arrays, by their names; see `offset`."""

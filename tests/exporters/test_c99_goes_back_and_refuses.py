@@ -6,6 +6,7 @@ import ctypes
 import itertools
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from gms_fsm import (
     ChartModel,
     FrictionState,
     GMSParameters,
+    Parameter,
     ParameterError,
     State,
     Stribeck,
@@ -28,10 +30,10 @@ from tests.exporters.c_programs import COMPILERS, Library
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
 
 
-def model(**curve: float) -> GMS:
-    given = {"F_c": 0.4, "F_s": 1.5, "v_s": 1e-3, "delta": 2.0} | curve
-    more = {"sigma_2": 0.1, "stribeck": Stribeck(**given), "v_c": 1e-6}
-    return GMS(GMSParameters([0.7, 0.9], [0.3, 0.4], [0.1, 0.05], **more), law="signed")
+def model(k: float = 0.7, **curve: float) -> GMS:
+    given: dict[str, float] = {"F_c": 0.4, "F_s": 1.5, "v_s": 1e-3, "delta": 2.0} | curve
+    more: dict[str, Any] = {"sigma_2": 0.1, "stribeck": Stribeck(**given), "v_c": 1e-6}
+    return GMS(GMSParameters([k, 0.9], [0.3, 0.4], [0.1, 0.05], **more), law="signed")
 
 
 def library(folder: Path, given: GMS) -> Library:
@@ -78,19 +80,44 @@ def test_bad_arguments(numbers: tuple[float, ...], tmp_path: Path) -> None:
     assert bytes(state) == before
 
 
-def test_numbers_are_set(tmp_path: Path) -> None:
-    c, other = library(tmp_path, model()), model(F_s=0.9, v_s=5e-3)
+def test_numbers_are_set_and_all_that_follows_from_them(tmp_path: Path) -> None:
+    """Tolerances and scales, too: the bits are those of a friction that began with the numbers."""
+    c, given = library(tmp_path, model()), {"F_s": 0.9, "v_s": 5e-3}
     state = c.begun()
     k = c.place("k")
     assert [c.get(state, k), c.get(state, k + 1)] == [0.7, 0.9]
-    assert c.set(state, c.place("F_s"), 0.9) == 0
-    assert c.set(state, c.place("v_s"), 5e-3) == 0
-    friction = FrictionState(other)
+    for name, value in given.items():
+        assert c.set(state, c.place(name), value) == 0
+    assert c.set(state, k, 70.0) == 0
+    friction = FrictionState(model(**given, k=70.0))
     pairs = list(itertools.pairwise(VELOCITIES))
-    wanted = [friction.advance(v0, v1, 0.1) for v0, v1 in pairs]
-    assert forces(c, state) == pytest.approx(wanted, rel=1e-5)  # tolerances are as exported
+    assert forces(c, state) == [friction.advance(v0, v1, 0.1) for v0, v1 in pairs]
     for place, value in ((-1, 1.0), (4, 1.0), (10**6, 1.0), (k, math.nan)):
         assert c.set(state, place, value) == -1
+
+
+def test_the_entry_of_the_default_state_follows_a_number(tmp_path: Path) -> None:
+    chart = Chart(
+        "winding down",
+        parameters=(Parameter("z_0", "m"), Parameter("tau", "s", "> 0")),
+        inputs=("v",),
+        variables=("z",),
+        states=(
+            State("only", entry={"z": "2.0 * z_0 + sgn(tau - 2.0)"}, flow={"z": "v - z / tau"}),
+        ),
+        outputs={"F": "z"},
+    )
+    export(ChartModel(chart, {"z_0": 0.5, "tau": 2.0}), "c99", tmp_path, name="it")
+    subject = Subject.of(ChartModel(chart, {"z_0": 0.5, "tau": 2.0}), "c99", name="it")
+    c = Library(tmp_path, engine_of(subject))
+    state: Any = c.begun()
+    assert state.z[0] == 1.0
+    assert c.set(state, c.place("z_0"), -3.0) == 0
+    assert state.z[0] == -6.0
+    assert c.set(state, c.place("tau"), 0.01) == 0
+    friction = FrictionState(ChartModel(chart, {"z_0": -3.0, "tau": 0.01}))
+    pairs = list(itertools.pairwise(VELOCITIES))
+    assert forces(c, state) == [friction.advance(v0, v1, 0.1) for v0, v1 in pairs]
 
 
 def test_what_only_the_first_call_knows_is_refused(tmp_path: Path) -> None:

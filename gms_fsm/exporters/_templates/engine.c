@@ -69,7 +69,9 @@ int ${name}_set(${name}_state *s, int parameter, double value)
     if (!is_parameter(parameter) || !is_number(value))
         return ${name}_BAD_ARGUMENT;
     w[parameter].f = value;
-$curves    return ${name}_OK;
+    w[$time_scale].f = adapt((char *)w);
+    show(s);
+    return ${name}_OK;
 }
 
 void ${name}_switch(const ${name}_state *s, int64_t k, double *t, int64_t *element, int64_t *edge)

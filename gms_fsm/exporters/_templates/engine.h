@@ -56,7 +56,8 @@ int ${name}_advance(${name}_state *s, ${lines}double dt);
 /* The same, to the time t. */
 int ${name}_advance_to(${name}_state *s, ${lines}double t);
 
-/* A parameter, by its name above. The tolerances stay those of the exported numbers. */
+/* A parameter, by its name above. Tolerances that were not given follow; before the first step
+ * initial values that depend on it do, too. */
 double ${name}_get(const ${name}_state *s, int parameter);
 int ${name}_set(${name}_state *s, int parameter, double value);
 

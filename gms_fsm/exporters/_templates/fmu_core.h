@@ -167,6 +167,8 @@ static bool set_number(instance *it, uint32_t reference, double value)
         return failed(it, "the variable with the reference %u can be set only before the start",
                       (unsigned)reference);
     it->now.block[v->index].f = value;
+    if (v->index >= Y && v->index < Y + LENGTH) /* an initial value: it stays */
+        it->now.block[GIVEN + v->index - Y].i = 1;
     MODEL(derive)(address(it));
     outdated(it);
     return true;
@@ -194,6 +196,7 @@ static bool set_count(instance *it, uint32_t reference, int64_t value)
     if (value < 1 || value > v->settable)
         return failed(it, "an element has %d states, there is no number %ld", v->settable, (long)value);
     it->now.block[v->index].i = value - 1;
+    MODEL(derive)(address(it));
     outdated(it);
     return true;
 }

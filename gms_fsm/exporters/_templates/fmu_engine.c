@@ -14,12 +14,12 @@ void ${name}_start(char *block)
 $image
 }
 
-/* What is computed from parameters. */
+/* What follows from parameters. */
 void ${name}_derive(char *block)
 {
     word *w = (word *)block;
-    (void)w;
-$curves}
+    w[$time_scale].f = fmu_adapt(block);
+}
 
 /* One step of Co-Simulation. */
 int64_t ${name}_step(char *block) { return fmu_step(block); }
