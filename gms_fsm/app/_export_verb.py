@@ -42,7 +42,7 @@ def export_command(
     contact: ContactName = "",
     listed: Annotated[bool, typer.Option("--list", help="List the formats.")] = False,
 ) -> None:
-    """Write friction for another program: C, an FMU, MATLAB, Modelica, a PLC, a chart tool.
+    """Write friction for another program: C, JavaScript, an FMU, MATLAB, Modelica, a PLC ...
 
     A chart, or one contact of a system (--contact), is friction whose velocity
     is an input. The inputs of a whole system are its records.
@@ -88,6 +88,7 @@ def _given(
         used = {each: run[each] for each in SETTINGS if each in run}
         more = {"settings": Settings(**used), "t_start": run["t_start"]}
         more["initial"] = run.get("initial") or {}
+        more["t_end"] = run["t_end"]
     if not contact:
         return own.system, own.path.stem, more
     if "initial" in more:

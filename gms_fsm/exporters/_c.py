@@ -12,8 +12,6 @@ from pathlib import Path
 from string import Template
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from gms_fsm._version import __version__
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._adapting import ADAPTED, adapting_of
@@ -40,6 +38,7 @@ __all__ = [
     "TEMPLATES",
     "WORDS",
     "Engine",
+    "Stepped",
     "check_entries",
     "engine_of",
     "filled",
@@ -313,21 +312,16 @@ def image_of(layout: Layout, arguments: Any) -> str:
     str
         One assignment a line.
     """
-    block = Block(layout, arguments)
-    block.update(block.contents)
-    kinds = layout.kinds()
     names = {offset: name for name, offset in layout.offsets.items()}
     lines = []
-    for k in np.flatnonzero(block.words).tolist():
+    for k, value in Block(layout, arguments).set_words():
         note = f" /* {names[k]} */" if k in names else ""
-        if kinds[k] == "f":
-            value = number_text(float(block.words[k : k + 1].view(np.float64)[0]))
-            lines.append(f"    w[{k}].f = {value};{note}")
-        elif kinds[k] == "i":
-            lines.append(f"    w[{k}].i = {int(block.words[k])};{note}")
+        if isinstance(value, float):
+            lines.append(f"    w[{k}].f = {number_text(value)};{note}")
+        elif isinstance(value, int):
+            lines.append(f"    w[{k}].i = {value};{note}")
         else:
-            truths = block.words[k : k + 1].view(np.bool_)
-            lines += [f"    w[{k}].b[{j}] = true;{note}" for j in np.flatnonzero(truths)]
+            lines += [f"    w[{k}].b[{j}] = true;{note}" for j, true in enumerate(value) if true]
     return "\n".join(lines)
 
 

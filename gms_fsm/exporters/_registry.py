@@ -38,7 +38,7 @@ class Exporter:
     words : iterable of str
         Words of the language, which no exported name may be.
     takes : tuple of str
-        Which of ``initial``, ``t_start`` and ``settings`` it uses; others are refused.
+        Which of ``initial``, ``t_start``, ``settings`` and ``t_end`` it uses; others are refused.
     """
 
     name: str
@@ -86,6 +86,7 @@ def export(
     initial: Mapping[str, Any] | None = None,
     t_start: float = 0.0,
     settings: Settings | None = None,
+    t_end: float | None = None,
 ) -> tuple[Path, ...]:
     """Write friction for another program.
 
@@ -109,7 +110,10 @@ def export(
     t_start : float
         s: when it starts.
     settings : Settings, optional
-        Method and tolerances, for the formats that contain the engine: c99, fmu2 and fmu3.
+        Method and tolerances, for the formats that contain the engine: c99, js, fmu2 and
+        fmu3.
+    t_end : float, optional
+        s: when it ends, for a system as js.
 
     Returns
     -------
@@ -143,13 +147,14 @@ def export(
     where = checked_path("folder", folder)
     exporter = EXPORTERS[format]
     subject = Subject.of(
-        system, format, name=name, initial=initial, t_start=t_start, settings=settings
+        system, format, name=name, initial=initial, t_start=t_start, settings=settings, t_end=t_end
     )
     identifier(subject.name, exporter.words, f"name {subject.name!r}")
     for each, unused in (
         ("initial", not initial),
         ("t_start", t_start == 0.0),
         ("settings", settings is None),
+        ("t_end", t_end is None),
     ):
         if not unused and each not in exporter.takes:
             raise ParameterError(

@@ -41,6 +41,8 @@ class Subject:
         s.
     settings : Settings
         Method and tolerances.
+    t_end : float or None
+        s: the end of a run, for formats that contain one.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Subject:
     initial: Mapping[str, Any] | None
     t_start: float
     settings: Settings
+    t_end: float | None = None
 
     @classmethod
     def of(
@@ -61,6 +64,7 @@ class Subject:
         initial: Mapping[str, Any] | None = None,
         t_start: float = 0.0,
         settings: Settings | None = None,
+        t_end: float | None = None,
     ) -> Subject:
         """Check what is exported; see `gms_fsm.export`."""
         what: System | Contact | Chart
@@ -84,7 +88,7 @@ class Subject:
         if initial is not None:
             checked_kind("initial", initial, Mapping, "a mapping")
         begin(t_start)
-        return cls(chosen, title, format, what, initial, t_start, used)
+        return cls(chosen, title, format, what, initial, t_start, used, t_end)
 
     @property
     def chart(self) -> Chart:

@@ -17,7 +17,7 @@ from gms_fsm.lowering.places import Places, total
 from gms_fsm.systems._assembly import of
 from integrators import LIVE
 
-__all__ = ["Line", "Signs", "Writer", "indented", "reads_of"]
+__all__ = ["Line", "Signs", "Writer", "indented", "one_line", "reads_of"]
 
 # Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
 # may be marked as live.
@@ -364,3 +364,8 @@ class Writer:
         """Spell the corners of a signal: their times and values."""
         places = (self.plan.tables.text((name, column)) for column in ("times", "values"))
         return ", ".join(f"tables[{place}]" for place in places)
+
+
+def one_line(text: str) -> str:
+    """Return text fit for a comment: a line break would end it."""
+    return "".join(c if c.isprintable() else " " for c in text)

@@ -18,7 +18,7 @@ from gms_fsm.language import (
     names_in,
     split,
 )
-from gms_fsm.lowering._lines import Line, Signs, indented, reads_of
+from gms_fsm.lowering._lines import Line, Signs, indented, one_line, reads_of
 from gms_fsm.lowering._lock_functions import LockFunctions
 from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import Gradient, Pair, Plan, both_sides
@@ -86,7 +86,7 @@ def python(plan: Plan) -> str:
     """
     printer = _Printer(plan)
     lines = [
-        f"# {_one_line(plan.title)}",
+        f"# {one_line(plan.title)}",
         "# Generated from the chart; parameters are arguments, so one text serves all values.",
         "",
     ]
@@ -591,8 +591,3 @@ def _numbered(constants: Iterable[str]) -> str:
     """Write an assignment of the numbers from 0 to constants."""
     names = [*constants]
     return f"{', '.join(names)} = {', '.join(str(number) for number in range(len(names)))}"
-
-
-def _one_line(text: str) -> str:
-    """Return text fit for a comment: a line break would end it."""
-    return "".join(c if c.isprintable() else " " for c in text)

@@ -155,7 +155,8 @@ def _sizes(key: ByIdentity[Chart]) -> _Sizes:
 
 def _spelled(tree: Value) -> str:
     """Spell a value at rest, or the limit that it has as all grow from rest."""
-    return re.sub(r"\bsgn\(", "sign_from_above(", spell(tree))
+    rename = {name: f"its_{name}" for name in names_in(tree)}
+    return re.sub(r"\bsgn\(", "sign_from_above(", spell(tree, rename=rename))
 
 
 def scale_text(chart: Chart, name: str, own: frozenset[str], *, curved: bool) -> list[str]:
@@ -167,12 +168,12 @@ def scale_text(chart: Chart, name: str, own: frozenset[str], *, curved: bool) ->
     a guard and the fastest time.
     """
     sizes = _sizes(ByIdentity(chart))
-    parameters = [f"{each}_" if each in own else each for each in chart.parameter_names]
+    parameters = [f"{'all' if each in own else 'its'}_{each}" for each in chart.parameter_names]
     arguments = ["_n", "_N", "_F_c", "_v_s", "_weight", *parameters]
     arguments += ["_first", "_sizes", "_base", "_states", "_relaxing"]
     found = [*sizes.reach]
-    numbers = ["s = _weight[_i] * (_F_c * _N)" if curved else "s = 0.0"]
-    numbers += [f"{each} = {each}_[_i]" for each in chart.parameter_names if each in own]
+    numbers = ["its_s = _weight[_i] * (_F_c * _N)" if curved else "its_s = 0.0"]
+    numbers += [f"its_{each} = all_{each}[_i]" for each in chart.parameter_names if each in own]
     first = [f"_r{k} = finite({text})" for k, text in enumerate(sizes.at_rest)]
     for k, each in enumerate(found):
         first.append(f"_u{k} = inf")
@@ -203,8 +204,12 @@ def scale_text(chart: Chart, name: str, own: frozenset[str], *, curved: bool) ->
     lines = [f"{each} = inf" for each in ("_x", "_v", "_slowest")]
     lines += ["for _i in range(_n):", *(f"    {each}" for each in (*numbers, *first))]
     lines += ["_v = known(nearer(_v, _v_s))" if curved else "_v = known(_v)", "_x = known(_x)"]
-    lines += ["v = _v_s" if curved else "v = _v", "_fastest = 0.0"]
+    lines += ["its_v = _v_s" if curved else "its_v = _v", "_fastest = 0.0"]
     lines += ["for _i in range(_n):", *(f"    {each}" for each in (*numbers, *second))]
-    lines += ["_time = divided(1.0, _fastest)", "if _time == 0.0:", "    _time = divided(_x, v)"]
+    lines += [
+        "_time = divided(1.0, _fastest)",
+        "if _time == 0.0:",
+        "    _time = divided(_x, its_v)",
+    ]
     lines.append("return _x, _v, known(_slowest), _time")
     return [f"def {name}({', '.join(arguments)}):", *(f"    {each}" for each in lines)]

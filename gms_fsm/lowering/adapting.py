@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
 from gms_fsm.language import Number, Value, names_in, renamed, spell
 from gms_fsm.lowering._generated import SIGNALS, ieee, load, load_careful
-from gms_fsm.lowering._lines import Line, indented
+from gms_fsm.lowering._lines import Line, indented, one_line
 from gms_fsm.lowering._lock_functions import LockFunctions
 from gms_fsm.lowering._locks import ENDLESS
 from gms_fsm.lowering._names import computed_names
@@ -41,7 +41,7 @@ LIMIT = math.sqrt(ENDLESS)  # where locks contradict each other a force has no l
 # --------------------------------------------------------------------------- the text
 def _text(plan: Plan) -> str:
     printer = _Printer(plan)
-    lines = [f"# What follows from the numbers of {plan.title.splitlines()[0]}"]
+    lines = [f"# What follows from the numbers of {one_line(plan.title)}"]
     for k, bank in enumerate(plan.read.banks):
         own = frozenset(n for n in bank.chart.parameter_names if of(bank.name, n) in plan.read.own)
         made = scale_text(bank.chart, f"scale_{k}", own, curved=printer.is_curved(bank))

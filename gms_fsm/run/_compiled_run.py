@@ -32,7 +32,7 @@ from integrators.steps import T
 if TYPE_CHECKING:
     from integrators.compiled import Run
 
-__all__ = ["CompiledRun"]
+__all__ = ["CompiledRun", "example_of"]
 
 WORTH_A_LOOK = 500_000  # steps: machine code takes fewer in less time than it takes to look ahead
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
@@ -405,16 +405,29 @@ def _prepared(start: Start) -> compiled.Prepared:
     if key not in _known:
         if len(_known) >= compiled.MOST_ENGINES:
             _known.clear()
-        run = _example(start, flow)
+        run = example_of(start)
         engine = compiled.engine(program, run)
         _known[key] = compiled.Prepared(engine, run, program.functions)
     return _known[key]
 
 
-def _example(start: Start, flow: str) -> Run:
+def example_of(start: Start) -> Run:
+    """Return the arguments of `integrators.columns.record`, with columns that may grow.
+
+    Parameters
+    ----------
+    start : Start
+        The run.
+
+    Returns
+    -------
+    integrators.compiled.Run
+        An example for `integrators.machine_code.layout.Layout`.
+    """
     from integrators.compiled import example
 
     program, layout = start.program, start.program.layout
+    flow = "flow" if start.options.located else "flow_live"
     made = compiled.functions(program)
     p: Any = compiled.packed(program.p)
     return example(

@@ -34,10 +34,10 @@ __all__ = ["javascript_text", "tables_of"]
 
 RESERVED = """
     B F Infinity Math NaN arguments async await break case catch class const continue debugger
-    default delete div do else enum eval export extends false finally for function if implements
-    import in instanceof interface let max min mod new nextafter null of package private protected
+    default delete div do else enum eval export extends false finally for function if implements in
+    instanceof interface let max min mod new nextafter null of package private protected
     public return scratch static super switch this throw true try typeof undefined var void while
-    with yield
+    with yield import
 """
 HELPERS = {
     "min": "function min(a, b) { return b < a ? b : a; }",

@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import operator
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -153,6 +153,14 @@ class Layout:
         """The first words of all numbers and arrays, by their names; see `offset`."""
         places = (*self.numbers, *self.arrays)
         return {_path(self._example, place.way): place.offset for place in places}
+
+    @functools.cached_property
+    def column_offsets(self) -> Mapping[str, tuple[int, int, int]]:
+        """Of each column, by its name: the word of its address, its lengths, its width."""
+        return {
+            _path(self._example, each.way): (each.offset, each.lengths, each.width)
+            for each in self.columns
+        }
 
     def kinds(self) -> list[str]:
         """Return what is in each word: ``"f"``, ``"i"`` or, eight in each, ``"b"``."""
@@ -317,6 +325,27 @@ class Block:
                 lengths = array.shape[: place.lengths]
                 address, _ = array.__array_interface__["data"]
                 words[place.offset : place.offset + 1 + place.lengths] = address, *lengths
+
+    def set_words(self) -> Iterator[tuple[int, float | int | list[bool]]]:
+        """Yield the words that are not zero, without the addresses and lengths of columns.
+
+        Yields
+        ------
+        (int, float or int or list of bool)
+            The place of a word, and what is in it.
+        """
+        self.update(self.contents)
+        columns = {each.offset + k for each in self.layout.columns for k in range(1 + each.lengths)}
+        kinds = self.layout.kinds()
+        for k in np.flatnonzero(self._words).tolist():
+            if k in columns:
+                continue
+            if kinds[k] == "f":
+                yield k, float(self._floats[k])
+            elif kinds[k] == "i":
+                yield k, int(self._words[k])
+            else:
+                yield k, self._words[k : k + 1].view(np.bool_).tolist()
 
     def copy(self) -> list[Any]:
         """Return the numbers and the arrays of the example, but no columns.

@@ -115,7 +115,10 @@ def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 def test_the_first_process_compiles_and_says_so(warm: tuple[Path, str]) -> None:
     folder, said = warm
     assert NOTE in said, "the wait is explained"
-    assert sorted(path.name.partition("-")[0] for path in _kept(folder)) == ["observe_rows", "record"]
+    assert sorted(path.name.partition("-")[0] for path in _kept(folder)) == [
+        "observe_rows",
+        "record",
+    ]
 
 
 def test_where_nobody_waits_nothing_is_said(capsys: pytest.CaptureFixture[str]) -> None:
