@@ -39,7 +39,7 @@ from integrators import columns, hybrid, loop
 from integrators.advance import ROW
 from integrators.columns import FIRINGS
 from integrators.compiled import INLINE, is_known
-from integrators.machine_code.javascript import RESERVED, javascript_text, script_number, tables_of
+from integrators.machine_code.javascript import javascript_text, script_number, tables_of
 from integrators.machine_code.layout import Block, Column, Layout
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
@@ -50,7 +50,6 @@ from integrators.steps import T
 
 __all__ = ["js"]
 
-WORDS = frozenset(RESERVED.split())
 GROWING = {
     "buffers.out.rows_t": "rows_t",
     "buffers.out.rows_y": "rows_y",
@@ -114,8 +113,8 @@ class _Module:
     def __init__(self, subject: Subject, start: Start, arguments: Any, alone: bool) -> None:
         self.subject, self.start, self.arguments = subject, start, arguments
         self.layout = Layout(arguments, is_known)
-        self.outputs = outputs_of(start, alone, WORDS)
-        self.numbers = parameters_of(start, alone, WORDS)
+        self.outputs = outputs_of(start, alone, ())
+        self.numbers = parameters_of(start, alone, ())
 
     # ------------------------------------------------------------------ what differs
     def entries(self, translator: Translator) -> list[str]:
@@ -392,7 +391,7 @@ class _Friction(_Module):
         start = subject.start
         check_entries(start)
         for each in subject.inputs:
-            identifier(each, WORDS, f"input {each!r}")
+            identifier(each, (), f"input {each!r}")
         step: tuple[Any, Any, Any, Any] = arguments_of(start)
         super().__init__(subject, start, Stepped(*step, adapting_of(start)), alone=True)
 
@@ -511,7 +510,6 @@ register(
         "js",
         "a JavaScript module: runs of a system, or one friction step by step",
         js,
-        WORDS,
-        ("initial", "t_start", "settings", "t_end"),
+        takes=("initial", "t_start", "settings", "t_end"),
     )
 )

@@ -284,10 +284,13 @@ def adapt(functions: Any, b: Buffers, seen: Vector, live: Vector, a: Adapting) -
         a.enter(now.clock[T], now.y, now.mode, p, a.given)
         for j in range(len(a.y)):
             b.memory.anchor[j] = now.y[j]
+        signs = now.held[0] if len(now.held) > 0 else 0.0  # all are equal before the first step
         a.raise_floor(
-            a.span, now.y, now.mode, p, now.held, live, b.relations.watch, b.scratch.k[0], seen,
+            a.span, now.y, now.mode, p, now.held, live, b.sliding.watch, b.scratch.k[0], seen,
             control.atol, now.floor,
         )  # fmt: skip
+        for j in range(len(now.held)):
+            now.held[j] = signs
     else:
         for j in range(len(a.sizes)):
             if control.atol[j] > 0.0:
