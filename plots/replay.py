@@ -10,6 +10,7 @@ the page with its licence.
 from __future__ import annotations
 
 import base64
+import functools
 import hashlib
 import html
 import importlib.util
@@ -31,12 +32,14 @@ from gms_fsm.inspection.prove import Report
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
+    ELEMENTARY,
     FUNCTIONS,
     LEVELS,
     OPERATIONS,
     SEVERAL,
 )
 from gms_fsm.traces.trace import Trace
+from integrators.machine_code.javascript import library_text
 from plots import formats
 from plots._window import window_of
 from plots.page._chart import chart_svg
@@ -81,6 +84,12 @@ NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPO
 NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES
 OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
 CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE."""
+
+
+@functools.cache
+def _elementary() -> str:
+    """Return the elementary functions of the expression language as JavaScript."""
+    return f"const ELEMENTARY = {library_text(ELEMENTARY)};\n"
 
 
 @dataclass(frozen=True)
@@ -343,7 +352,7 @@ def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
         If uPlot is not installed.
     """
     plot_script, plot_style = _uplot()
-    script = "".join(map(_part, SCRIPTS))
+    script = "".join([_elementary(), *map(_part, SCRIPTS)])
     style = _theme() + plot_style + _part("page.css")
     scripts = " ".join(map(_hash, (plot_script, script)))
     parts = {

@@ -20,8 +20,7 @@ from gms_fsm.exporters._plain_form import (
     plain_form,
 )
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import FUNCTIONS, NAMESPACE, Name, Node
-from gms_fsm.lowering._generated import ELEMENTARY
+from gms_fsm.language import ELEMENTARY, FUNCTIONS, NAMESPACE, Name, Node
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
@@ -49,7 +48,7 @@ C_WORDS = frozenset(
     )
 )
 LIBRARY = {"abs": "fabs({0})", "sqrt": "sqrt({0})"}
-OWN = {name: 2 if name == "pow" else 1 for name in NAMESPACE if name in ELEMENTARY}  # arguments
+OWN = {name: 2 if name == "pow" else 1 for name in ELEMENTARY}  # arguments
 HELPERS = {
     "sgn": "(double u)\n{\n    return u > 0.0 ? 1.0 : u < 0.0 ? -1.0 : 0.0;\n}",
     "min": "(double a, double b)\n{\n    return b < a ? b : a;\n}",

@@ -25,9 +25,9 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._charts import check_moved_from_outside, slow_velocity
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import NAMESPACE, Condition, Node, Value, parse_value, sgn, spell
+from gms_fsm.language import ELEMENTARY, NAMESPACE, Condition, Node, Value, parse_value, sgn, spell
 from gms_fsm.language._normal import renamed
-from gms_fsm.lowering._generated import ELEMENTARY, bare, elementary_text
+from gms_fsm.lowering._generated import bare, elementary_text
 from gms_fsm.run._steppable import other_inputs
 from gms_fsm.systems.system import LEAST_LOAD, LOAD, Contact, loaded
 

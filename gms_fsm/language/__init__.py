@@ -20,6 +20,7 @@ from gms_fsm.language._fold import Algebra, ValueAlgebra, fold
 from gms_fsm.language._functions import (
     COMPARISONS,
     CONSTANTS,
+    ELEMENTARY,
     FUNCTIONS,
     NAMESPACE,
     OPERATIONS,
@@ -64,6 +65,7 @@ __all__ = [
     "COMPARISONS",
     "CONSTANTS",
     "ECMASCRIPT",
+    "ELEMENTARY",
     "FUNCTIONS",
     "LARGEST_PRODUCT_POWER",
     "LEVELS",

@@ -12,6 +12,7 @@ from integrators import elementary
 __all__ = [
     "COMPARISONS",
     "CONSTANTS",
+    "ELEMENTARY",
     "FUNCTIONS",
     "NAMESPACE",
     "OPERATIONS",
@@ -66,3 +67,7 @@ NAMESPACE: Mapping[str, Callable[..., float]] = {**FUNCTIONS, "pow": elementary.
 CONSTANTS: Mapping[str, float] = {"pi": math.pi}
 SEVERAL = ("min", "max")  # functions of two or more arguments; the others take one
 ROUGH = ("sgn", "abs", "min", "max")  # functions whose flow has a corner or a jump
+# Those of them that are ours.
+ELEMENTARY: Mapping[str, Callable[..., float]] = {
+    name: each for name, each in NAMESPACE.items() if each.__module__ == elementary.__name__
+}

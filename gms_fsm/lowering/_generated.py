@@ -20,13 +20,12 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.language import NAMESPACE
+from gms_fsm.language import ELEMENTARY, NAMESPACE
 from gms_fsm.language._parser import PARSER
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 from integrators import elementary, quick
 
 __all__ = [
-    "ELEMENTARY",
     "SIGNALS",
     "bare",
     "elementary_text",
@@ -37,9 +36,6 @@ __all__ = [
     "standalone",
 ]
 
-ELEMENTARY = frozenset(
-    name for name, each in NAMESPACE.items() if each.__module__ == elementary.__name__
-)
 
 # What generated text calls besides the functions of the expression language.
 SIGNALS: Mapping[str, Any] = {
@@ -172,7 +168,7 @@ def standalone(source: str) -> str:
         )
     borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
     parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []
-    if ours := ELEMENTARY.intersection(missing):
+    if ours := [name for name in missing if name in ELEMENTARY]:
         parts.insert(0, elementary_text(ours))
     parts += ["\n" + bare(known[name]) for name in missing if name not in {*borrowed, *ours}]
     head, body = _split_head(source)
@@ -338,6 +334,6 @@ def _wide_result(function: Callable[..., float]) -> Callable[..., Any]:
 
 
 _IEEE: Mapping[str, Callable[..., Any]] = {
-    **{name: _wide_result(NAMESPACE[name]) for name in ELEMENTARY},
+    **{name: _wide_result(each) for name, each in ELEMENTARY.items()},
     "sqrt": np.sqrt,
 }

@@ -7,11 +7,13 @@ those that bits are taken from have 32 bits.
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from integrators.machine_code.c99 import Names, Writer, calls
+from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import (
     Address,
     Callback,
@@ -22,6 +24,7 @@ from integrators.machine_code.tree import (
     Function,
     Global,
     Load,
+    Local,
     Module,
     Op,
     Put,
@@ -29,8 +32,9 @@ from integrators.machine_code.tree import (
     SetMany,
     Statement,
 )
+from integrators.machine_code.values import Number
 
-__all__ = ["javascript_text", "tables_of"]
+__all__ = ["javascript_text", "library_text", "script_number", "tables_of"]
 
 RESERVED = """
     B F Infinity Math NaN arguments async await break case catch class const continue debugger
@@ -270,3 +274,34 @@ class _Script(Writer):
         if address.size != 8 and address.index is not None:
             raise NotImplementedError(f"an address within a word: {address}")
         return self.words(address), 8
+
+
+def library_text(functions: Mapping[str, Callable[..., float]]) -> str:
+    r"""Return functions of floats as one JavaScript expression: an object with them by name.
+
+    Parameters
+    ----------
+    functions : mapping of str to callable
+        Of the subset, such as those of `integrators.elementary`.
+
+    Returns
+    -------
+    str
+        It needs nothing around it.
+
+    Examples
+    --------
+    >>> from integrators.step_size import memory_of
+    >>> text = library_text({"memory_of": memory_of})
+    >>> text.startswith("(() => {") and text.endswith("return { memory_of };\n})()")
+    True
+    """
+    translator = Translator()
+    for name, function in functions.items():
+        numbers = [Number(Local("f", each)) for each in inspect.signature(function).parameters]
+        translator.entry(name, function, numbers)
+    _, words = tables_of(translator.module)
+    text = javascript_text(translator.module)
+    memory = ",".join(map(script_number, words)) if translator.module.tables else ""
+    lines = [f"const F = Float64Array.of({memory});", text, f"return {{ {', '.join(functions)} }};"]
+    return "\n".join(["(() => {", *lines, "})()"])

@@ -16,15 +16,16 @@ function product(u, whole) {
 }
 const divided = (a, b) => { if (b === 0) throw UNDEFINED; return a / b; };
 
+const { exp, log, sin, cos, tanh, atan, asinh, pow } = ELEMENTARY; // the bits of Python, in every browser
 const FUNCTIONS = {
   "+": (a, b) => a + b, "*": (a, b) => a * b, "/": divided,
   "-": (a, b) => (b === undefined ? -a : a - b),
-  "**": (a, b) => finite(real(a ** b), a, b),
+  "**": (a, b) => finite(real(pow(a, b)), a, b),
   "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b,
   abs: Math.abs, sgn: (u) => (u > 0 ? 1 : u < 0 ? -1 : 0),
   sqrt: (u) => { if (u < 0) throw UNDEFINED; return Math.sqrt(u); },
-  exp: (u) => finite(Math.exp(u), u), log: (u) => { if (u <= 0) throw UNDEFINED; return Math.log(u); },
-  sin: (u) => finite(Math.sin(u)), cos: (u) => finite(Math.cos(u)), tanh: Math.tanh, atan: Math.atan, asinh: Math.asinh,
+  exp: (u) => finite(exp(u), u), log: (u) => { if (u <= 0) throw UNDEFINED; return log(u); },
+  sin: (u) => finite(sin(u)), cos: (u) => finite(cos(u)), tanh, atan, asinh,
   min: (...all) => all.reduce((a, b) => (b < a ? b : a)), max: (...all) => all.reduce((a, b) => (b > a ? b : a)),
   product,
 };

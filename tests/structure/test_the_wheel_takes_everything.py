@@ -33,6 +33,8 @@ def test_there_are_files_of_all_three() -> None:
         ".js",
         ".m",
         ".md",
+        ".mjs",
+        ".mts",
     }
 
 
