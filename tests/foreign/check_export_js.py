@@ -37,7 +37,7 @@ def version(name: str) -> str:
     if name != "JavaScriptCore":
         command = [ENGINES[name][0], "--version"]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    return f"{name} {said.split()[-1].lstrip('v')}"
+    return f"{name} {said.split()[-1].removeprefix('v').removeprefix('JavaScript-C')}"
 
 
 def same(cases: Iterable[Case], script: list[str]) -> tuple[int, int]:
