@@ -201,13 +201,21 @@ def edition() -> str:
             elif isinstance(value, type) and value.__module__ == module.__name__:
                 members = vars(value).values()
                 functions += [each for each in members if isinstance(each, FunctionType)]
-            if isinstance(value, int | float | str) and not name.startswith("__"):
+            number = isinstance(value, int | float | str) or _is_table(value)
+            if number and not name.startswith("__"):
                 constants.append((name, value))
             elif isinstance(value, dict) and {*map(type, value.values())} in ({str}, {bool}):
                 constants.append((name, sorted(value.values())))  # an empty one is filled later
             else:
                 constants.append((name, getattr(value, "_fields", None)))
     return digest(*functions, text=repr((sys.version, constants)))
+
+
+def _is_table(value: Any) -> bool:
+    """Return whether a value is a tuple of floats, or of such tuples."""
+    if not isinstance(value, tuple) or hasattr(value, "_fields"):
+        return isinstance(value, float)
+    return bool(value) and all(map(_is_table, value))
 
 
 # --------------------------------------------------------------------------- engines

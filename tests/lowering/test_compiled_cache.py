@@ -26,7 +26,7 @@ from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import lower
 from gms_fsm.run import _compiled_run
-from integrators import columns, loop, step_size
+from integrators import columns, elementary, loop, step_size
 from integrators import compiled as machine
 from integrators.machine_code import statements
 from integrators.machine_code.layout import Layout
@@ -299,6 +299,7 @@ def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
         "a method of the front end": lambda: patch.setattr(Layout, "key", _other_key),
         "how a statement is translated": lambda: patch.setattr(statements, "body", _other_body),
         "a number": lambda: patch.setattr(step_size, "SAFETY", 0.8),
+        "a table": lambda: patch.setattr(elementary, "LOW", (1.0, *elementary.LOW[1:])),
         "a limit": lambda: patch.setattr(loop, "MOST_SWITCHES", 99),
         "Python": lambda: patch.setattr(sys, "version", "4.0"),
     }
