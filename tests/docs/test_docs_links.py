@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from gms_fsm.language import CONSTANTS, FUNCTIONS
 from tests.helpers import ROOT
 
 TEXTS = [
@@ -92,4 +93,11 @@ def test_the_citation_names_this_version() -> None:
     version = re.search(r'__version__ = "(.+)"', (ROOT / "gms_fsm/_version.py").read_text())
     assert version
     assert f"\nversion: {version[1]}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert f"(version {version[1]})" in (ROOT / "docs/cite.md").read_text(encoding="utf-8")
+    assert f"(version {version[1]}, unreleased)" in (ROOT / "docs/cite.md").read_text(
+        encoding="utf-8"
+    )
+
+
+def test_the_language_page_has_every_function() -> None:
+    page = (ROOT / "docs/concepts/chart.md").read_text(encoding="utf-8")
+    assert f"`{' '.join([*FUNCTIONS, *CONSTANTS])}`" in page
