@@ -32,24 +32,14 @@ def reportcard_command(
         list[str] | None,
         typer.Option("--only", help="Data set: tribometer or damper; repeat for several."),
     ] = None,
-    score: Annotated[
-        Path | None,
-        typer.Option(help="Score a JSON file of predictions instead.", show_default=False),
-    ] = None,
 ) -> None:
     """Score friction models on public records; write a page and a JSON file."""
     from gms_fsm._files import output_folder
-    from gms_fsm.app.reportcard import make, scored, write
+    from gms_fsm.app.reportcard import make, write
     from gms_fsm.app.reportcard.datasets import data_set
-    from gms_fsm.app.reportcard.pages import FILES, table
+    from gms_fsm.app.reportcard.pages import FILES
 
     folder = Path(os.environ.get("GMS_FSM_DATA", ".")) if data is None else data
-    if score is not None:
-        row = scored(score, folder)
-        typer.echo(table([row]))
-        for name, rmse in row.by_record.items():
-            typer.echo(f"{name}: {rmse:.4g} N")
-        return
     names = [data_set(name).name for name in only or ()]
     output_folder(output, FILES)
     with progress_bars() as bars:

@@ -6,6 +6,8 @@ Made small: a data set of one record, and methods that are known exactly.
 from __future__ import annotations
 
 import json
+import runpy
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,15 +16,17 @@ import numpy as np
 import pytest
 
 from gms_fsm import GMSError, ParameterError, Record, RecordError
-from gms_fsm.app.reportcard import datasets, make, page, scored, write
+from gms_fsm.app.reportcard import datasets, make, page, write
 from gms_fsm.app.reportcard.datasets import DataSet, Split, data_set
 from gms_fsm.app.reportcard.methods import METHODS, Method, Predictor
 from gms_fsm.identification.bank import stop_operators
 from gms_fsm.identification.fit import fitted
+from tests.helpers import ROOT
 from tests.scenario_files import CommandLine, data_folder
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
 
+SCORE = runpy.run_path(str(ROOT / "benchmarks" / "score.py"))
 T = np.linspace(0.0, 12.0, 601)
 X = 1e-3 * np.sin(2.0 * np.pi * T / 2.0)
 F = stop_operators(X, [2e-4]) @ [5e3] + 0.1
@@ -121,7 +125,7 @@ def submit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     def run(given: Any) -> Any:
         path = tmp_path / "mine.json"
         path.write_text(given if isinstance(given, str) else json.dumps(given))
-        return scored(path, tmp_path)
+        return SCORE["scored"](path, tmp_path)
 
     return run
 
@@ -169,7 +173,6 @@ def test_missing_data_are_said_first(gms_fsm: CommandLine) -> None:
     assert done.code == 2
     assert "nowhere: there is no such folder" in done.err
     assert gms_fsm("reportcard", "--only", "skates", "-o", "out").code == 2
-    assert gms_fsm("reportcard", "--score", "none.json").code == 2
 
 
 @pytest.fixture
@@ -177,18 +180,30 @@ def tribometer_folder() -> Path:
     return data_folder()
 
 
+def score(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> None:
+    monkeypatch.setattr(sys, "argv", ["score.py", *arguments])
+    SCORE["main"]()
+
+
+def test_a_missing_file_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(SystemExit, match=r"^score: none\.json: it cannot be read"):
+        score(monkeypatch, "none.json")
+
+
 def test_the_tribometer_is_scored_from_the_command_line(
-    tribometer_folder: Path, gms_fsm: CommandLine
+    tribometer_folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    folder = tribometer_folder  # found before the command line forgets where
-    (split,) = data_set("tribometer").splits(folder)
+    monkeypatch.chdir(tmp_path)
+    (split,) = data_set("tribometer").splits(tribometer_folder)
     (held,) = split.held
     forces = held.columns["force"][held.chosen] + 0.1
     Path("mine.json").write_text(
         json.dumps({"name": "mine", "dataset": "tribometer", "F": forces.tolist()})
     )
-    done = gms_fsm("reportcard", "--data", str(folder), "--score", "mine.json")
-    assert done.code == 0
-    assert "| mine | – | – | 0.1 |" in done.out
+    score(monkeypatch, "mine.json", "--data", str(tribometer_folder))
+    assert "| mine | – | – | 0.1 |" in capsys.readouterr().out
     assert split.training[0].columns["time"][split.training[0].chosen].max() < 100.0
     assert held.columns["time"][held.chosen].min() >= 100.0

@@ -4,6 +4,5 @@ from __future__ import annotations
 
 from gms_fsm.app.reportcard.card import Card, Row, make
 from gms_fsm.app.reportcard.pages import page, write
-from gms_fsm.app.reportcard.submissions import scored
 
-__all__ = ["Card", "Row", "make", "page", "scored", "write"]
+__all__ = ["Card", "Row", "make", "page", "write"]

@@ -34,7 +34,7 @@ Write the forces that your model predicts for the held-out rows into a JSON file
 the force at each held-out row in N, in the order of the record. `"rows": {"tribometer": [20120]}`
 scores only some of them, by their line in the file (the header is line 1; rows of the tribometer
 with a normal force of at most 4.5 N do not count). What is held out must not have been trained on.
-Then `gms-fsm reportcard --data FOLDER --score mine.json` prints your row of the table. To have it
+Then `python benchmarks/score.py mine.json --data FOLDER` prints your row of the table. To have it
 listed here, open an issue with the file and a sentence on how the model was trained.
 """
 

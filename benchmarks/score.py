@@ -1,6 +1,8 @@
-"""Scoring the predictions of others, from a JSON file.
+"""Score a JSON file of predictions on the held-out rows of the report card.
 
-::
+    python benchmarks/score.py mine.json --data FOLDER
+
+The file::
 
     {"name": "my model", "dataset": "tribometer", "F": {"tribometer": [2.31, 2.30, ...]}}
 
@@ -12,7 +14,10 @@ both may be plain lists.
 
 from __future__ import annotations
 
+import argparse
 import json
+import os
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
@@ -23,10 +28,9 @@ import numpy as np
 
 from gms_fsm.app.reportcard.card import Row
 from gms_fsm.app.reportcard.datasets import data_set, held_rows, score
-from gms_fsm.errors import RecordError, cut, shown
+from gms_fsm.app.reportcard.pages import table
+from gms_fsm.errors import GMSError, RecordError, cut, shown
 from gms_fsm.records.record import Record
-
-__all__ = ["scored"]
 
 FORM = '{"name": "my model", "dataset": "tribometer", "F": {"tribometer": [2.31, ...]}}'
 
@@ -157,3 +161,27 @@ def _with_rows(record: Record, rows: list[Any], place: str) -> Record:
     if any(after <= before for before, after in pairwise(rows)):
         raise RecordError("it must increase", place=place)
     return replace(record, chosen=np.isin(record.rows, rows) & record.chosen)
+
+
+def main() -> None:
+    """Print the row of the table, and the error of each record."""
+    parser = argparse.ArgumentParser(description="Score predictions of held-out rows.")
+    parser.add_argument("file", type=Path, help="the JSON file")
+    parser.add_argument(
+        "--data",
+        type=Path,
+        default=Path(os.environ.get("GMS_FSM_DATA", ".")),
+        help="folder with the records; by default what GMS_FSM_DATA names",
+    )
+    given = parser.parse_args()
+    try:
+        row = scored(given.file, given.data)
+    except GMSError as error:
+        sys.exit(f"score: {error}")
+    print(table([row]))
+    for name, rmse in row.by_record.items():
+        print(f"{name}: {rmse:.4g} N")
+
+
+if __name__ == "__main__":
+    main()
