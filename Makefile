@@ -82,13 +82,13 @@ paper: $(VENV)/all.stamp
 	$(RUN)/gms-fsm paper -o paper
 
 test: $(VENV)/dev.stamp
-	$(RUN)/python -m pytest -n auto -m "not matrix"
+	$(RUN)/python -m pytest -n auto
 
 quick: $(VENV)/dev.stamp
 	$(RUN)/python -m pytest -n auto -m "not slow and not matrix"
 
 coverage: $(VENV)/dev.stamp
-	$(RUN)/python -m pytest -n auto --cov --cov-report=term -m "not matrix"
+	$(RUN)/python -m pytest -n auto --cov --cov-report=term
 
 lint: $(VENV)/dev.stamp
 	$(RUN)/ruff format --check .
