@@ -275,10 +275,6 @@ class _Run(_Module):
     def __init__(self, subject: Subject) -> None:
         given, t_end = subject.given, subject.t_end
         assert isinstance(given, System)
-        if t_end is None:
-            raise ParameterError(
-                "a run needs its end", place="t_end", advice="for example t_end=10.0 (s)"
-            )
         for name, signal in given.signals.items():
             if isinstance(signal, Function):
                 raise ParameterError(
@@ -286,6 +282,10 @@ class _Run(_Module):
                     place=f"signal {name!r}",
                     advice="give it as an expression in t, or as a record",
                 )
+        if t_end is None:
+            raise ParameterError(
+                "a run needs its end", place="t_end", advice="for example t_end=10.0 (s)"
+            )
         start = Start.of(
             given, None, t_end, subject.settings, t_start=subject.t_start, initial=subject.initial
         )

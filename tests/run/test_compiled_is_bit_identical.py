@@ -478,7 +478,7 @@ def test_every_function_at_many_places(text: str) -> None:
     values = _argument_values()
     program = lower(_function(text), Prescribed("0"))
     y = np.column_stack([np.zeros(len(values)), values])
-    mode = np.zeros((len(values), 1), dtype=np.int64)
+    mode = np.zeros((len(values), program.layout.modes), dtype=np.int64)
     found = compiled.observe_rows(program, np.zeros(len(values)), y, mode, range(5))
     wanted, out = np.empty_like(found), [0.0] * 5
     for row, place in enumerate(y.tolist()):

@@ -14,13 +14,14 @@ pytest.importorskip("llvmlite", reason="needs the extra fast")
 import integrators.compiled
 from gms_fsm import Slider, simulate
 from gms_fsm.lowering import _compiled as compiled
+from gms_fsm.lowering._observing import on_surfaces
 from gms_fsm.run import _compiled_run
 from gms_fsm.traces import _observed
 from gms_fsm.traces.failures import LivelockError
 from integrators import columns
-from integrators.compiled import each_row
 from integrators.loop import Machines
 from integrators.machine_code.layout import Layout
+from integrators.observing import observe_rows as rows_observed
 from integrators.sliding import Functions
 from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
 from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
@@ -53,9 +54,11 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def observe_rows(program, t, y, mode, kept):
         table, seen = np.empty((t.size, len(kept))), np.empty(program.layout.observed.size)
-        p = compiled.packed(program.p)
-        observe = program.ieee["observe"]
-        each_row(observe, t, y, mode, program.live, p, seen, table, kept.start)
+        on = on_surfaces(program, program.ieee, compiled.packed(program.p))
+        observe, rows = program.ieee["observe"], (t, y, mode)
+        rows_observed(
+            on.functions, observe, on.held, on.sliding, *rows, seen, table, kept.start, t.size
+        )
         return table
 
     monkeypatch.setattr(compiled, "engine", engine)
