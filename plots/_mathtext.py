@@ -2,108 +2,12 @@
 
 from __future__ import annotations
 
-import math
-import unicodedata
-from collections.abc import Collection, Iterator, Mapping
-from typing import NamedTuple
+from collections.abc import Collection, Mapping
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.language import Binary, Call, Negative, Value, fold
-from gms_fsm.language._print import LEVELS
+from gms_fsm.language import LATEX, Value, latex_name, spell
 
-__all__ = ["Formulas", "formula", "symbol"]
-
-ATOM = 9  # binds tighter than every operator
-SIGNS = {"+": "+", "-": "-", "*": r"\,", "/": "/"}
-FUNCTIONS = ("exp", "log", "sin", "cos", "tan", "tanh", "sinh", "cosh", "min", "max")
-OTHERS = {"atan": "arctan", "asinh": "arsinh", "sign": "sgn", "log": "ln"}
-GREEK = frozenset(
-    unicodedata.name(each).rpartition(" ")[2].lower().replace("lamda", "lambda")
-    for each in "αβγδεζηθκλμνξπρστφχψωΓΔΘΛΞΠΣΦΨΩ"
-)
-
-
-class _Part(NamedTuple):
-    """A formula and how tightly it binds."""
-
-    text: str
-    level: int
-
-    def at(self, level: int) -> str:
-        return self.text if self.level >= level else rf"\left({self.text}\right)"
-
-
-class _Formula:
-    """The algebra of formulas."""
-
-    def __init__(self, names: Mapping[str, str]) -> None:
-        self.names = names
-
-    def number(self, value: float) -> _Part:
-        if value == math.pi:
-            return _Part(r"\pi", ATOM)
-        digits, _, exponent = f"{value:.12g}".partition("e")
-        if not exponent:
-            return _Part(digits, ATOM if value >= 0 else LEVELS["neg"])
-        power = rf"10^{{{int(exponent)}}}"
-        text = power if digits == "1" else rf"{digits} \cdot {power}"
-        return _Part(text, LEVELS["*"])
-
-    def name(self, name: str) -> _Part:
-        return _Part(self.names.get(name) or symbol(name), ATOM)
-
-    def negative(self, _: Negative, parts: Iterator[_Part]) -> _Part:
-        return _Part("-" + next(parts).at(LEVELS["neg"]), LEVELS["neg"])
-
-    def binary(self, node: Binary, parts: Iterator[_Part]) -> _Part:
-        left, right = parts
-        if node.op == "/":
-            return _Part(rf"\frac{{{left.text}}}{{{right.text}}}", LEVELS["*"])
-        level = LEVELS[node.op]
-        # Sums and products of real numbers need no parentheses on the right.
-        after = level + 1 if node.op == "-" else level
-        sign = rf" {SIGNS[node.op]} "
-        if node.op == "*" and right.text[:1].isdigit():
-            sign = r" \cdot "
-        return _Part(left.at(level) + sign + right.at(after), level)
-
-    def power(self, _: Binary, parts: Iterator[_Part]) -> _Part:
-        base, exponent = parts
-        return _Part(rf"{base.at(ATOM)}^{{{exponent.text}}}", LEVELS["**"])
-
-    def call(self, node: Call, parts: Iterator[_Part]) -> _Part:
-        texts = [part.text for part in parts]
-        if node.function == "abs":
-            return _Part(rf"\left|{texts[0]}\right|", ATOM)
-        if node.function == "sqrt":
-            return _Part(rf"\sqrt{{{texts[0]}}}", ATOM)
-        name = OTHERS.get(node.function, node.function)
-        written = "\\" + name if name in FUNCTIONS else rf"\mathrm{{{name}}}"
-        arguments = r",\,".join(texts)
-        return _Part(rf"{written}\left({arguments}\right)", ATOM)
-
-
-def symbol(name: str) -> str:
-    r"""Return a name as in formulas.
-
-    Examples
-    --------
-    >>> print(symbol("sigma_0"), symbol("v_s"), symbol("load"))
-    \sigma_{0} v_{s} \mathrm{load}
-    """
-    head, _, index = name.partition("_")
-    if head.lower() in GREEK and len(head) > 1:
-        head = "\\" + head
-    elif head[1:].isdigit():
-        head, index = head[:1], head[1:] + (f",{index}" if index else "")
-    elif len(head) > 1:
-        head = rf"\mathrm{{{head}}}"
-    if not index:
-        return head
-    index = index.replace("_", ",")
-    if len(index) > 1:
-        index = rf"\mathrm{{{index}}}"
-    return rf"{head}_{{{index}}}"
+__all__ = ["Formulas", "formula"]
 
 
 def formula(tree: Value, names: Mapping[str, str] | None = None) -> str:
@@ -114,7 +18,7 @@ def formula(tree: Value, names: Mapping[str, str] | None = None) -> str:
     tree : Value
         A checked tree.
     names : mapping of str to str, optional
-        Formulas for names, instead of `symbol`.
+        Formulas for names, instead of `latex_name`.
 
     Returns
     -------
@@ -127,7 +31,7 @@ def formula(tree: Value, names: Mapping[str, str] | None = None) -> str:
     >>> print(formula(parse_value("(F_s - F_c) * exp(-(v / v_s)**2)", ["F_s", "F_c", "v", "v_s"])))
     \left(F_{s} - F_{c}\right) \, \exp\left(-\left(\frac{v}{v_{s}}\right)^{2}\right)
     """
-    return fold(tree, _Formula(names or {})).text
+    return spell(tree, LATEX, names)
 
 
 class Formulas:
@@ -149,9 +53,9 @@ class Formulas:
 
     def __init__(self, chart: Chart, indexed: Collection[str] = ()) -> None:
         self.chart = chart
-        self.names = {name: _indexed(symbol(name)) for name in indexed}
+        self.names = {name: _indexed(latex_name(name)) for name in indexed}
         for name in chart.variables:
-            dotted = rf"\dot{{{symbol(name)}}}"
+            dotted = rf"\dot{{{latex_name(name)}}}"
             self.names[f"d{name}"] = _indexed(dotted) if name in indexed else dotted
 
     def __call__(self, tree: Value) -> str:
@@ -160,7 +64,7 @@ class Formulas:
 
     def left(self, name: str) -> str:
         """Return the left side of an equation."""
-        return self.names.get(name) or symbol(name)
+        return self.names.get(name) or latex_name(name)
 
     def named(self) -> list[str]:
         """Return the named expressions, as equations."""
@@ -185,7 +89,7 @@ class Formulas:
         for force in chart.force_names:
             for state in names:
                 force_tree = chart.forces[state, force]
-                held = ",\\ ".join(f"{symbol(each)} = 0" for each in chart.velocities)
+                held = ",\\ ".join(f"{latex_name(each)} = 0" for each in chart.velocities)
                 text = rf"{held},\ {self.left(force)}\ \mathrm{{holds\ it}}"
                 if force_tree is not None:
                     text = f"{self.left(force)} = {self(force_tree)}"

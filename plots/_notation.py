@@ -2,37 +2,27 @@
 
 from __future__ import annotations
 
-import re
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.language import (
+    MATHEMATICS,
     MATLAB_LIKE,
     Both,
     Condition,
     Either,
     Name,
-    Spelling,
     Value,
     renamed,
     spell,
 )
 
-__all__ = ["NOTATIONS", "RAISED", "Writer"]
+__all__ = ["NOTATIONS", "Writer"]
 
 NOTATIONS = ("stateflow", "math")
 
-# ! puts its operand in brackets
-MATH = Spelling(" ∧ ", " ∨ ", "!", "⊤", bars=True, products=False, timers=True)
-# Tokens that differ between the two notations; numbers are separate tokens, so that the minus of
-# 1e-06 is not mistaken for an operator.
-_TOKEN = re.compile(
-    r"(?P<power>\^\d+(?![\w.]))|(?P<number>\d[\d.]*(?:e[+-]?\d+)?)|(?P<name>\w+)|>=|<=|[*!-]"
-)
-_SIGNS = {">=": "≥", "<=": "≤", "*": "·", "-": "−", "!": "¬", "sqrt": "√", "pi": "π"}
-RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _GREEK = {
     unicodedata.name(c).removeprefix("GREEK SMALL LETTER ").lower(): c
@@ -78,7 +68,7 @@ class Writer:
         names |= {f"d{name}": self.rate(name) for name in chart.variables}
         if "s" in chart.inputs:
             names["s"] = "s(v)"  # the threshold that the model supplies depends on the velocity
-        return _TOKEN.sub(_formula_token, spell(tree, MATH, names))
+        return spell(tree, MATHEMATICS, names)
 
     def rate(self, variable: str) -> str:
         """Write the time derivative of a variable."""
@@ -117,8 +107,8 @@ class Writer:
     @property
     def words(self) -> Mapping[type, str]:
         """Words between the parts of a conjunction or a disjunction."""
-        spelling = MATH if self.math else MATLAB_LIKE
-        return {Both: spelling.both.strip(), Either: spelling.either.strip()}
+        written = (MATHEMATICS if self.math else MATLAB_LIKE).operators
+        return {Both: str(written["and"].write).strip(), Either: str(written["or"].write).strip()}
 
     def actions(self, trees: Mapping[str, Value]) -> str:
         """Write the assignments of an edge on one line; empty if there are none."""
@@ -135,14 +125,3 @@ def _symbol(name: str) -> str:
     if not index:
         return head if name == name.rstrip("_") else name
     return head + index.translate(_LOWERED) if index.isdecimal() else f"{head}_{index}"
-
-
-def _formula_token(match: re.Match[str]) -> str:
-    token = match[0]
-    if match["power"]:
-        return token[1:].translate(RAISED)
-    if match["number"]:
-        digits, _, exponent = token.partition("e")
-        power = f"10{str(int(exponent)).translate(RAISED)}" if exponent else ""
-        return (power if digits == "1" else f"{digits}·{power}") if power else digits
-    return _SIGNS.get(token, token)

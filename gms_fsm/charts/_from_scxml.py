@@ -284,7 +284,7 @@ def _edges(rows: list[Row]) -> list[Edge]:
 # --------------------------------------------------------------------------- texts
 def _read_back(text: str | None) -> str:
     """Return a condition or an expression of ECMAScript in the language of charts."""
-    called = {word: name for name, word in ECMASCRIPT.functions.items()}
+    called = {text.partition("(")[0]: name for name, text in ECMASCRIPT.functions.items()}
     said = TOKEN.sub(lambda found: WORDS.get(found[0], called.get(found[0], found[0])), text or "")
     return " ".join(said.split())
 

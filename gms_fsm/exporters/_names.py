@@ -1,4 +1,4 @@
-"""Names of files and of what is defined in them; refused if another language cannot have them."""
+"""Names of files, functions and quantities; refused if another language cannot have them."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterable
 
 from gms_fsm.errors import ParameterError
+from gms_fsm.language import Dialect, Node, spell
 
-__all__ = ["identifier", "slug"]
+__all__ = ["check_functions", "identifier", "slug"]
 
 LONGEST = 63  # characters that C99 compilers and MATLAB tell apart
 
@@ -87,3 +88,16 @@ def identifier(name: str, words: Iterable[str], place: str) -> str:
             "it is a word of the format's language", place=place, advice="give it another name"
         )
     return name
+
+
+def check_functions(trees: Iterable[Node], dialect: Dialect, place: str, language: str) -> None:
+    """Refuse trees with a function that another language does not have, naming it."""
+    try:
+        for tree in trees:
+            spell(tree, dialect)
+    except KeyError as error:
+        raise ParameterError(
+            f"{language} has no function {error.args[0]!r}",
+            place=place,
+            advice="write the expression without it, or choose another format",
+        ) from None

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._element import Element
 from gms_fsm.exporters._element_parts import Constant
-from gms_fsm.exporters._notation import Notation
 from gms_fsm.exporters._plain_form import (
     ByState,
     Declare,
@@ -20,7 +20,7 @@ from gms_fsm.exporters._plain_form import (
     plain_form,
 )
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import ELEMENTARY, FUNCTIONS, NAMESPACE, Name, Node
+from gms_fsm.language import C99, ELEMENTARY, FUNCTIONS, NAMESPACE, Name, Node, spell
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
@@ -47,7 +47,6 @@ C_WORDS = frozenset(
     """,
     )
 )
-LIBRARY = {"abs": "fabs({0})", "sqrt": "sqrt({0})"}
 OWN = {name: 2 if name == "pow" else 1 for name in ELEMENTARY}  # arguments
 HELPERS = {
     "sgn": "(double u)\n{\n    return u > 0.0 ? 1.0 : u < 0.0 ? -1.0 : 0.0;\n}",
@@ -131,9 +130,8 @@ class _Printer:
         self.form: Plain = plain_form(self.element)
         self.name = f"{subject.name}_plain"
         self.refuse_own_names()
-        own = {name: f"{self.name}_{name}({{0}})" for name in (*OWN, *HELPERS)}
-        own |= {name: f"{self.name}_{name}({{0}}, {{1}})" for name in ("min", "max", "pow")}
-        self.notation = Notation(" && ", " || ", "!", "1", {**own, **LIBRARY}, own["pow"])
+        own = {name: f"{self.name}_{name}({{all}})" for name in (*OWN, *HELPERS)}
+        self.dialect = replace(C99, functions={**own, **C99.functions})
         # The machine's own names give way to those of the chart.
         self.me = self.element.free("friction")
         # One element needs no arrays and no loop.
@@ -218,7 +216,7 @@ class _Printer:
         used = [name for name in OWN if f"{self.name}_{name}(" in text]
         if used:
             lines.append(self.elementary(used))
-        elif any(f"{each.split('(')[0]}(" in text for each in LIBRARY.values()):
+        elif any(f"{each.split('(')[0]}(" in text for each in C99.functions.values()):
             lines += ["#include <math.h>", ""]
         lines += [f'#include "{self.name}.h"']
         for name, helper in HELPERS.items():
@@ -239,9 +237,9 @@ class _Printer:
         for each in element.variables:
             for i, value in enumerate(each.start):
                 at = f"[{i}]" if self.i else ""
-                lines.append(f"    {self.me}->{each.name}{at} = {self.notation.number(value)};")
+                lines.append(f"    {self.me}->{each.name}{at} = {self.dialect.number(value)};")
         if element.position:
-            start = self.notation.number(element.position_start)
+            start = self.dialect.number(element.position_start)
             lines.append(f"    {self.me}->{element.position} = {start};")
         if len(element.states) > 1:
             for i, index in enumerate(element.start):
@@ -282,7 +280,7 @@ class _Printer:
         return [self.signature(), "{", *_indented([*unused, *body]), "}"]
 
     def constant(self, constant: Constant) -> str:
-        number, value = self.notation.number, constant.value
+        number, value = self.dialect.number, constant.value
         if isinstance(value, tuple):
             numbers = ", ".join(map(number, value))
             text = f"{constant.name}[{len(value)}] = {{{numbers}}}"
@@ -292,7 +290,7 @@ class _Printer:
 
     # ------------------------------------------------------------------ statements
     def spell(self, tree: Node) -> str:
-        return self.notation.spell(tree, self.texts)
+        return spell(tree, self.dialect, self.texts)
 
     def statements(self, found: Sequence[Statement]) -> list[str]:
         return [line for each in found for line in self.statement(each)]

@@ -10,11 +10,10 @@ from gms_fsm.exporters._c import TEMPLATES
 from gms_fsm.exporters._element import Element
 from gms_fsm.exporters._element_parts import Expression, Let, State
 from gms_fsm.exporters._names import LONGEST
-from gms_fsm.exporters._notation import Notation
 from gms_fsm.exporters._readme import about_friction
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import Node, Relation, names_in
+from gms_fsm.language import MATLAB, Node, Relation, names_in, spell
 from gms_fsm.lowering._plan import RoughCall, both_sides
 from gms_fsm.lowering.adapting import SHARE
 from gms_fsm.lowering.scales import scales_of
@@ -35,16 +34,6 @@ WORDS = frozenset(
         struct tanh true zeros
         """,
     )
-)
-NAMES = {name: f"{name}({{0}})" for name in ("abs", "exp", "log", "sqrt", "sin", "cos")}
-NAMES |= {name: f"{name}({{0}})" for name in ("tanh", "atan", "asinh")}
-NOTATION = Notation(
-    " && ",
-    " || ",
-    "~",
-    "true",
-    {**NAMES, "sgn": "sign({0})", "min": "min({0}, {1})", "max": "max({0}, {1})"},
-    "power({0}, {1})",
 )
 FIELDS = ("longest_step", "tolerance", "edges")
 
@@ -241,7 +230,7 @@ class _Printer:
                 yield "end"
 
     def spell(self, node: Node) -> str:
-        return NOTATION.spell(node, self.texts)
+        return spell(node, MATLAB, self.texts)
 
     def loop(
         self,

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Mapping
 
 from gms_fsm.exporters._element import Element
 from gms_fsm.exporters._element_parts import Constant, Leaving
-from gms_fsm.exporters._names import identifier
-from gms_fsm.exporters._notation import Notation
+from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._readme import about_friction
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import (
+    MODELICA,
     Both,
     Condition,
     Either,
@@ -21,6 +21,7 @@ from gms_fsm.language import (
     Split,
     Value,
     renamed,
+    spell,
     split,
 )
 
@@ -46,18 +47,6 @@ WORDS = frozenset(
         """,
     )
 )
-# Corners and jumps are written as if-expressions: they make events, sign() and abs() do not.
-# The language has no asinh of its own.
-FUNCTIONS = {
-    name: f"{name}({{0}})" for name in ("exp", "log", "sqrt", "sin", "cos", "tanh", "atan")
-}
-FUNCTIONS |= {
-    "abs": "(if {0} >= 0.0 then {0} else -({0}))",
-    "sgn": "(if {0} > 0.0 then 1.0 elseif {0} < 0.0 then -1.0 else 0.0)",
-    "min": "(if {1} < {0} then {1} else {0})",
-    "max": "(if {1} > {0} then {1} else {0})",
-}
-NOTATION = Notation(" and ", " or ", "not ", "true", FUNCTIONS, "(({0})^({1}))")
 
 
 def modelica(subject: Subject) -> dict[str, str]:
@@ -112,9 +101,7 @@ class _Printer:
         total = f"sum({self.one}.{self.part})" if element.n > 1 else f"{self.one}.{self.part}"
         self.texts = {"t": "time"}
         self.total = {"t": "time", "F": total}
-        place = f"chart {subject.title!r}"
-        for tree in self.trees():
-            NOTATION.check(tree, place, "Modelica")
+        check_functions(self.trees(), MODELICA, f"chart {subject.title!r}", "Modelica")
 
     def trees(self) -> Iterable[Node]:
         """Return all that is written."""
@@ -128,7 +115,7 @@ class _Printer:
                 yield from (tree for _, tree in edge.steps)
 
     def spell(self, node: Node) -> str:
-        return NOTATION.spell(node, self.texts)
+        return spell(node, MODELICA, self.texts)
 
     # ------------------------------------------------------------------ the whole
     def text(self) -> str:
@@ -140,7 +127,7 @@ class _Printer:
         )
         lines += _indented(['output Real F "N: friction force";', *constants])
         if element.position:
-            start = NOTATION.number(element.position_start)
+            start = MODELICA.number(element.position_start)
             declared = f'Real {element.position}(start = {start}, fixed = true) "m: position";'
             lines += _indented([declared])
         size = f"[{element.n}]" if element.n > 1 else ""
@@ -151,7 +138,7 @@ class _Printer:
         return "\n".join([*lines, f"end {self.name};"]) + "\n"
 
     def constant(self, constant: Constant) -> str:
-        value, number = constant.value, NOTATION.number
+        value, number = constant.value, MODELICA.number
         if isinstance(value, tuple):
             numbers = ", ".join(map(number, value))
             text = f"{constant.name}[{len(value)}] = {{{numbers}}}"
@@ -174,7 +161,7 @@ class _Printer:
             if each.name in self.inside:
                 word = "each " if several and not isinstance(each.value, tuple) else ""
                 found.append(f"{word}{each.name} = {each.name}")
-        number = NOTATION.number
+        number = MODELICA.number
         for variable in self.element.variables:
             numbers = list(map(number, variable.start))
             text = f"{{{', '.join(numbers)}}}" if several else numbers[0]
@@ -189,7 +176,7 @@ class _Printer:
         lines = [f"{each.name} = {self.spell(each.value.tree)};" for each in self.shared_lets]
         if element.position:
             lines.append(f"der({element.position}) = {element.inputs[0][0]};")
-        return [*lines, f"F = {NOTATION.spell(element.total.tree, self.total)};"]
+        return [*lines, f"F = {spell(element.total.tree, MODELICA, self.total)};"]
 
     # ------------------------------------------------------------------ one element
     def one_element(self) -> list[str]:
@@ -262,7 +249,7 @@ class _Printer:
             now[name] = renamed(tree, now)
         before = {each.name: f"pre({each.name})" for each in self.element.variables}
         texts: Mapping[str, str] = self.texts | before
-        return [f"reinit({name}, {NOTATION.spell(tree, texts)});" for name, tree in now.items()]
+        return [f"reinit({name}, {spell(tree, MODELICA, texts)});" for name, tree in now.items()]
 
     # ------------------------------------------------------------------ for people
     def readme(self) -> str:

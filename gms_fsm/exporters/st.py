@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._element import Element
 from gms_fsm.exporters._element_parts import Constant
-from gms_fsm.exporters._names import identifier
-from gms_fsm.exporters._notation import Notation
+from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._plain_form import (
     ByState,
     Declare,
@@ -23,7 +23,7 @@ from gms_fsm.exporters._plain_form import (
 from gms_fsm.exporters._readme import about_friction
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import Name, Node
+from gms_fsm.language import STRUCTURED_TEXT, Name, Node, spell
 
 __all__ = ["WORDS", "structured_text"]
 
@@ -53,17 +53,6 @@ WORDS = frozenset(
     """,
     )
 )
-FUNCTIONS = {
-    "abs": "ABS({0})",
-    "exp": "EXP({0})",
-    "log": "LN({0})",
-    "sqrt": "SQRT({0})",
-    "min": "MIN({0}, {1})",
-    "max": "MAX({0}, {1})",
-    "sin": "SIN({0})",
-    "cos": "COS({0})",
-    "atan": "ATAN({0})",
-}  # the standard has no tanh and no asinh; sgn is a function of the text itself
 SGN = """\
 FUNCTION {name} : LREAL
 VAR_INPUT
@@ -131,16 +120,10 @@ class _Printer:
         self.form: Plain = plain_form(element, "cycle")
         self.element = element.reserved(self.form.dt, self.form.part)
         self.force = self.take("force")  # F would be the same as a chart's f
-        self.notation = Notation(
-            " AND ",
-            " OR ",
-            "NOT ",
-            "TRUE",
-            {**FUNCTIONS, "sgn": f"{name}_sgn({{0}})"},
-            "EXPT({0}, {1})",
-        )
-        for tree in self.form.trees:
-            self.notation.check(tree, f"chart {subject.title!r}", "structured text")
+        functions = {**STRUCTURED_TEXT.functions, "sgn": f"{name}_sgn({{0}})"}
+        self.dialect = replace(STRUCTURED_TEXT, functions=functions)
+        place = f"chart {subject.title!r}"
+        check_functions(self.form.trees, self.dialect, place, "structured text")
         # One element needs no arrays and no loop.
         self.i = self.take("i") if element.n > 1 else ""
         self.at = f"[{self.i}]" if self.i else ""
@@ -197,11 +180,11 @@ class _Printer:
         value = constant.value
         if isinstance(value, tuple):
             return f"{constant.name} : {self.array('LREAL', value)};{_note(constant.about)}"
-        number = self.notation.number(value)
+        number = self.dialect.number(value)
         return f"{constant.name} : LREAL := {number};{_note(constant.about)}"
 
     def array(self, kind: str, values: Sequence[float | int]) -> str:
-        number = self.notation.number
+        number = self.dialect.number
         texts = [number(each) if isinstance(each, float) else str(each) for each in values]
         if len(values) == 1:
             return f"{kind} := {texts[0]}"
@@ -213,7 +196,7 @@ class _Printer:
         for each in element.variables:
             yield f"{each.name} : {self.array('LREAL', each.start)};{_note(each.about)}"
         if element.position:
-            start = self.notation.number(element.position_start)
+            start = self.dialect.number(element.position_start)
             yield f"{element.position} : LREAL := {start};  (* m: position *)"
         if len(element.states) > 1:
             yield f"{self.state} : {self.array('INT', element.start)};"
@@ -249,7 +232,7 @@ class _Printer:
 
     # ------------------------------------------------------------------ statements
     def spell(self, tree: Node) -> str:
-        return self.notation.spell(tree, self.texts)
+        return spell(tree, self.dialect, self.texts)
 
     def statements(self, found: Iterable[Statement]) -> list[str]:
         return [line for each in found for line in self.statement(each)]

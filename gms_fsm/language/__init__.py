@@ -1,10 +1,10 @@
 """The expression language: text -> checked tree -> every other notation.
 
 All physics and all switching of this package is written as short texts (``z >= s and v > v_c``).
-Here such a text becomes a tree that can be evaluated, printed as Python or as Stateflow text,
-differentiated, and split into its atomic comparisons. Nothing is ever passed to `eval`: the text is
-parsed with `ast`, only nodes on an allow-list are accepted, and code is generated from the checked
-tree alone. Every reader of a tree is an algebra for `fold`.
+Here such a text becomes a tree that can be evaluated, printed in a dialect (Python, Stateflow, C,
+LaTeX ...), differentiated, and split into its atomic comparisons. Nothing is ever passed to `eval`:
+the text is parsed with `ast`, only nodes on an allow-list are accepted, and code is generated from
+the checked tree alone. Every reader of a tree is an algebra for `fold`.
 
 Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains are split),
 ``and or not``, ``abs exp log sqrt sgn min max sin cos tanh
@@ -15,6 +15,22 @@ Nothing in this package knows about friction.
 """
 
 from gms_fsm.language._derivative import derivative
+from gms_fsm.language._dialects import (
+    C99,
+    ECMASCRIPT,
+    LATEX,
+    LEVELS,
+    MATHEMATICS,
+    MATLAB,
+    MATLAB_LIKE,
+    MODELICA,
+    PYTHON,
+    STRUCTURED_TEXT,
+    Dialect,
+    Form,
+    latex_name,
+    raised,
+)
 from gms_fsm.language._evaluate import evaluate
 from gms_fsm.language._fold import Algebra, ValueAlgebra, fold
 from gms_fsm.language._functions import (
@@ -40,7 +56,7 @@ from gms_fsm.language._normal import (
     turning_inside,
 )
 from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, integer_power, product_power
-from gms_fsm.language._print import ECMASCRIPT, LEVELS, MATLAB_LIKE, PYTHON, Spelling, spell
+from gms_fsm.language._print import spell
 from gms_fsm.language._read import Owner, parse_condition, parse_value
 from gms_fsm.language._tree import (
     Binary,
@@ -62,25 +78,33 @@ from gms_fsm.language._tree import (
 from gms_fsm.language._vectors import truths, values_of
 
 __all__ = [
+    "C99",
     "COMPARISONS",
     "CONSTANTS",
     "ECMASCRIPT",
     "ELEMENTARY",
     "FUNCTIONS",
     "LARGEST_PRODUCT_POWER",
+    "LATEX",
     "LEVELS",
+    "MATHEMATICS",
+    "MATLAB",
     "MATLAB_LIKE",
+    "MODELICA",
     "NAMESPACE",
     "OPERATIONS",
     "PYTHON",
     "SEVERAL",
+    "STRUCTURED_TEXT",
     "Algebra",
     "Binary",
     "Both",
     "Call",
     "Comparison",
     "Condition",
+    "Dialect",
     "Either",
+    "Form",
     "InState",
     "Name",
     "Negative",
@@ -90,7 +114,6 @@ __all__ = [
     "Owner",
     "Relation",
     "Requirement",
-    "Spelling",
     "Split",
     "Value",
     "ValueAlgebra",
@@ -100,10 +123,12 @@ __all__ = [
     "evaluate",
     "fold",
     "integer_power",
+    "latex_name",
     "names_in",
     "parse_condition",
     "parse_value",
     "product_power",
+    "raised",
     "renamed",
     "rough_points",
     "sgn",

@@ -20,13 +20,13 @@ from gms_fsm.language import (
     Value,
     clauses,
     comparisons,
+    raised,
     spell,
     split,
 )
 from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, NullLocator, to_rgb
-from plots._notation import RAISED
 from plots._plane import Plane, linear_threshold, turning_points
 from plots._window import Window
 from plots.panels._axes import Artists
@@ -230,7 +230,7 @@ def grid_of(ax: Axes, view: View, size: tuple[int, int]) -> tuple[Floats, Floats
 
 
 def _power(value: float) -> str:
-    return f"10{str(round(np.log10(value))).translate(RAISED)}"
+    return f"10{raised(str(round(np.log10(value))))}"
 
 
 def _speed_ticks(ax: Axes, view: View) -> None:

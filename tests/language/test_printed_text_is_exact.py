@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from gms_fsm.language import (
+    C99,
+    ECMASCRIPT,
+    LATEX,
+    MATHEMATICS,
+    MATLAB,
     MATLAB_LIKE,
+    MODELICA,
+    STRUCTURED_TEXT,
     Binary,
+    Dialect,
     Name,
     Negative,
     Number,
@@ -128,3 +138,51 @@ def test_times_in_a_state_and_pi_have_their_names_in_charts_only(
 ) -> None:
     tree = parse_condition(text, ["age", "v"])
     assert (spell(tree, MATLAB_LIKE), spell(tree)) == (in_charts, in_code)
+
+
+# Which functions are called pow, exp ... in C, each export says.
+C = replace(C99, functions={**C99.functions, "pow": "pow({0}, {1})"})
+
+
+@pytest.mark.parametrize(
+    ("dialect", "value", "condition"),
+    [
+        (C, "(-k) * fabs(z - v * v) - pow(v, 0.5)", "(z > 0.0 && v < 1.0e-06) || !(v > z)"),
+        (MATLAB, "(-k) * abs(z - v * v) - power(v, 0.5)", "(z > 0.0 && v < 1.0e-06) || ~(v > z)"),
+        (
+            MODELICA,
+            "(-k) * (if z - v * v >= 0.0 then z - v * v else -(z - v * v)) - ((v)^(0.5))",
+            "(z > 0.0 and v < 1.0e-06) or not (v > z)",
+        ),
+        (
+            STRUCTURED_TEXT,
+            "(-k) * ABS(z - v * v) - EXPT(v, 0.5)",
+            "(z > 0.0 AND v < 1.0e-06) OR NOT (v > z)",
+        ),
+        (
+            ECMASCRIPT,
+            "-k * Math.abs(z - v * v) - Math.pow(v, 0.5)",
+            "z > 0.0 && v < 1e-06 || (v > z) == false",
+        ),
+        (MATHEMATICS, "−k · |z − v²| − v^0.5", "z > 0 ∧ v < 10⁻⁶ ∨ ¬(v > z)"),
+    ],
+)
+def test_every_dialect_writes_the_same_trees(dialect: Dialect, value: str, condition: str) -> None:
+    assert spell(parse_value("-k * abs(z - v**2) - v**0.5", "kzv"), dialect) == value
+    told = parse_condition("z > 0 and v < 1e-6 or not v > z", "zv")
+    assert spell(told, dialect) == condition
+
+
+def test_a_formula_of_latex() -> None:
+    tree = parse_value(
+        "-sigma_0 * (1 - z / z_ss)**2 + sgn(v) * 2e-6", ["sigma_0", "z", "z_ss", "v"]
+    )
+    assert spell(tree, LATEX, {"v": r"v_{i}"}) == (
+        r"-\sigma_{0} \, \left(1 - \frac{z}{z_{\mathrm{ss}}}\right)^{2}"
+        r" + \mathrm{sgn}\left(v_{i}\right) \cdot 2 \cdot 10^{-6}"
+    )
+
+
+def test_a_function_that_a_dialect_does_not_have_is_named() -> None:
+    with pytest.raises(KeyError, match="asinh"):
+        spell(parse_value("asinh(v)", ["v"]), MODELICA)
