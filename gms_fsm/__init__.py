@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from gms_fsm.systems.system import Body as Body
     from gms_fsm.systems.system import Contact as Contact
     from gms_fsm.systems.system import Sampled as Sampled
+    from gms_fsm.systems.system import Spring as Spring
     from gms_fsm.systems.system import System as System
     from gms_fsm.traces.failures import CallbackError as CallbackError
     from gms_fsm.traces.failures import LivelockError as LivelockError
@@ -114,7 +115,7 @@ _HOMES = {
     "systems.models": "ChartModel GMS LuGre Model",
     "systems.rigs": "Prescribed PulledSlider Rig Slider",
     "systems.signals": "Signal",
-    "systems.system": "Body Contact Sampled System",
+    "systems.system": "Body Contact Sampled Spring System",
     "traces.failures": "CallbackError LivelockError LockError NotFiniteError NotUniqueError "
     "SignalEndError SimulationError StepLimitError StepSizeError",
     "traces.trace": "Trace",

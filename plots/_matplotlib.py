@@ -19,7 +19,6 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pgf import RendererPgf
 from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex, to_rgb
 from matplotlib.figure import Figure
@@ -55,7 +54,6 @@ __all__ = [
     "NullLocator",
     "Rectangle",
     "RendererBase",
-    "RendererPgf",
     "ScaledTranslation",
     "Text",
     "patches",

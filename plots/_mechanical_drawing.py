@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import textwrap
 
-from gms_fsm.language import MATLAB_LIKE, names_in, parse_value, spell
-from gms_fsm.systems.system import Body, System
+from gms_fsm.language import names_in, parse_value
+from gms_fsm.systems.system import System
 from plots._labels import printable
 from plots._matplotlib import Figure, rc_context
 from plots._mechanical_layout import (
@@ -15,7 +15,10 @@ from plots._mechanical_layout import (
     Column,
     Item,
     Layout,
+    Link,
+    Touch,
     arranged,
+    force_of,
     label_of,
     motion_of,
     slots_of,
@@ -27,11 +30,9 @@ from plots._mechanical_symbols import (
     UNIT,
     Pen,
     damper_points,
-    formula,
     spring_points,
     width,
 )
-from plots._mechanics import Force, Link, Touch, mechanism
 from plots._system_diagram import signal_text
 from plots.style import PANEL, PAPER, RC, TEXT_GREY
 
@@ -54,7 +55,7 @@ def mechanical_figure(system: System) -> Figure:
     Figure
         One panel without axes.
     """
-    layout = arranged(system, mechanism(system))
+    layout = arranged(system)
     with rc_context(RC):
         figure = Figure()
         ax = figure.add_axes((0, 0, 1, 1))
@@ -194,7 +195,7 @@ def _gap(pen: Pen, layout: Layout, place: int, items: list[Item]) -> None:
 
 def _anchor(pen: Pen, item: Item, x: float, y: float, low: float, high: float, way: int) -> None:
     """Draw the end of an item that is at no body: a wall, or a point that moves."""
-    if not item.driven:
+    if not item.drive:
         pen.wall(x, low, high, way)
         return
     pen.line([(x, y - 0.3), (x, y + 0.3)], lw=1.8)
@@ -223,8 +224,8 @@ def _item(pen: Pen, item: Item, left: float, right: float, y: float) -> None:
     """Draw springs, dampers or a contact between two places."""
     if item.touch is not None:
         y += 0.5 * item.height - ABOVE
-    left = _gear(pen, item.ratio(item.left), left, y, 1)
-    right = _gear(pen, item.ratio(item.right), right, y, -1)
+    left = _gear(pen, item.ratios[0], left, y, 1)
+    right = _gear(pen, item.ratios[1], right, y, -1)
     if item.touch is None:
         _links(pen, item.links, left, right, y)
         return
@@ -276,22 +277,21 @@ def _links(pen: Pen, links: tuple[Link, ...], left: float, right: float, y: floa
     for link in links:
         at, a, b = heights[link.kind], middle - half, middle + half
         points = spring_points(a, b, at) if link.kind == "spring" else damper_points(a, b, at)
-        pen.line(points, gid=f"{link.kind} {spell(link.constant, MATLAB_LIKE)}")
+        pen.line(points, gid=f"{link.kind} {link.constant}")
         if a > inner_left:
             pen.line([(inner_left, at), (a, at)])
             pen.line([(b, at), (inner_right, at)])
-        constant = formula(spell(link.constant, MATLAB_LIKE))
-        above = link.kind == "spring"
-        pen.text(middle, at + (0.32 if above else -0.34), constant)
+        pen.text(middle, at + (0.32 if link.kind == "spring" else -0.34), link.label)
 
 
 # --------------------------------------------------------------------------- what is written below
 def _sources(system: System) -> list[str]:
-    """Return where signals, states and sampled values come from that stand in forces."""
-    found = mechanism(system)
-    used = _names(found.forces)
+    """Return where signals, states and sampled values come from that stand in the picture."""
+    given = [each.velocity for each in system.bodies if each.velocity is not None]
+    given += [each.rest for each in system.springs]
+    used = {name for text in given for name in names_in(parse_value(str(text), system.names))}
+    used |= {name for body in system.bodies for name in names_in(force_of(system, body))}
     lines = []
-    used |= {name for body in system.bodies if body.driven for name in _read(system, body)}
     flows = {name: text for name, text in system.flow.items() if name in used}
     for text in flows.values():
         used |= names_in(parse_value(text, system.names))
@@ -299,12 +299,12 @@ def _sources(system: System) -> list[str]:
         if name in used:
             lines += _folded(signal_text(name, signal))
     for sampled in system.sampled:
-        given = [name for name in sampled.updates if name in used]
-        if given:
+        own = [name for name in sampled.updates if name in used]
+        if own:
             every = (
                 f"{1e3 * sampled.period:g} ms" if sampled.period < 1 else f"{sampled.period:g} s"
             )
-            lines.append(f"{', '.join(given)}: from {sampled.name}, every {every}")
+            lines.append(f"{', '.join(own)}: from {sampled.name}, every {every}")
     for name, text in flows.items():
         lines += _folded(f"d{name}/dt = {text}")
     return lines
@@ -316,12 +316,3 @@ def _folded(text: str) -> list[str]:
         return [written(text)]
     lines = textwrap.wrap(printable(text), FOOT, subsequent_indent="    ")
     return [line.replace("$", r"\$") for line in lines]
-
-
-def _read(system: System, body: Body) -> frozenset[str]:
-    given = body.velocity
-    return names_in(parse_value(given, system.names)) if isinstance(given, str) else frozenset()
-
-
-def _names(forces: tuple[Force, ...]) -> set[str]:
-    return {name for force in forces for term in force.terms for name in term.names()}

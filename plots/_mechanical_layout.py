@@ -10,16 +10,25 @@ from __future__ import annotations
 
 import textwrap
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import permutations
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.language import MATLAB_LIKE, spell
-from gms_fsm.systems.system import Body, System
-from plots._labels import printable
+from gms_fsm.charts.registry import charts
+from gms_fsm.language import (
+    MATLAB_LIKE,
+    Negative,
+    Number,
+    Value,
+    derivative,
+    names_in,
+    parse_value,
+    spell,
+)
+from gms_fsm.systems.system import Body, Contact, Spring, System
+from plots._labels import printable, wrapped
 from plots._mechanical_symbols import LINE, NAME, formula, width
-from plots._mechanics import GROUND, Force, Link, Mechanism, Term, Touch, total
 
 __all__ = [
     "ABOVE",
@@ -28,8 +37,11 @@ __all__ = [
     "Column",
     "Item",
     "Layout",
+    "Link",
     "Slot",
+    "Touch",
     "arranged",
+    "force_of",
     "label_of",
     "written",
 ]
@@ -41,8 +53,30 @@ MOST_ORDERED = 7  # bodies; of more, all orders are too many to try
 BELOW = 1.75  # from the ground to a belt under it, and from one belt to the next
 BRISTLE = 0.35  # from the bottom of a body to what it rubs on
 STUB = 0.25  # between lines that pass above other bodies
+GROUND = ""  # stands for the name of a body where there is none
+# Contacts with a symbol of their own; all other included charts, and those that can lock, are
+# friction.
+SYMBOLS = {"backlash": "backlash", "end-stop": "stop", "dog-clutch": "clutch"}
 # Numbers that belong into the picture: how far a stop is, how wide a play.
 SHOWN = {"stop": ("x_s",), "backlash": ("gap",)}
+
+
+@dataclass(frozen=True)
+class Link:
+    """A spring or a damper: ``kind`` says which; the label is a formula."""
+
+    kind: str
+    constant: str
+    label: str
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A contact, how it is drawn, and by body the sign and the size of its share in the motion."""
+
+    contact: Contact
+    symbol: str
+    shares: Mapping[str, tuple[int, str]]
 
 
 @dataclass(frozen=True)
@@ -53,26 +87,22 @@ class Item:
     ----------
     left, right : str
         The bodies at its ends; `GROUND` is the ground, or a point that moves by itself.
+    ratios : (str, str)
+        The gear ratios there, as formulas; empty for 1.
     links : tuple of Link
         At most one spring and one damper.
+    drive : str
+        How an end that is no body moves, as a formula; empty for the ground.
     touch : Touch or None
         Instead, a contact.
     """
 
     left: str
     right: str
+    ratios: tuple[str, str] = ("", "")
     links: tuple[Link, ...] = ()
+    drive: str = ""
     touch: Touch | None = None
-
-    @property
-    def drive(self) -> str:
-        """How an end that is no body moves, as a formula."""
-        return formula(spell(total(self.links[0].drive), MATLAB_LIKE)) if self.driven else ""
-
-    @property
-    def driven(self) -> bool:
-        """Whether an end that is no body moves."""
-        return any("t" in each.names() for link in self.links for each in link.drive)
 
     @property
     def height(self) -> float:
@@ -81,15 +111,6 @@ class Item:
             return ABOVE + 0.45 + LINE * len(label_of(self.touch))
         return 1.7 if len(self.links) == 2 else 1.1
 
-    def ratio(self, body: str) -> str:
-        """Return the gear ratio at an end, as a formula; empty for 1."""
-        if not body:
-            return ""
-        if self.touch is not None:
-            return ratio_of(self.touch.shares[body])
-        link = self.links[0]
-        return ratio_of(link.ratios[link.ends.index(body)])
-
     @property
     def width(self) -> float:
         """Width that it needs at least."""
@@ -97,11 +118,8 @@ class Item:
             texts = [width(line) for line in label_of(self.touch)]
             wide = max(1.7, width(self.touch.contact.name, NAME, bold=True), *texts)
         else:
-            texts = [width(formula(spell(link.constant, MATLAB_LIKE))) for link in self.links]
-            wide = max(2.0, 0.6 + max(texts))
-        geared = sum(
-            width(self.ratio(each)) + 0.5 for each in (self.left, self.right) if self.ratio(each)
-        )
+            wide = max(2.0, 0.6 + max(width(link.label) for link in self.links))
+        geared = sum(width(each) + 0.5 for each in self.ratios if each)
         return wide + 0.3 + geared
 
 
@@ -215,27 +233,18 @@ class Layout:
         return 0.75 + (0.35 + LINE * lines if lines else 0.0)
 
 
-def arranged(system: System, found: Mechanism) -> Layout:
-    """Return where everything is.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    found : Mechanism
-        Its parts.
-
-    Returns
-    -------
-    Layout
-        Each link, force and contact is in it once.
-    """
+def arranged(system: System) -> Layout:
+    """Return where everything is: each spring, force and contact once."""
     bodies = {each.name: each for each in system.bodies}
-    belts = _belts(system, found)
-    below, level = _slots(found, belts), [*_items(found, belts)]
+    touches = [_touch(system, each) for each in system.contacts]
+    belts = _belts(system, touches)
+    below = _slots(touches, belts)
+    level = [*_sprung(system), *_touching(touches, belts)]
     row = _ordered([name for name in bodies if name not in belts], level)
-    force = {each.body: _lines(each) for each in found.forces}
-    columns = [Column(bodies[name], tuple(below[name]), force.get(name, ())) for name in row]
+    columns = [
+        Column(bodies[name], tuple(below[name]), _lines(force_of(system, bodies[name])))
+        for name in row
+    ]
     layout = Layout(columns, defaultdict(list), [], {}, bodies)
     for item in level:
         _put(layout, item)
@@ -286,9 +295,9 @@ def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, NARROW, break_long_words=False)
 
 
-def ratio_of(share: Term) -> str:
-    """Return a gear ratio as a formula; empty for 1."""
-    return formula(spell(share.tree, MATLAB_LIKE)) if share.factors or share.divisors else ""
+def force_of(system: System, body: Body) -> Value:
+    """Return what the text of a body's force says; 0 for a driven one."""
+    return Number(0.0) if body.driven else parse_value(str(body.force), system.names)
 
 
 def written(text: str | float) -> str:
@@ -298,25 +307,60 @@ def written(text: str | float) -> str:
 
 
 # --------------------------------------------------------------------------- who is where
-def _belts(system: System, found: Mechanism) -> list[str]:
+def _touch(system: System, contact: Contact) -> Touch:
+    shares: dict[str, tuple[int, str]] = {}
+    for text in contact.v:
+        tree = parse_value(text, system.names)
+        for body in system.bodies:
+            share = derivative(tree, body.v)
+            if share is not None and share != Number(0.0):
+                shares.setdefault(body.name, _share(share))
+    many = len(shares) > 2 or len(contact.v) > 1
+    return Touch(contact, "box" if many else _symbol(contact), shares)
+
+
+def _share(tree: Value) -> tuple[int, str]:
+    """Return the sign of a share, and its size as a formula; empty for 1."""
+    match tree:
+        case Negative(operand):
+            sign, size = _share(operand)
+            return -sign, size
+        case Number(value):
+            return 1 if value > 0.0 else -1, _ratio(abs(value))
+    return 1, _ratio(spell(tree, MATLAB_LIKE))
+
+
+def _ratio(text: str | float) -> str:
+    return "" if text == 1.0 else written(text)
+
+
+def _symbol(contact: Contact) -> str:
+    name = next((name for name, chart in charts().items() if chart == contact.chart), "")
+    if name:
+        return SYMBOLS.get(name, "friction")
+    locks = any(state.locked for state in contact.chart.states)
+    return "friction" if locks or contact.model is not None else "box"
+
+
+def _belts(system: System, touches: Sequence[Touch]) -> list[str]:
     """Return the driven bodies that others only rub on."""
-    linked = {end for link in found.links for end in link.ends}
+    linked = {end for spring in system.springs for end in (spring.first, spring.second)}
     driven = {each.name for each in system.bodies if each.driven}
     free = {each.name for each in system.bodies} - driven
     belts = []
     for name in driven - linked:
-        touches = [each for each in found.touches if name in each.shares]
-        if touches and all(
+        own = [each for each in touches if name in each.shares]
+        if own and all(
             each.symbol == "friction" and len(each.shares) == 2 and each.shares.keys() & free
-            for each in touches
+            for each in own
         ):
             belts.append(name)
     return sorted(belts, key=[each.name for each in system.bodies].index)
 
 
-def _slots(found: Mechanism, belts: Sequence[str]) -> dict[str, list[Slot]]:
+def _slots(touches: Iterable[Touch], belts: Sequence[str]) -> dict[str, list[Slot]]:
     slots: dict[str, list[Slot]] = defaultdict(list)
-    for touch in found.touches:
+    for touch in touches:
         above = [name for name in touch.shares if name not in belts]
         belt = next((name for name in touch.shares if name in belts), GROUND)
         single = len(above) == 1 and touch.symbol not in ("stop", "backlash")
@@ -325,25 +369,37 @@ def _slots(found: Mechanism, belts: Sequence[str]) -> dict[str, list[Slot]]:
     return slots
 
 
-def _items(found: Mechanism, belts: Sequence[str]) -> Iterable[Item]:
-    groups: dict[object, list[Link]] = {}
-    for link in found.links:
-        key = link.ends, tuple(each.size for each in link.ratios), link.drive
-        same = groups.setdefault(key, [])
-        if any(each.kind == link.kind for each in same):  # two in parallel: a lane each
-            groups[key, len(groups)] = [link]
-        else:
-            same.append(link)
-    for links in groups.values():
-        yield Item(*links[0].ends, links=tuple(sorted(links, key=lambda each: each.kind)[::-1]))
-    for touch in found.touches:
+def _sprung(system: System) -> Iterator[Item]:
+    for spring in system.springs:
+        ends, ratios = (spring.first, spring.second or GROUND), ("", _ratio(spring.ratio))
+        rest, moves = _rest(system, spring)
+        label = written(spring.k) + (f", rest {rest}" if rest and not moves else "")
+        links = [Link("spring", str(spring.k), label)] if spring.k != 0.0 else []
+        damper = [Link("damper", str(spring.d), written(spring.d))] if spring.d != 0.0 else []
+        if moves and links:  # the damper does not see the end that moves
+            yield Item(*ends, links=tuple(links), drive=rest)
+            links = []
+        if links or damper:
+            yield Item(*ends, ratios, tuple(links + damper))
+
+
+def _rest(system: System, spring: Spring) -> tuple[str, bool]:
+    """Return where a spring is at rest, as a formula, and whether that is an end that moves."""
+    tree = parse_value(str(spring.rest), system.names)
+    moves = spring.second is None and bool(names_in(tree) - {*system.numbers})
+    return ("" if tree == Number(0.0) else written(spring.rest)), moves
+
+
+def _touching(touches: Iterable[Touch], belts: Sequence[str]) -> Iterator[Item]:
+    for touch in touches:
         ends = [name for name in touch.shares if name not in belts]
         if _of_many(touch):
             continue
+        sizes = [touch.shares[each][1] for each in ends]
         if len(ends) == 2 == len(touch.shares):
-            yield Item(ends[0], ends[1], touch=touch)
+            yield Item(ends[0], ends[1], (sizes[0], sizes[1]), touch=touch)
         elif touch.symbol in ("stop", "backlash"):
-            yield Item(ends[0], GROUND, touch=touch)
+            yield Item(ends[0], GROUND, (sizes[0], ""), touch=touch)
 
 
 def _ordered(row: list[str], items: Iterable[Item]) -> list[str]:
@@ -372,9 +428,9 @@ def _put(layout: Layout, item: Item) -> None:
             layout.gaps[there].append(item)
         return
     # At the ground: outside of the row if that is next to it.
-    to_right = here == last and (here > 0 or item.driven)
+    to_right = here == last and (here > 0 or bool(item.drive))
     if item.touch is not None and item.touch.symbol == "stop":
-        to_right = item.touch.shares[item.left].sign > 0
+        to_right = item.touch.shares[item.left][0] > 0
     if to_right:
         layout.gaps[here + 1].append(item)
     else:
@@ -382,20 +438,14 @@ def _put(layout: Layout, item: Item) -> None:
 
 
 def _turned(item: Item) -> Item:
-    return Item(item.right, item.left, item.links, item.touch)
+    ratios = (item.ratios[1], item.ratios[0])
+    return replace(item, left=item.right, right=item.left, ratios=ratios)
 
 
-def _lines(force: Force) -> tuple[str, ...]:
+def _lines(force: Value) -> tuple[str, ...]:
     """Return a force as lines of formulas."""
-    lines = [""]
-    for k, term in enumerate(force.terms):
-        text = spell(total([term]), MATLAB_LIKE)
-        if k:
-            text = f" + {text}" if term.sign > 0 else f" - {spell(term.tree, MATLAB_LIKE)}"
-        if lines[-1] and len(lines[-1] + text) > LONGEST:
-            lines.append("")
-        lines[-1] += text
-    return tuple(formula(line.strip()) for line in lines)
+    text = "" if force == Number(0.0) else spell(force, MATLAB_LIKE)
+    return tuple(formula(line.strip()) for line in wrapped(text, LONGEST))
 
 
 # --------------------------------------------------------------------------- places

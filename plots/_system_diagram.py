@@ -1,14 +1,15 @@
-"""Draw a system: bodies, contacts, signals, controllers, further states, and who acts on whom.
+"""Draw a system: bodies, springs, contacts, signals, controllers, states, and who acts on whom.
 
 Everything is read from the system. Signals are on the left, then come controllers and further
-states, then the bodies and on the right the contacts. Thick lines join a contact to the bodies that
-it acts on: their velocities go one way, its force goes back. Thin arrows carry the values written
-on them; dashed ones are read at ticks only. Kinds of blocks differ in shape: signals and contacts
-have round corners, bodies and contacts thick outlines; what holds its values between ticks has a
-staircase.
+states, then the bodies and on the right springs and contacts. Thick lines join a spring or a
+contact to the bodies that it acts on: their motion goes one way, its force goes back. Thin arrows
+carry the values written on them; dashed ones are read at ticks only. Kinds of blocks differ in
+shape: signals and contacts have round corners, bodies, springs and contacts thick outlines; what
+holds its values between ticks has a staircase, a spring a zigzag, a damper without a spring a
+dashpot.
 
-In the SVG, nodes have the classes ``signal``, ``sampled``, ``flow``, ``body`` and ``contact`` and
-the id ``kind-name``; lines have the classes ``acts`` (contact and body) and ``reads``, and ids such
+In the SVG, nodes have the classes ``signal``, ``sampled``, ``flow``, ``body``, ``spring`` and
+``contact`` and the id ``kind-name``; lines have the classes ``acts`` and ``reads``, and ids such
 as ``reads-signal-r-sampled-pid-1``, the last number counting their pieces.
 """
 
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import graphviz
 
@@ -32,7 +34,8 @@ from gms_fsm.language import (
     spell,
 )
 from gms_fsm.systems.signals import Corners, Formula, Signal
-from gms_fsm.systems.system import Body, Contact, System
+from gms_fsm.systems.springs import field_of, pull, summed
+from gms_fsm.systems.system import Body, Contact, Spring, System
 from plots._labels import escape, printable, wrapped
 from plots._system_routes import Box, Join, Sheet, routed
 from plots._wires import PLACED, caption, draw_wire, joint, position, sides
@@ -47,13 +50,22 @@ LOOKS = {
     "sampled": (1, "filled", PAPER, 1.1),
     "flow": (1, "filled", PAPER, 1.1),
     "body": (2, "filled", PANEL, 1.8),
+    "spring": (3, "filled", PAPER, 1.8),
     "contact": (3, "rounded,filled", PANEL, 1.8),
 }
 # Sizes in points; Graphviz would ask the fonts, and its programs have different ones.
 TITLE_ROW, ROW, ABOVE, SIDE = 19.0, 15.0, 5.0, 8.0
 WIDE, NARROW, BOLD = 6.1, 5.6, 7.4  # characters: 10 points mono, 10 points sans, 12 points bold
 LONGEST = 36  # characters of a line
-HOLD = (20.0, 10.0)  # the staircase of a sampler
+MARK = (20.0, 10.0)  # size of a symbol; its lines in parts of it
+MARKS = {
+    "hold": [[(0, 0), (1 / 3, 0), (1 / 3, 0.5), (2 / 3, 0.5), (2 / 3, 1), (1, 1)]],
+    "spring": [[(0, 0.5), (0.2, 1), (0.4, 0), (0.6, 1), (0.8, 0), (1, 0.5)]],
+    "damper": [
+        [(0.7, 1), (0.3, 1), (0.3, 0.5), (0, 0.5), (0.3, 0.5), (0.3, 0), (0.7, 0)],
+        [(1, 0.5), (0.55, 0.5), (0.55, 0.8), (0.55, 0.2)],
+    ],
+}
 ACTS = 2.2  # width of a line between body and contact
 
 
@@ -73,8 +85,8 @@ class Block:
         Equations.
     reads : tuple of str
         The names that its equations read.
-    held : bool
-        Whether it holds its values between ticks.
+    mark : str
+        A key of `MARKS`, or empty.
     """
 
     kind: str
@@ -82,7 +94,7 @@ class Block:
     note: str
     texts: tuple[str, ...]
     reads: tuple[str, ...]
-    held: bool = False
+    mark: str = ""
 
     @property
     def id(self) -> str:
@@ -143,12 +155,14 @@ def _blocks(system: System) -> Iterator[Block]:
             note += f", first after {_seconds(part.offset)}"
         texts = tuple(_equation(each, tree) for each, tree in trees.items())
         reads = _read(system, trees.values())
-        yield Block("sampled", part.name, note, texts, reads, held=True)
+        yield Block("sampled", part.name, note, texts, reads, "hold")
     for name, text in system.flow.items():
         tree = parse_value(text, names)
         yield Block("flow", name, "state", (_equation(f"d{name}/dt", tree),), _read(system, [tree]))
     for body in system.bodies:
         yield _body(system, body)
+    for index, spring in enumerate(system.springs):
+        yield _spring(system, index, spring)
     for contact in system.contacts:
         yield _contact(system, contact)
 
@@ -160,12 +174,27 @@ def _body(system: System, body: Body) -> Block:
         return Block("body", body.name, "driven body", texts, _read(system, [tree]))
     inertia, force = (_tree(each, system.names) for each in (body.inertia or 0.0, body.force))
     total = force
+    for spring in system.springs:
+        name = f"{spring.name}.F"
+        if body.name == spring.first:
+            total = _less(total, Number(-1.0), name)
+        elif body.name == spring.second:
+            total = _less(total, _tree(spring.ratio, system.names), name)
     for v, name in _forces(system):
         total = _less(total, _share(system, v, body), name)
     rate = Name(f"d{body.v}/dt")
     left = rate if inertia == Number(1.0) else Binary("*", inertia, rate)
     texts = (_equation(spell(left, MATLAB_LIKE), total),)
     return Block("body", body.name, "body", texts, _read(system, [inertia, force]))
+
+
+def _spring(system: System, index: int, spring: Spring) -> Block:
+    bodies = {body.name: body for body in system.bodies}
+    terms = pull(spring, bodies, partial(field_of, system, index))
+    kind = "damper" if spring.k == 0.0 else "spring"
+    text = _equation("F", summed(terms))
+    reads = _read(system, [field_of(system, index, "rest")])
+    return Block("spring", spring.name, kind, (text,), reads, kind)
 
 
 def _contact(system: System, contact: Contact) -> Block:
@@ -184,9 +213,9 @@ def _contact(system: System, contact: Contact) -> Block:
         title = f"{chart.name} × {contact.n}" if contact.n > 1 else chart.name
     else:
         title = contact.model.title
-    held = contact.period is not None
+    mark = "" if contact.period is None else "hold"
     reads = _read(system, bound.values())
-    return Block("contact", contact.name, note, (title, *texts), reads, held)
+    return Block("contact", contact.name, note, (title, *texts), reads, mark)
 
 
 def _forces(system: System) -> Iterator[tuple[str, str]]:
@@ -249,6 +278,11 @@ def _read(system: System, trees: Iterable[Value]) -> tuple[str, ...]:
 
 
 def _acting(system: System) -> Iterator[Join]:
+    for spring in system.springs:
+        for end in (spring.first, spring.second):
+            if end is not None:
+                name = f"acts-{spring.name}-{end}"
+                yield Join(name, f"body-{end}", f"spring-{spring.name}")
     for contact in system.contacts:
         for body in system.bodies:
             if any(_share(system, v, body) != Number(0.0) for v in contact.v):
@@ -282,20 +316,21 @@ def _draw_block(graph: graphviz.Digraph, block: Block, box: Box) -> None:
         **{"class": block.kind},
         **sides((box.width, box.height)),
     )
-    if block.held:
-        _draw_hold(graph, block.id, box)
+    for k, places in enumerate(MARKS.get(block.mark, ())):
+        _draw_mark(graph, f"{block.id}-{block.mark}{k or ''}", block.mark, places, box)
 
 
-def _draw_hold(graph: graphviz.Digraph, name: str, box: Box) -> None:
-    """Draw the staircase of what is held between ticks."""
-    wide, high = HOLD
+def _draw_mark(
+    graph: graphviz.Digraph, name: str, kind: str, places: list[tuple[float, float]], box: Box
+) -> None:
+    """Draw a line of a symbol at the upper right of a block."""
+    wide, high = MARK
     x, y = box.x + 0.5 * box.width - wide - 7.0, box.y + 0.5 * box.height - high - 8.0
-    places = [(0, 0), (1, 0), (1, 1), (2, 1), (2, 2), (3, 2)]
-    corners = [(x + wide * a / 3, y + high * b / 2) for a, b in places]
-    first, last = f"{name}-hold-first", f"{name}-hold-last"
+    corners = [(x + wide * a, y + high * b) for a, b in places]
+    first, last = f"{name}-first", f"{name}-last"
     joint(graph, first, corners[0])
     joint(graph, last, corners[-1])
-    draw_wire(graph, f"{name}-hold", first, corners[1:-1], last, arrow="none", kind="hold")
+    draw_wire(graph, name, first, corners[1:-1], last, arrow="none", kind=kind)
 
 
 def _draw_join(
@@ -325,7 +360,7 @@ def _draw_join(
 
 
 def _draw_title(graph: graphviz.Digraph, system: System, sheet: Sheet) -> None:
-    key = "thick: velocity to the contact, force to the body; thin: values that are read"
+    key = "thick: motion one way, force back to the body; thin: values that are read"
     if system.sampled:
         key += "; dashed: at ticks only"
     rows = [_text(printable(system.name), bold=True), _text(key, size=10, colour=TEXT_GREY)]
@@ -368,7 +403,9 @@ def _lines(block: Block) -> list[str]:
 def _size(block: Block) -> tuple[float, float]:
     """Return the width and the height of a block."""
     shown = [line for text in block.texts for line in wrapped(text, LONGEST)]
-    title = BOLD * len(block.name) + NARROW * (len(block.note) + 2) + (HOLD[0] + 8) * block.held
+    title = (
+        BOLD * len(block.name) + NARROW * (len(block.note) + 2) + (MARK[0] + 8) * bool(block.mark)
+    )
     wide = max(title, *(WIDE * len(line) for line in shown), 60.0)
     return wide + 2 * SIDE, TITLE_ROW + ROW * len(shown) + 2 * ABOVE
 

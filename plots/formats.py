@@ -127,12 +127,6 @@ def _matplotlib(form: str, **metadata: None) -> Callable[[Any], bytes]:
     return write
 
 
-def _pgf(figure: Any) -> bytes:
-    from plots.figures._pgf import pgf
-
-    return pgf(figure)
-
-
 def _gif(movie: Any) -> bytes:
     from plots.film._files import gif
 
@@ -168,7 +162,6 @@ FORMATS: list[Format] = [
     Format(".png", "figure", "a figure", "matplotlib", _matplotlib("png"), "plots", usual=True),
     Format(".svg", "figure", "a figure", "matplotlib", _svg, "plots", usual=True),
     Format(".pdf", "figure", "a figure", "matplotlib", _pdf, "plots"),
-    Format(".pgf", "figure", "a figure", "matplotlib", _pgf, "plots"),
     Format(".gif", "animation", "an animation", "Pillow", _gif, "plots"),
     Format(".mp4", "animation", "an animation", "PyAV", _video("mp4", "libx264"), "film"),
     Format(".webm", "animation", "an animation", "PyAV", _video("webm", "libvpx-vp9"), "film"),
@@ -228,7 +221,7 @@ def endings(*subjects: Subject, usual: bool = False) -> list[str]:
     Examples
     --------
     >>> endings("figure")
-    ['.png', '.svg', '.pdf', '.pgf']
+    ['.png', '.svg', '.pdf']
     """
     return [each.ending for each in of(*subjects) if each.usual or not usual]
 
@@ -273,7 +266,7 @@ def listed(*subjects: Subject) -> str:
     Examples
     --------
     >>> listed("figure")
-    '.png, .svg, .pdf or .pgf'
+    '.png, .svg or .pdf'
     >>> listed("chart")
     '.mmd for Mermaid text or .puml for PlantUML text or .tikz for TikZ text'
     """
@@ -320,7 +313,7 @@ def chosen(path: str | Path, *subjects: Subject) -> Format:
     'matplotlib'
     >>> chosen("a.bmp", "figure")
     Traceback (most recent call last):
-    gms_fsm.errors.ParameterError: path is 'a.bmp'; it must end in .png, .svg, .pdf or .pgf
+    gms_fsm.errors.ParameterError: path is 'a.bmp'; it must end in .png, .svg or .pdf
     """
     path = checked_path("path", path)
     for each in of(*subjects):

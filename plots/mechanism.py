@@ -21,11 +21,9 @@ __all__ = ["schematic", "schematic_figure"]
 def schematic(system: System) -> Figure:
     """Draw a system as a mechanism: masses, springs, dampers, and the contacts between them.
 
-    All of it is read from the system. Springs and dampers are terms of the bodies' forces: a
-    constant times a difference of positions or velocities (``k * (x_2 - x_1)``), which the other
-    body has with the opposite sign; the other end may be the ground, or a point that moves as a
-    function of time (``K * (V * t - x)``). Every other term is written at an arrow; so is what a
-    controller computes. Friction has bristles; end stops, backlash and dog clutches have symbols of
+    All of it is read from the system. Springs and dampers are those that it declares, between two
+    bodies, or a body and the ground or a point that moves; forces given as text are written at an
+    arrow. Friction has bristles; end stops, backlash and dog clutches have symbols of
     their own; any other contact is a box. A driven body that others rub on is a belt. The number in
     a box on a line is a gear ratio.
 

@@ -35,6 +35,7 @@ from gms_fsm.systems._given import derivative_free, is_positive
 from gms_fsm.systems._numbers import numbers_of, of
 from gms_fsm.systems._parts import LEAST_LOAD, LOAD
 from gms_fsm.systems.signals import Formula
+from gms_fsm.systems.springs import added, spring_forces
 from gms_fsm.systems.system import Body, Contact, System
 
 __all__ = [
@@ -301,6 +302,9 @@ class Reader:
             elif not (body.velocity == body.v and body.v in system.signals):
                 tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
                 self.definitions.append(Definition(body.v, tree))
+        for name, sign, term in spring_forces(system):
+            if name in forces:
+                forces[name] = added(forces[name], sign, term)
         flow = {
             name: self.value(text, system.names, self.here.of(f"flow of {name!r}", "flow", name))
             for name, text in system.flow.items()

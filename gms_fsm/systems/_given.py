@@ -22,7 +22,7 @@ from gms_fsm.language import (
     names_in,
 )
 
-__all__ = ["Text", "check_name", "check_text", "checked_numbers"]
+__all__ = ["Text", "check_name", "check_text", "checked_numbers", "constant"]
 __all__ += ["derivative_free", "is_positive", "mapping_of", "several", "texts_of"]
 
 Text: TypeAlias = str | float  # an expression, or just a number
@@ -227,13 +227,15 @@ def is_positive(tree: Value, numbers: Mapping[str, float]) -> bool:
     bool
         True if it depends on the state.
     """
-    if names_in(tree) - {*numbers}:
-        return True
+    return bool(names_in(tree) - {*numbers}) or 0.0 < constant(tree, numbers) < math.inf
+
+
+def constant(tree: Value, numbers: Mapping[str, float]) -> float:
+    """Return a value over numbers; NaN if it has none."""
     try:
-        value = float(evaluate(tree, numbers))
+        return float(evaluate(tree, numbers))
     except (ArithmeticError, ValueError):
-        return False
-    return 0.0 < value < math.inf
+        return math.nan
 
 
 def derivative_free(rest: Value) -> bool:

@@ -20,6 +20,7 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import SignalError
 from gms_fsm.systems.models import ChartModel, Model
 from gms_fsm.systems.signals import Corners, Formula, Function, Signal, as_signal
+from gms_fsm.systems.springs import Spring
 from gms_fsm.systems.system import Body, Contact, Sampled, System
 
 __all__ = [
@@ -229,6 +230,18 @@ class BodyTable(Table):
     v: str = "v"
 
 
+class SpringTable(Table):
+    """A spring, a damper, or both, between two bodies, or a body and the ground."""
+
+    name: str
+    first: str = Field(description="a body")
+    second: str | None = Field(None, description="another body; without it, the ground")
+    k: Value = Field(0.0, description="stiffness")
+    d: Value = Field(0.0, description="damping")
+    ratio: Value = Field(1.0, description="gear ratio of the second body")
+    rest: Value = Field(0.0, description="x_1 - ratio x_2 without a force")
+
+
 class ContactTable(Table):
     """A contact: a chart with values, or a model."""
 
@@ -296,6 +309,7 @@ class SystemTable(Table):
     signals: dict[str, SignalField] = Field({})
     flow: dict[str, Value] = Field({})
     bodies: list[BodyTable] = Field(alias="body")
+    springs: list[SpringTable] = Field([], alias="spring")
     contacts: list[ContactTable] = Field(alias="contact")
     sampled: list[SampledTable] = Field([])
 
@@ -339,6 +353,18 @@ def plain(system: System) -> dict[str, Any]:
             )
             for each in system.bodies
         ],
+        "springs": [
+            SpringTable(
+                name=each.name,
+                first=each.first,
+                second=each.second,
+                k=value_table(each.k),
+                d=value_table(each.d),
+                ratio=value_table(each.ratio),
+                rest=value_table(each.rest),
+            )
+            for each in system.springs
+        ],
         "sampled": [
             SampledTable(
                 name=each.name,
@@ -357,6 +383,9 @@ def system_from(table: SystemTable, contacts: list[Contact]) -> System:
     return System(
         table.name,
         bodies=tuple(built(Body, "bodies", i, **vars(each)) for i, each in enumerate(table.bodies)),
+        springs=tuple(
+            built(Spring, "springs", i, **vars(each)) for i, each in enumerate(table.springs)
+        ),
         contacts=tuple(contacts),
         signals={
             name: built(signal_of, "signals", name, name=name, table=each)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from gms_fsm.systems._assembly import Assembly, Reader
 from gms_fsm.systems._numbers import numbers_of
+from gms_fsm.systems.springs import check_springs
 
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
@@ -51,8 +52,10 @@ def check_numbers(read: Assembly, system: System) -> None:
     Raises
     ------
     ParameterError
-        If an inertia is not positive, or locks that always hold depend on each other.
+        If an inertia is not positive, a spring pushes away, or locks that always hold depend on
+        each other.
     """
     reader = Reader(system)
     reader.check_inertias(read.inertias)
+    check_springs(system)
     reader.check_locks(read.banks)

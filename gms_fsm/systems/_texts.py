@@ -52,6 +52,7 @@ def texts_of_system(system: System) -> tuple[Any, ...]:
     return (
         system.name,
         system.bodies,
+        system.springs,
         tuple(contacts),
         tuple(system.numbers),
         tuple(signals),

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from gms_fsm._display import short_repr
 from gms_fsm.charts.parameters import Parameter, checked_scalar
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
+from gms_fsm.systems.springs import Spring
 
 __all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "TextRig", "numbers_of", "with_numbers"]
 
@@ -136,6 +137,7 @@ class PulledSlider:
 
     title = "slider pulled through a spring"
     acceleration = "(stiffness * (speed * t - x) - F) / mass"
+    springs = (Spring("spring", "body", k="stiffness", rest="speed * t"),)
     parameters: ClassVar[tuple[Parameter, ...]] = (
         MASS,
         Parameter("stiffness", "N/m", "> 0", per_element=False, meaning="stiffness of the spring"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -43,6 +43,7 @@ from gms_fsm.systems._texts import texts_of_system
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
+from gms_fsm.systems.springs import Spring, on_ground
 
 if TYPE_CHECKING:
     from gms_fsm.systems._assembly import Assembly
@@ -55,6 +56,7 @@ __all__ = [
     "Mounting",
     "Sampled",
     "Several",
+    "Spring",
     "System",
     "loaded",
     "system_of",
@@ -77,6 +79,8 @@ class System:
         At least one.
     contacts : sequence of Contact
         Whatever switches.
+    springs : sequence of Spring, optional
+        Springs and dampers; their forces are added to those of the bodies, in this order.
     signals : mapping of str to signal, optional
         Functions of time, as those of a rig; texts may use the numbers.
     numbers : mapping of str to float, optional
@@ -90,7 +94,7 @@ class System:
     ------
     ParameterError, ExpressionError
         If names clash, a text cannot be read, a velocity is not linear, an inertia is not
-        positive, or a lock cannot hold.
+        positive, a spring has an end that is no body or pushes away, or a lock cannot hold.
 
     Notes
     -----
@@ -102,7 +106,8 @@ class System:
     >>> from gms_fsm.charts.gms import gms_element
     >>> from gms_fsm import GMS, GMSParameters
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> system = System("pulled mass", bodies=(Body("mass", inertia="m", force="K*(V*t - x)"),),
+    >>> system = System("pulled mass", bodies=(Body("mass", inertia="m"),),
+    ...                 springs=(Spring("pulled", "mass", k="K", rest="V * t"),),
     ...                 contacts=(Contact("pad", model),), numbers={"m": 1.0, "K": 2.0, "V": 0.1})
     >>> system.contact("pad").n
     4
@@ -111,6 +116,7 @@ class System:
     name: str
     bodies: tuple[Body, ...] = field(kw_only=True)
     contacts: tuple[Contact, ...] = field(kw_only=True)
+    springs: tuple[Spring, ...] = field(default=(), kw_only=True)
     signals: Mapping[str, Signal | str] = field(default_factory=dict, kw_only=True)
     numbers: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     flow: Mapping[str, str] = field(default_factory=dict, kw_only=True)
@@ -120,7 +126,8 @@ class System:
         if not isinstance(self.name, str):
             raise ParameterError("it must be a text", place="name", value=self.name)
         put, here = object.__setattr__, f"system {shown(self.name)}"
-        for each, kind in (("bodies", Body), ("contacts", Contact), ("sampled", Sampled)):
+        kinds = {"bodies": Body, "springs": Spring, "contacts": Contact, "sampled": Sampled}
+        for each, kind in kinds.items():
             put(self, each, several(getattr(self, each), kind, f"{here}: {each}"))
         if not self.bodies:
             raise ParameterError("it has no bodies", place=here, advice="give at least one")
@@ -186,7 +193,7 @@ class System:
                     )
                 owner[name] = kind
         seen: set[str] = set()
-        for attribute in ("bodies", "contacts", "sampled"):
+        for attribute in ("bodies", "springs", "contacts", "sampled"):
             for i, part in enumerate(getattr(self, attribute)):
                 key = (attribute, i, "name")
                 check_name(part.name, f"{here}, {type(part).__name__.lower()}", key)
@@ -239,10 +246,11 @@ class System:
         ----------
         path : str or Path
             With the keys ``name``, ``[[body]]`` (name, inertia, force, velocity, x, v),
-            ``[[contact]]`` (name, v, n, inputs, period; ``chart``, a chart file next to this file,
-            the name of an included chart, or a table as in a chart file, with ``values``; or
-            ``model``, as in scenario files), ``[signals]``, ``[numbers]``, ``[flow]`` and
-            ``[[sampled]]`` (name, period, updates, initial, offset).
+            ``[[spring]]`` (name, first, second, k, d, ratio, rest), ``[[contact]]`` (name, v, n,
+            inputs, period; ``chart``, a chart file next to this file, the name of an included
+            chart, or a table as in a chart file, with ``values``; or ``model``, as in scenario
+            files), ``[signals]``, ``[numbers]``, ``[flow]`` and ``[[sampled]]`` (name, period,
+            updates, initial, offset).
 
         Returns
         -------
@@ -379,9 +387,9 @@ class Mounting:
     @property
     def acceleration(self) -> str | None:
         """The balance of the first free body; None if all bodies are driven."""
-        for body in self.system.bodies:
-            if not body.driven:
-                return f"({body.force} - F) / ({body.inertia})"
+        read = self.system.assembly
+        for body in read.free:
+            return f"({spell(read.forces[body.name])} - F) / ({spell(read.inertias[body.name])})"
         return None
 
 
@@ -484,8 +492,8 @@ def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
     --------
     >>> from gms_fsm import GMS, GMSParameters, PulledSlider
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> system_of(model, PulledSlider(1.0, 2.0, 0.1)).bodies[0].force
-    'stiffness * (speed * t - x)'
+    >>> system_of(model, PulledSlider(1.0, 2.0, 0.1)).springs[0].rest
+    'speed * t'
     """
     signals = tuple(rig.signals.items())
     chart, values = model.chart, model.values
@@ -518,6 +526,7 @@ class _Shape:
 def _of_shape(shape: _Shape) -> System:
     """Read the texts of a model on a rig."""
     model, rig, period = shape.model, shape.rig, shape.period
+    springs: tuple[Spring, ...] = ()
     if rig.acceleration is None:
         body = Body("body", velocity="v")
     else:
@@ -529,9 +538,14 @@ def _of_shape(shape: _Shape) -> System:
         names = ["t", "x", "v", "F", *rig.signals, *rig.numbers]
         force, inertia = _balance(parse_value(rig.acceleration, names), rig)
         body = Body("body", inertia=spell(inertia), force=spell(force))
+        declared = getattr(rig, "springs", ())
+        # A class derived from ours may have another acceleration.
+        if declared and force == on_ground(declared, body, names):
+            body, springs = replace(body, force="0"), declared
     return System(
         rig.title,
         bodies=(body,),
+        springs=springs,
         contacts=(Contact("friction", model, period=period),),
         signals=dict(rig.signals),
         numbers=rig.numbers,

@@ -98,7 +98,7 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     "an unknown picture format": (
         ("figures = []", 'figures = ["jpg"]'),
-        ("output.figures", "'jpg'", "'png', 'svg', 'pdf' or 'pgf'"),
+        ("output.figures", "'jpg'", "'png', 'svg' or 'pdf'"),
     ),
     "text for a number": (("v_c = 1e-6", 'v_c = "1e-6"'), ("model.v_c", "'1e-6'", "number")),
     "text in a list": (("[100.0, 50.0]", '[100.0, "50"]'), ("model.k", "'50'", "number")),

@@ -89,7 +89,7 @@ def test_plot_animate_and_replay(draw: CommandLine, files: Path) -> None:
         (["chart", "gms", "--law", "signed", "--elements", "0"], "elements is 0"),
         (["blocks", "--elements", "-1"], "elements is -1"),
         (["blocks", "--schematic"], "no system is given"),
-        (["blocks", str(SERVO), "--schematic", "-o", "s.dot"], ".png, .svg, .pdf or .pgf"),
+        (["blocks", str(SERVO), "--schematic", "-o", "s.dot"], ".png, .svg or .pdf"),
         (["plot", "bad.npz"], "damaged or incomplete"),
         (["plot", "none.npz"], "no such file"),
         (["animate", "t.npz", "-o", "film.avi"], ".gif, .mp4 or .webm"),

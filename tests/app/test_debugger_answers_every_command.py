@@ -134,7 +134,7 @@ def test_short_names_are_those_of_pdb(alias: str, name: str) -> None:
         ("compare 0", "two branches are needed"),
         ("compare 0 4", "no branch 4"),
         ("plot", "a file name is missing"),
-        ("plot picture.bmp", "must end in .png, .svg, .pdf or .pgf"),
+        ("plot picture.bmp", "must end in .png, .svg or .pdf"),
         ("save", "a file name is missing"),
         ("save no/folder/here.json", "cannot write"),
         ("load", "a file name is missing"),

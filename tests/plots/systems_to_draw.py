@@ -20,7 +20,7 @@ from gms_fsm.app.scenario import load_scenario, load_system
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
-from gms_fsm.systems.system import Body, Contact, Sampled, System, system_of
+from gms_fsm.systems.system import Body, Contact, Sampled, Spring, System, system_of
 from gms_fsm.traces.trace import Trace
 
 STICTION, END_STOP = CHARTS["stiction"], CHARTS["end-stop"]
@@ -71,7 +71,8 @@ GMS12 = GMS(  # more elements than are drawn one by one
 
 PULLED = System(
     "pulled mass",
-    bodies=(Body("mass", inertia="m", force="K * (V * t - x)"),),
+    bodies=(Body("mass", inertia="m"),),
+    springs=(Spring("pulled", "mass", k="K", rest="V * t"),),
     contacts=(Contact("pad", STICTION, DRY),),
     numbers={"m": 1.0, "K": 2.0, "V": 0.1},
 )
@@ -126,13 +127,20 @@ TRAIN = System(
         Body(
             "one",
             inertia="m",
-            force="-k * x_1 + k_c * (x_2 - x_1) + k_l * (x_4 - x_1) + P * sin(w * t)",
+            force="P * sin(w * t)",
             x="x_1",
             v="v_1",
         ),
-        Body("two", inertia="m", force="k_c*x_1 - k_c*x_2 + 0.5*d*(v_3 - v_2)", x="x_2", v="v_2"),
-        Body("three", inertia="m + J/r**2", force="0.5*d*(v_2 - v_3) - k*x_3", x="x_3", v="v_3"),
-        Body("four", inertia="m", force="k_l*(x_1 - x_4) - k_f*x_1", x="x_4", v="v_4"),
+        Body("two", inertia="m", x="x_2", v="v_2"),
+        Body("three", inertia="m + J/r**2", x="x_3", v="v_3"),
+        Body("four", inertia="m", force="-k_f*x_1", x="x_4", v="v_4"),
+    ),
+    springs=(
+        Spring("left", "one", k="k"),
+        Spring("near", "one", "two", k="k_c"),
+        Spring("far", "one", "four", k="k_l"),
+        Spring("oil", "two", "three", d="0.5 * d"),
+        Spring("below", "three", k="k", rest="0.5 * r"),
     ),
     contacts=(
         Contact("slip", STICTION, DRY, v="v_2 - v_3"),

@@ -76,7 +76,7 @@ def test_a_new_format_of_figures(gms_fsm: CommandLine) -> None:
     assert "new" in json.dumps(Scenario.model_json_schema())
     one_message(
         gms_fsm("run", "own.toml", "--set", 'output.figures=["bmp"]'),
-        "output.figures.0 = 'bmp': it must be 'png', 'svg', 'pdf', 'pgf' or 'new'",
+        "output.figures.0 = 'bmp': it must be 'png', 'svg', 'pdf' or 'new'",
     )
 
 
@@ -89,7 +89,7 @@ def test_a_new_format_of_figures_in_the_debugger(
     monkeypatch.setattr("sys.stdin", io.StringIO("plot a.new\nplot a.bmp\nquit\n"))
     done = gms_fsm("debug", "own.toml")
     assert "written to a.new" in done.out
-    assert ".png, .svg, .pdf, .pgf for a figure or .new for" in " ".join(done.out.split())
+    assert ".png, .svg, .pdf for a figure or .new for" in " ".join(done.out.split())
     assert Path("a.new").read_text() == "Figure"
 
 

@@ -21,7 +21,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 MODEL = GMS(GMSParameters.paper("stick-slip"), law="signed")
 
 
-KINDS = {"signal", "sampled", "flow", "body", "contact"}
+KINDS = {"signal", "sampled", "flow", "body", "spring", "contact"}
 Span = tuple[float, float, float, float]  # left, bottom, right, top
 
 
@@ -53,7 +53,7 @@ def pieces(system: System) -> dict[str, list[tuple[str, str, str]]]:
     found: dict[str, list[tuple[str, str, str]]] = {}
     for line in block_diagram(system).body:
         ends = re.match(r'\s*"?([\w-]+)"? -> "?([\w-]+)"? \[(.*)', line)
-        if ends and "-hold" not in ends[1]:
+        if ends and not re.search("-(hold|spring|damper)\\d?-", ends[1]):
             name = re.search(r'id="?([\w-]+)-\d+"?', ends[3])
             assert name is not None
             found.setdefault(name[1], []).append((ends[1], ends[2], ends[3]))
@@ -79,7 +79,8 @@ def lines(system: System) -> set[tuple[str, str, str]]:
             bodies = "|".join(each.name for each in system.bodies)
             acting = re.fullmatch(f"acts-(.*)-({bodies})", name)
             assert acting is not None
-            found.add((f"body-{acting[2]}", f"contact-{acting[1]}", ""))
+            kind = "spring" if f"spring-{acting[1]}" in parts(system) else "contact"
+            found.add((f"body-{acting[2]}", f"{kind}-{acting[1]}", ""))
     return found
 
 
@@ -117,6 +118,24 @@ def test_what_is_read_at_ticks_is_dashed() -> None:
     for name, found in pieces(SERVO).items():
         for _, _, look in found:
             assert ("style=dashed" in look) == name.endswith("-sampled-pid"), name
+
+
+def test_springs_pull_their_bodies_and_have_a_symbol() -> None:
+    screw = systems()["ball_screw_table"]
+    shown = parts(screw)
+    assert shown["spring-nut"] == (
+        "nut  spring | F = k_n * (lead * phi - x) + d_n * (lead * w - v)"
+    )
+    assert shown["spring-windings"] == "windings  damper | F = -c_m * w"
+    assert shown["body-screw"].endswith("M + windings.F - lead * nut.F - bearing.F")
+    assert shown["body-table"].startswith("table  body | m * dv/dt = nut.F - guide.F")
+    assert {(f"body-{each}", "spring-nut", "") for each in ("screw", "table")} <= lines(screw)
+    marks = {name for name in nodes(screw) if name.endswith("-first") and name.startswith("spring")}
+    assert marks == {
+        "spring-nut-spring-first",
+        "spring-windings-damper-first",
+        "spring-windings-damper1-first",
+    }
 
 
 def test_what_is_held_has_a_staircase() -> None:

@@ -145,9 +145,12 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "Session": run | options,
         "Settings": options,
         "Slider": {"mass": 1.0, "force": "t"},
+        "Spring": {"name": "shaft", "first": "a", "second": None, "k": 1.0, "d": 0.0}
+        | {"ratio": 1.0, "rest": 0.0},
         "State": {"name": "on", "flow": {"z": "v"}},
         "Stribeck": {"F_c": 1.0, "F_s": 1.5, "v_s": 0.1},
         "System": {"name": "one mass", "bodies": (BODY,), "contacts": (CONTACT,), "signals": {}}
+        | {"springs": ()}
         | {"numbers": {}, "flow": {}, "sampled": ()},
         "Transition": edge,
         "excite": {"stroke": 1e-3, "speeds": [1e-3, 2e-3], "rate": None, "acceleration": None},

@@ -46,6 +46,14 @@ preset = "stick-slip"
 name = "pid"
 period = 1e-3
 updates.u = "m * x1"
+[[spring]]
+name = "shaft"
+first = "one"
+second = "two"
+k = "2 * m"
+d = 0.5
+ratio = 3
+rest = "r"
 """
 CASES = {
     "an inertia": ('"m"\nforce', '"mm"\nforce', 11, "body.0.inertia", "unknown name 'mm'"),
@@ -80,6 +88,15 @@ CASES = {
     "an update": ("m * x1", "m * y1", 36, "sampled.0.updates.u", "'y1'"),
     "a number": ("m = 1.0", 'm = "1"', 3, "numbers.m", "valid number"),
     "an unknown key": ("inertia = 2", "inertia = 2\nmass = 1", 18, "body.1.mass", "valid here"),
+    "an end": ('second = "two"', 'second = "tow"', 40, "spring.0.second", "no body 'tow'"),
+    "the same end": ('second = "two"', 'second = "one"', 40, "spring.0.second", "both its ends"),
+    "a stiffness": ('"2 * m"', '"2 * x1"', 41, "spring.0.k", "unknown name 'x1'"),
+    "a negative stiffness": ('"2 * m"', '"-2 * m"', 41, "spring.0.k", "the stiffness must be >= 0"),
+    "a negative damping": ("d = 0.5", "d = -0.5", 42, "spring.0.d", "the damping must be >= 0"),
+    "a ratio": ("ratio = 3", 'ratio = "t"', 43, "spring.0.ratio", "unknown name 't'"),
+    "a rest": ('rest = "r"', 'rest = "v1"', 44, "spring.0.rest", "unknown name 'v1'"),
+    "a spring of nothing": ('k = "2 * m"\nd = 0.5\n', "", 37, "spring.0", "neither a stiffness"),
+    "a spring's name": ('"shaft"', '"two"', 38, "spring.0.name", "used twice"),
     "an unknown table": ("[[sampled]]", "[[sample]]", 33, "sample", "did you mean 'sampled'?"),
 }
 

@@ -25,7 +25,7 @@ from gms_fsm import (
 from gms_fsm.charts import LUGRE
 from gms_fsm.errors import OutputError
 from gms_fsm.lowering.program import lower
-from gms_fsm.systems.system import Body, Contact, Sampled, System
+from gms_fsm.systems.system import Body, Contact, Sampled, Spring, System
 from tests.helpers import same_bits
 
 STICTION = Chart(
@@ -73,9 +73,13 @@ def system_with(contacts: list[str], signal: Any = "0.5 * sin(t)", m: float = 1.
     return System(
         "two masses on a belt",
         bodies=(
-            Body("one", inertia=m, force="k * (q2 - q1) + 4 * r + i", x="q1", v="w1"),
-            Body("two", inertia="2 * k / k", force="k * (q1 - q2)", x="q2", v="w2"),
+            Body("one", inertia=m, force="4 * r + i", x="q1", v="w1"),
+            Body("two", inertia="2 * k / k", x="q2", v="w2"),
             Body("belt", velocity="A * r", x="q_b", v="w_b"),
+        ),
+        springs=(
+            Spring("shaft", "one", "two", k="k", ratio=1.5, rest="0.1 * r"),
+            Spring("ground", "two", k=0.5, d="0.1 * k"),
         ),
         contacts=[
             Contact(f"contact_{i}", **CONTACTS[name], v=["w1 - w_b", "w2", "w1 - 2 * w2"][i])

@@ -18,6 +18,7 @@ from gms_fsm import (
     ParameterError,
     Prescribed,
     Sampled,
+    Spring,
     State,
     System,
     Transition,
@@ -68,6 +69,21 @@ REFUSED: dict[str, tuple[Callable[[], object], type[GMSError], str]] = {
         lambda: system(body=Body("mass", inertia="a - b"), numbers={"a": 1.0, "b": 2.0}),
         ParameterError,
         "body 'mass': the inertia 'a - b' is not positive",
+    ),
+    "a stiffness that a number makes negative": (
+        lambda: system(springs=(Spring("s", "mass", k="a"),), numbers={"a": -1.0}),
+        ParameterError,
+        "spring 's', k is 'a'; the stiffness must be >= 0",
+    ),
+    "a spring at no body": (
+        lambda: system(springs=(Spring("s", "mas", k=1.0),)),
+        ParameterError,
+        "spring 's': there is no body 'mas'; the bodies are 'mass'",
+    ),
+    "a spring with one end": (
+        lambda: Spring("s", "mass", "mass", k=1.0),
+        ParameterError,
+        "spring 's': both its ends are 'mass'",
     ),
     "F in a flow": (
         lambda: one_state(flow={"z": "F"}, outputs={"F": "z"}),

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gms_fsm import Body, Contact, System, Trace, simulate
+from gms_fsm import Body, Contact, Spring, System, Trace, simulate
 from gms_fsm.app.lessons.l6_stick_slip import SIGMA_2, F_c, F_s, bank
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.parameters import FloatArray
@@ -72,7 +72,8 @@ def pulled(*, bristles: bool = False) -> System:
     pad = Contact("pad", bank()) if bristles else Contact("pad", CHARTS["stiction"], DRY)
     return System(
         "pulled mass",
-        bodies=(Body("mass", inertia="m", force="K * (V * t - x)"),),
+        bodies=(Body("mass", inertia="m"),),
+        springs=(Spring("pulled", "mass", k="K", rest="V * t"),),
         contacts=(pad,),
         numbers={"m": MASS, "K": STIFFNESS, "V": SPEED},
     )
