@@ -137,6 +137,7 @@ class PulledSlider:
 
     title = "slider pulled through a spring"
     acceleration = "(stiffness * (speed * t - x) - F) / mass"
+    # The force in the acceleration, as the system of a model on this rig declares it.
     springs = (Spring("spring", "body", k="stiffness", rest="speed * t"),)
     parameters: ClassVar[tuple[Parameter, ...]] = (
         MASS,

@@ -504,6 +504,7 @@ def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
         tuple(getattr(model, "inputs", {}).items()),
         rig.title,
         rig.acceleration,
+        getattr(rig, "springs", ()),
         tuple(rig.numbers),
         tuple((name, type(each), getattr(each, "text", None)) for name, each in signals),
         period,
