@@ -50,7 +50,7 @@ from integrators.machine_code import (
     work,
 )
 from integrators.machine_code import layout as layouts
-from integrators.machine_code.layout import Block, Column, Layout
+from integrators.machine_code.layout import Block, Column, Layout, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.translate import Translator
@@ -207,7 +207,7 @@ def edition() -> str:
             elif isinstance(value, dict) and {*map(type, value.values())} in ({str}, {bool}):
                 constants.append((name, sorted(value.values())))  # an empty one is filled later
             else:
-                constants.append((name, getattr(value, "_fields", None)))
+                constants.append((name, getattr(value, "__match_args__", None)))
     return digest(*functions, text=repr((sys.version, constants)))
 
 
@@ -353,7 +353,9 @@ def _library(
 ) -> Library:
     """Return machine code from the store, or compile it."""
     # Which of the functions in the text are called, and the coefficients.
-    fixed = [getattr(part, "__name__", part) for part in _parts(arguments) if is_known(part)]
+    fixed = [
+        getattr(part, "__name__", part) for part in parts_of(arguments, is_known) if is_known(part)
+    ]
     what = edition(), function.__name__, text, layout.key(), fixed, target_name()
     name = f"{function.__name__}-{hashlib.sha256(repr(what).encode()).hexdigest()[:24]}"
     content = None if store is None else store.get(name)
@@ -373,17 +375,10 @@ def _library(
     return Library(content)
 
 
-def _parts(record: Any) -> list[Any]:
-    """Return the parts of named tuples that are no named tuples, except known ones."""
-    if isinstance(record, tuple) and not is_known(record):
-        return [part for each in record for part in _parts(each)]
-    return [record]
-
-
 def _longest(arguments: Any) -> int:
     """Return the largest length of a list."""
     lengths = [0]
-    for part in _parts(arguments):
+    for part in parts_of(arguments, is_known):
         if isinstance(part, np.ndarray):
             lengths += part.shape
         elif isinstance(part, list):

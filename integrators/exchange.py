@@ -10,7 +10,7 @@ The machines are run by the same loop as always (`integrators.loop`), as for a f
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from integrators.advance import CROSSED, REACHED
 from integrators.crossings import any_changed, listed
@@ -37,19 +37,18 @@ from integrators.step_size import INFINITY
 from integrators.stepping import Clocks, next_tick
 from integrators.steps import LATEST, Motion, T, Vector
 
-__all__ = ["MOVED", "SWITCHES", "Exchange", "changed", "indicate", "observe", "settle"]
-__all__ += ["slope"]
+__all__ = ["Exchange", "changed", "indicate", "observe", "settle", "slope"]
 
-# Indices into Exchange.counts: switches since the start; whether the last `settle` moved the state.
-SWITCHES, MOVED = range(2)
 SOON = 1e-9  # of its time: a tick that is not farther away is now
 
 
-class Exchange(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Exchange:
     """What the caller is given besides the buffers."""
 
-    counts: list[int]  # see the indices above
-    next: Vector  # [time of the next tick, infinity if there is none]
+    next: float  # time of the next tick, infinity if there is none
+    switches: int  # since the start
+    moved: bool  # whether the last `settle` moved the state
     slope: Vector  # dy/dt, shape (m,)
     seen: Vector  # observed values
     margins: Vector  # left - right of each comparison, 0 if it is not watched, shape (r,)
@@ -73,7 +72,7 @@ def settle(
     clocks : Clocks
         What ticks, as in `integrators.stepping`.
     x : Exchange
-        Its counts, and the time of the next tick, are filled.
+        Its numbers are filled.
 
     Returns
     -------
@@ -99,11 +98,11 @@ def settle(
         counts[STATUS] = REACHED
         counts[PHASE] = AFTER
         error = _quiet(functions, machines, b, clocks, x)
-    x.next[0] = plan.jumps[counts[JUMP]] if len(plan.jumps) > 0 else INFINITY
-    x.counts[MOVED] = 0
+    x.next = plan.jumps[counts[JUMP]] if len(plan.jumps) > 0 else INFINITY
+    x.moved = False
     for j in range(len(now.y)):
         if now.y[j] != x.before[j]:
-            x.counts[MOVED] = 1
+            x.moved = True
     return error
 
 
@@ -120,7 +119,7 @@ def _quiet(
             next_tick(plan, clocks)
             counts[JUMP] = 0
         if event == FIRED:
-            x.counts[SWITCHES] += 1
+            x.switches += 1
         elif event not in (FIRING, STOPPED, SLID, ROWS, ADVANCE):
             return event
     return 0

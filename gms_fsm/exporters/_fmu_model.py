@@ -168,8 +168,8 @@ class Model:
             "SLOPE": place("exchange.slope"),
             "INDICATORS_AT": place("exchange.indicators"),
             "GIVEN": place("adapting.given"),
-            "SWITCHED": place("exchange.counts") + exchange.SWITCHES,
-            "MOVED": place("exchange.counts") + exchange.MOVED,
+            "SWITCHED": place("exchange.switches"),
+            "MOVED": place("exchange.moved"),
             "NEXT": place("exchange.next"),
             "SAMPLE_END": place("sample.end"),
             "SAMPLE_INPUTS": place("sample.inputs"),
@@ -198,8 +198,9 @@ def both_of(subject: Subject) -> Both:
     indicators = indicators_of(start, alone)
     assert len(indicators) == relations
     made = Exchange(
-        counts=[0, 0],
-        next=[math.inf],
+        next=math.inf,
+        switches=0,
+        moved=False,
         slope=[0.0] * size,
         seen=[0.0] * len(sample.seen),
         margins=[0.0] * relations,

@@ -194,7 +194,7 @@ def _object(work: Work, given: Any) -> Value:
 def _attribute(work: Work, whole: Value, name: str) -> Value:
     """Return a field of a tuple, or a member of a module."""
     if isinstance(whole, Record) and name in whole.fields:
-        part = whole.fields[name]
+        part = whole[name]
         return _object(work, part.value) if isinstance(part, Fixed) else part
     if isinstance(whole, Fixed) and isinstance(whole.value, types.ModuleType):
         return _object(work, getattr(whole.value, name))

@@ -4,10 +4,15 @@ A block is described by an example: named tuples of numbers, of lists or arrays,
 Lists become arrays inside the block, with constant lengths; a `Column` is an array elsewhere, of
 which the block holds the address and the lengths. Functions and what else is known while
 translating take no room.
+
+A dataclass is a record whose numbers can be assigned. They come first among its fields. In a block,
+its attributes read and write the block's words.
 """
 
 from __future__ import annotations
 
+import ctypes
+import dataclasses
 import functools
 import operator
 import typing
@@ -20,7 +25,7 @@ import numpy as np
 from integrators.machine_code.tree import Address, Const, Expr, Load, Local
 from integrators.machine_code.values import Array, Fixed, Number, Record, Value
 
-__all__ = ["Block", "Column", "Layout"]
+__all__ = ["Block", "Column", "Layout", "parts_of"]
 
 _KINDS = {float: "f", int: "i", bool: "b"}
 # Of fields of named tuples; truth values that are not in lists take a word, as integers do.
@@ -28,6 +33,7 @@ _FIELDS: dict[Any, str] = {
     float: "f", int: "i", bool: "i", list[int]: "i", list[list[int]]: "i", list[bool]: "b",
 }  # fmt: skip
 _DTYPES = {"f": np.dtype(np.float64), "i": np.dtype(np.int64), "b": np.dtype(np.bool_)}
+_WORDS: dict[str, Any] = {"f": ctypes.c_double, "i": ctypes.c_int64}
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,7 @@ class _Place:
     way: tuple[int, ...]
     offset: int  # in words of eight bytes
     kind: str
-    shape: tuple[int, ...] | None  # of an array inside the block
+    shape: tuple[int, ...] | None  # of an array inside the block; () of a number in a dataclass
     lengths: int = 0  # of a column
     width: int = 0  # of its rows
 
@@ -102,6 +108,18 @@ class Layout:
         self.look_at_columns = _looker(example, [place.way for place in self.columns])
 
     @functools.cached_property
+    def assigned_columns(self) -> list[tuple[tuple[int, ...], str]]:
+        """The ways to dataclasses that have columns, and the names of these."""
+        arrays = {place.way for place in self.arrays}
+        ways = [place.way for place in self.columns if place.way not in arrays]
+        owners = [(way, _found(self._example, way[:-1])) for way in ways]
+        return [
+            (way[:-1], _names(owner)[way[-1]])
+            for way, owner in owners
+            if dataclasses.is_dataclass(owner)
+        ]
+
+    @functools.cached_property
     def inner(self) -> frozenset[tuple[int, ...]]:
         """The ways to named tuples that contain arrays."""
         ways = [place.way for place in (*self.arrays, *self.columns)]
@@ -145,7 +163,7 @@ class Layout:
         found: Value = self.value
         for each in name.split("."):
             assert isinstance(found, Record)
-            found = found.fields[each]
+            found = found[each]
         return found
 
     @functools.cached_property
@@ -173,20 +191,24 @@ class Layout:
         return found
 
     def _value(self, example: Any, way: tuple[int, ...], block: Expr) -> Record:
-        names = getattr(example, "_fields", None) or tuple(map(str, range(len(example))))
         record: Any = type(example)
-        hints = _kinds(record) if hasattr(example, "_fields") else {}
+        names, hints = _names(example), _kinds(record)
+        words = _words(record) if dataclasses.is_dataclass(example) else {}
         fields: dict[str, Value] = {}
-        for k, (name, part) in enumerate(zip(names, example, strict=True)):
+        for k, (name, part) in enumerate(zip(names, _parts(example), strict=True)):
             here = (*way, k)
             if self.known(part):
                 fields[name] = _constant(part)
-            elif isinstance(part, tuple):
-                fields[name] = self._value(part, here, block)
+            elif name in words:
+                self.arrays.append(_Place(here, self.words, words[name], ()))
+                fields[name] = Array(words[name], (), block, 8 * self.words)
+                self.words += 1
             elif isinstance(part, list | np.ndarray):
                 fields[name] = self._array(part, here, block, hints.get(name))
             elif isinstance(part, Column):
                 fields[name] = self._column(part, here, block)
+            elif _is_record(part):
+                fields[name] = self._value(part, here, block)
             else:
                 kind = hints.get(name) or ("f" if isinstance(part, float) else "i")
                 place = Address(block, 8 * self.words)
@@ -225,7 +247,8 @@ class Layout:
 
     def key(self) -> str:
         """Return a text that says where everything is."""
-        return repr((self.words, self.numbers, self.arrays if self.inside else (), self.columns))
+        inside = [place for place in self.arrays if place.offset >= 0]
+        return repr((self.words, self.numbers, inside, self.columns))
 
 
 class Block:
@@ -272,14 +295,14 @@ class Block:
         self.address: int = self._words.ctypes.data
         made = {place.way: self._array(place) for place in layout.arrays}
         self._outside = [made[place.way] for place in layout.arrays if place.offset < 0]
-        if like is not None:
-            self.become(like)
-        else:
+        if like is None:
             for way, array in made.items():
                 if array.size:
                     array[...] = _found(example, way)
         made |= {place.way: place.empty for place in layout.columns if place.way not in made}
-        self.contents: Any = _rebuilt(example, (), made, layout.inner)
+        self.contents: Any = self._rebuilt(example, (), made)
+        if like is not None:
+            self.become(like)
 
     @property
     def words(self) -> Any:
@@ -298,11 +321,35 @@ class Block:
         self._words[:] = like._words
         for array, other in zip(self._outside, like._outside, strict=True):
             array[...] = other
+        for way, name in self.layout.assigned_columns:
+            setattr(_found(self.contents, way), name, getattr(_found(like.contents, way), name))
 
     def _array(self, place: _Place) -> Any:
         if place.offset < 0:
             return np.zeros(place.shape or (), place.dtype)
         return np.ndarray(place.shape or (), place.dtype, self._words, 8 * place.offset)
+
+    def _rebuilt(
+        self, example: Any, way: tuple[int, ...], made: Mapping[tuple[int, ...], Any]
+    ) -> Any:
+        """Return an example with some parts replaced by places in the block."""
+        parts = []
+        for k, part in enumerate(_parts(example)):
+            here = (*way, k)
+            if here in made:
+                parts.append(made[here])
+            elif here in self.layout.inner:
+                parts.append(self._rebuilt(part, here, made))
+            else:
+                parts.append(part)
+        if isinstance(example, tuple):
+            return getattr(type(example), "_make", type(example))(parts)
+        record: Any = type(example)
+        kind, words = _view(record), _words(record)
+        view = kind.from_buffer(self._words, made[(*way, 0)].ctypes.data - self.address)
+        for name, part in list(zip(_names(example), parts, strict=True))[len(words) :]:
+            setattr(view, name, part)
+        return view
 
     def update(self, contents: Any) -> None:
         """Write numbers, and where the columns are, before a call.
@@ -386,45 +433,88 @@ def _looker(example: Any, ways: Sequence[tuple[int, ...]]) -> Callable[[Any], Se
 
 def _dotted(example: Any, way: tuple[int, ...]) -> str:
     """Return the names on a way, with dots; nothing if there is a tuple without names."""
-    names = []
-    for k in way:
-        if not hasattr(example, "_fields"):
-            return ""
-        names.append(example._fields[k])
-        example = example[k]
-    return ".".join(names)
+    path = _path(example, way)
+    return "" if any(name.isdigit() for name in path.split(".")) else path
 
 
 def _path(example: Any, way: tuple[int, ...]) -> str:
     """Return the names on a way, with dots; numbers where there are none."""
     names = []
     for k in way:
-        names.append(str(getattr(example, "_fields", range(len(example)))[k]))
-        example = example[k]
+        names.append(_names(example)[k])
+        example = _found(example, (k,))
     return ".".join(names)
 
 
 def _found(contents: Any, way: tuple[int, ...]) -> Any:
     for k in way:
-        contents = contents[k]
+        named = not isinstance(contents, tuple)
+        contents = getattr(contents, _names(contents)[k]) if named else contents[k]
     return contents
 
 
-def _rebuilt(
-    example: Any,
-    way: tuple[int, ...],
-    made: Mapping[tuple[int, ...], Any],
-    inner: frozenset[tuple[int, ...]],
-) -> Any:
-    """Return named tuples with some parts replaced."""
-    parts = []
-    for k, part in enumerate(example):
-        here = (*way, k)
-        if here in made:
-            parts.append(made[here])
-        else:
-            parts.append(_rebuilt(part, here, made, inner) if here in inner else part)
-    return getattr(type(example), "_make", type(example))(parts)
+def _is_record(part: Any) -> bool:
+    """Return whether a part of an example is a tuple or a dataclass, which has parts itself."""
+    return isinstance(part, tuple) or (
+        dataclasses.is_dataclass(part) and not isinstance(part, Column)
+    )
+
+
+def _names(record: Any) -> tuple[str, ...]:
+    """Return the names of the fields of a record; their places in a tuple without names."""
+    if isinstance(record, tuple) and not hasattr(record, "_fields"):
+        return tuple(map(str, range(len(record))))
+    names: tuple[str, ...] = type(record).__match_args__
+    return names
+
+
+def _parts(record: Any) -> tuple[Any, ...]:
+    """Return the fields of a record, in order."""
+    if isinstance(record, tuple):
+        return record
+    return tuple(getattr(record, name) for name in _names(record))
+
+
+def parts_of(record: Any, known: Callable[[Any], bool]) -> list[Any]:
+    """Return the parts of records that are no records themselves.
+
+    Parameters
+    ----------
+    record : named tuple, tuple or dataclass
+        As for a `Layout`; something else is its own only part.
+    known : callable
+        As for a `Layout`: what is known has no parts.
+
+    Returns
+    -------
+    list
+        In order.
+
+    Examples
+    --------
+    >>> parts_of((1, ([2.0], 3)), callable)
+    [1, [2.0], 3]
+    """
+    if _is_record(record) and not known(record):
+        return [part for each in _parts(record) for part in parts_of(each, known)]
+    return [record]
+
+
+@functools.cache
+def _words(record: Any) -> dict[str, str]:
+    """Return the kinds of the numbers of a dataclass."""
+    hints = typing.get_type_hints(record)
+    kinds = {name: _FIELDS[hint] for name, hint in hints.items() if hint in (float, int, bool)}
+    assert [*kinds] == [*hints][: len(kinds)], f"numbers come first in {record.__name__}"
+    return kinds
+
+
+@functools.cache
+def _view(record: Any) -> Any:
+    """Return a class like a dataclass whose numbers are words in memory."""
+    fields = [(name, _WORDS[kind]) for name, kind in _words(record).items()]
+    members = {"_fields_": fields, "__match_args__": record.__match_args__}
+    return type(record.__name__, (ctypes.Structure,), members)
 
 
 def _constant(part: Any) -> Value:
@@ -438,7 +528,7 @@ def _constant(part: Any) -> Value:
 
 @functools.cache
 def _kinds(record: Any) -> dict[str, str]:
-    """Return the kinds of the fields of a named tuple, where its hints say them."""
+    """Return the kinds of the fields of a record, where its hints say them."""
     hints = typing.get_type_hints(record)
     return {name: _FIELDS[hint] for name, hint in hints.items() if hint in _FIELDS}
 

@@ -245,7 +245,7 @@ def _assign(work: Work, target: ast.expr, given: ast.expr) -> None:
         parts = in_order(work, given.elts)
         names = {each.id for each in target.elts if isinstance(each, ast.Name)}
         read = {each.id for each in ast.walk(given) if isinstance(each, ast.Name)}
-        if names & read or any(isinstance(each, ast.Subscript) for each in target.elts):
+        if names & read or any(not isinstance(each, ast.Name) for each in target.elts):
             parts = [
                 steady(work, each) if isinstance(each, Number) else own(work, work.fresh(), each)
                 for each in parts
@@ -268,8 +268,6 @@ def _augment(work: Work, target: ast.expr, op: ast.operator, given: ast.expr) ->
         more = number(work, given)
         _store(work, target, Number(operation(work, op, now, more)))
         return
-    if not isinstance(target, ast.Subscript):
-        raise work.error("only names and entries of arrays can be changed")
     entry = _entry(work, target)
     more = number(work, given)
     if contains(more, Invoke):
@@ -279,22 +277,29 @@ def _augment(work: Work, target: ast.expr, op: ast.operator, given: ast.expr) ->
 
 
 def _store(work: Work, target: ast.expr, given: Value) -> None:
-    """Assign a value to a name or to an entry of an array."""
+    """Assign a value to a name, to an entry of an array or to a field of a dataclass."""
     if isinstance(target, ast.Name):
         bind(work, target.id, given)
         return
-    if not isinstance(target, ast.Subscript) or not isinstance(given, Number):
-        raise work.error("only names and entries of arrays can be assigned")
+    if not isinstance(given, Number):
+        raise work.error("an entry or a field is a number")
     expr = work.kept(given.expr) if contains(given.expr, Invoke) else given.expr
     entry = _entry(work, target)
     work.out.append(Put(entry.kind, entry.address, as_kind(work, expr, entry.kind)))
 
 
-def _entry(work: Work, target: ast.Subscript) -> Load:
-    entry = subscript(work, target)
-    if not isinstance(entry, Number) or not isinstance(entry.expr, Load):
-        raise work.error("only entries of arrays can be assigned")
-    return entry.expr
+def _entry(work: Work, target: ast.expr) -> Load:
+    match target:
+        case ast.Subscript():
+            entry = subscript(work, target)
+            if isinstance(entry, Number) and isinstance(entry.expr, Load):
+                return entry.expr
+        case ast.Attribute(value=owner, attr=name):
+            whole = value(work, owner)
+            part = whole.fields.get(name) if isinstance(whole, Record) else None
+            if isinstance(part, Array) and not part.dims:
+                return Load(part.kind, part.address)
+    raise work.error("only names, entries of arrays and numbers of dataclasses can be assigned")
 
 
 def _has_call(node: ast.expr) -> bool:

@@ -73,10 +73,20 @@ class Array:
 
 @dataclass(frozen=True)
 class Record:
-    """A named tuple, or a tuple whose names are its places."""
+    """A named tuple, a tuple whose names are its places, or a dataclass.
 
-    cls: Any  # the class of a named tuple, or tuple
+    The numbers of a dataclass can be assigned: they are arrays without lengths.
+    """
+
+    cls: Any  # the class of a named tuple or a dataclass, or tuple
     fields: Mapping[str, Value]
+
+    def __getitem__(self, name: str) -> Value:
+        """Return a field."""
+        part = self.fields[name]
+        if isinstance(part, Array) and not part.dims:
+            return Number(Load(part.kind, part.address))
+        return part
 
 
 @dataclass(frozen=True)

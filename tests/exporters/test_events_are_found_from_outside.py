@@ -21,7 +21,6 @@ from gms_fsm.exporters import Subject
 from gms_fsm.exporters._fmu_model import Both, both_of
 from gms_fsm.systems.models import ChartModel
 from integrators import exchange, stepping
-from integrators.exchange import MOVED, SWITCHES
 from integrators.steps import T
 
 PAPER = GMS(GMSParameters.paper("stick-slip"), law="signed")
@@ -70,7 +69,7 @@ class Importer:
         before = list(self.b.now.y)
         x = self.x
         assert exchange.settle(self.functions, self.machines, self.b, self.clocks, x) == 0
-        assert x.counts[MOVED] == (before != list(self.b.now.y))
+        assert x.moved == (before != list(self.b.now.y))
 
     def slope(self, t: float, y: np.ndarray) -> np.ndarray:
         """Return dy/dt."""
@@ -98,7 +97,7 @@ class Importer:
         self.settle()
         while t < end:
             y = np.array(self.b.now.y)
-            stop = min(t + h, end, self.x.next[0])
+            stop = min(t + h, end, self.x.next)
             before = self.indicators(t, y)
             y_new = self.step(t, y, stop - t)
             crossed = before * self.indicators(stop, y_new) <= 0.0
@@ -115,7 +114,7 @@ class Importer:
                 assert exchange.changed(self.functions, self.b, self.x) == 1
                 self.roots += 1
             self.go_to(stop, y_new.tolist())
-            if crossed.any() or stop >= self.x.next[0]:
+            if crossed.any() or stop >= self.x.next:
                 self.settle()
             t = stop
 
@@ -135,7 +134,7 @@ def test_all_switches_are_seen(name: str) -> None:
     importer = Importer(both_of(Subject.of(system, "fmu2")))
     importer.run(end, h)
     trace = simulate(system, end, engine="ifelse", rtol=1e-9)
-    assert importer.x.counts[SWITCHES] == len(trace.transitions) > 2
+    assert importer.x.switches == len(trace.transitions) > 2
     assert (name == "sliding") == (len(trace.sliding) > 0)
     y = trace.rows.y[-1]
     assert importer.roots > 0
@@ -162,5 +161,5 @@ def test_another_start_moves_the_ticks() -> None:
     importer.go_to(3.0, list(importer.b.now.y))
     stepping.restart(importer.b, importer.clocks)
     importer.settle()
-    assert importer.x.next[0] == 3.0 + 1e-3
+    assert importer.x.next == 3.0 + 1e-3
     assert math.isclose(importer.b.now.clock[T], 3.0)

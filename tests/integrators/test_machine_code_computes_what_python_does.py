@@ -10,6 +10,7 @@ import math
 import shutil
 import struct
 import subprocess
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,14 @@ class Pair(NamedTuple):
     second: list[float]
 
 
+@dataclass(slots=True, eq=False)
+class State:
+    t: float
+    count: int
+    on: bool
+    x: list[float]
+
+
 class Given(NamedTuple):
     x: list[float]
     y: list[float]
@@ -60,6 +69,7 @@ class Given(NamedTuple):
     whole: list[int]
     scale: float
     count: int
+    state: State
 
 
 class Window(NamedTuple):
@@ -173,6 +183,28 @@ def records(g):
         g.out[j] += second[j]
     g.out[3], g.out[4] = g.out[4], g.out[3]
     return len(w.part) + w.count
+
+
+def advanced(state, h):
+    state.t += h
+    state.count += 1
+    state.on = not state.on
+    return state.count
+
+
+def fields(g):
+    """Numbers of a dataclass are changed in place, whatever name it has."""
+    state, whole = g.state, g.whole
+    before = state.t
+    pair = (state.t, state.count)
+    g.out[0] = before - advanced(state, g.scale) * state.t
+    whole[state.count % 5] = g.state.count
+    state.t, state.x[0] = state.x[0], state.t
+    state.count = whole[1] = 3 if state.on else advanced(g.state, 0.5)
+    g.out[1] = before + pair[0] + pair[1]
+    for j in range(len(state.x)):
+        state.x[j] = state.x[j] - state.t
+    return state.count
 
 
 def tables(g):
@@ -317,7 +349,7 @@ def after_loops(g):
 
 
 CASES = [
-    arithmetic, conversions, choices, undefined, functions, loops, records, tables, passed,
+    arithmetic, conversions, choices, undefined, functions, loops, records, fields, tables, passed,
     lengths, zeros, returns, now_and_later, once,
     after_loops,
 ]  # fmt: skip
@@ -336,6 +368,7 @@ def given(seed: int) -> Given:
         whole=rng.integers(-9, 9, SIZE).tolist(),
         scale=float(rng.normal()),
         count=int(rng.integers(0, SIZE)),
+        state=State(float(rng.normal()), 7, bool(rng.integers(0, 2)), rng.normal(size=2).tolist()),
     )
 
 
@@ -352,7 +385,9 @@ def plainly(function, arguments: Given) -> int:
 
 def bits(arguments: Given) -> list[bytes]:
     """Return all arrays bit for bit."""
-    parts = [arguments.out, *arguments.table, arguments.whole]
+    state = arguments.state
+    numbers = [state.t, state.count, state.on, *state.x]
+    parts = [arguments.out, *arguments.table, arguments.whole, numbers]
     return [struct.pack(f"<{len(p)}d", *map(float, p)) for p in parts]
 
 
@@ -456,6 +491,32 @@ def test_a_column_may_change_between_calls():
         assert column[0] == total
 
 
+def test_numbers_of_a_dataclass_are_words_of_the_block():
+    layout, arguments = Layout(given(0), callable), given(1)
+    block = Block(layout, arguments)
+    state = block.contents.state
+    assert [state.t, state.count, state.on] == [arguments.state.t, 7, arguments.state.on]
+    state.t, state.count = 0.5, 8
+    k = layout.offset("state.t")
+    assert (block.words[k : k + 1].view(float)[0], block.words[k + 1]) == (0.5, 8)
+    assert dict(block.set_words())[k] == 0.5
+    copy = Block(layout, arguments, block)
+    copy.contents.state.t = 1.5
+    assert (state.t, copy.contents.state.count) == (0.5, 8)
+
+
+def test_a_column_of_a_dataclass_is_replaced():
+    example = (State(0.0, 0, False, Column()),)
+    block = Block(Layout(example, callable), example)
+    (state,) = block.contents
+    state.x = np.arange(3.0)
+    block.update(block.contents)
+    other = Block(block.layout, example, block)
+    assert other.contents[0].x is state.x
+    other.become(Block(block.layout, example))
+    assert other.contents[0].x.size == 0
+
+
 # --------------------------------------------------------------------------- what is refused
 def unknown_statement(g):
     raise ValueError(g.count)
@@ -473,6 +534,16 @@ def unknown_name(g):
 
 def wrong_kind(g):
     g.whole[0] = g.x[0]
+    return 0
+
+
+def wrong_field(g):
+    g.state.count = g.scale
+    return 0
+
+
+def no_dataclass(g):
+    g.scale = 1.0
     return 0
 
 
@@ -507,6 +578,8 @@ def two_results(g):
         (unknown_call, "g.out[0] = round(g.x[0])"),
         (unknown_name, "g.out[0] = nowhere  # noqa: F821"),
         (wrong_kind, "g.whole[0] = g.x[0]"),
+        (wrong_field, "g.state.count = g.scale"),
+        (no_dataclass, "g.scale = 1.0"),
         (own_variable, "for j in range(3):"),
         (no_value, "def no_value(g):  # noqa: RET503"),
         (two_kinds, "w = Window(g.x, 1.0, 2)"),
