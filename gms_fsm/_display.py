@@ -1,24 +1,30 @@
 """How objects show themselves: pictures and tables in notebooks, short text everywhere.
 
-The only module of the core that imports `plots`, and only when a notebook asks for a picture. See
-`plots.notebook` for what is shown.
+What draws stands above and is not imported here: it declares itself in the entry point group
+``gms_fsm.display``, and is loaded when a notebook asks for a picture, or a fit for its report.
 """
 
 from __future__ import annotations
 
+import functools
 import re
 import sys
-from collections.abc import Callable
+import tomllib
+from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from gms_fsm.errors import cut
+from gms_fsm.errors import MissingExtraError, cut
 
-__all__ = ["Form", "displayed", "full_text", "register_figures", "short_repr"]
+__all__ = ["Form", "asked", "displayed", "full_text", "register_figures", "short_repr"]
 
 Form: TypeAlias = str  # as in the names of the methods that IPython asks: html, png or svg
 Shown = TypeVar("Shown", bound=type)
 
+GROUP = "gms_fsm.display"  # of entry points
+PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # in a checkout
 MOST_NUMBERS = 8  # of an array in a short repr
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
@@ -29,7 +35,7 @@ def displayed(*forms: Form) -> Callable[[Shown], Shown]:
     Parameters
     ----------
     *forms : {"html", "png", "svg"}
-        What `plots.notebook` makes of them.
+        What the entry point ``notebook`` makes of them.
 
     Returns
     -------
@@ -56,9 +62,7 @@ def displayed(*forms: Form) -> Callable[[Shown], Shown]:
 
 def _method(form: Form) -> Callable[[object], Any]:
     def method(self: object) -> Any:
-        from plots import notebook
-
-        return notebook.shown(self, form)
+        return _shown("notebook", self, form)
 
     return method
 
@@ -76,9 +80,60 @@ def register_figures() -> None:
 
 
 def _figure(figure: object) -> Any:
-    from plots import notebook
+    return _shown("figure", figure)
 
-    return notebook.figure_png(figure)
+
+def _shown(name: str, *given: object) -> Any:
+    try:
+        show = asked(name)
+    except MissingExtraError:  # a notebook then shows the text
+        return None
+    return show(*given)
+
+
+# --------------------------------------------------------------------------- what draws
+@functools.cache
+def asked(name: str) -> Callable[..., Any]:
+    """Return what is declared in the entry point group under a name.
+
+    Parameters
+    ----------
+    name : {"notebook", "figure", "report"}
+        ``notebook(thing, form)`` returns a form of an object, ``figure(figure)`` a matplotlib
+        figure as PNG, ``report(fit, folder)`` writes a report.
+
+    Returns
+    -------
+    callable
+        Loaded.
+
+    Raises
+    ------
+    MissingExtraError
+        If neither a checkout nor an installed package declares it.
+
+    Examples
+    --------
+    >>> asked("notebook").__module__
+    'plots.notebook'
+    """
+    for each in _declared():
+        if each.name == name:
+            found: Callable[..., Any] = each.load()
+            return found
+    raise MissingExtraError(
+        f"no installed package shows this (entry point {name!r} of the group {GROUP!r})",
+        advice="install gms-fsm with pip, or run it from its checkout",
+    )
+
+
+def _declared() -> Iterator[EntryPoint]:
+    """Yield the entry points of the checkout, which need not be installed, then the others."""
+    if PROJECT.is_file():
+        project = tomllib.loads(PROJECT.read_text(encoding="utf-8")).get("project", {})
+        for name, value in project.get("entry-points", {}).get(GROUP, {}).items():
+            yield EntryPoint(name, value, GROUP)
+    yield from entry_points(group=GROUP)
 
 
 # --------------------------------------------------------------------------- text

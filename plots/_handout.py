@@ -25,11 +25,11 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import loaded
 from plots import formats, panels, presets
 from plots._excitation import Excited, excited
+from plots._graphviz import picture
 from plots._mathtext import Formulas, formula
 from plots._matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
 from plots._svg_artists import EXACT, drawn, smallest
 from plots.live_chart import plain_tree
-from plots.render import picture
 from plots.statechart import statechart
 from plots.style import INK, PALE_GREY, TEXT_GREY
 

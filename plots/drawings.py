@@ -7,7 +7,10 @@ from html import escape
 
 import graphviz
 
-__all__ = ["DrawnGraph", "MermaidText", "PlantUMLText", "Svg", "TikzText", "image"]
+from gms_fsm.errors import OutputError
+from plots._graphviz import drawn
+
+__all__ = ["DrawnGraph", "MermaidText", "PlantUMLText", "Svg", "TikzText", "image", "svg_of"]
 
 
 def image(picture: str | bytes, words: str) -> str:
@@ -38,6 +41,15 @@ def image(picture: str | bytes, words: str) -> str:
     return f'<img style="max-width:100%" alt="{words}" src="data:image/{kind};base64,{data}">'
 
 
+def svg_of(graph: graphviz.Digraph) -> str | None:
+    """Return a graph as SVG, or None if it cannot be drawn."""
+    try:
+        picture = drawn(graph, "svg")
+    except OutputError:
+        return None
+    return None if picture is None else picture.decode()
+
+
 class DrawnGraph(graphviz.Digraph):  # type: ignore[misc]
     """A Graphviz graph that a notebook shows as a picture, or as text without Graphviz.
 
@@ -58,9 +70,7 @@ class DrawnGraph(graphviz.Digraph):  # type: ignore[misc]
         **_: object,  # include, exclude: the caller selects again
     ) -> dict[str, str]:
         # graphviz would run the program dot, and raise an error where there is none.
-        from plots import notebook
-
-        picture = notebook.svg_of(self)
+        picture = svg_of(self)
         if picture is None:
             return {"text/plain": self.text or repr(self)}
         html = image(picture, self.text)

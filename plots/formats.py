@@ -88,7 +88,7 @@ class Format:
 # --------------------------------------------------------------------------- writers
 def _graphviz(form: str) -> Callable[[Any], bytes]:
     def write(graph: Any) -> bytes:
-        from plots.render import picture
+        from plots._graphviz import picture
 
         return picture(graph, form)
 

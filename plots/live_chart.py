@@ -24,9 +24,9 @@ from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import Condition, clauses, evaluate, names_in
 from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.trace import Trace, check_trace
+from plots._graphviz import picture
 from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, edge_id, element_id, part_id
 from plots.drawings import Svg, image
-from plots.render import picture
 from plots.statechart import Sheet, chosen
 
 __all__ = [

@@ -13,13 +13,11 @@ from io import BytesIO
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-import graphviz
 import numpy as np
 
 from gms_fsm._display import Form
 from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import GMSError, MissingExtraError, OutputError
-from gms_fsm.identification.report import scores_text
+from gms_fsm.errors import GMSError, MissingExtraError
 from gms_fsm.inspection._findings import Finding, Report
 from gms_fsm.inspection._results import BranchComparison, Here
 from gms_fsm.inspection.explain import Explanation, Why
@@ -35,17 +33,17 @@ from gms_fsm.traces.verdicts import (
     InvariantVerdict,
     PassivityVerdict,
 )
+from plots._graphviz import available
 from plots._html import listing, paragraph, table
 from plots.block_diagram import block_diagram
-from plots.drawings import DrawnGraph, image
+from plots.drawings import DrawnGraph, image, svg_of
 from plots.live_chart import LiveChart
-from plots.render import available, drawn
 from plots.statechart import statechart
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
-__all__ = ["figure_png", "shown", "svg_of"]
+__all__ = ["figure_png", "shown"]
 
 MOST_ELEMENTS = 4  # a larger bank is shown as one element, because all have the same chart
 MOST_ROWS = 10  # of a table
@@ -95,15 +93,6 @@ def figure_png(figure: Any) -> tuple[bytes, dict[str, int]]:
 
 
 # --------------------------------------------------------------------------- drawings
-def svg_of(graph: graphviz.Digraph) -> str | None:
-    """Return a graph as SVG, or None if it cannot be drawn."""
-    try:
-        picture = drawn(graph, "svg")
-    except OutputError:
-        return None
-    return None if picture is None else picture.decode()
-
-
 def graph_of(subject: Chart | Model | Contact | System) -> DrawnGraph:
     """Return what is drawn of a chart, a model, a contact or a system."""
     if isinstance(subject, System):
@@ -194,7 +183,7 @@ def fit_html(fit: Fit) -> str:
     words = table(
         ["parameter", "value", "95 % interval", "unit", "note"],
         ([each.name, *each.shown, each.unit, each.note] for each in fit.table),
-        caption=f"{fit.title}: {scores_text(fit)}",
+        caption=f"{fit.title}: {fit.scores_text}",
         more=fit.weakest,
     )
     picture = fit_png(fit)

@@ -29,9 +29,9 @@ def fit_command(
 ) -> None:
     """Fit the model of a scenario to its record; write a report and a scenario that runs."""
     import plots
+    from gms_fsm.app.fit_report import report_folder, write_report
     from gms_fsm.app.fits import load_fit
     from gms_fsm.identification.fit import fitted
-    from gms_fsm.identification.report import report_folder, write_report
 
     loaded = load_fit(scenario, overrides or [])
     folder = Path("out") / f"{scenario.stem}-fit" if output is None else output
@@ -60,8 +60,6 @@ def _print(found: Fit) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from gms_fsm.identification.report import scores_text
-
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for head in ("parameter", "value", "95 % interval", "unit"):
         table.add_column(head, justify="right" if head == "value" else "left", no_wrap=True)
@@ -71,4 +69,4 @@ def _print(found: Fit) -> None:
     Console(width=max(Console().width, NARROWEST)).print(table)
     if found.weakest:
         typer.echo(found.weakest)
-    typer.echo(scores_text(found))
+    typer.echo(found.scores_text)

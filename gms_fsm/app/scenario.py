@@ -261,7 +261,7 @@ def read_system(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, S
     """
 
     def build(table: SystemScenario) -> tuple[SystemScenario, System]:
-        return table, table.chosen(path.parent)
+        return table, table.chosen(path.parent, System)
 
     try:
         return read_file(path, SystemScenario, ScenarioError, build, overrides)

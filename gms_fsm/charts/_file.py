@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import (
     ConfigDict,
@@ -18,9 +18,11 @@ from pydantic import (
 from gms_fsm._records import ONE, TABLE, Table, Texts, built, read_file, write_file
 from gms_fsm.charts._parts import State, Transition
 from gms_fsm.charts._reader import AGE
-from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ChartError
+
+if TYPE_CHECKING:
+    from gms_fsm.charts.chart import Chart
 
 __all__ = ["ChartTable", "load", "save"]
 
@@ -147,8 +149,13 @@ class ChartTable(Table):
             }
         )
 
-    def build(self) -> Chart:
+    def build(self, kind: type[Chart]) -> Chart:
         """Return the chart.
+
+        Parameters
+        ----------
+        kind : type of Chart
+            The class, which imports this module.
 
         Returns
         -------
@@ -169,7 +176,7 @@ class ChartTable(Table):
             built(Transition, "transitions", i, **vars(each))
             for i, each in enumerate(self.transitions)
         ]
-        return Chart(
+        return kind(
             **{
                 **vars(self),
                 "parameters": parameters,
@@ -179,45 +186,11 @@ class ChartTable(Table):
         )
 
 
-def load(path: Path) -> Chart:
-    """Read a chart file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Chart
-        Checked.
-
-    Raises
-    ------
-    ChartError, ExpressionError
-        Naming file, line, key and text.
-    """
-    return read_file(path, ChartTable, ChartError, ChartTable.build)
+def load(path: Path, kind: type[Chart]) -> Chart:
+    """Read a chart file; errors name file, line, key and text."""
+    return read_file(path, ChartTable, ChartError, lambda table: table.build(kind))
 
 
 def save(chart: Chart, path: Path) -> Path:
-    """Write a chart file.
-
-    Parameters
-    ----------
-    chart : Chart
-        What to write.
-    path : Path
-        Where to.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written, or something else is there.
-    """
+    """Write a chart file, unless something else is there."""
     return write_file(path, ChartTable.of(chart))

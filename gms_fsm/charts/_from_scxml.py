@@ -7,14 +7,16 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
 from gms_fsm.charts._imported import Edge, Texts, built
 from gms_fsm.charts._scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
-from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ChartError, why
 from gms_fsm.language import ECMASCRIPT
+
+if TYPE_CHECKING:
+    from gms_fsm.charts.chart import Chart
 
 __all__ = ["load"]
 
@@ -40,11 +42,13 @@ class Row:
     place: str
 
 
-def load(path: Path, texts: Mapping[str, Any]) -> Chart:
+def load(kind: type[Chart], path: Path, texts: Mapping[str, Any]) -> Chart:
     """Return the chart of a document.
 
     Parameters
     ----------
+    kind : type of Chart
+        The class, which imports this module.
     path : Path
         The document.
     texts : mapping
@@ -74,18 +78,18 @@ def load(path: Path, texts: Mapping[str, Any]) -> Chart:
         if row.cond is not None or row.guard is not None
     }
     found["actions"] = {row.name: _texts(row.assigned) for row in rows}
-    for kind, tag in (("entry", "onentry"), ("exit", "onexit")):
-        found[kind] = {
+    for part, tag in (("entry", "onentry"), ("exit", "onexit")):
+        found[part] = {
             str(state.get("id")): _texts(_assigned(_all(state, tag), here)) for state in states
         }
     found["flows"] = {str(each.get("id")): _pairs(each, "flow") for each in states}
     found["state_outputs"] = {str(each.get("id")): _pairs(each, "force") for each in states}
     merged = {**found, **texts}
-    for kind in ("guards", "actions", "entry", "exit", "flows", "state_outputs"):
-        beside = getattr(given, kind)
+    for part in ("guards", "actions", "entry", "exit", "flows", "state_outputs"):
+        beside = getattr(given, part)
         if isinstance(beside, Mapping):
-            merged[kind] = {**found[kind], **beside}
-    chart = built([str(each.get("id")) for each in states], edges, Texts(**merged), here)
+            merged[part] = {**found[part], **beside}
+    chart = built(kind, [str(each.get("id")) for each in states], edges, Texts(**merged), here)
     _check_kept(chart, rows, states, given, here)
     return chart
 

@@ -96,11 +96,15 @@ class GivenTexts(TypedDict, total=False):
     impulses: Iterable[str]
 
 
-def built(states: list[str], edges: list[Edge], given: Texts, here: str) -> Chart:
+def built(
+    kind: type[Chart], states: list[str], edges: list[Edge], given: Texts, here: str
+) -> Chart:
     """Return the chart.
 
     Parameters
     ----------
+    kind : type of Chart
+        The class, which imports this module.
     states : list of str
         The first one is the default state.
     edges : list of Edge
@@ -120,8 +124,6 @@ def built(states: list[str], edges: list[Edge], given: Texts, here: str) -> Char
     ChartError, ExpressionError
         If a text belongs to no state or edge, an edge has no guard, or the chart is inconsistent.
     """
-    from gms_fsm.charts.chart import Chart  # which imports this module
-
     by_state = {
         name: _known(getattr(given, name), states, "state", f"{here}: {name}")
         for name in ("flows", "entry", "exit", "state_outputs")
@@ -141,7 +143,7 @@ def built(states: list[str], edges: list[Edge], given: Texts, here: str) -> Char
     _check_known(locked, states, "state", f"{here}: locked")
     impulses = dict.fromkeys(map(str, _several(given.impulses, f"{here}: impulses")))
     _check_known(impulses, names, "edge", f"{here}: impulses")
-    return Chart(
+    return kind(
         given.name,
         given.inputs,
         given.variables,

@@ -313,7 +313,7 @@ class Chart:
         """
         from gms_fsm.charts._file import load
 
-        return load(checked_path("path", path))
+        return load(checked_path("path", path), cls)
 
     # ------------------------------------------------------------------ from other programs
     @classmethod
@@ -362,7 +362,7 @@ class Chart:
 
         given = _imported.Texts.of(texts, _from_transitions.HERE)
         states, edges = _from_transitions.read(machine)
-        return _imported.built(states, edges, given, _from_transitions.HERE)
+        return _imported.built(cls, states, edges, given, _from_transitions.HERE)
 
     @classmethod
     def from_scxml(cls, path: str | Path, **texts: Unpack[GivenTexts]) -> Chart:
@@ -404,7 +404,7 @@ class Chart:
         """
         from gms_fsm.charts import _from_scxml
 
-        return _from_scxml.load(checked_path("path", path), texts)
+        return _from_scxml.load(cls, checked_path("path", path), texts)
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import gms_fsm.charts
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import Parameter, checked_values
 from gms_fsm.charts.stribeck import Stribeck
@@ -223,7 +223,7 @@ def registered() -> Mapping[str, Entry]:
     'Generalized Maxwell Slip element'
     """
     found: dict[str, tuple[Entry, str]] = {}
-    for module in pkgutil.iter_modules(gms_fsm.charts.__path__):
+    for module in pkgutil.iter_modules(sys.modules["gms_fsm.charts"].__path__):
         place = f"gms_fsm/charts/{module.name}.py"
         for each in _entries(f"gms_fsm.charts.{module.name}", place):
             if each.name in found:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm._arguments import checked_integer, checked_kind, checked_path, listed
-from gms_fsm._display import displayed
+from gms_fsm._display import asked, displayed
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError, RecordError, shown
 from gms_fsm.identification._assess import Assessed, Estimate
@@ -530,11 +530,22 @@ class Fit:
         OutputError
             If it cannot be written.
         """
-        from gms_fsm.identification.report import write_report
-
-        return write_report(self, checked_path("folder", folder))
+        page: Path = asked("report")(self, checked_path("folder", folder))
+        return page
 
     # ------------------------------------------------------------------ texts
+    @property
+    def scores_text(self) -> str:
+        """Its scores in one line: training, held out, repeatability."""
+        unit = self.task.measured.unit
+        parts = [
+            f"{name} RMSE {one['rmse']:.4g} {unit}, R² {one['r2']:.4f} ({one['rows']:.0f} rows)"
+            for name, one in (("training", self.training), ("held out", self.held_out))
+            if one is not None
+        ]
+        parts += [f"repeatability {self.floor:.4g} {unit}"] if self.floor is not None else []
+        return "; ".join(parts)
+
     def with_choice(self, choice: Choice, seconds: float) -> Fit:
         """Return the same fit with how it was chosen."""
         return replace(self, choice=choice, seconds=seconds)

@@ -12,6 +12,7 @@ import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,10 +34,12 @@ from gms_fsm.language._normal import renamed_in
 from gms_fsm.systems._definitions import Definition, Edge
 from gms_fsm.systems._given import derivative_free, is_positive
 from gms_fsm.systems._numbers import numbers_of, of
-from gms_fsm.systems._parts import LEAST_LOAD, LOAD
+from gms_fsm.systems._parts import LEAST_LOAD, LOAD, Body, Contact
 from gms_fsm.systems.signals import Formula
 from gms_fsm.systems.springs import added, spring_forces
-from gms_fsm.systems.system import Body, Contact, System
+
+if TYPE_CHECKING:
+    from gms_fsm.systems.system import System
 
 __all__ = [
     "CURVE_LOAD",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Discriminator, Field, Tag
 
@@ -17,6 +17,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.registry import chart_named, charts
 from gms_fsm.errors import OutputError, ParameterError, ScenarioError
 from gms_fsm.records.record import Record
+from gms_fsm.systems._parts import Contact
 from gms_fsm.systems._record import (
     ContactTable,
     CornersTable,
@@ -33,7 +34,9 @@ from gms_fsm.systems._record import (
 )
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model
-from gms_fsm.systems.system import Contact, System
+
+if TYPE_CHECKING:
+    from gms_fsm.systems.system import System
 
 __all__ = ["FileTable", "SystemFile", "load", "save", "save_as"]
 
@@ -92,7 +95,7 @@ class ContactInFile(ContactTable):
 
 def _chart(given: str | ChartTable, folder: Path) -> Chart:
     if isinstance(given, ChartTable):
-        return given.build()
+        return given.build(Chart)
     if not given.endswith(".toml"):
         return chart_named(given)
     return Chart.load(_beside(folder, given, "chart"))
@@ -148,13 +151,15 @@ class SystemFile(SystemTable):
     signals: dict[str, SignalInFile] = Field({})  # type: ignore[assignment]
     contacts: list[ContactInFile] = Field(alias="contact")  # type: ignore[assignment]
 
-    def chosen(self, folder: Path) -> System:
+    def chosen(self, folder: Path, kind: type[System]) -> System:
         """Return the system; its charts may be files in a folder.
 
         Parameters
         ----------
         folder : Path
             Where the names of chart files lead.
+        kind : type of System
+            The class, which imports this module.
 
         Returns
         -------
@@ -182,51 +187,17 @@ class SystemFile(SystemTable):
             else each
             for name, each in self.signals.items()
         }
-        return system_from(self.model_copy(update={"signals": signals}), contacts)
+        return system_from(kind, self.model_copy(update={"signals": signals}), contacts)
 
 
-def load(path: Path) -> System:
-    """Read a system file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    System
-        Checked.
-
-    Raises
-    ------
-    GMSError
-        Naming file, line, key and text.
-    """
-    build = functools.partial(SystemFile.chosen, folder=path.parent)
+def load(path: Path, kind: type[System]) -> System:
+    """Read a system file; errors name file, line, key and text."""
+    build = functools.partial(SystemFile.chosen, folder=path.parent, kind=kind)
     return read_file(path, SystemFile, ScenarioError, build)
 
 
 def save(system: System, path: Path) -> Path:
-    """Write a system file.
-
-    Parameters
-    ----------
-    system : System
-        What to write.
-    path : Path
-        Where to.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OutputError
-        If a signal is a Python function, the file cannot be written, or something else is there.
-    """
+    """Write a system file, unless a signal is a Python function or something else is there."""
     return save_as(SystemFile, system, path)
 
 

@@ -8,20 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from gms_fsm._records import ONE, TABLE, TEXT, Numbers, Table, Texts, Value, built
 from gms_fsm.charts._file import ChartTable
+from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import STRIBECK, FloatArray
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import SignalError
+from gms_fsm.systems._parts import Body, Contact, Sampled
 from gms_fsm.systems.models import ChartModel, Model
 from gms_fsm.systems.signals import Corners, Formula, Function, Signal, as_signal
 from gms_fsm.systems.springs import Spring
-from gms_fsm.systems.system import Body, Contact, Sampled, System
+
+if TYPE_CHECKING:
+    from gms_fsm.systems.system import System
 
 __all__ = [
     "ContactTable",
@@ -191,7 +195,7 @@ class ModelTable(Table):
     def build(self) -> ChartModel:
         """Return an equivalent model."""
         return ChartModel(
-            built(self.chart.build, "chart"),
+            built(self.chart.build, "chart", kind=Chart),
             values_of(self.values),
             n=self.n,
             stribeck=None if self.stribeck is None else self.stribeck.build(),
@@ -261,7 +265,7 @@ class ContactTable(Table):
 
     def build(self) -> Contact:
         """Return an equivalent contact."""
-        chart = built(self.chart.build, "chart") if self.chart else None
+        chart = built(self.chart.build, "chart", kind=Chart) if self.chart else None
         model = built(self.model.build, "model") if self.model else None
         return contact_from(self, chart, model)
 
@@ -329,10 +333,10 @@ class SystemTable(Table):
         """
         return cls(**plain(system), contacts=[ContactTable.of(each) for each in system.contacts])
 
-    def build(self) -> System:
-        """Return an equivalent system."""
+    def build(self, kind: type[System]) -> System:
+        """Return an equivalent system; its class is given, as it imports this module."""
         contacts = [built(each.build, "contacts", i) for i, each in enumerate(self.contacts)]
-        return system_from(self, contacts)
+        return system_from(kind, self, contacts)
 
 
 def plain(system: System) -> dict[str, Any]:
@@ -378,9 +382,9 @@ def plain(system: System) -> dict[str, Any]:
     }
 
 
-def system_from(table: SystemTable, contacts: list[Contact]) -> System:
+def system_from(kind: type[System], table: SystemTable, contacts: list[Contact]) -> System:
     """Return the system that a table describes, with its contacts."""
-    return System(
+    return kind(
         table.name,
         bodies=tuple(built(Body, "bodies", i, **vars(each)) for i, each in enumerate(table.bodies)),
         springs=tuple(

@@ -264,7 +264,7 @@ class System:
         """
         from gms_fsm.systems._file import load
 
-        return load(checked_path("path", path))
+        return load(checked_path("path", path), cls)
 
     def save(self, path: str | Path) -> Path:
         """Write the system to a TOML file, from which `load` returns an equivalent one.

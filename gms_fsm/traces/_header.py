@@ -122,4 +122,4 @@ class Header(BaseModel):
 
     def to_system(self) -> System | None:
         """Return an equivalent system, if it is one and not a model on a rig."""
-        return None if self.system is None else self.system.build()
+        return None if self.system is None else self.system.build(System)

@@ -5,6 +5,10 @@ Figures are made without pyplot, so there is no global state and no display.
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from plots import formats
+from plots._matplotlib import Figure
 from plots.figures._fit import fit_figure
 from plots.figures._landscapes import landscape
 from plots.figures._paper import (
@@ -19,7 +23,6 @@ from plots.figures._phase import phase
 from plots.figures._phenomena import phenomena_matrix, phenomenon_figure
 from plots.figures._profiles import profiles_figure
 from plots.figures._runs import Measured, cascade_figure, overview, ribbons_figure
-from plots.figures._saving import save
 from plots.figures._unfold import unfold
 from plots.panels._shown import SMOOTH
 
@@ -44,3 +47,28 @@ __all__ = [
     "save",
     "unfold",
 ]
+
+
+def save(figure: Figure, path: str | Path) -> Path:
+    """Write a figure; the file ending selects the format.
+
+    Parameters
+    ----------
+    figure : Figure
+        What.
+    path : str or Path
+        Its ending must be that of a figure format in `plots.formats.FORMATS`.
+
+    Returns
+    -------
+    Path
+        The file, written atomically.
+
+    Raises
+    ------
+    ParameterError
+        If the file ending is not supported.
+    OutputError
+        If the folder cannot be written.
+    """
+    return formats.save(figure, path, "figure")

@@ -1,42 +1,15 @@
-"""Saves figures."""
+"""Figures as bytes, the same for the same trace."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from io import BytesIO
-from pathlib import Path
 
-from plots import formats
 from plots._matplotlib import Figure, rc_context
 from plots.style import RC
 
-__all__ = ["picture", "save"]
-
-
-def save(figure: Figure, path: str | Path) -> Path:
-    """Write a figure; the file ending selects the format.
-
-    Parameters
-    ----------
-    figure : Figure
-        What.
-    path : str or Path
-        Its ending must be that of a figure format in `plots.formats.FORMATS`.
-
-    Returns
-    -------
-    Path
-        The file, written atomically.
-
-    Raises
-    ------
-    ParameterError
-        If the file ending is not supported.
-    OutputError
-        If the folder cannot be written.
-    """
-    return formats.save(figure, path, "figure")
+__all__ = ["picture"]
 
 
 def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:

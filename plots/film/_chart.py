@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.inspection.explain import values_at
+from plots._graphviz import picture as rendered
 from plots._matplotlib import to_hex, to_rgb
 from plots.film._pace import Frame, Pace
 from plots.live_chart import ElementParts, LiveChart, Marks, marks_of, plain_tree
-from plots.render import picture as rendered
 from plots.statechart import Sheet, chosen
 from plots.style import CHART_THEMES
 

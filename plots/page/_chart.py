@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from xml.etree import ElementTree
 
 from gms_fsm.charts.chart import Chart
+from plots._graphviz import drawn
 from plots._labels import Row, edge_id, element_id, part_id
-from plots.render import drawn
 from plots.statechart import Sheet
 
 __all__ = ["chart_svg"]

@@ -291,7 +291,7 @@ def test_program_and_package_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     if shutil.which("dot") is None:
         pytest.skip("needs the program dot")
     pytest.importorskip("pygraphviz", reason="needs the package pygraphviz")
-    from plots.render import drawn as drawing
+    from plots._graphviz import drawn as drawing
 
     def drawn(graph: object) -> tuple[list[str], list[float]]:
         picture = drawing(graph, "svg")  # type: ignore[arg-type]

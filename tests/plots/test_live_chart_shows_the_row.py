@@ -275,7 +275,7 @@ def test_wrong_options_are_rejected() -> None:
 
 
 def test_without_graphviz_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["plots.render"], "drawn", lambda *_: None)
+    monkeypatch.setattr(sys.modules["plots._graphviz"], "drawn", lambda *_: None)
     with pytest.raises(
         MissingExtraError, match=r"Graphviz, .* pip install .*\[render\].* program dot"
     ):

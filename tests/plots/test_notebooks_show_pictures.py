@@ -16,7 +16,7 @@ import plots
 from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, simulate
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.errors import OutputError
-from plots import notebook
+from plots import drawings, notebook
 from tests.helpers import ROOT, one_element, stick_slip
 from tests.plots.systems_to_draw import BLOCKS, SERVO, run
 
@@ -25,7 +25,7 @@ CURVE = Stribeck(1.0, 1.5, 1e-3)
 
 @pytest.fixture
 def _graphviz() -> None:
-    if notebook.drawn(plots.block_diagram(1), "svg") is None:
+    if notebook.svg_of(plots.block_diagram(1)) is None:
         pytest.skip("no Graphviz: neither the program dot nor pygraphviz")
 
 
@@ -60,7 +60,7 @@ def test_a_trace_is_a_png() -> None:
 
 
 def test_without_graphviz_a_notebook_falls_back_to_text(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(notebook, "drawn", lambda graph, form: None)
+    monkeypatch.setattr(drawings, "drawn", lambda graph, form: None)
     for shown in (GMS_ELEMENT["signed"], stick_slip("signed"), SERVO.contact("bearing")):
         assert shown._repr_svg_() is None  # type: ignore[attr-defined]
         assert " -> " in html.unescape(shown._repr_html_())  # type: ignore[attr-defined]
@@ -71,7 +71,7 @@ def test_a_graph_that_graphviz_refuses_is_text(monkeypatch: pytest.MonkeyPatch) 
     def broken(graph: object, form: str) -> bytes:
         raise OutputError("Graphviz cannot draw this graph")
 
-    monkeypatch.setattr(notebook, "drawn", broken)
+    monkeypatch.setattr(drawings, "drawn", broken)
     assert plots.block_diagram(2)._repr_mimebundle_().keys() == {"text/plain"}
     assert stick_slip("signed")._repr_html_().startswith("<pre")  # type: ignore[attr-defined]
 

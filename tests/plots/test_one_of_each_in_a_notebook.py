@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from plots.render import available
+from plots._graphviz import available
 
 SVG, PNG, HTML, TEXT = "image/svg+xml", "image/png", "text/html", "text/plain"
 

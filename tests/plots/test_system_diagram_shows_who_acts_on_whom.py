@@ -236,7 +236,7 @@ def test_program_and_package_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     if shutil.which("dot") is None:
         pytest.skip("needs the program dot")
     pytest.importorskip("pygraphviz", reason="needs the package pygraphviz")
-    from plots.render import drawn as picture_of
+    from plots._graphviz import drawn as picture_of
 
     def drawn(graph: object) -> tuple[list[str], list[float]]:
         picture = picture_of(graph, "svg")  # type: ignore[arg-type]

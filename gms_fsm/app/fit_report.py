@@ -7,7 +7,7 @@ import io
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +17,9 @@ from gms_fsm._files import output_folder, refuse_input, write_whole
 from gms_fsm._markdown import plain, table_lines
 from gms_fsm.errors import MissingExtraError, OutputError
 from gms_fsm.identification._profile import LIMIT, Profile
+from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
 
-if TYPE_CHECKING:
-    from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
-
-__all__ = [
-    "report_files",
-    "report_folder",
-    "scores_text",
-    "write_report",
-]
+__all__ = ["report_files", "report_folder", "write_report"]
 
 PAGE, PARAMETERS, RESIDUALS, FITTED = "report.md", "parameters.csv", "residuals.csv", "fitted.toml"
 MOTION = "fitted.csv"  # beside the scenario, if it is long
@@ -57,10 +50,9 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
         If the folder is not writable, or a file would replace one that was not written by gms-fsm
         or that is an input.
     """
-    from gms_fsm.identification.result import Fit as Kind
     from plots import formats
 
-    checked_kind("fit", fit, Kind, "a Fit, from gms_fsm.fit")
+    checked_kind("fit", fit, Fit, "a Fit, from gms_fsm.fit")
     inputs = [each.path for each in fit.records if each.path is not None]
     place = report_folder(folder, inputs)
     residuals, written, lacking = fit.residuals(), [PARAMETERS, RESIDUALS], []
@@ -117,30 +109,6 @@ def report_files() -> list[str]:
 
     drawn = [name for stem in ("fit", PROFILES) for name in formats.files(stem, "figure")]
     return [PAGE, *drawn, PARAMETERS, RESIDUALS, FITTED, MOTION]
-
-
-def scores_text(fit: Fit) -> str:
-    """Return the scores of a fit in one line: training, held out, repeatability.
-
-    Parameters
-    ----------
-    fit : Fit
-        The fit.
-
-    Returns
-    -------
-    str
-        RMSE in the unit of what was compared, and R².
-    """
-    unit = fit.task.measured.unit
-    named = (("training", fit.training), ("held out", fit.held_out))
-    parts = [
-        f"{name} RMSE {score['rmse']:.4g} {unit}, R² {score['r2']:.4f} ({score['rows']:.0f} rows)"
-        for name, score in named
-        if score is not None
-    ]
-    parts += [f"repeatability {fit.floor:.4g} {unit}"] if fit.floor is not None else []
-    return "; ".join(parts)
 
 
 def _draw(fit: Fit, folder: Path) -> list[str]:

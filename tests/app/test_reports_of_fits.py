@@ -11,10 +11,10 @@ import pytest
 
 from gms_fsm import Fit, Record
 from gms_fsm._extras import missing
+from gms_fsm.app import fit_report
+from gms_fsm.app.fit_report import report_files, write_report
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import OutputError, ParameterError
-from gms_fsm.identification import report
-from gms_fsm.identification.report import report_files, write_report
 from gms_fsm.identification.result import Choice, ChoiceRow
 from tests.identification.fits_made import small, two_records, with_profiles, with_table
 
@@ -27,14 +27,14 @@ FILES = {"report.md", "parameters.csv", "residuals.csv", "fitted.toml"}
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")
     place = tmp_path_factory.mktemp("report")
-    assert write_report(small(), place) == place / "report.md"
+    assert small().report(place) == place / "report.md"  # which finds write_report
     return place
 
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the figure, which takes longest."""
-    monkeypatch.setattr(report, "_draw", lambda *_: [])
+    monkeypatch.setattr(fit_report, "_draw", lambda *_: [])
 
 
 def table(path: Path) -> list[dict[str, str]]:
@@ -174,7 +174,7 @@ def test_without_matplotlib_the_texts_are_written(
     def refused(*_: object) -> list[str]:
         raise missing("matplotlib", "plots")
 
-    monkeypatch.setattr(report, "_draw", refused)
+    monkeypatch.setattr(fit_report, "_draw", refused)
     with pytest.warns(UserWarning, match="no figure was drawn: figures and animations need"):
         page = write_report(small(), tmp_path).read_text(encoding="utf-8")
     assert "- no figure was drawn: figures and animations need matplotlib" in page
