@@ -16,7 +16,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from gms_fsm.errors import MissingExtraError, cut
+from gms_fsm.errors import cut
 
 __all__ = ["Form", "asked", "displayed", "full_text", "register_figures", "short_repr"]
 
@@ -84,16 +84,13 @@ def _figure(figure: object) -> Any:
 
 
 def _shown(name: str, *given: object) -> Any:
-    try:
-        show = asked(name)
-    except MissingExtraError:  # a notebook then shows the text
-        return None
-    return show(*given)
+    show = asked(name)
+    return None if show is None else show(*given)  # a notebook then shows the text
 
 
 # --------------------------------------------------------------------------- what draws
 @functools.cache
-def asked(name: str) -> Callable[..., Any]:
+def asked(name: str) -> Callable[..., Any] | None:
     """Return what is declared in the entry point group under a name.
 
     Parameters
@@ -104,27 +101,20 @@ def asked(name: str) -> Callable[..., Any]:
 
     Returns
     -------
-    callable
-        Loaded.
-
-    Raises
-    ------
-    MissingExtraError
-        If neither a checkout nor an installed package declares it.
+    callable or None
+        Loaded; None if neither a checkout nor an installed package declares it.
 
     Examples
     --------
-    >>> asked("notebook").__module__
-    'plots.notebook'
+    >>> show = asked("notebook")
+    >>> show is None or show.__module__ == "plots.notebook"
+    True
     """
     for each in _declared():
         if each.name == name:
             found: Callable[..., Any] = each.load()
             return found
-    raise MissingExtraError(
-        f"no installed package shows this (entry point {name!r} of the group {GROUP!r})",
-        advice="install gms-fsm with pip, or run it from its checkout",
-    )
+    return None
 
 
 def _declared() -> Iterator[EntryPoint]:

@@ -108,7 +108,9 @@ class SciPyStepper:
             cursor[STEPS] += 1
             try:
                 solver = self._solver_to(min(self._limit(), ahead))
-                solver.step()
+                # BDF computes with a row that it has not filled yet, and overwrites the result.
+                with np.errstate(invalid="ignore"):
+                    solver.step()
             except (ArithmeticError, np.linalg.LinAlgError):
                 return NOT_FINITE
             if solver.status == "failed":

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gms_fsm._arguments import checked_integer, checked_kind, checked_path, listed
 from gms_fsm._display import asked, displayed
+from gms_fsm._extras import missing
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError, RecordError, shown
 from gms_fsm.identification._assess import Assessed, Estimate
@@ -530,7 +531,10 @@ class Fit:
         OutputError
             If it cannot be written.
         """
-        page: Path = asked("report")(self, checked_path("folder", folder))
+        report = asked("report")
+        if report is None:
+            raise missing("an entry point of gms-fsm", "plots")
+        page: Path = report(self, checked_path("folder", folder))
         return page
 
     # ------------------------------------------------------------------ texts
