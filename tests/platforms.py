@@ -21,6 +21,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -46,6 +47,7 @@ from tests.helpers import ROOT
 from tests.random_systems import T_END, bits, trial
 
 SHAPES = 60
+ENGINE = "compiled" if find_spec("llvmlite") else "ifelse"
 COMPILERS = [each for each in ("gcc", "clang") if shutil.which(each)]
 FLAGS = ("-std=c99", "-ffp-contract=off", "-shared", "-fPIC", "-w")
 COMBINATIONS = [(each, level) for each in COMPILERS for level in ("-O0", "-O1", "-O2", "-O3")]
@@ -68,7 +70,7 @@ class Case:
         functions = any(isinstance(each, Function) for each in self.system.signals.values())
         return not functions and self.settings.get("output") != "end"
 
-    def run(self, engine: str = "compiled") -> tuple[Trace | None, str]:
+    def run(self, engine: str = ENGINE) -> tuple[Trace | None, str]:
         """Return the trace, also of a run that stops, and how it ended."""
         more = {**self.settings, "engine": engine}
         try:
