@@ -38,6 +38,7 @@ from integrators.machine_code.tree import (
     Statement,
     Table,
     While,
+    may_write,
     parts_of,
 )
 
@@ -270,7 +271,8 @@ class Writer:
         match statement:
             case Set(target=target, value=value):
                 if target.name in self.unread:
-                    return [f"{space}{self.value(value)};"] if calls(value) else []
+                    kept = may_write(value) or any(isinstance(u, Callback) for u in parts_of(value))
+                    return [f"{space}{self.value(value)};"] if kept else []
                 return [f"{space}{self.name(target.name)} = {self.value(value)};"]
             case SetMany(targets=targets, call=call):
                 self.counter += 1

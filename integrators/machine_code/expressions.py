@@ -27,6 +27,7 @@ from integrators.machine_code.tree import (
     Op,
     Set,
     SetMany,
+    may_write,
     parts_of,
 )
 from integrators.machine_code.values import (
@@ -134,19 +135,13 @@ def in_order(work: Work, nodes: Sequence[ast.expr]) -> list[Value]:
     made: list[Value] = []
     for k, node in enumerate(nodes):
         each = value(work, node)
-        if isinstance(each, Number) and _may_write(each.expr):
+        if isinstance(each, Number) and may_write(each.expr):
             touched = [isinstance(u, Number) and contains(u.expr, Load | Invoke) for u in made]
             made = [steady(work, u) if old else u for u, old in zip(made, touched, strict=True)]
             if any(touched) or any(not isinstance(u, ast.Constant) for u in nodes[k + 1 :]):
                 each = steady(work, each)
         made.append(each)
     return made
-
-
-def _may_write(expr: Expr) -> bool:
-    """Return whether an expression calls a function that is given memory."""
-    calls = (part for part in parts_of(expr) if isinstance(part, Invoke))
-    return any(each.kind == "p" for call in calls for each in call.arguments)
 
 
 def steady(work: Work, each: Value) -> Value:

@@ -40,6 +40,7 @@ __all__ = [
     "Table",
     "While",
     "locals_in",
+    "may_write",
     "parts_of",
 ]
 
@@ -169,6 +170,28 @@ class Callback:
 
 
 Expr = Const | Local | Global | Op | Logic | Choose | Load | AddressOf | Invoke | Foreign | Callback
+
+
+def may_write(expr: Expr) -> bool:
+    """Return whether an expression calls a function of the module that is given memory.
+
+    Parameters
+    ----------
+    expr : Expr
+        Any expression.
+
+    Returns
+    -------
+    bool
+        If False, no part of it changes what others read.
+
+    Examples
+    --------
+    >>> may_write(Invoke("f", "sin", (Local("f", "x"),)))
+    False
+    """
+    made = (each for each in parts_of(expr) if isinstance(each, Invoke))
+    return any(part.kind == "p" for each in made for part in each.arguments)
 
 
 def parts_of(expr: Expr) -> Iterator[Expr]:
