@@ -40,14 +40,14 @@ def sign_from_above(u: float) -> float:
     return 1.0 if u >= 0.0 else -1.0
 
 
-def finite(u: float) -> float:
+def number_or_0(u: float) -> float:
     """Return a number, or 0 if it is not finite."""
     return u if u - u == 0.0 else 0.0
 
 
 def divided(a: float, b: float) -> float:
     """Return |a / b|, or 0 if it is undefined."""
-    return finite(abs(a / b)) if b != 0.0 else 0.0
+    return number_or_0(abs(a / b)) if b != 0.0 else 0.0
 
 
 def reach(height: float, slope: float) -> float:
@@ -71,7 +71,7 @@ def known(least: float) -> float:
 
 
 HELPERS: Mapping[str, object] = {
-    "sign_from_above": sign_from_above, "finite": finite, "divided": divided, "reach": reach,
+    "sign_from_above": sign_from_above, "number_or_0": number_or_0, "divided": divided, "reach": reach,
     "reach_bent": reach_bent, "nearer": nearer, "known": known, "inf": INF,
 }  # fmt: skip
 
@@ -174,7 +174,7 @@ def scale_text(chart: Chart, name: str, own: frozenset[str], *, curved: bool) ->
     found = [*sizes.reach]
     numbers = ["its_s = _weight[_i] * (_F_c * _N)" if curved else "its_s = 0.0"]
     numbers += [f"its_{each} = all_{each}[_i]" for each in chart.parameter_names if each in own]
-    first = [f"_r{k} = finite({text})" for k, text in enumerate(sizes.at_rest)]
+    first = [f"_r{k} = number_or_0({text})" for k, text in enumerate(sizes.at_rest)]
     for k, each in enumerate(found):
         first.append(f"_u{k} = inf")
         for margin in sizes.reach[each]:
@@ -195,7 +195,7 @@ def scale_text(chart: Chart, name: str, own: frozenset[str], *, curved: bool) ->
     for each in chart.velocities:
         first.append(f"_slowest = nearer(_slowest, _u{found.index(each)})")
         first.append(f"_v = nearer(_v, {WINDOW} * _u{found.index(each)})")
-    second = [f"_p{k} = finite({text})" for k, text in enumerate(sizes.paces)]
+    second = [f"_p{k} = number_or_0({text})" for k, text in enumerate(sizes.paces)]
     second += [f"_fastest = max(_fastest, abs(_p{k}))" for k in range(len(sizes.paces))]
     for k, state in enumerate(chart.states):
         rates = "".join(f", _p{j}" for j in sizes.relaxes[state.name])

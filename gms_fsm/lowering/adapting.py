@@ -137,7 +137,7 @@ class _Printer(LockFunctions):
         if names_in(tree) - {*self.read.system.numbers}:
             return "0.0"
         text = spell(tree, rename=self.places)
-        return text if isinstance(tree, Number) else f"finite({text})"
+        return text if isinstance(tree, Number) else f"number_or_0({text})"
 
     # ------------------------------------------------------------------ the beginning
     def enter(self) -> list[str]:
