@@ -71,8 +71,8 @@ def known(least: float) -> float:
 
 
 HELPERS: Mapping[str, object] = {
-    "sign_from_above": sign_from_above, "number_or_0": number_or_0, "divided": divided, "reach": reach,
-    "reach_bent": reach_bent, "nearer": nearer, "known": known, "inf": INF,
+    "sign_from_above": sign_from_above, "number_or_0": number_or_0, "divided": divided,
+    "reach": reach, "reach_bent": reach_bent, "nearer": nearer, "known": known, "inf": INF,
 }  # fmt: skip
 
 
