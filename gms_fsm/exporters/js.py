@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -102,7 +103,7 @@ def js(subject: Subject) -> dict[str, str]:
     }
 
 
-class _Module:
+class _Module(ABC):
     """What both kinds of modules have in common."""
 
     face: str  # the template of what a user calls
@@ -117,25 +118,25 @@ class _Module:
         self.numbers = parameters_of(start, alone, ())
 
     # ------------------------------------------------------------------ what differs
+    @abstractmethod
     def entries(self, translator: Translator) -> list[str]:
         """Translate the entries, and return their names."""
-        raise NotImplementedError
 
+    @abstractmethod
     def holes(self) -> dict[str, object]:
         """Return what the template of the face needs."""
-        raise NotImplementedError
 
     def columns(self) -> Mapping[str, tuple[Any, ...]]:
         """Return the contents of columns by the paths to them; of those that grow nothing."""
         return {}
 
+    @abstractmethod
     def output(self, each: Quantity) -> dict[str, Any]:
         """Return where an output is."""
-        raise NotImplementedError
 
+    @abstractmethod
     def example(self) -> str:
         """Return a program that uses the module."""
-        raise NotImplementedError
 
     # ------------------------------------------------------------------ files
     def module(self) -> str:

@@ -101,6 +101,11 @@ def javascript_text(module: Module) -> str:
     str
         The text, to stand where ``F`` and ``B`` are defined. It defines the entries by name.
 
+    Raises
+    ------
+    ValueError
+        If the module calls a function of the host program.
+
     Examples
     --------
     >>> from integrators.machine_code.translate import Translator
@@ -213,7 +218,7 @@ class _Script(Writer):
             case Load(kind="b", address=address):
                 return f"{self.place('b', address)} !== 0", 5
             case Callback():
-                raise NotImplementedError("a function of the host program")
+                raise ValueError("JavaScript cannot call a function of the host program")
             case Foreign(name=name, arguments=arguments):
                 return f"{name}({', '.join(map(self.value, arguments))})", _WHOLE
             case Choose(kind="i", test=test, yes=yes, no=no) if isinstance(yes, Const):
@@ -248,7 +253,7 @@ class _Script(Writer):
     def words(self, address: Address) -> str:
         """Write the number of a word."""
         if address.offset % 8:
-            raise NotImplementedError(f"an address within a word: {address}")
+            raise ValueError(f"JavaScript has no address within a word: {address}")
         base, offset = address.base, address.offset // 8
         parts = [] if isinstance(base, Global) else [self.value(base, 8)]
         if isinstance(base, Global):
@@ -272,7 +277,7 @@ class _Script(Writer):
     def address(self, address: Address) -> tuple[str, int]:
         """Write an address."""
         if address.size != 8 and address.index is not None:
-            raise NotImplementedError(f"an address within a word: {address}")
+            raise ValueError(f"JavaScript has no address within a word: {address}")
         return self.words(address), 8
 
 
