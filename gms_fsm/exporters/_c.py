@@ -24,7 +24,6 @@ from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import MOST_SWITCHES, arguments_of
 from gms_fsm.run.start import LATEST, Start
-from gms_fsm.systems.system import System
 from integrators.compiled import INLINE, is_known
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Block, Layout
@@ -117,7 +116,7 @@ def engine_of(subject: Subject) -> Engine:
     ParameterError
         If a name cannot be one in C, or a default state is entered with what is not known yet.
     """
-    start, alone = subject.start, not isinstance(subject.given, System)
+    start, alone = subject.start, subject.alone
     check_entries(start)
     for each in subject.inputs:
         identifier(each, WORDS, f"input {each!r}")

@@ -18,7 +18,6 @@ from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import arguments_of
-from gms_fsm.systems.system import System
 from integrators import exchange, stepping
 from integrators.compiled import INLINE, is_known
 from integrators.exchange import Exchange
@@ -95,10 +94,10 @@ class Model:
             By file name; those to be compiled end in ``.c``.
         """
         return {
-            f"fmi{version}.c": (TEMPLATES / f"fmi{version}.c").read_text(encoding="utf-8"),
+            f"fmi{version}.c": (TEMPLATES / "fmi.c").read_text(encoding="utf-8"),
             f"{self.subject.name}_engine.c": self.engine(),
             "fmu_core.h": (TEMPLATES / "fmu_core.h").read_text(encoding="utf-8"),
-            "model.h": self.header(token),
+            "model.h": self.header(version, token),
         }
 
     # ------------------------------------------------------------------ engine
@@ -122,7 +121,7 @@ class Model:
         )
 
     # ------------------------------------------------------------------ model.h
-    def header(self, token: str) -> str:
+    def header(self, version: int, token: str) -> str:
         """Return what the fixed sources must know: names, places in the block, variables."""
         constants = self._constants()
         counts = {kind: len(names) for kind, names in types_of(self.subject.start).items()}
@@ -142,6 +141,7 @@ class Model:
             name=self.subject.name,
             title=safe(self.subject.title),
             token=token,
+            version=version,
             constants="\n".join(f"#define {key} {value}" for key, value in constants.items()),
             variables="\n".join(rows),
             places=", ".join(map(str, places)) or "0",
@@ -192,7 +192,7 @@ def both_of(subject: Subject) -> Both:
     Both
         At the start, for Co-Simulation.
     """
-    start, alone = subject.start, not isinstance(subject.given, System)
+    start, alone = subject.start, subject.alone
     functions, machines, buffers, sample = arguments_of(start)
     size, relations = len(buffers.now.y), len(buffers.relations.watch)
     indicators = indicators_of(start, alone)

@@ -15,7 +15,6 @@ from gms_fsm.lowering._plan import plan_of
 from gms_fsm.lowering.adapting import SHARE
 from gms_fsm.lowering.scales import scales_of_system
 from gms_fsm.run.start import Start
-from gms_fsm.systems.system import System
 from integrators.sliding import MOST_SLIDING
 
 __all__ = ["Indicator", "Variable", "indicators_of", "nominals_of", "types_of", "variables_of"]
@@ -110,7 +109,7 @@ def variables_of(subject: Subject, *, exchange: bool) -> tuple[Variable, ...]:
     tuple of Variable
         With names that are all different.
     """
-    start, alone = subject.start, not isinstance(subject.given, System)
+    start, alone = subject.start, subject.alone
     found = [Variable("time", "TIME", causality="independent", initial="", unit="s")]
     found += _inputs(subject)
     states = [each for each in _shown(subject, alone) if each.name not in subject.inputs]
@@ -149,9 +148,8 @@ def types_of(start: Start) -> dict[str, tuple[str, ...]]:
 
 def _inputs(subject: Subject) -> Iterator[Variable]:
     tables = subject.start.program.p[2]
-    alone = not isinstance(subject.given, System)
     for k, name in enumerate(subject.inputs):
-        velocity = alone and name == "v"
+        velocity = subject.alone and name == "v"
         first, *_ = tables[2 * k + 1]
         yield Variable(
             name,

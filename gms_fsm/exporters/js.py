@@ -35,7 +35,6 @@ from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import arguments_of
 from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems.signals import Function
-from gms_fsm.systems.system import System
 from integrators import columns, hybrid, loop
 from integrators.advance import ROW
 from integrators.columns import FIRINGS
@@ -95,7 +94,7 @@ def js(subject: Subject) -> dict[str, str]:
         Contents by file name.
     """
     name = subject.name
-    made = _Run(subject) if isinstance(subject.given, System) else _Friction(subject)
+    made = _Friction(subject) if subject.alone else _Run(subject)
     return {
         f"{name}.mjs": made.module(),
         f"{name}.d.mts": made.types(),
@@ -274,8 +273,7 @@ class _Run(_Module):
 """
 
     def __init__(self, subject: Subject) -> None:
-        given, t_end = subject.given, subject.t_end
-        assert isinstance(given, System)
+        given, t_end = subject.system, subject.t_end
         for name, signal in given.signals.items():
             if isinstance(signal, Function):
                 raise ParameterError(

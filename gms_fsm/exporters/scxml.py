@@ -46,7 +46,7 @@ def _write(subject: Subject) -> dict[str, str]:
     for each in _names(chart):
         identifier(each, WORDS, f"chart {chart.name!r}, name {each!r}")
     _check_characters(chart)
-    contact = None if isinstance(subject.given, Chart) else subject.contact
+    contact = subject.numbers
     numbers = _numbers(contact)
     files = {
         f"{name}_{i}.scxml" if len(numbers) > 1 else f"{name}.scxml": _document(name, chart, row)

@@ -47,7 +47,7 @@ def _write(subject: Subject) -> dict[str, str]:
             place=f"chart {chart.name!r}",
             advice="export it as scxml",
         )
-    contact = None if isinstance(subject.given, Chart) else subject.contact
+    contact = subject.numbers
     source = "\n".join(_program(chart, contact))
     return {
         f"{name}.py": _head(chart) + _imports(source) + source,
