@@ -22,9 +22,9 @@ from xml.sax.saxutils import quoteattr
 
 from gms_fsm._version import __version__
 from gms_fsm.exporters._c import WORDS, check_entries, filled
-from gms_fsm.exporters._fmu_model import Model
+from gms_fsm.exporters._fmu_model import FmuModel
 from gms_fsm.exporters._fmu_units import base_units
-from gms_fsm.exporters._fmu_variables import Variable, types_of, variables_of
+from gms_fsm.exporters._fmu_variables import FmuVariable, types_of, variables_of
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
 
@@ -90,7 +90,7 @@ class Described:
         Model identifier, and the title for people.
     token : str
         GUID or instantiation token.
-    variables : tuple of Variable
+    variables : tuple of FmuVariable
         By value reference.
     types : mapping of str to tuple of str
         Enumerations: the names of the states.
@@ -109,7 +109,7 @@ class Described:
     name: str
     title: str
     token: str
-    variables: tuple[Variable, ...]
+    variables: tuple[FmuVariable, ...]
     types: Mapping[str, tuple[str, ...]]
     exchange: bool
     t_start: float
@@ -165,7 +165,7 @@ def fmu(
         identifier(each, WORDS, f"input {each!r}")
     exchange = "piecewise_slope(" not in start.program.source
     variables = variables_of(subject, exchange=exchange)
-    model = Model(subject, variables, exchange=exchange)
+    model = FmuModel(subject, variables, exchange=exchange)
     digest = hashlib.sha256(repr((version, model.engine(), variables)).encode()).hexdigest()
     token = f"{{{uuid.UUID(digest[:32])}}}"
     sources = model.sources(version, token)
@@ -286,12 +286,12 @@ def tag(name: str, /, *inside: str, **attributes: object) -> str:
     return "\n".join([f"<{head}>", *lines, f"</{name}>"])
 
 
-def units_of(variables: Iterable[Variable]) -> dict[str, dict[str, int]]:
+def units_of(variables: Iterable[FmuVariable]) -> dict[str, dict[str, int]]:
     """Return the units that can be read, with their exponents.
 
     Parameters
     ----------
-    variables : iterable of Variable
+    variables : iterable of FmuVariable
         Of an FMU.
 
     Returns
@@ -352,7 +352,7 @@ def _held(subject: Subject, described: Described, version: int) -> str:
     return filled("fmu_inputs.md", held=HELD[version], only_held=ONLY_HELD[version], loop=loop)
 
 
-def _line(each: Variable) -> str:
+def _line(each: FmuVariable) -> str:
     unit = f" [{each.unit}]" if each.unit else ""
     return f"- `{each.name}`{unit} {each.meaning}".rstrip()
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from gms_fsm._version import __version__
 from gms_fsm.exporters._adapting import ADAPTED, adapting_of
 from gms_fsm.exporters._c import PLACES, STEPPED, TEMPLATES, filled, image_of, safe
-from gms_fsm.exporters._fmu_variables import Variable, indicators_of, nominals_of, types_of
+from gms_fsm.exporters._fmu_variables import FmuVariable, indicators_of, nominals_of, types_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run._joint import FAILURES
@@ -25,7 +25,7 @@ from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Layout
 from integrators.machine_code.translate import Translator
 
-__all__ = ["Both", "Model", "both_of"]
+__all__ = ["FmuArguments", "FmuModel", "both_of"]
 
 ENTRIES: Mapping[str, tuple[Any, str]] = {
     "step": (stepping.step_to, STEPPED),
@@ -41,7 +41,7 @@ ENTRIES: Mapping[str, tuple[Any, str]] = {
 OWN = ("IN_BLOCK", "INPUT", "SEEN", "INDICATOR", "STATE", "TIME", "place", "variable", "word")
 
 
-class Both(NamedTuple):
+class FmuArguments(NamedTuple):
     """The arguments of all entries."""
 
     functions: Any
@@ -52,20 +52,22 @@ class Both(NamedTuple):
     adapting: Adapting
 
 
-class Model:
+class FmuModel:
     """The engine of an FMU.
 
     Parameters
     ----------
     subject : Subject
         A friction or a system.
-    variables : sequence of Variable
+    variables : sequence of FmuVariable
         Of the FMU.
     exchange : bool
         Whether there is Model Exchange.
     """
 
-    def __init__(self, subject: Subject, variables: Sequence[Variable], *, exchange: bool) -> None:
+    def __init__(
+        self, subject: Subject, variables: Sequence[FmuVariable], *, exchange: bool
+    ) -> None:
         self.subject, self.variables, self.exchange = subject, variables, exchange
         self.arguments = both_of(subject)
         self.layout = Layout(self.arguments, is_known)
@@ -179,7 +181,7 @@ class Model:
         }
 
 
-def both_of(subject: Subject) -> Both:
+def both_of(subject: Subject) -> FmuArguments:
     """Return the arguments of all entries, made of lists.
 
     Parameters
@@ -189,7 +191,7 @@ def both_of(subject: Subject) -> Both:
 
     Returns
     -------
-    Both
+    FmuArguments
         At the start, for Co-Simulation.
     """
     start, alone = subject.start, subject.alone
@@ -209,4 +211,4 @@ def both_of(subject: Subject) -> Both:
         before=[0.0] * size,
         signs=[0.0] * len(buffers.now.held),
     )
-    return Both(functions, machines, buffers, sample, made, adapting_of(start))
+    return FmuArguments(functions, machines, buffers, sample, made, adapting_of(start))

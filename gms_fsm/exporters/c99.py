@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._c import TAKES, WORDS, Engine, engine_of, filled
+from gms_fsm.exporters._c import TAKES, WORDS, CEngine, engine_of, filled
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._plain_c import plain_c, plain_c_notes
 from gms_fsm.exporters._registry import Exporter, register
@@ -62,7 +62,7 @@ def _plain(subject: Subject) -> tuple[dict[str, str], str]:
         return {}, f"There is no plain form: {error}\n"
 
 
-def _main(made: Engine) -> str:
+def _main(made: CEngine) -> str:
     name, heads, rows = made.name, [], []
     for each in made.outputs:
         kind = "%lld" if each.place == "mode" else "%.17g"
@@ -141,7 +141,7 @@ def _values(signal: Corners, t: FloatArray, after: NDArray[np.bool_]) -> FloatAr
     return found
 
 
-def _readme(subject: Subject, made: Engine) -> str:
+def _readme(subject: Subject, made: CEngine) -> str:
     name = made.name
     inputs = ", ".join(f"`{each}`" for each in made.inputs) or "none"
     numbers = "\n".join(

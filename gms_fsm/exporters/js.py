@@ -19,7 +19,7 @@ from gms_fsm.exporters._adapting import ADAPTED, adapting_of
 from gms_fsm.exporters._c import (
     PLACES,
     STEPPED,
-    Stepped,
+    StepArguments,
     check_entries,
     filled,
 )
@@ -392,7 +392,7 @@ class _Friction(_Module):
         for each in subject.inputs:
             identifier(each, (), f"input {each!r}")
         step: tuple[Any, Any, Any, Any] = arguments_of(start)
-        super().__init__(subject, start, Stepped(*step, adapting_of(start)), alone=True)
+        super().__init__(subject, start, StepArguments(*step, adapting_of(start)), alone=True)
 
     def entries(self, translator: Translator) -> list[str]:
         """Translate a step, and what follows from the numbers."""

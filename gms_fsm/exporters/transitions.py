@@ -169,7 +169,7 @@ def _assigned(name: str, value: Any) -> str:
     return f"{name} = " + text.replace("\n", "\n" + " " * (len(name) + 3))
 
 
-class _Printer:
+class ElementPrinter:
     """Prints trees over the attributes of an element."""
 
     def __init__(self, chart: Chart) -> None:
@@ -189,7 +189,7 @@ class _Printer:
 
 
 def _element(chart: Chart, contact: Contact | None) -> Iterator[str]:
-    text = _Printer(chart)
+    text = ElementPrinter(chart)
     yield "class Element:"
     yield '    """One element: the model object of the machine. Its state is `state`."""'
     yield ""
@@ -248,7 +248,7 @@ def _inputs(chart: Chart, contact: Contact | None) -> Iterator[str]:
 
 def _total(chart: Chart, contact: Contact | None) -> Iterator[str]:
     """Write the force of the contact over the sum of its elements' forces."""
-    names = {**_Printer(chart).names, "F": "F"}
+    names = {**ElementPrinter(chart).names, "F": "F"}
     named = {name: each.replace("self.", "first.") for name, each in names.items()}
     total = spell(chart.totals["F"], rename=named) if "F" in chart.totals else "F"
     if contact is not None and contact.model is not None:
