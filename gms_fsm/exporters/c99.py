@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm._formats import Format, register
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._c import TAKES, WORDS, CEngine, engine_of, filled
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._plain_c import plain_c, plain_c_notes
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.systems.signals import Corners
@@ -111,7 +111,7 @@ def _sine(subject: Subject) -> tuple[FloatArray, dict[str, FloatArray]]:
 
 
 def _records(subject: Subject) -> tuple[FloatArray, dict[str, FloatArray]]:
-    signals = subject.start.system.signals
+    signals = subject.system.signals
     records = {name: each for name, each in signals.items() if isinstance(each, Corners)}
     t, after = _rows([*records.values()], subject.t_start)
     return t, {name: _values(each, t, after) for name, each in records.items()}
@@ -161,4 +161,14 @@ def _readme(subject: Subject, made: CEngine) -> str:
     )
 
 
-register(Exporter("c99", "C99 with located switches, and the plain form", c99, WORDS, TAKES))
+register(
+    Format(
+        "c99",
+        "friction",
+        "C99 with located switches, and the plain form",
+        "gms-fsm",
+        c99,
+        words=WORDS,
+        takes=TAKES,
+    )
+)

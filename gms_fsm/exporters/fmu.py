@@ -7,10 +7,10 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gms_fsm._formats import Format, register
 from gms_fsm._version import __version__
 from gms_fsm.exporters._c import TAKES, WORDS
 from gms_fsm.exporters._fmu import FLAGS, Described, fmu, tag, units_of
-from gms_fsm.exporters._registry import Exporter, register
 
 __all__: list[str] = []
 
@@ -210,11 +210,13 @@ def _structure_3(it: Described, indicators: list[int]) -> Iterator[str]:
 
 for _version in WORDINGS:
     register(
-        Exporter(
+        Format(
             f"fmu{_version}",
+            "friction",
             f"FMU of FMI {_version}.0: Model Exchange and Co-Simulation",
+            "gms-fsm",
             functools.partial(fmu, version=_version, describe=_files),
-            WORDS,
-            TAKES,
+            words=WORDS,
+            takes=TAKES,
         )
     )

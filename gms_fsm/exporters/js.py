@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gms_fsm._formats import Format, register
 from gms_fsm._version import __version__
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._adapting import ADAPTED, adapting_of
@@ -25,7 +26,6 @@ from gms_fsm.exporters._c import (
 )
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering._compiled import packed
 from gms_fsm.lowering.adapting import Adapting, adapt
@@ -505,9 +505,11 @@ def _note(each: Quantity) -> str:
 
 
 register(
-    Exporter(
+    Format(
         "js",
+        "friction",
         "a JavaScript module: runs of a system, or one friction step by step",
+        "gms-fsm",
         js,
         takes=("initial", "t_start", "settings", "t_end"),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
+from gms_fsm._formats import Format, register
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._c import TEMPLATES
 from gms_fsm.exporters._element import NamedFriction
@@ -21,7 +22,6 @@ from gms_fsm.exporters._plain_form import (
     Verbatim,
 )
 from gms_fsm.exporters._readme import about_friction
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters._walker import Forms, Walker
 from gms_fsm.language import MATLAB, Binary, Comparison, Name, Relation, names_in
@@ -482,4 +482,14 @@ def _relations(found: Iterable[Comparison]) -> list[Relation]:
     return [Relation(">" if e.strict else ">=", e.left, e.right) for e in found]
 
 
-register(Exporter("matlab", "a function file for MATLAB and GNU Octave", matlab, WORDS))
+register(
+    Format(
+        "matlab",
+        "friction",
+        "a function file for MATLAB and GNU Octave",
+        "gms-fsm",
+        matlab,
+        words=WORDS,
+        takes=("initial", "t_start"),
+    )
+)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
+from gms_fsm._formats import Format, register
 from gms_fsm.exporters._element import NamedFriction
 from gms_fsm.exporters._element_parts import Constant, Leaving
 from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._readme import about_friction
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters._walker import indented
 from gms_fsm.language import (
@@ -304,4 +304,14 @@ def _comment(text: str) -> str:
     return f" {_string(text)}" if text else ""
 
 
-register(Exporter("modelica", "a Modelica model with events", modelica, WORDS))
+register(
+    Format(
+        "modelica",
+        "friction",
+        "a Modelica model with events",
+        "gms-fsm",
+        modelica,
+        words=WORDS,
+        takes=("initial", "t_start"),
+    )
+)

@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
+from gms_fsm._formats import Format, register
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._element import NamedFriction
 from gms_fsm.exporters._element_parts import Constant
 from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._plain_form import PlainForm, declared, plain_form
 from gms_fsm.exporters._readme import about_friction
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters._walker import Forms, Walker, indented
 from gms_fsm.language import STRUCTURED_TEXT
@@ -268,5 +268,13 @@ def _block(head: str, lines: Iterable[str]) -> list[str]:
 
 
 register(
-    Exporter("st", "IEC 61131-3 structured text, the plain form", structured_text, _Words(WORDS))
+    Format(
+        "st",
+        "friction",
+        "IEC 61131-3 structured text, the plain form",
+        "gms-fsm",
+        structured_text,
+        words=_Words(WORDS),
+        takes=("initial", "t_start"),
+    )
 )

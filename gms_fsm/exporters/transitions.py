@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from gms_fsm._formats import Format, register
 from gms_fsm._version import __version__
 from gms_fsm.charts._reader import AGE
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._charts import check_moved_from_outside, slow_velocity
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import ELEMENTARY, NAMESPACE, Condition, Node, Value, parse_value, sgn, spell
 from gms_fsm.language._normal import renamed
@@ -421,4 +421,13 @@ def _one_line(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-register(Exporter("transitions", "Python for the package transitions", _write, WORDS, takes=()))
+register(
+    Format(
+        "transitions",
+        "friction",
+        "Python for the package transitions",
+        "gms-fsm",
+        _write,
+        words=WORDS,
+    )
+)

@@ -27,7 +27,7 @@ from gms_fsm import (
     System,
     export,
 )
-from gms_fsm.exporters import EXPORTERS, Exporter, Subject, register
+from gms_fsm.exporters import FORMATS, Format, Subject, formats, register
 from tests.scenario_files import CommandLine, one_message
 
 CHART = """\
@@ -42,7 +42,8 @@ F = "k * z"
 name = "on"
 flow.z = "v"
 """
-FORMATS = [*EXPORTERS, "states"]
+PROGRAMS = [name for name, each in formats().items() if each.subject == "friction"]
+KINDS = [*PROGRAMS, "states"]
 GMS_MODEL = GMS(GMSParameters.paper("stick-slip"), law="signed")
 LINUX = pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no /proc")
 
@@ -64,9 +65,12 @@ def _no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True)
 def _one_more_format() -> Iterator[None]:
-    register(Exporter("states", "a list of states", states, words=["double", "while"]))
+    takes = ("initial", "t_start")
+    own = Format("states", "friction", "a list of states", "a test", states, takes=takes,
+                 words=["double", "while"])  # fmt: skip
+    register(own)
     yield
-    del EXPORTERS["states"]
+    FORMATS.remove(own)
 
 
 def there(folder: Path) -> dict[str, bytes | None]:
@@ -108,7 +112,7 @@ def driven() -> System:
 def words_for_charts(form: str) -> list[str]:
     """Return words of a format's language that are parameters of charts, at most three."""
     found = []
-    for word in sorted(EXPORTERS[form].words, key=lambda each: (len(each) < 4, each)):
+    for word in sorted(formats()[form].words, key=lambda each: (len(each) < 4, each)):
         try:
             friction(parameter=word)
         except GMSError:
@@ -117,7 +121,7 @@ def words_for_charts(form: str) -> list[str]:
     return found[:3]
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 def test_without_a_mistake_the_readme_is_among_the_files(form: str, tmp_path: Path) -> None:
     files = export(GMS_MODEL, form, tmp_path / "out", name="it")
     assert tmp_path / "out" / f"README-it-{form}.md" in files
@@ -127,7 +131,7 @@ def test_without_a_mistake_the_readme_is_among_the_files(form: str, tmp_path: Pa
     assert form in ("fmu2", "fmu3") or {path: path.read_bytes() for path in files} == again
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 def test_a_file_in_place_of_the_folder(form: str, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine")
     said = refused(tmp_path, GMS_MODEL, form, tmp_path / "out", kind=OutputError)
@@ -144,14 +148,14 @@ def test_a_text_that_names_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @LINUX
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 def test_a_folder_that_cannot_be_written(form: str, tmp_path: Path) -> None:
     said = refused(tmp_path, GMS_MODEL, form, "/proc/friction", kind=OutputError)
     assert "/proc/friction" in said
     refused(tmp_path, GMS_MODEL, form, "/proc/self/fdinfo", kind=OutputError)
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 def test_a_file_that_is_not_ours(form: str, tmp_path: Path) -> None:
     files = export(GMS_MODEL, form, tmp_path / "first", name="it")
     for number, path in enumerate(files):
@@ -163,7 +167,7 @@ def test_a_file_that_is_not_ours(form: str, tmp_path: Path) -> None:
         assert "was not written by gms-fsm" in said
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 def test_a_folder_in_place_of_a_file(form: str, tmp_path: Path) -> None:
     (tmp_path / f"README-it-{form}.md").mkdir()
     assert "a folder is there" in refused(
@@ -175,23 +179,23 @@ def test_a_folder_in_place_of_a_file(form: str, tmp_path: Path) -> None:
 def test_an_unknown_format(form: Any, tmp_path: Path) -> None:
     said = refused(tmp_path, GMS_MODEL, form, tmp_path / "out")
     assert "there is no such format" in said
-    assert all(each in said for each in EXPORTERS)
+    assert all(each in said for each in formats())
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 def test_a_word_of_the_language_as_name(form: str, tmp_path: Path) -> None:
-    for word in sorted(EXPORTERS[form].words)[:3]:
+    for word in sorted(formats()[form].words)[:3]:
         said = refused(tmp_path, GMS_MODEL, form, tmp_path / "out", name=word)
         assert repr(word) in said
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 @pytest.mark.parametrize("name", ["../x", "/x", "a/b", "a b", "1x", "x.y", "é", "x" * 64])
 def test_a_name_that_is_no_identifier(form: str, name: str, tmp_path: Path) -> None:
     assert repr(name) in refused(tmp_path, GMS_MODEL, form, tmp_path / "out", name=name)
 
 
-@pytest.mark.parametrize("form", [form for form in FORMATS if form != "states"])
+@pytest.mark.parametrize("form", PROGRAMS)
 def test_a_word_of_the_language_as_chart_or_parameter(form: str, tmp_path: Path) -> None:
     words = words_for_charts(form)
     for word in words:
@@ -204,7 +208,7 @@ def test_a_word_of_the_language_as_chart_or_parameter(form: str, tmp_path: Path)
     assert words or not re.search(r"c99|fmu|matlab|modelica|st$", form)
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 @pytest.mark.parametrize("name", ["../x", "..", "/etc/x", "x\\y", "...", "+", "3"])
 def test_a_chart_named_like_a_path(form: str, name: str, tmp_path: Path) -> None:
     said = refused(tmp_path, friction(name), form, tmp_path / "out")
@@ -212,13 +216,13 @@ def test_a_chart_named_like_a_path(form: str, name: str, tmp_path: Path) -> None
     assert "give another name" in said
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 def test_a_python_function_as_signal(form: str, tmp_path: Path) -> None:
     said = refused(tmp_path, driven(), form, tmp_path / "out")
     assert re.search(r"'f'|'driven'", said), said
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 def test_a_chart_without_numbers(form: str, tmp_path: Path) -> None:
     chart = friction().chart
     if form in ("scxml", "transitions"):  # formats of charts
@@ -238,7 +242,7 @@ WRONG: Mapping[str, tuple[Any, ...]] = {
 }
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", KINDS)
 @pytest.mark.parametrize("wrong", WRONG)
 def test_wrong_types(form: str, wrong: str, tmp_path: Path) -> None:
     for value in WRONG[wrong]:

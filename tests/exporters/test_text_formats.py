@@ -12,7 +12,7 @@ import pytest
 from gms_fsm import Chart, ChartModel, FrictionState, State, Transition, export
 from gms_fsm.charts.registry import entry
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters import EXPORTERS, Subject
+from gms_fsm.exporters import Subject, formats
 from gms_fsm.systems.models import demonstration
 from tests.exporters.text_cases import NAMES, case
 
@@ -34,7 +34,7 @@ def one_state(flow: str = "v", name: str = "k", **more: Any) -> ChartModel:
 def test_blark_parses_structured_text() -> None:
     blark = pytest.importorskip("blark")
     subject = Subject.of(case("gms-4-signed", 0).model, "st", name="friction")
-    blark.parse_source_code(EXPORTERS["st"].write(subject)["friction.st"])
+    blark.parse_source_code(formats()["st"].write(subject)["friction.st"])
 
 
 def test_octave_takes_a_switch(tmp_path: Path) -> None:
