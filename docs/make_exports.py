@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from gms_fsm._files import write_whole
-from gms_fsm.exporters import EXPORTERS
+from gms_fsm.exporters import formats
 
 HERE = Path(__file__).parent
 PAGE = HERE / "howto" / "exports.md"
@@ -27,16 +27,21 @@ def rows() -> list[list[str]]:
     return found
 
 
-def unrun(formats: Iterable[str], known: Sequence[Sequence[str]]) -> list[str]:
+def programs() -> list[str]:
+    """Return the formats in which friction is a program."""
+    return [name for name, each in formats().items() if each.subject == "friction"]
+
+
+def unrun(names: Iterable[str], known: Sequence[Sequence[str]]) -> list[str]:
     """Return the formats that no tool has run."""
     done = {form for form, *_ in known}
-    return [each for each in formats if each not in done]
+    return [each for each in names if each not in done]
 
 
-def table(formats: Iterable[str], known: Sequence[Sequence[str]]) -> str:
+def table(programs: Iterable[str], known: Sequence[Sequence[str]]) -> str:
     """Return the table as Markdown, and below it the formats without a row."""
     lines = [f"| {' | '.join(HEADS)} |", "|---|---|---|---|"]
-    names = {each: f"`{each}`" for each in formats}  # the others are pictures
+    names = {each: f"`{each}`" for each in programs}  # the others are pictures
     for row in known:
         form, *cells = (each.replace("|", BAR) for each in row)
         lines.append(f"| {names.get(form, form)} | {' | '.join(cells)} |")
@@ -57,7 +62,7 @@ def filled(page: str, made: str) -> str:
 
 def main() -> None:
     """Write the table into the page."""
-    text = filled(PAGE.read_text(encoding="utf-8"), table(EXPORTERS, rows()))
+    text = filled(PAGE.read_text(encoding="utf-8"), table(programs(), rows()))
     write_whole(PAGE, lambda file: file.write(text.encode()))
 
 

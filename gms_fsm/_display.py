@@ -95,9 +95,10 @@ def asked(name: str) -> Callable[..., Any] | None:
 
     Parameters
     ----------
-    name : {"notebook", "figure", "report"}
+    name : {"notebook", "figure", "formats", "report"}
         ``notebook(thing, form)`` returns a form of an object, ``figure(figure)`` a matplotlib
-        figure as PNG, ``report(fit, folder)`` writes a report.
+        figure as PNG, ``formats(*subjects)`` the formats of the one table, those of pictures
+        included; ``report(fit, folder)`` writes a report.
 
     Returns
     -------

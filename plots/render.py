@@ -63,9 +63,10 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
             advice="give first the graph, for example from statechart, then the path",
         )
     path = checked_path("path", path)
-    chart: tuple[formats.Subject, ...] = ("chart",) if isinstance(graph, ChartGraph) else ()
+    chart: tuple[formats.Written, ...] = ("chart",) if isinstance(graph, ChartGraph) else ()
+    form = formats.chosen(path, "graph", *chart)
     try:
-        content = formats.chosen(path, "graph", *chart).write(graph)
+        content = form.write(graph.chart if form.subject == "chart" else graph)
     except MissingExtraError as error:
         path = path.with_suffix(formats.INSTEAD)
         content = formats.chosen(path, "graph").write(graph)

@@ -47,19 +47,21 @@ def export_command(
     A chart, or one contact of a system (--contact), is friction whose velocity
     is an input. The inputs of a whole system are its records.
     """
-    from gms_fsm.exporters import EXPORTERS, export
+    from gms_fsm.exporters import export, formats
+
+    known = formats()
 
     if listed:
-        wide = max(map(len, EXPORTERS), default=0)
-        typer.echo("\n".join(f"{each.name:<{wide}}  {each.title}" for each in EXPORTERS.values()))
+        wide = max(map(len, known))
+        typer.echo("\n".join(f"{each.name:<{wide}}  {each.kind}" for each in known.values()))
         return
     if not to:
         raise ParameterError(
-            "no format is given", place="--to", advice=f"give one of {', '.join(EXPORTERS)}"
+            "no format is given", place="--to", advice=f"give one of {', '.join(known)}"
         )
     given, default, more = _given(name, law, contact)
-    if to in EXPORTERS:
-        more = {each: value for each, value in more.items() if each in EXPORTERS[to].takes}
+    if to in known:
+        more = {each: value for each, value in more.items() if each in known[to].takes}
     chosen = called or default
     folder = Path(f"{chosen or 'friction'}-{to}") if output is None else output
     for path in export(given, to, folder, name=chosen, **more):

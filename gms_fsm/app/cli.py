@@ -73,7 +73,7 @@ class _Drawing(TyperCommand):
         from plots import formats
 
         params = super().get_params(ctx)
-        listed: dict[str, str] = {each: formats.listed(each) for each in get_args(formats.Subject)}
+        listed: dict[str, str] = {each: formats.listed(each) for each in get_args(formats.Written)}
         listed["chart"] = formats.listed("graph", "chart")
         for param in params:
             if isinstance(param, TyperOption) and param.help:

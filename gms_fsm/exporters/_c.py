@@ -24,7 +24,6 @@ from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import MOST_SWITCHES, arguments_of
 from gms_fsm.run.start import LATEST, Start
-from gms_fsm.systems.system import System
 from integrators.compiled import INLINE, is_known
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Block, Layout
@@ -37,8 +36,8 @@ __all__ = [
     "TAKES",
     "TEMPLATES",
     "WORDS",
-    "Engine",
-    "Stepped",
+    "CEngine",
+    "StepArguments",
     "check_entries",
     "engine_of",
     "filled",
@@ -54,7 +53,7 @@ BAD_ARGUMENT = -1
 STEPPED = "functions machines buffers sample"  # the arguments of a step, in the block
 
 
-class Stepped(NamedTuple):
+class StepArguments(NamedTuple):
     """The arguments of both entries."""
 
     functions: Any
@@ -65,7 +64,7 @@ class Stepped(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Engine:
+class CEngine:
     """C99 text, and what it defines.
 
     Parameters
@@ -99,7 +98,7 @@ class Engine:
         return "".join(f"double {each}0, double {each}1, " for each in self.inputs)
 
 
-def engine_of(subject: Subject) -> Engine:
+def engine_of(subject: Subject) -> CEngine:
     """Return the engine of what is exported.
 
     Parameters
@@ -109,7 +108,7 @@ def engine_of(subject: Subject) -> Engine:
 
     Returns
     -------
-    Engine
+    CEngine
         Its text.
 
     Raises
@@ -117,7 +116,7 @@ def engine_of(subject: Subject) -> Engine:
     ParameterError
         If a name cannot be one in C, or a default state is entered with what is not known yet.
     """
-    start, alone = subject.start, not isinstance(subject.given, System)
+    start, alone = subject.start, subject.alone
     check_entries(start)
     for each in subject.inputs:
         identifier(each, WORDS, f"input {each!r}")
@@ -133,7 +132,7 @@ def engine_of(subject: Subject) -> Engine:
     for each in (*states, *edges):
         identifier(each, (), f"state or edge {each!r}")
     outputs, parameters = outputs_of(start, alone, WORDS), parameters_of(start, alone, WORDS)
-    made = Engine(subject.name, "", "", subject.inputs, outputs, parameters, states, edges)
+    made = CEngine(subject.name, "", "", subject.inputs, outputs, parameters, states, edges)
     text = _Text(made, start, subject.title)
     return replace(made, header=text.header(), source=text.source())
 
@@ -174,10 +173,10 @@ def check_entries(start: Start) -> None:
 class _Text:
     """Writes header and source."""
 
-    def __init__(self, made: Engine, start: Start, title: str) -> None:
+    def __init__(self, made: CEngine, start: Start, title: str) -> None:
         self.made, self.start, self.title, self.name = made, start, title, made.name
         step: tuple[Any, Any, Any, Any] = arguments_of(start)
-        self.arguments = Stepped(*step, adapting_of(start))
+        self.arguments = StepArguments(*step, adapting_of(start))
         self.layout = Layout(self.arguments, is_known)
 
     def header(self) -> str:

@@ -20,7 +20,7 @@ from gms_fsm.exporters._element_parts import (
     Expression,
     Leaving,
     Let,
-    State,
+    StateParts,
     Variable,
 )
 from gms_fsm.exporters._names import identifier
@@ -29,6 +29,7 @@ from gms_fsm.language import (
     Call,
     Comparison,
     Name,
+    Node,
     Value,
     names_in,
     renamed,
@@ -37,9 +38,9 @@ from gms_fsm.language._normal import renamed_in
 from gms_fsm.lowering._plan import Computed, Plan, RoughCall, both_sides, plan_of
 from gms_fsm.systems._assembly import CURVE_LOAD, Assembly, Bank, Edge, assembled, of
 
-__all__ = ["Element"]
+__all__ = ["NamedFriction"]
 
-SUM = "F"  # what the sum over elements is called in `Element.total`
+SUM = "F"  # what the sum over elements is called in `NamedFriction.total`
 MODEL = {  # what a model adds to its chart: name here, and its description
     "curve S": ("stribeck", Parameter("s", "N", meaning="Stribeck curve")),
     CURVE_LOAD: ("load", Parameter("N", "N", meaning="what multiplies the curve")),
@@ -50,7 +51,7 @@ MODEL = {  # what a model adds to its chart: name here, and its description
 
 
 @dataclass(frozen=True, eq=False)
-class Element:
+class NamedFriction:
     """A friction of n elements.
 
     Parameters
@@ -71,7 +72,7 @@ class Element:
         m: its initial value.
     lets : tuple of Let
         Each after those it needs.
-    states : tuple of State
+    states : tuple of StateParts
         Of an element.
     edges : tuple of str
         Names of all edges, by number.
@@ -97,7 +98,7 @@ class Element:
     position: str
     position_start: float
     lets: tuple[Let, ...]
-    states: tuple[State, ...]
+    states: tuple[StateParts, ...]
     edges: tuple[str, ...]
     start: tuple[int, ...]
     total: Expression
@@ -109,7 +110,7 @@ class Element:
     @classmethod
     def of(
         cls, subject: Subject, words: Iterable[str], *, time: bool = True, cases: bool = True
-    ) -> Element:
+    ) -> NamedFriction:
         """Describe a friction.
 
         Parameters
@@ -125,7 +126,7 @@ class Element:
 
         Returns
         -------
-        Element
+        NamedFriction
             Complete.
 
         Raises
@@ -137,7 +138,7 @@ class Element:
         --------
         >>> from gms_fsm import GMS, GMSParameters
         >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-        >>> made = Element.of(Subject.of(model, "c99"), ())
+        >>> made = NamedFriction.of(Subject.of(model, "c99"), ())
         >>> [each.name for each in made.lets], [each.name for each in made.states]
         (['stribeck', 's'], ['stick', 'slip'])
         """
@@ -146,7 +147,9 @@ class Element:
         (bank,) = read.banks
         _refuse_feedback(bank, f"chart {contact.chart.name!r}")
         every = frozenset(words)
-        return _Reader(subject, read, bank, _names(read, bank, every, cases), time, every).element()
+        return PlanReader(
+            subject, read, bank, _names(read, bank, every, cases), time, every
+        ).element()
 
     # ------------------------------------------------------------------ what is read
     def needed(self, names: Iterable[str], *, per_element: bool) -> tuple[Let, ...]:
@@ -203,6 +206,17 @@ class Element:
         found += [each.name for each in self.lets]
         return found + [each.name for each in self.variables]
 
+    @property
+    def trees(self) -> Iterator[Node]:
+        """All that is computed."""
+        yield self.total.tree
+        yield from (each.value.tree for each in self.lets)
+        for state in self.states:
+            yield from (each.tree for each in (*state.rates.values(), state.force))
+            for edge in state.edges:
+                yield edge.guard
+                yield from (tree for _, tree in edge.steps)
+
     def check_name(self, name: str, *, cases: bool = True) -> None:
         """Refuse a name of what is defined, if the friction has a quantity of that name.
 
@@ -241,7 +255,7 @@ class Element:
         """
         return next(each for each in _numbered(name) if each.lower() not in self.taken)
 
-    def reserved(self, *names: str) -> Element:
+    def reserved(self, *names: str) -> NamedFriction:
         """Return the same friction with further names in use, to which those of `free` give way.
 
         Parameters
@@ -251,7 +265,7 @@ class Element:
 
         Returns
         -------
-        Element
+        NamedFriction
             A copy.
         """
         return replace(self, taken=self.taken | {name.lower() for name in names})
@@ -349,7 +363,7 @@ def _names(read: Assembly, bank: Bank, words: Iterable[str], cases: bool) -> Map
     return {"t": "t", bank.position: "x", bank.threshold: "s"} | names
 
 
-class _Reader:
+class PlanReader:
     """Translates the plan of a contact into short names."""
 
     def __init__(
@@ -426,7 +440,7 @@ class _Reader:
         )
 
     # ------------------------------------------------------------------ parts
-    def states(self) -> tuple[State, ...]:
+    def states(self) -> tuple[StateParts, ...]:
         (plan,), bank = self.plan.banks, self.bank
         edges = [self.edge(number, edge) for number, edge in enumerate(bank.edges)]
         found = []
@@ -436,7 +450,7 @@ class _Reader:
             common = plan.common.get(self.force)
             computed = each.forces[self.force] if common is None else Computed(common)
             found.append(
-                State(
+                StateParts(
                     each.state,
                     {
                         self.names[name]: self.expression(bank.flows[each.state, name], rate)
@@ -474,7 +488,7 @@ class _Reader:
                 )
                 yield Constant(self.names[name], value, about)
 
-    def element(self) -> Element:
+    def element(self) -> NamedFriction:
         start, bank, layout = self.subject.start, self.bank, self.subject.start.program.layout
         states, lets = self.states(), tuple(self.lets())
         totals = self.plan.banks[0].totals
@@ -489,7 +503,7 @@ class _Reader:
         if self.time and "t" in used:
             inputs.append(("t", "s: time"))
         held, corners = self.plan.held, [self.tree(r.left) for r in self.outer()]
-        return Element(
+        return NamedFriction(
             title=self.subject.title,
             n=bank.n,
             inputs=tuple(inputs),

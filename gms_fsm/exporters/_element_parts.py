@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from gms_fsm.language import Comparison, Condition, Value, comparisons, names_in, split
 from gms_fsm.lowering._plan import RoughCall
 
-__all__ = ["Constant", "Expression", "Leaving", "Let", "State", "Variable"]
+__all__ = ["Constant", "Expression", "Leaving", "Let", "StateParts", "Variable"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,11 @@ class Constant:
     name: str
     value: float | tuple[float, ...]
     about: str = ""
+
+    @property
+    def several(self) -> bool:
+        """Whether each element has its own."""
+        return isinstance(self.value, tuple)
 
 
 @dataclass(frozen=True)
@@ -130,7 +135,7 @@ class Leaving:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class StateParts:
     """A state of an element.
 
     Parameters

@@ -1,6 +1,6 @@
 """FMUs: the archive, its binary, its documentation; what both versions of FMI have in common.
 
-One FMU offers Model Exchange and Co-Simulation. The XML text is made in `fmu2` and `fmu3`.
+One FMU offers Model Exchange and Co-Simulation. The XML text is made in `fmu`.
 """
 
 from __future__ import annotations
@@ -22,12 +22,11 @@ from xml.sax.saxutils import quoteattr
 
 from gms_fsm._version import __version__
 from gms_fsm.exporters._c import WORDS, check_entries, filled
-from gms_fsm.exporters._fmu_model import Model
+from gms_fsm.exporters._fmu_model import FmuModel
 from gms_fsm.exporters._fmu_units import base_units
-from gms_fsm.exporters._fmu_variables import Variable, types_of, variables_of
+from gms_fsm.exporters._fmu_variables import FmuVariable, types_of, variables_of
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.systems.system import System
 
 __all__ = ["Described", "fmu", "tag", "units_of"]
 
@@ -91,7 +90,7 @@ class Described:
         Model identifier, and the title for people.
     token : str
         GUID or instantiation token.
-    variables : tuple of Variable
+    variables : tuple of FmuVariable
         By value reference.
     types : mapping of str to tuple of str
         Enumerations: the names of the states.
@@ -110,7 +109,7 @@ class Described:
     name: str
     title: str
     token: str
-    variables: tuple[Variable, ...]
+    variables: tuple[FmuVariable, ...]
     types: Mapping[str, tuple[str, ...]]
     exchange: bool
     t_start: float
@@ -136,7 +135,7 @@ class Described:
 
 
 def fmu(
-    subject: Subject, version: int, describe: Callable[[Described], Mapping[str, str]]
+    subject: Subject, version: int, describe: Callable[[Described, int], Mapping[str, str]]
 ) -> dict[str, str | bytes]:
     """Return an FMU and its README.
 
@@ -147,7 +146,8 @@ def fmu(
     version : {2, 3}
         Of FMI.
     describe : callable
-        Returns the XML files that the standard wants, by their paths in the archive.
+        Takes what is described and the version; returns the XML files that the standard wants, by
+        their paths in the archive.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def fmu(
         identifier(each, WORDS, f"input {each!r}")
     exchange = "piecewise_slope(" not in start.program.source
     variables = variables_of(subject, exchange=exchange)
-    model = Model(subject, variables, exchange=exchange)
+    model = FmuModel(subject, variables, exchange=exchange)
     digest = hashlib.sha256(repr((version, model.engine(), variables)).encode()).hexdigest()
     token = f"{{{uuid.UUID(digest[:32])}}}"
     sources = model.sources(version, token)
@@ -183,7 +183,7 @@ def fmu(
     )
     binary, why = _binary(subject.name, version, sources)
     readme = _readme(subject, described, version, why)
-    files: dict[str, str | bytes] = {**describe(described)}
+    files: dict[str, str | bytes] = {**describe(described, version)}
     files |= {f"sources/{name}": text for name, text in sources.items()}
     files |= binary
     files["documentation/index.html"] = _page(subject.title, readme)
@@ -286,12 +286,12 @@ def tag(name: str, /, *inside: str, **attributes: object) -> str:
     return "\n".join([f"<{head}>", *lines, f"</{name}>"])
 
 
-def units_of(variables: Iterable[Variable]) -> dict[str, dict[str, int]]:
+def units_of(variables: Iterable[FmuVariable]) -> dict[str, dict[str, int]]:
     """Return the units that can be read, with their exponents.
 
     Parameters
     ----------
-    variables : iterable of Variable
+    variables : iterable of FmuVariable
         Of an FMU.
 
     Returns
@@ -306,7 +306,6 @@ def units_of(variables: Iterable[Variable]) -> dict[str, dict[str, int]]:
 # --------------------------------------------------------------------------- documentation
 def _readme(subject: Subject, described: Described, version: int, why: str) -> str:
     variables, (folder, ending) = described.variables, _platform(version)
-    alone = not isinstance(subject.given, System)
     charts = dict.fromkeys(contact.chart.name for contact in subject.start.system.contacts)
     inputs, outputs = (
         "\n".join(_line(each) for each in variables if each.causality == causality)
@@ -319,7 +318,7 @@ def _readme(subject: Subject, described: Described, version: int, why: str) -> s
         writer=__version__,
         name=described.name,
         file=_file(described.name, version),
-        what="friction whose velocity is an input" if alone else "a whole system",
+        what="friction whose velocity is an input" if subject.alone else "a whole system",
         kinds="Model Exchange and Co-Simulation" if described.exchange else "Co-Simulation",
         charts=", ".join(charts),
         binary=f"There is no binary in it: {why}. Compile the sources."
@@ -353,7 +352,7 @@ def _held(subject: Subject, described: Described, version: int) -> str:
     return filled("fmu_inputs.md", held=HELD[version], only_held=ONLY_HELD[version], loop=loop)
 
 
-def _line(each: Variable) -> str:
+def _line(each: FmuVariable) -> str:
     unit = f" [{each.unit}]" if each.unit else ""
     return f"- `{each.name}`{unit} {each.meaning}".rstrip()
 

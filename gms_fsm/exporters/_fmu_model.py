@@ -13,12 +13,11 @@ from typing import Any, NamedTuple
 from gms_fsm._version import __version__
 from gms_fsm.exporters._adapting import ADAPTED, adapting_of
 from gms_fsm.exporters._c import PLACES, STEPPED, TEMPLATES, filled, image_of, safe
-from gms_fsm.exporters._fmu_variables import Variable, indicators_of, nominals_of, types_of
+from gms_fsm.exporters._fmu_variables import FmuVariable, indicators_of, nominals_of, types_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import arguments_of
-from gms_fsm.systems.system import System
 from integrators import exchange, stepping
 from integrators.compiled import INLINE, is_known
 from integrators.exchange import Exchange
@@ -26,7 +25,7 @@ from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Layout
 from integrators.machine_code.translate import Translator
 
-__all__ = ["Both", "Model", "both_of"]
+__all__ = ["FmuArguments", "FmuModel", "both_of"]
 
 ENTRIES: Mapping[str, tuple[Any, str]] = {
     "step": (stepping.step_to, STEPPED),
@@ -42,7 +41,7 @@ ENTRIES: Mapping[str, tuple[Any, str]] = {
 OWN = ("IN_BLOCK", "INPUT", "SEEN", "INDICATOR", "STATE", "TIME", "place", "variable", "word")
 
 
-class Both(NamedTuple):
+class FmuArguments(NamedTuple):
     """The arguments of all entries."""
 
     functions: Any
@@ -53,20 +52,22 @@ class Both(NamedTuple):
     adapting: Adapting
 
 
-class Model:
+class FmuModel:
     """The engine of an FMU.
 
     Parameters
     ----------
     subject : Subject
         A friction or a system.
-    variables : sequence of Variable
+    variables : sequence of FmuVariable
         Of the FMU.
     exchange : bool
         Whether there is Model Exchange.
     """
 
-    def __init__(self, subject: Subject, variables: Sequence[Variable], *, exchange: bool) -> None:
+    def __init__(
+        self, subject: Subject, variables: Sequence[FmuVariable], *, exchange: bool
+    ) -> None:
         self.subject, self.variables, self.exchange = subject, variables, exchange
         self.arguments = both_of(subject)
         self.layout = Layout(self.arguments, is_known)
@@ -95,10 +96,10 @@ class Model:
             By file name; those to be compiled end in ``.c``.
         """
         return {
-            f"fmi{version}.c": (TEMPLATES / f"fmi{version}.c").read_text(encoding="utf-8"),
+            f"fmi{version}.c": (TEMPLATES / "fmi.c").read_text(encoding="utf-8"),
             f"{self.subject.name}_engine.c": self.engine(),
             "fmu_core.h": (TEMPLATES / "fmu_core.h").read_text(encoding="utf-8"),
-            "model.h": self.header(token),
+            "model.h": self.header(version, token),
         }
 
     # ------------------------------------------------------------------ engine
@@ -122,7 +123,7 @@ class Model:
         )
 
     # ------------------------------------------------------------------ model.h
-    def header(self, token: str) -> str:
+    def header(self, version: int, token: str) -> str:
         """Return what the fixed sources must know: names, places in the block, variables."""
         constants = self._constants()
         counts = {kind: len(names) for kind, names in types_of(self.subject.start).items()}
@@ -142,6 +143,7 @@ class Model:
             name=self.subject.name,
             title=safe(self.subject.title),
             token=token,
+            version=version,
             constants="\n".join(f"#define {key} {value}" for key, value in constants.items()),
             variables="\n".join(rows),
             places=", ".join(map(str, places)) or "0",
@@ -179,7 +181,7 @@ class Model:
         }
 
 
-def both_of(subject: Subject) -> Both:
+def both_of(subject: Subject) -> FmuArguments:
     """Return the arguments of all entries, made of lists.
 
     Parameters
@@ -189,10 +191,10 @@ def both_of(subject: Subject) -> Both:
 
     Returns
     -------
-    Both
+    FmuArguments
         At the start, for Co-Simulation.
     """
-    start, alone = subject.start, not isinstance(subject.given, System)
+    start, alone = subject.start, subject.alone
     functions, machines, buffers, sample = arguments_of(start)
     size, relations = len(buffers.now.y), len(buffers.relations.watch)
     indicators = indicators_of(start, alone)
@@ -209,4 +211,4 @@ def both_of(subject: Subject) -> Both:
         before=[0.0] * size,
         signs=[0.0] * len(buffers.now.held),
     )
-    return Both(functions, machines, buffers, sample, made, adapting_of(start))
+    return FmuArguments(functions, machines, buffers, sample, made, adapting_of(start))

@@ -15,10 +15,9 @@ from gms_fsm.lowering._plan import plan_of
 from gms_fsm.lowering.adapting import SHARE
 from gms_fsm.lowering.scales import scales_of_system
 from gms_fsm.run.start import Start
-from gms_fsm.systems.system import System
 from integrators.sliding import MOST_SLIDING
 
-__all__ = ["Indicator", "Variable", "indicators_of", "nominals_of", "types_of", "variables_of"]
+__all__ = ["FmuVariable", "Indicator", "indicators_of", "nominals_of", "types_of", "variables_of"]
 
 # How far behind its crossing an indicator is zero, as a part of the scale of what is compared: far
 # above the rounding errors at the root, far below the tolerances (which are 1e-7 of it).
@@ -26,7 +25,7 @@ BEHIND = 1e-11
 
 
 @dataclass(frozen=True)
-class Variable:
+class FmuVariable:
     """A variable of an FMU; its place in the list is its value reference.
 
     Parameters
@@ -95,7 +94,7 @@ class Indicator:
     shift: float
 
 
-def variables_of(subject: Subject, *, exchange: bool) -> tuple[Variable, ...]:
+def variables_of(subject: Subject, *, exchange: bool) -> tuple[FmuVariable, ...]:
     """Return the variables of what is exported.
 
     Parameters
@@ -107,11 +106,11 @@ def variables_of(subject: Subject, *, exchange: bool) -> tuple[Variable, ...]:
 
     Returns
     -------
-    tuple of Variable
+    tuple of FmuVariable
         With names that are all different.
     """
-    start, alone = subject.start, not isinstance(subject.given, System)
-    found = [Variable("time", "TIME", causality="independent", initial="", unit="s")]
+    start, alone = subject.start, subject.alone
+    found = [FmuVariable("time", "TIME", causality="independent", initial="", unit="s")]
     found += _inputs(subject)
     states = [each for each in _shown(subject, alone) if each.name not in subject.inputs]
     found += states
@@ -119,9 +118,9 @@ def variables_of(subject: Subject, *, exchange: bool) -> tuple[Variable, ...]:
     for k, each in enumerate(states, first):
         if each.continuous_state:
             rate = {"m": "m/s", "m/s": "m/s2", "": ""}.get(each.unit, f"{each.unit}/s")
-            found.append(Variable(f"der({each.name})", "SLOPES", each.index, unit=rate, of=k))
+            found.append(FmuVariable(f"der({each.name})", "SLOPES", each.index, unit=rate, of=k))
     found.append(
-        Variable(
+        FmuVariable(
             "switches",
             "COUNT",
             causality="output",
@@ -133,7 +132,7 @@ def variables_of(subject: Subject, *, exchange: bool) -> tuple[Variable, ...]:
         found += _parameter(quantity, alone)
     if exchange:
         found += [
-            Variable(each.name, "INDICATOR", k, meaning=each.meaning)
+            FmuVariable(each.name, "INDICATOR", k, meaning=each.meaning)
             for k, each in enumerate(indicators_of(start, alone))
         ]
     return tuple(_different(found))
@@ -147,13 +146,12 @@ def types_of(start: Start) -> dict[str, tuple[str, ...]]:
     }
 
 
-def _inputs(subject: Subject) -> Iterator[Variable]:
+def _inputs(subject: Subject) -> Iterator[FmuVariable]:
     tables = subject.start.program.p[2]
-    alone = not isinstance(subject.given, System)
     for k, name in enumerate(subject.inputs):
-        velocity = alone and name == "v"
+        velocity = subject.alone and name == "v"
         first, *_ = tables[2 * k + 1]
-        yield Variable(
+        yield FmuVariable(
             name,
             "INPUT",
             k,
@@ -165,7 +163,7 @@ def _inputs(subject: Subject) -> Iterator[Variable]:
         )
 
 
-def _shown(subject: Subject, alone: bool) -> Iterator[Variable]:
+def _shown(subject: Subject, alone: bool) -> Iterator[FmuVariable]:
     """Yield the state vector, what is observed and the states of the elements."""
     start = subject.start
     layout, system = start.program.layout, start.system
@@ -177,7 +175,7 @@ def _shown(subject: Subject, alone: bool) -> Iterator[Variable]:
         causality = "output" if wanted else "local"
         for name, k in _elements(each, alone):
             start_value = each.values[k] if each.values else None
-            made = Variable(
+            made = FmuVariable(
                 name, "SEEN", each.index + k, causality=causality, unit=each.unit,
                 meaning=each.meaning,
             )  # fmt: skip
@@ -185,7 +183,7 @@ def _shown(subject: Subject, alone: bool) -> Iterator[Variable]:
                 yield made
             elif each.place == "y":
                 discrete = each.label in held or each.label.endswith(" held")
-                yield Variable(
+                yield FmuVariable(
                     name, "IN_BLOCK", each.index + k, "y", causality,
                     "discrete" if discrete else "continuous", "exact", start_value, each.unit,
                     each.meaning,
@@ -193,15 +191,15 @@ def _shown(subject: Subject, alone: bool) -> Iterator[Variable]:
             else:
                 assert start_value is not None
                 bank = layout.bank(each.index)
-                yield Variable(
+                yield FmuVariable(
                     name, "STATE", each.index + k, "mode", "local", "discrete", "exact",
                     start_value + 1.0, meaning="active state", kind=f"{bank.name} states",
                 )  # fmt: skip
 
 
-def _parameter(each: Quantity, alone: bool) -> Iterator[Variable]:
+def _parameter(each: Quantity, alone: bool) -> Iterator[FmuVariable]:
     for name, k in _elements(each, alone):
-        yield Variable(
+        yield FmuVariable(
             name, "IN_BLOCK", each.index + k, each.place, "parameter", "fixed", "exact",
             each.values[k], each.unit, each.meaning,
         )  # fmt: skip
@@ -220,7 +218,7 @@ def _elements(each: Quantity, alone: bool) -> Iterator[tuple[str, int]]:
         yield from ((f"{name}[{k + 1}]", k) for k in range(each.length))
 
 
-def _different(found: list[Variable]) -> Iterator[Variable]:
+def _different(found: list[FmuVariable]) -> Iterator[FmuVariable]:
     """Yield the variables, with numbers where two would have the same name."""
     taken: set[str] = set()
     for each in found:
@@ -230,7 +228,7 @@ def _different(found: list[Variable]) -> Iterator[Variable]:
             number += 1
             name = f"{base}_{number}{bracket}{rest}"
         taken.add(name)
-        yield each if name == each.name else Variable(**{**vars(each), "name": name})
+        yield each if name == each.name else FmuVariable(**{**vars(each), "name": name})
 
 
 # --------------------------------------------------------------------------- event indicators

@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element import NamedFriction
 from gms_fsm.exporters._element_parts import Constant
-from gms_fsm.exporters._plain_form import (
-    ByState,
-    Declare,
-    Enter,
-    Guards,
-    Plain,
-    Set,
-    Statement,
-    plain_form,
-)
+from gms_fsm.exporters._plain_form import plain_form
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import C99, ELEMENTARY, FUNCTIONS, NAMESPACE, Name, Node, spell
+from gms_fsm.exporters._walker import Forms, Walker, indented
+from gms_fsm.language import C99, ELEMENTARY, FUNCTIONS, NAMESPACE
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
@@ -53,6 +45,20 @@ HELPERS = {
     "min": "(double a, double b)\n{\n    return b < a ? b : a;\n}",
     "max": "(double a, double b)\n{\n    return b > a ? b : a;\n}",
 }
+FORMS = Forms(
+    assign="{0} = {1};",
+    new="const double {0} = {1};",
+    load="double {0} = {1};",
+    declare="double {0};",
+    first="if ({0}) {{",
+    then="}} else if ({0}) {{",
+    other="}} else {{",
+    end="}",
+    loop="for (int {0} = 0; {0} < {1}; {0}++) {{",
+    end_loop="}",
+    comment="/* {0} */",
+    marks={"*/": "* /", "/*": "/ *", "\\": "/"},
+)
 
 
 def plain_c(subject: Subject) -> dict[str, str]:
@@ -81,7 +87,7 @@ def plain_c(subject: Subject) -> dict[str, str]:
     >>> "else if (z <= -s && v < -v_c)" in files["gms_plain.c"]
     True
     """
-    printer = _Printer(subject)
+    printer = PlainC(subject)
     return {f"{subject.name}_plain.h": printer.header(), f"{subject.name}_plain.c": printer.code()}
 
 
@@ -96,7 +102,7 @@ def plain_c_notes(subject: Subject) -> str:
     Returns
     -------
     str
-        Plain text.
+        PlainForm text.
     """
     name = subject.name
     return f"""\
@@ -121,27 +127,35 @@ first order in dt; a velocity that passes through a narrow guard between two ste
 """
 
 
-class _Printer:
+class PlainC:
     """Prints the plain form of a friction."""
 
     def __init__(self, subject: Subject) -> None:
         words = {*C_WORDS, *FUNCTIONS, "fabs"}
-        self.element = Element.of(subject, words)
-        self.form: Plain = plain_form(self.element)
+        self.element = NamedFriction.of(subject, words)
+        self.form = plain_form(self.element)
         self.name = f"{subject.name}_plain"
         self.refuse_own_names()
         own = {name: f"{self.name}_{name}({{all}})" for name in (*OWN, *HELPERS)}
-        self.dialect = replace(C99, functions={**own, **C99.functions})
         # The machine's own names give way to those of the chart.
-        self.me = self.element.free("friction")
+        element, self.me = self.element, self.element.free("friction")
         # One element needs no arrays and no loop.
-        self.i = self.element.free("i") if self.element.n > 1 else ""
+        self.i = element.free("i") if element.n > 1 else ""
         self.at = f"[{self.i}]" if self.i else ""
-        element = self.element
-        numbers = {c.name for c in element.constants if isinstance(c.value, tuple)}
-        self.texts = {name: f"{name}{self.at}" for name in numbers}
+        texts = {c.name: f"{c.name}{self.at}" for c in element.constants if c.several}
         if element.position:
-            self.texts[element.position] = f"{self.me}->{element.position}"
+            texts[element.position] = f"{self.me}->{element.position}"
+        self.walker = Walker(
+            FORMS,
+            replace(C99, functions={**own, **C99.functions}),
+            texts,
+            [each.name for each in element.states],
+            test=lambda k: f"{self.me}->state{self.at} == {self.state(k)}",
+            enter=lambda k: f"{self.me}->state{self.at} = {self.state(k)};",
+            count=element.n,
+            index=self.i,
+            memory={e.name: f"{self.me}->{e.name}{self.at}" for e in element.variables},
+        )
 
     def refuse_own_names(self) -> None:
         """Refuse a quantity that would hide what the text defines."""
@@ -163,14 +177,15 @@ class _Printer:
         several = len(element.states) > 1
         names = [self.state(index) for index in range(len(element.states))]
         size = f"[{element.n}]" if self.i else ""
-        fields = [f"    double {each.name}{size};{_note(each.about)}"
-                  for each in element.variables]  # fmt: skip
+        fields = [
+            f"    double {each.name}{size};{FORMS.note(each.about)}" for each in element.variables
+        ]
         if element.position:
             fields.append(f"    double {element.position};  /* m: position */")
         if several:
             fields.append(f"    enum {self.name}_state state{size};")
         lines = [
-            f"/* {_plain_text(element.title)}: the plain form, once a step. */",
+            f"/* {FORMS.clean(element.title)}: the plain form, once a step. */",
             f"#ifndef {guard}",
             f"#define {guard}",
             "",
@@ -209,10 +224,10 @@ class _Printer:
         start = self.start()
         text = "\n".join([*start, *body])
         lines = [
-            f"/* {_plain_text(self.element.title)}: the plain form, once a step. */",
+            f"/* {FORMS.clean(self.element.title)}: the plain form, once a step. */",
         ]
         if self.element.reference:
-            lines.append(f"/* {_plain_text(self.element.reference)} */")
+            lines.append(f"/* {FORMS.clean(self.element.reference)} */")
         used = [name for name in OWN if f"{self.name}_{name}(" in text]
         if used:
             lines.append(self.elementary(used))
@@ -233,43 +248,23 @@ class _Printer:
         return c99_text(translator.module, [self.name, *self.element.names], hidden=True)
 
     def start(self) -> list[str]:
-        element, lines = self.element, list[str]()
+        element, number, lines = self.element, C99.number, list[str]()
         for each in element.variables:
             for i, value in enumerate(each.start):
                 at = f"[{i}]" if self.i else ""
-                lines.append(f"    {self.me}->{each.name}{at} = {self.dialect.number(value)};")
+                lines.append(f"{self.me}->{each.name}{at} = {number(value)};")
         if element.position:
-            start = self.dialect.number(element.position_start)
-            lines.append(f"    {self.me}->{element.position} = {start};")
+            lines.append(f"{self.me}->{element.position} = {number(element.position_start)};")
         if len(element.states) > 1:
             for i, index in enumerate(element.start):
                 at = f"[{i}]" if self.i else ""
-                lines.append(f"    {self.me}->state{at} = {self.state(index)};")
-        lines = lines or [f"    {self.me}->unused = 0;"]
-        return [f"void {self.name}_start({self.name} *{self.me})", "{", *lines, "}"]
+                lines.append(f"{self.me}->state{at} = {self.state(index)};")
+        lines = lines or [f"{self.me}->unused = 0;"]
+        return [f"void {self.name}_start({self.name} *{self.me})", "{", *indented(lines), "}"]
 
     def step(self) -> list[str]:
         element, form = self.element, self.form
-        elements = [*self.statements(form.guards), *self.statements(form.flows)]
-        loads = [f"double {each.name} = {self.me}->{each.name}{self.at};"
-                 for each in element.variables]  # fmt: skip
-        stores = [
-            f"{self.me}->{each.name}{self.at} = {self.spell(each.tree)};" for each in form.updates
-        ]
-        inner = [*loads, *elements, f"{form.force} += {form.part};", *stores]
-        body = [*map(self.constant, element.constants)]
-        body += [f"double {form.force} = 0.0;", "", *self.statements(form.shared)]
-        if self.i:
-            body += [f"for (int {self.i} = 0; {self.i} < {element.n}; {self.i}++) {{"]
-            body += [*_indented(inner), "}"]
-        else:
-            body += inner
-        total = element.total.tree
-        body += [f"{form.force} = {self.spell(total)};"] if total != Name(form.force) else []
-        if element.position:
-            place = f"{self.me}->{element.position}"
-            velocity = element.inputs[0][0]
-            body.append(f"{place} = {place} + {form.dt} * {velocity};")
+        body = [*map(self.constant, element.constants), *self.walker.lines(form.step)]
         body.append(f"return {form.force};")
         text = "\n".join(body)
         unused = [
@@ -277,69 +272,13 @@ class _Printer:
             for name in (self.me, *(name for name, _ in element.inputs), form.dt)
             if not re.search(rf"(?<!\w){name}(?!\w)", text)
         ]
-        return [self.signature(), "{", *_indented([*unused, *body]), "}"]
+        return [self.signature(), "{", *indented([*unused, *body]), "}"]
 
     def constant(self, constant: Constant) -> str:
-        number, value = self.dialect.number, constant.value
+        number, value = C99.number, constant.value
         if isinstance(value, tuple):
             numbers = ", ".join(map(number, value))
             text = f"{constant.name}[{len(value)}] = {{{numbers}}}"
         else:
             text = f"{constant.name} = {number(value)}"
-        return f"static const double {text};{_note(constant.about)}"
-
-    # ------------------------------------------------------------------ statements
-    def spell(self, tree: Node) -> str:
-        return spell(tree, self.dialect, self.texts)
-
-    def statements(self, found: Sequence[Statement]) -> list[str]:
-        return [line for each in found for line in self.statement(each)]
-
-    def statement(self, statement: Statement) -> Iterator[str]:
-        match statement:
-            case Set(name, tree, note, new):
-                kind = "const double " if new else ""
-                yield f"{kind}{name} = {self.spell(tree)};{_note(note)}"
-            case Declare(names):
-                if names:
-                    yield f"double {', '.join(names)};"
-            case Enter(state):
-                yield f"{self.me}->state{self.at} = {self.state(state)};"
-            case Guards(edges):
-                word = "if"
-                for edge, taken in edges:
-                    yield f"{word} ({self.spell(edge.guard)}) {{  /* {edge.name} */"
-                    yield from _indented(self.statements(taken))
-                    word = "} else if"
-                yield "}"
-            case ByState(branches):
-                yield from self.by_state(branches)
-
-    def by_state(self, branches: Sequence[Sequence[Statement]]) -> Iterator[str]:
-        if len(branches) == 1:
-            yield from self.statements(branches[0])
-            return
-        yield f"switch ({self.me}->state{self.at}) {{"
-        for index, branch in enumerate(branches):
-            last = index == len(branches) - 1
-            scope = any(isinstance(each, Set) and each.new for each in branch)
-            yield f"case {self.state(index)}:{' {' if scope and not last else ''}"
-            if last:
-                yield f"default:{' {' if scope else ''}"
-            yield from _indented([*self.statements(branch), "break;"])
-            if scope:
-                yield "}"
-        yield "}"
-
-
-def _indented(lines: Iterable[str]) -> list[str]:
-    return [f"    {line}" if line else "" for line in lines]
-
-
-def _note(text: str) -> str:
-    return f"  /* {_plain_text(text)} */" if text else ""
-
-
-def _plain_text(text: str) -> str:
-    """Return a text that may stand in a comment."""
-    return re.sub(r"\s+", " ", text.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/"))
+        return f"static const double {text};{FORMS.note(constant.about)}"

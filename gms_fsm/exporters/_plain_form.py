@@ -7,18 +7,33 @@ printers of languages write down in this order.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TypeAlias
 
-from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element import NamedFriction
 from gms_fsm.exporters._element_parts import Leaving, Let
-from gms_fsm.language import Binary, Name, Node, Value
+from gms_fsm.language import Binary, Name, Number, Value
 
-__all__ = ["ByState", "Declare", "Enter", "Guards", "Plain", "Set", "Statement", "plain_form"]
+__all__ = [
+    "Assign",
+    "ByState",
+    "Declare",
+    "Enter",
+    "ForEach",
+    "Guards",
+    "Keep",
+    "PlainForm",
+    "Recall",
+    "Statement",
+    "TwoWays",
+    "Verbatim",
+    "declared",
+    "plain_form",
+]
 
 
 @dataclass(frozen=True)
-class Set:
+class Assign:
     """An assignment; `new` if it declares the name, which is then never changed."""
 
     name: str
@@ -29,9 +44,24 @@ class Set:
 
 @dataclass(frozen=True)
 class Declare:
-    """Names that the branches after it assign."""
+    """Names that statements after it assign."""
 
     names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Recall:
+    """A variable of an element is read from where it is kept between steps."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Keep:
+    """A variable is written to where it is kept."""
+
+    name: str
+    tree: Value
 
 
 @dataclass(frozen=True)
@@ -39,6 +69,13 @@ class Enter:
     """The element's next state; a friction of one state has none of these."""
 
     state: int
+
+
+@dataclass(frozen=True)
+class Verbatim:
+    """A statement in the words of a language."""
+
+    text: str
 
 
 @dataclass(frozen=True)
@@ -55,53 +92,61 @@ class ByState:
     branches: tuple[tuple[Statement, ...], ...]
 
 
-Statement: TypeAlias = "Set | Declare | Enter | Guards | ByState"
+@dataclass(frozen=True)
+class TwoWays:
+    """One of two lists of statements, by a test in the words of a language."""
+
+    test: str
+    body: tuple[Statement, ...]
+    other: tuple[Statement, ...]
+
+
+@dataclass(frozen=True)
+class ForEach:
+    """Statements for each element."""
+
+    body: tuple[Statement, ...]
+
+
+Statement: TypeAlias = (
+    "Assign | Declare | Recall | Keep | Enter | Verbatim | Guards | ByState | TwoWays | ForEach"
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Plain:
+class PlainForm:
     """A step of the plain form.
 
     Parameters
     ----------
-    element : Element
+    element : NamedFriction
         Of which friction.
     dt, force, part : str
         Names of the step, of the sum of the elements' forces, and of an element's force.
-    shared : tuple of Set
-        What all elements read.
-    guards, flows : tuple of Statement
-        For each element, in this order.
-    updates : tuple of Set
-        Each variable after the step.
-    trees : tuple of Node
-        All that is computed.
+    step : tuple of Statement
+        The whole step.
     """
 
-    element: Element
+    element: NamedFriction
     dt: str
     force: str
     part: str
-    shared: tuple[Set, ...]
-    guards: tuple[Statement, ...]
-    flows: tuple[Statement, ...]
-    updates: tuple[Set, ...]
-    trees: tuple[Node, ...] = field(repr=False)
+    step: tuple[Statement, ...]
 
 
-def plain_form(element: Element, dt: str = "dt") -> Plain:
+def plain_form(element: NamedFriction, dt: str = "dt") -> PlainForm:
     """Return the plain form of a friction.
 
     Parameters
     ----------
-    element : Element
+    element : NamedFriction
         The friction.
     dt : str
         What the step is called, unless the friction uses that name.
 
     Returns
     -------
-    Plain
+    PlainForm
         For a printer.
 
     Examples
@@ -109,9 +154,9 @@ def plain_form(element: Element, dt: str = "dt") -> Plain:
     >>> from gms_fsm import GMS, GMSParameters
     >>> from gms_fsm.exporters._subject import Subject
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> form = plain_form(Element.of(Subject.of(model, "c99"), ()))
-    >>> [each.name for each in form.shared], [each.name for each in form.updates]
-    (['stribeck'], ['z'])
+    >>> form = plain_form(NamedFriction.of(Subject.of(model, "c99"), ()))
+    >>> declared(form.step)
+    ['F', 'stribeck', 's', 'dz', 'F_i']
     """
     dt, part = element.free(dt), element.free("F_i")
     states = element.states
@@ -134,30 +179,47 @@ def plain_form(element: Element, dt: str = "dt") -> Plain:
     rows = []
     for state, lets in zip(states, inside, strict=True):
         row = [_let(each) for each in lets]
-        row += [Set(each.rate, state.rates[each.name].tree) for each in element.variables]
-        row += [] if same else [Set(part, state.force.tree)]
+        row += [Assign(each.rate, state.rates[each.name].tree) for each in element.variables]
+        row += [] if same else [Assign(part, state.force.tree)]
         rows.append(tuple(row))
     flows += [ByState(tuple(rows))] if any(rows) else []
-    flows += [Set(part, states[0].force.tree, new=True)] if same else []
-    updates = tuple(
-        Set(each.name, _after(each.name, dt, Name(each.rate))) for each in element.variables
+    flows += [Assign(part, states[0].force.tree, new=True)] if same else []
+    force = Name("F")
+    body = (
+        *(Recall(each.name) for each in element.variables),
+        *guards,
+        *flows,
+        Assign("F", Binary("+", force, Name(part))),
+        *(Keep(e.name, _after(e.name, dt, Name(e.rate))) for e in element.variables),
     )
-    shared = tuple(_let(each) for each in element.needed(every, per_element=False))
-    return Plain(
-        element=element,
-        dt=dt,
-        force="F",
-        part=part,
-        shared=shared,
-        guards=tuple(guards),
-        flows=tuple(flows),
-        updates=updates,
-        trees=tuple(_trees(element)),
-    )
+    shared = map(_let, element.needed(every, per_element=False))
+    step: list[Statement] = [Declare(("F",)), Assign("F", Number(0.0)), *shared, ForEach(body)]
+    if element.total.tree != force:
+        step.append(Assign("F", element.total.tree))
+    if element.position:
+        (velocity, _), x = element.inputs[0], element.position
+        step.append(Assign(x, _after(x, dt, Name(velocity))))
+    return PlainForm(element=element, dt=dt, force="F", part=part, step=tuple(step))
 
 
-def _let(let: Let) -> Set:
-    return Set(let.name, let.value.tree, let.about, new=True)
+def declared(statements: Iterable[Statement]) -> list[str]:
+    """Return the names that statements compute anew in every step, in order."""
+    found = dict[str, None]()
+    for each in statements:
+        match each:
+            case Assign(name, _, _, True):
+                found[name] = None
+            case Declare(names):
+                found |= dict.fromkeys(names)
+            case ByState(branches):
+                found |= dict.fromkeys(name for branch in branches for name in declared(branch))
+            case ForEach(body):
+                found |= dict.fromkeys(declared(body))
+    return [*found]
+
+
+def _let(let: Let) -> Assign:
+    return Assign(let.name, let.value.tree, let.about, new=True)
 
 
 def _after(name: str, dt: str, rate: Value) -> Value:
@@ -166,16 +228,5 @@ def _after(name: str, dt: str, rate: Value) -> Value:
 
 
 def _taken(edge: Leaving, several: bool) -> tuple[Statement, ...]:
-    steps = tuple(Set(name, tree) for name, tree in edge.steps)
+    steps = tuple(Assign(name, tree) for name, tree in edge.steps)
     return (*steps, Enter(edge.target)) if several else steps
-
-
-def _trees(element: Element) -> Iterable[Node]:
-    """Return all that is computed."""
-    yield element.total.tree
-    yield from (each.value.tree for each in element.lets)
-    for state in element.states:
-        yield from (each.tree for each in (*state.rates.values(), state.force))
-        for edge in state.edges:
-            yield edge.guard
-            yield from (tree for _, tree in edge.steps)

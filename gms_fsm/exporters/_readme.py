@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element import NamedFriction
 from gms_fsm.exporters._element_parts import Constant
 
 __all__ = ["about_friction"]
 
 
-def about_friction(element: Element) -> str:
+def about_friction(element: NamedFriction) -> str:
     """Return the model, its inputs, its numbers and its states, as Markdown.
 
     Parameters
     ----------
-    element : Element
+    element : NamedFriction
         The friction.
 
     Returns
@@ -26,7 +26,7 @@ def about_friction(element: Element) -> str:
     >>> from gms_fsm import GMS, GMSParameters
     >>> from gms_fsm.exporters._subject import Subject
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> made = Element.of(Subject.of(model, "st"), ())
+    >>> made = NamedFriction.of(Subject.of(model, "st"), ())
     >>> print(about_friction(made).splitlines()[0])
     GMS element, signed law, 4 elements (arXiv 2512.03049 (2025)).
     """

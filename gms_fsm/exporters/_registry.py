@@ -1,14 +1,15 @@
-"""The table of export formats, and the one function that writes any of them."""
+"""The formats that friction can be written in, and the one function that writes any of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
 from gms_fsm._arguments import checked_path
+from gms_fsm._display import asked
 from gms_fsm._files import output_folder, write_together
+from gms_fsm._formats import Format, of
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
@@ -17,64 +18,24 @@ from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact, System
 
-__all__ = ["EXPORTERS", "Exporter", "export", "register"]
-
-Files = Mapping[str, str | bytes]  # contents by file name
+__all__ = ["export", "formats"]
 
 
-@dataclass(frozen=True)
-class Exporter:
-    """A format.
+def formats() -> dict[str, Format]:
+    """Return what `export` can write: the formats of friction, and those of its chart.
 
-    Parameters
-    ----------
-    name : str
-        Of the format, for example ``"c99"``.
-    title : str
-        What is written, for lists: ``"C99 with located switches"``.
-    write : callable
-        Takes a `Subject` and returns the contents of the files by name, README included. It
-        refuses what the format cannot express with a `ParameterError`, and writes nothing.
-    words : iterable of str
-        Words of the language, which no exported name may be.
-    takes : tuple of str
-        Which of ``initial``, ``t_start``, ``settings`` and ``t_end`` it uses; others are refused.
-    """
-
-    name: str
-    title: str
-    write: Callable[[Subject], Files]
-    words: Iterable[str] = ()
-    takes: tuple[str, ...] = ("initial", "t_start")
-
-
-EXPORTERS: dict[str, Exporter] = {}
-
-
-def register(new: Exporter) -> None:
-    """Add a format.
-
-    Parameters
-    ----------
-    new : Exporter
-        The format.
-
-    Raises
-    ------
-    ParameterError
-        If there is already a format of that name.
+    Returns
+    -------
+    dict of str to Format
+        By name.
 
     Examples
     --------
-    >>> from gms_fsm.exporters import EXPORTERS, Exporter, register
-    >>> register(Exporter("names", "a list of states", lambda subject: {"README.md": "..."}))
-    >>> "names" in EXPORTERS
+    >>> {"c99", "fmu3", "scxml", "transitions", ".mmd"} <= {*formats()}
     True
-    >>> del EXPORTERS["names"]
     """
-    if new.name in EXPORTERS:
-        raise ParameterError(f"there is already a format {new.name!r}", place="register")
-    EXPORTERS[new.name] = new
+    table = asked("formats") or of  # what draws is above, and registers its formats first
+    return {each.name: each for each in table("friction", "chart")}
 
 
 def export(
@@ -99,7 +60,7 @@ def export(
         inputs of a system are those of its signals that are records. A chart alone has no numbers:
         only formats for charts take it.
     format : str
-        A key of `EXPORTERS`.
+        A key of `formats()`.
     folder : str or Path
         Where the files are written; created if missing.
     name : str, optional
@@ -137,30 +98,35 @@ def export(
     >>> "gms.h" in [file.name for file in files]
     True
     """
-    if not isinstance(format, str) or format not in EXPORTERS:
+    known = formats()
+    if not isinstance(format, str) or format not in known:
         raise ParameterError(
             "there is no such format",
             place="format",
             value=format,
-            advice=f"there are {', '.join(EXPORTERS)}",
+            advice=f"there are {', '.join(known)}",
         )
     where = checked_path("folder", folder)
-    exporter = EXPORTERS[format]
+    form = known[format]
     subject = Subject.of(
         system, format, name=name, initial=initial, t_start=t_start, settings=settings, t_end=t_end
     )
-    identifier(subject.name, exporter.words, f"name {subject.name!r}")
+    identifier(subject.name, form.words, f"name {subject.name!r}")
     for each, unused in (
         ("initial", not initial),
         ("t_start", t_start == 0.0),
         ("settings", settings is None),
         ("t_end", t_end is None),
     ):
-        if not unused and each not in exporter.takes:
+        if not unused and each not in form.takes:
             raise ParameterError(
                 f"format {format!r} does not use it", place=each, advice="leave it out"
             )
-    files = exporter.write(subject)
+    files: Mapping[str, str | bytes]
+    if form.subject == "chart":
+        files = {f"{subject.name}{form.name}": form.write(subject.chart)}
+    else:
+        files = form.write(subject)
     output_folder(where, files)
     write_together({where / each: _writer(content) for each, content in files.items()})
     return tuple(where / each for each in files)

@@ -33,8 +33,12 @@ class Subject:
         For people.
     format : str
         Name of the format, for messages.
-    given : System, Contact or Chart
-        A system; or one friction, whose velocity is an input; or a chart without numbers.
+    whole : System or None
+        None if one friction is exported, whose velocity is an input.
+    friction : Contact or None
+        None if it has no numbers, or a system is exported.
+    own_chart : Chart or None
+        Of the one friction.
     initial : mapping or None
         As given.
     t_start : float
@@ -48,7 +52,9 @@ class Subject:
     name: str
     title: str
     format: str
-    given: System | Contact | Chart
+    whole: System | None
+    friction: Contact | None
+    own_chart: Chart | None
     initial: Mapping[str, Any] | None
     t_start: float
     settings: Settings
@@ -67,28 +73,18 @@ class Subject:
         t_end: float | None = None,
     ) -> Subject:
         """Check what is exported; see `gms_fsm.export`."""
-        what: System | Contact | Chart
-        if isinstance(given, System | Contact | Chart):
-            what = given
-        elif isinstance(getattr(given, "chart", None), Chart):
-            what = Contact("friction", given)
-        else:
-            raise ParameterError(
-                "it must be a system, a model, a contact or a chart, for example "
-                "GMS(parameters, law='signed')",
-                place="system",
-                value=given,
-            )
+        whole, friction, chart = _parts(given)
         checked_kind("name", name, str, "a text")
-        kind = "system" if isinstance(what, System) else "chart"
-        title = what.chart.name if isinstance(what, Contact) else what.name
-        chosen = name or slug(title, f"{kind} {title!r}")
+        kind, named = ("chart", chart) if whole is None else ("system", whole)
+        assert named is not None
+        chosen = name or slug(named.name, f"{kind} {named.name!r}")
         used = Settings() if settings is None else settings
         checked_kind("settings", used, Settings, "Settings(...)")
         if initial is not None:
             checked_kind("initial", initial, Mapping, "a mapping")
         begin(t_start)
-        return cls(chosen, title, format, what, initial, t_start, used, t_end)
+        more = (initial, t_start, used, t_end)
+        return cls(chosen, named.name, format, whole, friction, chart, *more)
 
     @property
     def chart(self) -> Chart:
@@ -99,9 +95,14 @@ class Subject:
         ParameterError
             If it is a system.
         """
-        if isinstance(self.given, System):
+        if self.own_chart is None:
             raise self._refused_system("a chart")
-        return self.given if isinstance(self.given, Chart) else self.given.chart
+        return self.own_chart
+
+    @property
+    def alone(self) -> bool:
+        """Whether it is one friction, which names need not tell from others."""
+        return self.whole is None
 
     @property
     def contact(self) -> Contact:
@@ -113,9 +114,26 @@ class Subject:
             If it is a system, or a chart without numbers, or a friction that needs more than its
             velocity.
         """
-        if isinstance(self.given, System):
+        found = self.numbers
+        if found is None:
+            raise ParameterError(
+                f"format {self.format!r} needs numbers",
+                place=f"chart {self.chart.name!r}",
+                advice="give a model, for example ChartModel(chart, values), or a scenario file",
+            )
+        return found
+
+    @property
+    def numbers(self) -> Contact | None:
+        """As `contact`; None for a chart without numbers."""
+        if self.whole is not None:
             raise self._refused_system("one friction, whose velocity is an input")
-        return alone(self._with_numbers())
+        return None if self.friction is None else alone(self.friction)
+
+    @property
+    def system(self) -> System:
+        """The system, or one in which a friction has its velocity as an input."""
+        return self.start.system if self.whole is None else self.whole
 
     @functools.cached_property
     def start(self) -> Start:
@@ -126,10 +144,11 @@ class Subject:
         ParameterError
             If it cannot be stepped; what is in the way is named.
         """
-        if isinstance(self.given, System):
-            return start_of_system(self.given, self.t_start, self.initial, self.settings)
-        given, settings = self._with_numbers(), self.settings
-        return start_of(given, self.t_start, self.initial, settings.rtol, settings=settings)
+        settings = self.settings
+        if self.whole is None:
+            given = (self.contact, self.t_start, self.initial, settings.rtol)
+            return start_of(*given, settings=settings)
+        return start_of_system(self.whole, self.t_start, self.initial, settings)
 
     @functools.cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -137,22 +156,32 @@ class Subject:
         signals = self.start.system.signals
         return tuple(name for name, each in signals.items() if isinstance(each, Corners))
 
-    def _with_numbers(self) -> Contact:
-        if isinstance(self.given, Chart):
-            raise ParameterError(
-                f"format {self.format!r} needs numbers",
-                place=f"chart {self.given.name!r}",
-                advice="give a model, for example ChartModel(chart, values), or a scenario file",
-            )
-        assert isinstance(self.given, Contact)
-        return self.given
-
     def _refused_system(self, what: str) -> ParameterError:
-        assert isinstance(self.given, System)
-        names = [each.name for each in self.given.contacts]
+        names = [each.name for each in self.system.contacts]
         some = names[0] if names else "contact"
         return ParameterError(
             f"format {self.format!r} expresses {what}, not a system of bodies",
-            place=f"system {self.given.name!r}",
+            place=f"system {self.title!r}",
             advice=f"export one contact, such as system.contact({some!r}) (--contact {some})",
         )
+
+
+def _parts(
+    given: System | Model | Contact | Chart,
+) -> tuple[System | None, Contact | None, Chart | None]:
+    """Return the system, or the friction and its chart: the only place that asks what was given."""
+    match given:
+        case System():
+            return given, None, None
+        case Contact():
+            return None, given, given.chart
+        case Chart():
+            return None, None, given
+    if isinstance(getattr(given, "chart", None), Chart):
+        return None, Contact("friction", given), given.chart
+    raise ParameterError(
+        "it must be a system, a model, a contact or a chart, for example "
+        "GMS(parameters, law='signed')",
+        place="system",
+        value=given,
+    )

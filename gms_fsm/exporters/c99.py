@@ -7,16 +7,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm._formats import Format, register
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._c import TAKES, WORDS, Engine, engine_of, filled
+from gms_fsm.exporters._c import TAKES, WORDS, CEngine, engine_of, filled
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._plain_c import plain_c, plain_c_notes
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.systems.signals import Corners
-from gms_fsm.systems.system import System
 
 __all__ = ["c99"]
 
@@ -53,7 +52,7 @@ def c99(subject: Subject) -> dict[str, str]:
 
 def _plain(subject: Subject) -> tuple[dict[str, str], str]:
     """Return the files of the plain form, if there can be one, and what the README says of it."""
-    if isinstance(subject.given, System):
+    if not subject.alone:
         return {}, ""
     for name in subject.chart.let:
         identifier(name, WORDS, f"let {name!r}")
@@ -63,7 +62,7 @@ def _plain(subject: Subject) -> tuple[dict[str, str], str]:
         return {}, f"There is no plain form: {error}\n"
 
 
-def _main(made: Engine) -> str:
+def _main(made: CEngine) -> str:
     name, heads, rows = made.name, [], []
     for each in made.outputs:
         kind = "%lld" if each.place == "mode" else "%.17g"
@@ -96,27 +95,26 @@ def _main(made: Engine) -> str:
 
 def _record(subject: Subject) -> str:
     """Return a record for the inputs: that of the system, or a sine chosen by us."""
-    given = subject.given
-    t: FloatArray
-    if isinstance(given, System):
-        records = [each for each in given.signals.values() if isinstance(each, Corners)]
-        t, after = _rows(records, subject.t_start)
-        columns = {
-            name: _values(each, t, after)
-            for name, each in given.signals.items()
-            if isinstance(each, Corners)
-        }
-    else:
-        scales = scales_of(subject.start.system.contacts[0])
-        sizes = [u for row in scales.variables.values() for u in row if u > 0.0]
-        omega = 2.0 * math.pi / PERIOD
-        speed = max(FAR * max(sizes, default=0.1) * omega, FAST * scales.speed)
-        t = np.linspace(subject.t_start, subject.t_start + PERIOD * PERIODS, ROWS + 1)
-        columns = {name: np.zeros(t.size) for name in subject.inputs}
-        columns["v"] = speed * np.sin(omega * t)
+    t, columns = _sine(subject) if subject.alone else _records(subject)
     lines = [",".join(("t", *columns))]
     rows = zip(t.tolist(), *(each.tolist() for each in columns.values()), strict=True)
     return "\n".join([*lines, *(",".join(map(repr, row)) for row in rows), ""])
+
+
+def _sine(subject: Subject) -> tuple[FloatArray, dict[str, FloatArray]]:
+    scales = scales_of(subject.contact)
+    sizes = [u for row in scales.variables.values() for u in row if u > 0.0]
+    omega = 2.0 * math.pi / PERIOD
+    speed = max(FAR * max(sizes, default=0.1) * omega, FAST * scales.speed)
+    t = np.linspace(subject.t_start, subject.t_start + PERIOD * PERIODS, ROWS + 1)
+    return t, {name: np.zeros(t.size) for name in subject.inputs} | {"v": speed * np.sin(omega * t)}
+
+
+def _records(subject: Subject) -> tuple[FloatArray, dict[str, FloatArray]]:
+    signals = subject.system.signals
+    records = {name: each for name, each in signals.items() if isinstance(each, Corners)}
+    t, after = _rows([*records.values()], subject.t_start)
+    return t, {name: _values(each, t, after) for name, each in records.items()}
 
 
 def _rows(records: list[Corners], t_start: float) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -143,7 +141,7 @@ def _values(signal: Corners, t: FloatArray, after: NDArray[np.bool_]) -> FloatAr
     return found
 
 
-def _readme(subject: Subject, made: Engine) -> str:
+def _readme(subject: Subject, made: CEngine) -> str:
     name = made.name
     inputs = ", ".join(f"`{each}`" for each in made.inputs) or "none"
     numbers = "\n".join(
@@ -163,4 +161,14 @@ def _readme(subject: Subject, made: Engine) -> str:
     )
 
 
-register(Exporter("c99", "C99 with located switches, and the plain form", c99, WORDS, TAKES))
+register(
+    Format(
+        "c99",
+        "friction",
+        "C99 with located switches, and the plain form",
+        "gms-fsm",
+        c99,
+        words=WORDS,
+        takes=TAKES,
+    )
+)

@@ -13,19 +13,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gms_fsm._formats import Format, register
 from gms_fsm._version import __version__
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._adapting import ADAPTED, adapting_of
 from gms_fsm.exporters._c import (
     PLACES,
     STEPPED,
-    Stepped,
+    StepArguments,
     check_entries,
     filled,
 )
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering._compiled import packed
 from gms_fsm.lowering.adapting import Adapting, adapt
@@ -35,7 +35,6 @@ from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import arguments_of
 from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems.signals import Function
-from gms_fsm.systems.system import System
 from integrators import columns, hybrid, loop
 from integrators.advance import ROW
 from integrators.columns import FIRINGS
@@ -95,7 +94,7 @@ def js(subject: Subject) -> dict[str, str]:
         Contents by file name.
     """
     name = subject.name
-    made = _Run(subject) if isinstance(subject.given, System) else _Friction(subject)
+    made = _Friction(subject) if subject.alone else _Run(subject)
     return {
         f"{name}.mjs": made.module(),
         f"{name}.d.mts": made.types(),
@@ -274,8 +273,7 @@ class _Run(_Module):
 """
 
     def __init__(self, subject: Subject) -> None:
-        given, t_end = subject.given, subject.t_end
-        assert isinstance(given, System)
+        given, t_end = subject.system, subject.t_end
         for name, signal in given.signals.items():
             if isinstance(signal, Function):
                 raise ParameterError(
@@ -394,7 +392,7 @@ class _Friction(_Module):
         for each in subject.inputs:
             identifier(each, (), f"input {each!r}")
         step: tuple[Any, Any, Any, Any] = arguments_of(start)
-        super().__init__(subject, start, Stepped(*step, adapting_of(start)), alone=True)
+        super().__init__(subject, start, StepArguments(*step, adapting_of(start)), alone=True)
 
     def entries(self, translator: Translator) -> list[str]:
         """Translate a step, and what follows from the numbers."""
@@ -507,9 +505,11 @@ def _note(each: Quantity) -> str:
 
 
 register(
-    Exporter(
+    Format(
         "js",
+        "friction",
         "a JavaScript module: runs of a system, or one friction step by step",
+        "gms-fsm",
         js,
         takes=("initial", "t_start", "settings", "t_end"),
     )

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
+from gms_fsm._formats import Format, register
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._c import TEMPLATES
-from gms_fsm.exporters._element import Element
-from gms_fsm.exporters._element_parts import Expression, Let, State
+from gms_fsm.exporters._element import NamedFriction
+from gms_fsm.exporters._element_parts import Expression, Let, StateParts
 from gms_fsm.exporters._names import LONGEST
+from gms_fsm.exporters._plain_form import (
+    Assign,
+    ByState,
+    Enter,
+    ForEach,
+    Guards,
+    Statement,
+    TwoWays,
+    Verbatim,
+)
 from gms_fsm.exporters._readme import about_friction
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import MATLAB, Node, Relation, names_in, spell
+from gms_fsm.exporters._walker import Forms, Walker
+from gms_fsm.language import MATLAB, Binary, Comparison, Name, Relation, names_in
 from gms_fsm.lowering._plan import RoughCall, both_sides
 from gms_fsm.lowering.adapting import SHARE
 from gms_fsm.lowering.scales import scales_of
@@ -36,6 +47,20 @@ WORDS = frozenset(
     )
 )
 FIELDS = ("longest_step", "tolerance", "edges")
+FORMS = Forms(
+    assign="{0} = {1};",
+    new="{0} = {1};",
+    load="{0} = {1};",
+    declare="",
+    first="if {0}",
+    then="elseif {0}",
+    other="else",
+    end="end",
+    loop="for {0} = 1:{1}",
+    end_loop="end",
+    comment="% {0}",
+    marks={"@": "at", "{": "(", "}": ")"},
+)
 
 
 def matlab(subject: Subject) -> dict[str, str]:
@@ -64,32 +89,41 @@ def matlab(subject: Subject) -> dict[str, str]:
     >>> "elseif z(i) <= -s && v < -p.v_c" in text
     True
     """
-    printer = _Printer(subject)
+    printer = FunctionFile(subject)
     return {
         f"{subject.name}.m": printer.text(),
         f"README-{subject.name}-matlab.md": printer.readme(),
     }
 
 
-class _Printer:
+class FunctionFile:
     """Prints a friction as a function file."""
 
     def __init__(self, subject: Subject) -> None:
         self.name = subject.name
-        self.element = Element.of(subject, WORDS, time=False)
+        self.element = NamedFriction.of(subject, WORDS, time=False)
         element, free = self.element, self.element.free
         self.part, self.t_start = free("F_i"), subject.t_start
         self.scales = scales_of(subject.contact)
         self.y, self.u, self.tau, self.p, self.i = map(free, ("y", "u", "tau", "p", "i"))
         self.state, self.held, self.found = map(free, ("state", "held", "found"))
         self.edge, self.dy = map(free, ("edge", "dy"))
-        self.texts = {
-            each.name: f"{self.p}.{each.name}" + f"({self.i})" * isinstance(each.value, tuple)
+        texts = {
+            each.name: f"{self.p}.{each.name}" + f"({self.i})" * each.several
             for each in element.constants
         }
-        for variable in element.variables:
-            self.texts[variable.name] = f"{variable.name}({self.i})"
-            self.texts[variable.rate] = f"{variable.rate}({self.i})"
+        own = [name for each in element.variables for name in (each.name, each.rate)]
+        self.walker = Walker(
+            FORMS,
+            MATLAB,
+            texts | {name: f"{name}({self.i})" for name in own},
+            [each.name for each in element.states],
+            test=lambda k: f"{self.state}({self.i}) == {k + 1}",
+            enter=lambda k: f"{self.state} = {k + 1};",
+            count=element.n,
+            index=self.i,
+        )
+        self.spell = self.walker.spell
         # The held signs, h1, h2 ...: of what they are stands in a comment.
         self.signs = {
             u: (f"{self.held}.h{number}{f'({self.i})' if own else ''}", own)
@@ -118,7 +152,7 @@ class _Printer:
         template = (TEMPLATES / "matlab.m").read_text(encoding="utf-8")
         main = template.format(
             arguments=further,
-            title=_one_line(element.title),
+            title=FORMS.clean(element.title),
             inputs=about,
             lines=", ".join(f"'{name}', [{name}0, {name}1]" for name in inputs),
             pack="; ".join(f"s.{name}" for name in vectors),
@@ -170,8 +204,8 @@ class _Printer:
         held = [self.held] if more else []
         return ", ".join([self.y, self.u, self.tau, self.state, *held, self.p])
 
-    def function(self, head: str, body: Sequence[str]) -> str:
-        return "\n".join([f"function {head}", *body, "end", ""])
+    def function(self, head: str, body: Iterable[Statement]) -> str:
+        return "\n".join([f"function {head}", *self.walker.lines(body), "end", ""])
 
     def piece(self, name: str, vector: str) -> str:
         """Spell the part of the vector that a name stands for."""
@@ -182,95 +216,74 @@ class _Printer:
         return f"{vector}({first + 1}:{first + n})" if n > 1 else f"{vector}({first + 1})"
 
     # ------------------------------------------------------------------ what is read first
-    def head(self, reads: Iterable[str], held: bool = False) -> list[str]:
+    def head(self, reads: Iterable[str], held: bool = False) -> list[Statement]:
         """Assign what elements read: inputs, variables, and what they share."""
-        element = self.element
+        element, u = self.element, self.u
         shared = element.needed(reads, per_element=False)
         inside = element.needed(reads, per_element=True)
         names = {*reads}.union(*(each.value.names for each in (*shared, *inside)))
-        lines = [
-            f"{name} = @_line({self.u}.{name}, {self.u}, {self.tau});"
-            for name, _ in element.inputs
-            if name in names
-        ]
-        if "t" in names:
-            lines.append(f"t = {self.u}.t + {self.tau};")
-        for each in element.variables:
-            if each.name in names:
-                lines.append(f"{each.name} = {self.piece(each.name, self.y)};")
-        if element.position in names:
-            lines.append(f"{element.position} = {self.piece(element.position, self.y)};")
-        return lines + self.lets(shared, held)
+        lines = {name: f"@_line({u}.{name}, {u}, {self.tau})" for name, _ in element.inputs}
+        lines |= {"t": f"{u}.t + {self.tau}"}
+        lines |= {each.name: self.piece(each.name, self.y) for each in element.variables}
+        lines |= {name: self.piece(name, self.y) for name in filter(None, [element.position])}
+        read = [Verbatim(f"{name} = {text};") for name, text in lines.items() if name in names]
+        return [*read, *self.lets(shared, held)]
 
-    def lets(self, lets: Iterable[Let], held: bool) -> list[str]:
+    def lets(self, lets: Iterable[Let], held: bool) -> list[Statement]:
         return [line for each in lets for line in self.assign(each.name, each.value, held)]
 
-    def assign(self, target: str, value: Expression, held: bool) -> list[str]:
+    def assign(self, target: str, value: Expression, held: bool) -> list[Statement]:
         """Assign a value, with held signs or with those of now."""
         if not held:
-            return [f"{target} = {self.spell(value.tree)};"]
-        calls = [line for each in value.calls for line in self.call(each)]
-        return [*calls, f"{target} = {self.spell(value.smooth)};"]
+            return [Assign(target, value.tree)]
+        return [*map(self.call, value.calls), Assign(target, value.smooth)]
 
-    def call(self, rough: RoughCall) -> Iterator[str]:
+    def call(self, rough: RoughCall) -> Statement:
         """Assign a call that has a corner or a jump, with the sign that is held."""
         (sign, _), call = self.signs[rough.turning], rough.call
-        first, *others = map(self.spell, call.arguments)
         match call.function:
             case "sgn":
-                yield f"{rough.name} = {sign};"
+                return Verbatim(f"{rough.name} = {sign};")
             case "abs":
-                product = self.spell(call.arguments[0])
-                yield f"{rough.name} = {sign} * ({product});"
+                return Verbatim(f"{rough.name} = {sign} * ({self.spell(call.arguments[0])});")
             case function:
-                yield f"if {sign} {'<=' if function == 'min' else '>='} 0"
-                yield f"    {rough.name} = {first};"
-                yield "else"
-                yield f"    {rough.name} = {others[0]};"
-                yield "end"
-
-    def spell(self, node: Node) -> str:
-        return spell(node, MATLAB, self.texts)
+                first, other = (Assign(rough.name, each) for each in call.arguments)
+                test = f"{sign} {'<=' if function == 'min' else '>='} 0"
+                return TwoWays(test, (first,), (other,))
 
     def loop(
         self,
         reads: Sequence[frozenset[str]],
-        branches: Sequence[Sequence[str]],
+        branches: Sequence[Sequence[Statement]],
         *,
         held: bool = False,
-        first: Sequence[str] = (),
-        after: Sequence[str] = (),
-    ) -> list[str]:
+        after: Sequence[Statement] = (),
+    ) -> list[Statement]:
         """Write a loop over the elements, with a branch for each state."""
-        before, inside = self.element.placed(reads)
-        rows = [
-            [*self.lets(lets, held), *lines] if lines else []
-            for lets, lines in zip(inside, branches, strict=True)
-        ]
-        body = [*first, *self.lets(before, held), *self.choice(rows), *after]
-        return [f"for {self.i} = 1:{self.element.n}", *_indented(body), "end"]
-
-    def choice(self, rows: Sequence[Sequence[str]]) -> list[str]:
-        """Choose by the element's state."""
-        if len(rows) == 1:
-            return list(rows[0])
-        if not any(rows):
+        if not any(branches):
             return []
-        lines = [f"switch {self.state}({self.i})"]
-        for number, (state, row) in enumerate(zip(self.element.states, rows, strict=True), 1):
-            lines += [f"    case {number}  % {state.name}", *_indented(_indented(row))]
-        return [*lines, "end"]
+        before, inside = self.element.placed(reads)
+        rows = tuple(
+            (*self.lets(lets, held), *lines) if lines else ()
+            for lets, lines in zip(inside, branches, strict=True)
+        )
+        return [ForEach((*self.lets(before, held), ByState(rows), *after))]
 
     # ------------------------------------------------------------------ the functions
-    def rates(self, state: State, held: bool, wanted: frozenset[str] | None = None) -> list[str]:
+    def rates(
+        self, state: StateParts, held: bool, wanted: frozenset[str] | None = None
+    ) -> list[Statement]:
         return [
             line
             for each in self.element.variables
             if wanted is None or each.rate in wanted
-            for line in self.assign(self.texts[each.rate], state.rates[each.name], held)
+            for line in self.assign(each.rate, state.rates[each.name], held)
         ]
 
-    def flow(self) -> list[str]:
+    def zeros(self, rates: Iterable[str]) -> list[Statement]:
+        return [Verbatim(f"{rate} = zeros({self.element.n}, 1);") for rate in rates]
+
+    def flow(self) -> list[Statement]:
         element = self.element
         reads = [
             frozenset[str]().union(*(rate.names for rate in state.rates.values()))
@@ -278,17 +291,19 @@ class _Printer:
         ]
         every = frozenset[str]().union(*reads)
         v, _ = element.inputs[0]
-        empty = [f"{each.rate} = zeros({element.n}, 1);" for each in element.variables]
-        rows = [self.rates(state, held=True) for state in element.states]
-        parts = [each.rate for each in element.variables] + [v] * bool(element.position)
-        lines = ["% The rates of change, states and signs held."]
-        lines += [*self.head(every | ({v} if element.position else set()), held=True), *empty]
-        lines += self.loop(reads, rows, held=True) if any(rows) else []
-        return [*lines, f"{self.dy} = [{'; '.join(parts)}];"]
+        rates = [each.rate for each in element.variables]
+        parts = rates + [v] * bool(element.position)
+        return [
+            Verbatim("% The rates of change, states and signs held."),
+            *self.head(every | ({v} if element.position else set()), held=True),
+            *self.zeros(rates),
+            *self.loop(reads, [self.rates(e, held=True) for e in element.states], held=True),
+            Verbatim(f"{self.dy} = [{'; '.join(parts)}];"),
+        ]
 
-    def force(self) -> list[str]:
+    def force(self) -> list[Statement]:
         element = self.element
-        reads, rows = list[frozenset[str]](), []
+        reads, rows = list[frozenset[str]](), list[list[Statement]]()
         for state in element.states:
             wanted = state.force.names
             used = [state.rates[e.name].names for e in element.variables if e.rate in wanted]
@@ -296,32 +311,42 @@ class _Printer:
             row = self.rates(state, held=False, wanted=wanted)
             rows.append([*row, *self.assign(self.part, state.force, held=False)])
         every = element.total.names.union(*reads)
-        rates = [each.rate for each in element.variables if each.rate in every]
-        lines = ["% The force of all elements.", *self.head(every)]
-        lines += [f"{rate} = zeros({element.n}, 1);" for rate in rates]
-        lines += ["F = 0;", *self.loop(reads, rows, after=[f"F = F + {self.part};"])]
-        return [*lines, f"F = {self.spell(element.total.tree)};"]
+        added = Assign("F", Binary("+", Name("F"), Name(self.part)))
+        return [
+            Verbatim("% The force of all elements."),
+            *self.head(every),
+            *self.zeros(each.rate for each in element.variables if each.rate in every),
+            Verbatim("F = 0;"),
+            *self.loop(reads, rows, after=[added]),
+            Assign("F", element.total.tree),
+        ]
 
-    def guards(self) -> list[str]:
-        element = self.element
+    def guards(self) -> list[Statement]:
+        states = self.element.states
         reads = [
             frozenset[str]().union(*(names_in(edge.guard) for edge in state.edges))
-            for state in element.states
+            for state in states
         ]
-        rows = []
-        for state in element.states:
-            row, word = [], "if"
-            for edge in state.edges:
-                row.append(f"{word} {self.spell(edge.guard)}")
-                row.append(f"    {self.edge}({self.i}) = {edge.number + 1};  % {edge.name}")
-                word = "elseif"
-            rows.append([*row, "end"] if row else row)
-        lines = ["% For each element its first edge whose guard is true, or 0."]
-        lines += [*self.head(frozenset[str]().union(*reads))]
-        lines += [f"{self.edge} = zeros(1, {element.n});"]
-        return lines + (self.loop(reads, rows) if any(rows) else [])
+        rows: list[list[Statement]] = [
+            [
+                Guards(
+                    tuple(
+                        (edge, (Verbatim(f"{self.edge}({self.i}) = {edge.number + 1};"),))
+                        for edge in state.edges
+                    )
+                )
+            ]
+            * bool(state.edges)
+            for state in states
+        ]
+        return [
+            Verbatim("% For each element its first edge whose guard is true, or 0."),
+            *self.head(frozenset[str]().union(*reads)),
+            Verbatim(f"{self.edge} = zeros(1, {self.element.n});"),
+            *self.loop(reads, rows),
+        ]
 
-    def take(self) -> list[str]:
+    def take(self) -> list[Statement]:
         element = self.element
         edges = [edge for state in element.states for edge in state.edges]
         reads = [names_in(tree) for edge in edges for _, tree in edge.steps]
@@ -331,77 +356,76 @@ class _Printer:
             for each in element.variables
             if any(each.name == name for edge in edges for name, _ in edge.steps)
         ]
-        lines = ["% Take an edge of an element."]
+        lines: list[Statement] = [Verbatim("% Take an edge of an element.")]
         lines += self.head(every | {*changed})
         lines += self.lets(element.needed(every, per_element=True), held=False)
         if not edges:
             return lines
-        lines.append(f"switch {self.edge}")
+        lines.append(Verbatim(f"switch {self.edge}"))
         for edge in sorted(edges, key=lambda each: each.number):
-            row = [f"{self.texts[name]} = {self.spell(tree)};" for name, tree in edge.steps]
-            row.append(f"{self.state} = {edge.target + 1};  % {element.states[edge.target].name}")
-            lines += [f"    case {edge.number + 1}  % {edge.name}", *_indented(_indented(row))]
-        lines.append("end")
-        return lines + [f"{self.piece(name, self.y)} = {name};" for name in changed]
+            lines.append(Verbatim(f"    case {edge.number + 1}  % {edge.name}"))
+            steps = (Assign(name, tree) for name, tree in edge.steps)
+            row: list[Statement] = [*steps, Enter(edge.target)]
+            lines += [Verbatim(f"        {line}") for line in self.walker.lines(row)]
+        lines.append(Verbatim("end"))
+        return lines + [Verbatim(f"{self.piece(name, self.y)} = {name};") for name in changed]
 
-    def compare(self) -> list[str]:
+    def compare(self) -> list[Statement]:
         """Print the comparisons in which guards, corners and jumps can change."""
         element = self.element
-        rows: list[list[str]] = []
+        rows: list[list[Statement]] = []
         reads: list[frozenset[str]] = []
         for state in element.states:
             found = [each for edge in state.edges for each in edge.comparisons]
             found += [each for u in state.corners for each in both_sides(u)]
-            relations = [
-                Relation(">" if each.strict else ">=", each.left, each.right)
-                for each in dict.fromkeys(found)
-            ]
+            relations = _relations(dict.fromkeys(found))
             reads.append(frozenset[str]().union(*map(names_in, relations)))
-            rows.append(self.collected(map(self.spell, relations)))
-        outer = [
-            Relation(">" if each.strict else ">=", each.left, each.right)
-            for u in element.corners
-            for each in both_sides(u)
-        ]
+            rows.append(self.collected(relations))
+        outer = _relations(each for u in element.corners for each in both_sides(u))
         every = frozenset[str]().union(*reads, *map(names_in, outer))
-        lines = ["% Comparisons: while none of them changes, no guard and no sign does."]
-        lines += [*self.head(every), f"{self.found} = false(1, 0);"]
-        lines += self.collected(map(self.spell, outer))
-        return lines + (self.loop(reads, rows) if any(rows) else [])
+        return [
+            Verbatim("% Comparisons: while none of them changes, no guard and no sign does."),
+            *self.head(every),
+            Verbatim(f"{self.found} = false(1, 0);"),
+            *self.collected(outer),
+            *self.loop(reads, rows),
+        ]
 
-    def collected(self, relations: Iterable[str]) -> list[str]:
-        texts = ", ".join(f"({each})" for each in relations)
-        return [f"{self.found} = [{self.found}, {texts}];"] if texts else []
+    def collected(self, relations: Iterable[Relation]) -> list[Statement]:
+        texts = ", ".join(f"({self.spell(each)})" for each in relations)
+        return [Verbatim(f"{self.found} = [{self.found}, {texts}];")] if texts else []
 
-    def sign(self) -> list[str]:
+    def sign(self) -> list[Statement]:
         """Print the signs that an arc begins with."""
-        shared = [(u, text) for u, (text, own) in self.signs.items() if not own]
-        own = [(u, text) for u, (text, each) in self.signs.items() if each]
         reads = frozenset[str]().union(*(names_in(u) for u in self.signs))
-        lines = ["% Signs, held until they change.", *self.head(reads), f"{self.held} = struct();"]
-        lines += [f"{text} = sign({self.spell(u)});" for u, text in shared]
-        if own:
-            needed = frozenset[str]().union(*(names_in(u) for u, _ in own))
-            body = self.lets(self.element.needed(needed, per_element=True), held=False)
-            body += [f"{text} = sign({self.spell(u)});" for u, text in own]
-            lines += [f"for {self.i} = 1:{self.element.n}", *_indented(body), "end"]
-        return lines
+        lines: dict[bool, list[Statement]] = {True: [], False: []}
+        for u, (text, own) in self.signs.items():
+            lines[own].append(Verbatim(f"{text} = sign({self.spell(u)});"))
+        inner = [names_in(u) for u, (_, own) in self.signs.items() if own]
+        needed = self.element.needed(frozenset[str]().union(*inner), per_element=True)
+        body = ForEach((*self.lets(needed, held=False), *lines[True]))
+        return [
+            Verbatim("% Signs, held until they change."),
+            *self.head(reads),
+            Verbatim(f"{self.held} = struct();"),
+            *lines[False],
+            *([body] if inner else []),
+        ]
 
     def numbers(self) -> str:
         lines = ["p = struct();"]
         for each in self.element.constants:
             value = each.value
             text = f"[{', '.join(map(repr, value))}]" if isinstance(value, tuple) else repr(value)
-            lines.append(f"p.{each.name} = {text};{_note(each.about)}")
-        return self.function("p = @_numbers()", lines)
+            lines.append(f"p.{each.name} = {text};{FORMS.note(each.about)}")
+        return self.function("p = @_numbers()", map(Verbatim, lines))
 
     def begin(self) -> str:
         element, start = self.element, repr(self.t_start)
         lines = [f"s = struct('t', {start}, 'longest_step', Inf, 'tolerance', 1e-10);"]
         for each in element.variables:
-            lines.append(
-                f"s.{each.name} = [{'; '.join(map(repr, each.start))}];{_note(each.about)}"
-            )
+            values = "; ".join(map(repr, each.start))
+            lines.append(f"s.{each.name} = [{values}];{FORMS.note(each.about)}")
         if element.position:
             lines.append(f"s.{element.position} = {element.position_start!r};  % m: position")
         states = ", ".join(f"'{each.name}'" for each in element.states)
@@ -413,7 +437,7 @@ class _Printer:
             f"s.edges = {{{edges}}};",
             "s.log = zeros(0, 3);",
         ]
-        return self.function("s = @_begin()", lines)
+        return self.function("s = @_begin()", map(Verbatim, lines))
 
     # ------------------------------------------------------------------ for people
     def readme(self) -> str:
@@ -454,16 +478,18 @@ slides along a surface on which a sign changes (Filippov) ends in an error.
 """
 
 
-def _indented(lines: Iterable[str]) -> list[str]:
-    return [f"    {line}" for line in lines]
+def _relations(found: Iterable[Comparison]) -> list[Relation]:
+    return [Relation(">" if e.strict else ">=", e.left, e.right) for e in found]
 
 
-def _one_line(text: str) -> str:
-    return re.sub(r"\s+", " ", text).replace("@", "at").replace("{", "(").replace("}", ")")
-
-
-def _note(text: str) -> str:
-    return f"  % {_one_line(text)}" if text else ""
-
-
-register(Exporter("matlab", "a function file for MATLAB and GNU Octave", matlab, WORDS))
+register(
+    Format(
+        "matlab",
+        "friction",
+        "a function file for MATLAB and GNU Octave",
+        "gms-fsm",
+        matlab,
+        words=WORDS,
+        takes=("initial", "t_start"),
+    )
+)

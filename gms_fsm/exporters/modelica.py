@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from gms_fsm.exporters._element import Element
+from gms_fsm._formats import Format, register
+from gms_fsm.exporters._element import NamedFriction
 from gms_fsm.exporters._element_parts import Constant, Leaving
 from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._readme import about_friction
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
+from gms_fsm.exporters._walker import indented
 from gms_fsm.language import (
     MODELICA,
     Both,
@@ -75,19 +76,19 @@ def modelica(subject: Subject) -> dict[str, str]:
     >>> "when pre(state) == 1 and z >= s and v > v_c then" in text
     True
     """
-    printer = _Printer(subject)
+    printer = ModelOfElements(subject)
     return {
         f"{subject.name}.mo": printer.text(),
         f"README-{subject.name}-modelica.md": printer.readme(),
     }
 
 
-class _Printer:
+class ModelOfElements:
     """Prints a friction as a model of its elements."""
 
     def __init__(self, subject: Subject) -> None:
         self.name = identifier(subject.name, WORDS, f"name {subject.name!r}")
-        self.element = element = Element.of(subject, WORDS, time=False)
+        self.element = element = NamedFriction.of(subject, WORDS, time=False)
         element.check_name(self.name)
         # A class of its own: Rumoca 0.10 counts equations of arrays of nested classes twice.
         self.kind, self.one = f"{self.name}_element", element.free("element")
@@ -101,18 +102,7 @@ class _Printer:
         total = f"sum({self.one}.{self.part})" if element.n > 1 else f"{self.one}.{self.part}"
         self.texts = {"t": "time"}
         self.total = {"t": "time", "F": total}
-        check_functions(self.trees(), MODELICA, f"chart {subject.title!r}", "Modelica")
-
-    def trees(self) -> Iterable[Node]:
-        """Return all that is written."""
-        element = self.element
-        yield element.total.tree
-        yield from (each.value.tree for each in element.lets)
-        for state in element.states:
-            yield from (each.tree for each in (*state.rates.values(), state.force))
-            for edge in state.edges:
-                yield edge.guard
-                yield from (tree for _, tree in edge.steps)
+        check_functions(element.trees, MODELICA, f"chart {subject.title!r}", "Modelica")
 
     def spell(self, node: Node) -> str:
         return spell(node, MODELICA, self.texts)
@@ -122,19 +112,17 @@ class _Printer:
         element = self.element
         constants = [self.constant(each) for each in element.constants]
         lines = [*self.one_element(), "", f"model {self.name} {_string(element.title)}"]
-        lines += _indented(
-            [f"input Real {name}{_comment(about)};" for name, about in element.inputs]
-        )
-        lines += _indented(['output Real F "N: friction force";', *constants])
+        lines += _inside([f"input Real {name}{_comment(about)};" for name, about in element.inputs])
+        lines += _inside(['output Real F "N: friction force";', *constants])
         if element.position:
             start = MODELICA.number(element.position_start)
             declared = f'Real {element.position}(start = {start}, fixed = true) "m: position";'
-            lines += _indented([declared])
+            lines += _inside([declared])
         size = f"[{element.n}]" if element.n > 1 else ""
-        lines += _indented([f"{self.kind} {self.one}{size}({self.given()});"])
+        lines += _inside([f"{self.kind} {self.one}{size}({self.given()});"])
         lines += ["protected"] * bool(self.shared_lets)
-        lines += _indented(f"Real {e.name}{_comment(e.about)};" for e in self.shared_lets)
-        lines += ["equation", *_indented(self.equations())]
+        lines += _inside(f"Real {e.name}{_comment(e.about)};" for e in self.shared_lets)
+        lines += ["equation", *_inside(self.equations())]
         return "\n".join([*lines, f"end {self.name};"]) + "\n"
 
     def constant(self, constant: Constant) -> str:
@@ -201,8 +189,8 @@ class _Printer:
         rates = [each for each in element.variables if self.reads(each.rate)]
         protected = [f"Real {each.name}{_comment(each.about)};" for each in self.own_lets]
         protected += [f"Real {each.rate};" for each in rates]
-        lines += _indented(inner)
-        lines += ["protected", *_indented(protected)] if protected else []
+        lines += _inside(inner)
+        lines += ["protected", *_inside(protected)] if protected else []
         body = [f"{each.name} = {self.spell(each.value.tree)};" for each in self.own_lets]
         for each in element.variables:
             flow = self.by_state([state.rates[each.name].tree for state in element.states])
@@ -212,7 +200,7 @@ class _Printer:
                 body.append(f"der({each.name}) = {flow};")
         force = self.by_state([state.force.tree for state in element.states])
         body += [f"{self.part} = {force};", *self.switches()]
-        return [*lines, "equation", *_indented(body), f"end {self.kind};"]
+        return [*lines, "equation", *_inside(body), f"end {self.kind};"]
 
     def reads(self, rate: str) -> bool:
         return any(rate in state.force.names for state in self.element.states)
@@ -233,7 +221,7 @@ class _Printer:
             for edge in state.edges:
                 source = f"pre(state) == {number} and " if several else ""
                 lines.append(f"{word} {source}{self.guard(edge.guard)} then  // {edge.name}")
-                lines += _indented([f"state = {edge.target + 1};"] * several + self.resets(edge))
+                lines += _inside([f"state = {edge.target + 1};"] * several + self.resets(edge))
                 word = "elsewhen"
         return [*lines, "end when;"] if lines else []
 
@@ -308,12 +296,22 @@ def _string(text: str) -> str:
     return f'"{clean}"'
 
 
+def _inside(lines: Iterable[str]) -> list[str]:
+    return indented(lines, "  ")
+
+
 def _comment(text: str) -> str:
     return f" {_string(text)}" if text else ""
 
 
-def _indented(lines: Iterable[str]) -> list[str]:
-    return [f"  {line}" for line in lines]
-
-
-register(Exporter("modelica", "a Modelica model with events", modelica, WORDS))
+register(
+    Format(
+        "modelica",
+        "friction",
+        "a Modelica model with events",
+        "gms-fsm",
+        modelica,
+        words=WORDS,
+        takes=("initial", "t_start"),
+    )
+)

@@ -14,6 +14,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from gms_fsm._formats import Format, register
 from gms_fsm._version import __version__
 from gms_fsm.charts._reader import AGE
 from gms_fsm.charts._scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
@@ -22,7 +23,6 @@ from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._charts import check_moved_from_outside
 from gms_fsm.exporters._names import identifier
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.systems.system import LEAST_LOAD, Contact, loaded
 
@@ -46,7 +46,7 @@ def _write(subject: Subject) -> dict[str, str]:
     for each in _names(chart):
         identifier(each, WORDS, f"chart {chart.name!r}, name {each!r}")
     _check_characters(chart)
-    contact = None if isinstance(subject.given, Chart) else subject.contact
+    contact = subject.numbers
     numbers = _numbers(contact)
     files = {
         f"{name}_{i}.scxml" if len(numbers) > 1 else f"{name}.scxml": _document(name, chart, row)
@@ -247,4 +247,6 @@ def _one_line(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-register(Exporter("scxml", "W3C SCXML document of an element", _write, WORDS, takes=()))
+register(
+    Format("scxml", "friction", "W3C SCXML document of an element", "gms-fsm", _write, words=WORDS)
+)

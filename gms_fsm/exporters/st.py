@@ -6,24 +6,16 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
+from gms_fsm._formats import Format, register
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element import NamedFriction
 from gms_fsm.exporters._element_parts import Constant
 from gms_fsm.exporters._names import check_functions, identifier
-from gms_fsm.exporters._plain_form import (
-    ByState,
-    Declare,
-    Enter,
-    Guards,
-    Plain,
-    Set,
-    Statement,
-    plain_form,
-)
+from gms_fsm.exporters._plain_form import PlainForm, declared, plain_form
 from gms_fsm.exporters._readme import about_friction
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import STRUCTURED_TEXT, Name, Node, spell
+from gms_fsm.exporters._walker import Forms, Walker, indented
+from gms_fsm.language import STRUCTURED_TEXT
 
 __all__ = ["WORDS", "structured_text"]
 
@@ -68,6 +60,21 @@ END_IF;
 END_FUNCTION
 
 """
+FORMS = Forms(
+    assign="{0} := {1};",
+    new="{0} := {1};",
+    load="{0} := {1};",
+    declare="",
+    first="IF {0} THEN",
+    then="ELSIF {0} THEN",
+    other="ELSE",
+    end="END_IF;",
+    loop="FOR {0} := 1 TO {1} DO",
+    end_loop="END_FOR;",
+    comment="(* {0} *)",
+    marks={"*)": "* )", "(*": "( *"},
+    nothing=";",
+)
 
 
 class _Words(frozenset[str]):
@@ -103,39 +110,48 @@ def structured_text(subject: Subject) -> dict[str, str]:
     >>> "ELSIF z_i <= -s AND v < -v_c THEN" in text
     True
     """
-    printer = _Printer(subject)
+    printer = StructuredText(subject)
     return {f"{subject.name}.st": printer.text(), f"README-{subject.name}-st.md": printer.readme()}
 
 
-class _Printer:
+class StructuredText:
     """Prints the plain form of a friction."""
 
     def __init__(self, subject: Subject) -> None:
         name = subject.name
         identifier(name.upper(), WORDS, f"name {name!r}")
-        self.name, element = name, Element.of(subject, WORDS, cases=False)
+        self.name, element = name, NamedFriction.of(subject, WORDS, cases=False)
         for each in (name, f"{name}_sgn"):
             element.check_name(each, cases=False)
         element = element.reserved(name, f"{name}_sgn")
-        self.form: Plain = plain_form(element, "cycle")
+        self.form: PlainForm = plain_form(element, "cycle")
         self.element = element.reserved(self.form.dt, self.form.part)
         self.force = self.take("force")  # F would be the same as a chart's f
         functions = {**STRUCTURED_TEXT.functions, "sgn": f"{name}_sgn({{0}})"}
         self.dialect = replace(STRUCTURED_TEXT, functions=functions)
         place = f"chart {subject.title!r}"
-        check_functions(self.form.trees, self.dialect, place, "structured text")
+        check_functions(element.trees, self.dialect, place, "structured text")
         # One element needs no arrays and no loop.
         self.i = self.take("i") if element.n > 1 else ""
-        self.at = f"[{self.i}]" if self.i else ""
-        self.now = {
-            each.name: self.take(f"{each.name}_i") if self.i else each.name
-            for each in element.variables
-        }
-        numbers = {c.name for c in element.constants if isinstance(c.value, tuple)}
-        self.texts = {each: f"{each}{self.at}" for each in numbers} | self.now
-        self.texts[self.form.force] = self.force
+        at = f"[{self.i}]" if self.i else ""
+        self.now = {each.name: self.take(f"{each.name}_i") for each in element.variables if at}
         self.state = self.take("state")
         self.states = [self.take(f"STATE_{each.name.upper()}") for each in element.states]
+        self.walker = Walker(
+            FORMS,
+            self.dialect,
+            {
+                **{c.name: f"{c.name}{at}" for c in element.constants if c.several},
+                **self.now,
+                self.form.force: self.force,
+            },
+            [each.name for each in element.states],
+            test=lambda k: f"{self.state}{at} = {self.states[k]}",
+            enter=lambda k: f"{self.state}{at} := {self.states[k]};",
+            count=element.n,
+            index=self.i,
+            memory={name: f"{name}{at}" for name in self.now},
+        )
         names = [*element.names, *self.states, *(each for each, _ in element.inputs), name]
         for each in names:
             if "__" in each or each.endswith("_"):
@@ -154,12 +170,12 @@ class _Printer:
     # ------------------------------------------------------------------ the text
     def text(self) -> str:
         element, name = self.element, self.name
-        body = self.body()
+        body = self.walker.lines(self.form.step)
         inputs = [*element.inputs, (self.form.dt, "s: since the last call")]
         lines = [
-            f"(* {_plain_text(element.title)}: the plain form, to be called once a cycle. *)",
+            f"(* {FORMS.clean(element.title)}: the plain form, to be called once a cycle. *)",
             f"FUNCTION_BLOCK {name}",
-            *_block("VAR_INPUT", (f"{each} : LREAL;{_note(about)}" for each, about in inputs)),
+            *_block("VAR_INPUT", (f"{each} : LREAL;{FORMS.note(about)}" for each, about in inputs)),
             *_block("VAR_OUTPUT", [f"{self.force} : LREAL;  (* N: friction force *)"]),
             *_block("VAR CONSTANT", self.constants()),
             *_block("VAR", self.memory()),
@@ -179,9 +195,9 @@ class _Printer:
     def constant(self, constant: Constant) -> str:
         value = constant.value
         if isinstance(value, tuple):
-            return f"{constant.name} : {self.array('LREAL', value)};{_note(constant.about)}"
+            return f"{constant.name} : {self.array('LREAL', value)};{FORMS.note(constant.about)}"
         number = self.dialect.number(value)
-        return f"{constant.name} : LREAL := {number};{_note(constant.about)}"
+        return f"{constant.name} : LREAL := {number};{FORMS.note(constant.about)}"
 
     def array(self, kind: str, values: Sequence[float | int]) -> str:
         number = self.dialect.number
@@ -194,7 +210,7 @@ class _Printer:
         """Declare what is kept from call to call."""
         element = self.element
         for each in element.variables:
-            yield f"{each.name} : {self.array('LREAL', each.start)};{_note(each.about)}"
+            yield f"{each.name} : {self.array('LREAL', each.start)};{FORMS.note(each.about)}"
         if element.position:
             start = self.dialect.number(element.position_start)
             yield f"{element.position} : LREAL := {start};  (* m: position *)"
@@ -205,66 +221,9 @@ class _Printer:
         """Declare what is computed in every call."""
         if self.i:
             yield f"{self.i} : INT;"
-        found = dict.fromkeys(self.now.values() if self.i else ())
-        for each in (*self.form.shared, *self.form.guards, *self.form.flows):
-            found |= dict.fromkeys(_assigned(each))
-        for name in found:
+        names = [each for each in declared(self.form.step) if each != self.form.force]
+        for name in (*self.now.values(), *names):
             yield f"{name} : LREAL;"
-
-    def body(self) -> list[str]:
-        element, form = self.element, self.form
-        inner = [*self.statements(form.guards), *self.statements(form.flows)]
-        inner.append(f"{self.force} := {self.force} + {form.part};")
-        inner += [f"{each.name}{self.at} := {self.spell(each.tree)};" for each in form.updates]
-        lines = [f"{self.force} := 0.0;", *self.statements(form.shared)]
-        if self.i:
-            loads = [f"{now} := {name}[{self.i}];" for name, now in self.now.items()]
-            inner = _indented([*loads, *inner])
-            lines += [f"FOR {self.i} := 1 TO {element.n} DO", *inner, "END_FOR;"]
-        else:
-            lines += inner
-        if element.total.tree != Name(form.force):
-            lines.append(f"{self.force} := {self.spell(element.total.tree)};")
-        if element.position:
-            x, (v, _) = element.position, element.inputs[0]
-            lines.append(f"{x} := {x} + {form.dt} * {v};")
-        return lines
-
-    # ------------------------------------------------------------------ statements
-    def spell(self, tree: Node) -> str:
-        return spell(tree, self.dialect, self.texts)
-
-    def statements(self, found: Iterable[Statement]) -> list[str]:
-        return [line for each in found for line in self.statement(each)]
-
-    def statement(self, statement: Statement) -> Iterator[str]:
-        match statement:
-            case Set(name, tree, note):
-                yield f"{self.texts.get(name, name)} := {self.spell(tree)};{_note(note)}"
-            case Enter(state):
-                yield f"{self.state}{self.at} := {self.states[state]};"
-            case Guards(edges):
-                word = "IF"
-                for edge, taken in edges:
-                    yield f"{word} {self.spell(edge.guard)} THEN{_note(edge.name)}"
-                    yield from _indented(self.statements(taken) or [";"])
-                    word = "ELSIF"
-                yield "END_IF;"
-            case ByState(branches):
-                yield from self.by_state(branches)
-
-    def by_state(self, branches: Sequence[Sequence[Statement]]) -> Iterator[str]:
-        if len(branches) == 1:
-            yield from self.statements(branches[0])
-            return
-        word, last = "IF", len(branches) - 1
-        for index, branch in enumerate(branches):
-            name = self.states[index]
-            test = f"{word} {self.state}{self.at} = {name} THEN"
-            yield f"ELSE{_note(name)}" if index == last else test
-            yield from _indented(self.statements(branch) or [";"])
-            word = "ELSIF"
-        yield "END_IF;"
 
     # ------------------------------------------------------------------ for people
     def readme(self) -> str:
@@ -303,37 +262,19 @@ AND and OR may evaluate both sides.
 """
 
 
-def _assigned(statement: Statement) -> Iterator[str]:
-    """Return the names that a statement computes anew in every call."""
-    match statement:
-        case Set(name, _, _, True):
-            yield name
-        case Declare(names):
-            yield from names
-        case ByState(branches):
-            for branch in branches:
-                for each in branch:
-                    yield from _assigned(each)
-
-
 def _block(head: str, lines: Iterable[str]) -> list[str]:
-    inner = _indented(lines)
+    inner = indented(lines)
     return [head, *inner, "END_VAR"] if inner else []
 
 
-def _indented(lines: Iterable[str]) -> list[str]:
-    return [f"    {line}" for line in lines]
-
-
-def _note(text: str) -> str:
-    return f"  (* {_plain_text(text)} *)" if text else ""
-
-
-def _plain_text(text: str) -> str:
-    """Return a text that may stand in a comment."""
-    return re.sub(r"\s+", " ", text.replace("*)", "* )").replace("(*", "( *"))
-
-
 register(
-    Exporter("st", "IEC 61131-3 structured text, the plain form", structured_text, _Words(WORDS))
+    Format(
+        "st",
+        "friction",
+        "IEC 61131-3 structured text, the plain form",
+        "gms-fsm",
+        structured_text,
+        words=_Words(WORDS),
+        takes=("initial", "t_start"),
+    )
 )

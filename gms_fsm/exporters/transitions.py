@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from gms_fsm._formats import Format, register
 from gms_fsm._version import __version__
 from gms_fsm.charts._reader import AGE
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._charts import check_moved_from_outside, slow_velocity
-from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import ELEMENTARY, NAMESPACE, Condition, Node, Value, parse_value, sgn, spell
 from gms_fsm.language._normal import renamed
@@ -47,7 +47,7 @@ def _write(subject: Subject) -> dict[str, str]:
             place=f"chart {chart.name!r}",
             advice="export it as scxml",
         )
-    contact = None if isinstance(subject.given, Chart) else subject.contact
+    contact = subject.numbers
     source = "\n".join(_program(chart, contact))
     return {
         f"{name}.py": _head(chart) + _imports(source) + source,
@@ -169,7 +169,7 @@ def _assigned(name: str, value: Any) -> str:
     return f"{name} = " + text.replace("\n", "\n" + " " * (len(name) + 3))
 
 
-class _Printer:
+class ElementPrinter:
     """Prints trees over the attributes of an element."""
 
     def __init__(self, chart: Chart) -> None:
@@ -189,7 +189,7 @@ class _Printer:
 
 
 def _element(chart: Chart, contact: Contact | None) -> Iterator[str]:
-    text = _Printer(chart)
+    text = ElementPrinter(chart)
     yield "class Element:"
     yield '    """One element: the model object of the machine. Its state is `state`."""'
     yield ""
@@ -248,7 +248,7 @@ def _inputs(chart: Chart, contact: Contact | None) -> Iterator[str]:
 
 def _total(chart: Chart, contact: Contact | None) -> Iterator[str]:
     """Write the force of the contact over the sum of its elements' forces."""
-    names = {**_Printer(chart).names, "F": "F"}
+    names = {**ElementPrinter(chart).names, "F": "F"}
     named = {name: each.replace("self.", "first.") for name, each in names.items()}
     total = spell(chart.totals["F"], rename=named) if "F" in chart.totals else "F"
     if contact is not None and contact.model is not None:
@@ -421,4 +421,13 @@ def _one_line(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-register(Exporter("transitions", "Python for the package transitions", _write, WORDS, takes=()))
+register(
+    Format(
+        "transitions",
+        "friction",
+        "Python for the package transitions",
+        "gms-fsm",
+        _write,
+        words=WORDS,
+    )
+)

@@ -36,7 +36,7 @@ def scenario(tmp_path: Path) -> Path:
 
 
 # --------------------------------------------------------------------------- formats
-FORMATS = {each.ending: each for each in of("graph", "chart")}
+FORMATS = {each.name: each for each in of("graph", "chart")}
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

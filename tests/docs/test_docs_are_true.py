@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from gms_fsm.app.scenario import Scenario
-from plots.formats import FORMATS
+from gms_fsm.exporters import FORMATS, formats
 from tests.page_blocks import ROOT, Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow
@@ -40,7 +40,8 @@ def test_page(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setenv("COLUMNS", "200")
     monkeypatch.delenv("GMS_FSM_DATA", raising=False)
     monkeypatch.setattr("warnings.showwarning", None)  # the command line sets its own
-    monkeypatch.setattr("plots.formats.FORMATS", list(FORMATS))  # a page adds one
+    assert formats()  # all are in the table
+    monkeypatch.setattr("gms_fsm._formats.FORMATS", list(FORMATS))  # a page adds one
     page = Page(str(path.relative_to(ROOT)))
     printed: str | None = None
     for block in blocks_of(path.read_text(encoding="utf-8")):

@@ -9,12 +9,12 @@ from types import ModuleType
 
 import pytest
 
-from gms_fsm.exporters import EXPORTERS
-from plots.formats import FORMATS
+from gms_fsm.exporters import formats
 from tests.helpers import ROOT
 from tests.scenario_files import CommandLine
 
 PAGE = (ROOT / "docs" / "howto" / "exports.md").read_text(encoding="utf-8")
+PROGRAMS = [name for name, each in formats().items() if each.subject == "friction"]
 COMMANDS = re.findall(r"^`gms-fsm (export .* --to (\w+))`$", PAGE, re.MULTILINE)
 
 
@@ -32,13 +32,13 @@ def script() -> ModuleType:
 
 def test_page_and_file_agree(script: ModuleType) -> None:
     """If this fails, run: python docs/make_exports.py."""
-    assert script.filled(PAGE, script.table(EXPORTERS, script.rows())) == PAGE
+    assert script.filled(PAGE, script.table(PROGRAMS, script.rows())) == PAGE
 
 
 def test_rows_are_of_formats_and_complete(script: ModuleType) -> None:
-    pictures = {each.kind for each in FORMATS}
+    pictures = {each.kind for each in formats().values()}
     for form, tool, what, result in script.rows():
-        assert form in {*EXPORTERS, *pictures}
+        assert form in {*PROGRAMS, *pictures}
         assert re.search(r"\d", tool), f"{tool}: its version is missing"
         assert what
         assert result
@@ -62,7 +62,7 @@ def test_a_page_without_the_marks_is_refused(script: ModuleType) -> None:
         script.filled("# A page\n", "")
 
 
-@pytest.mark.parametrize("name", EXPORTERS)
+@pytest.mark.parametrize("name", PROGRAMS)
 def test_each_format_has_a_section_whose_command_runs(name: str, gms_fsm: CommandLine) -> None:
     headings = [line for line in PAGE.splitlines() if line.startswith("### ")]
     assert [line for line in headings if re.search(rf"\b{name}\b", line)], f"{name}: no section"

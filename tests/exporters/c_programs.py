@@ -16,7 +16,7 @@ import numpy as np
 
 from gms_fsm import GMSError, Model, Prescribed, Settings, System, Trace, export, simulate
 from gms_fsm.exporters import Subject
-from gms_fsm.exporters._c import Engine, engine_of
+from gms_fsm.exporters._c import CEngine, engine_of
 from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Corners
 
@@ -134,7 +134,7 @@ def same_bits(
 class Library:
     """An exported engine, called from Python."""
 
-    def __init__(self, folder: Path, made: Engine, compiler: str = "cc") -> None:
+    def __init__(self, folder: Path, made: CEngine, compiler: str = "cc") -> None:
         self.made, name = made, made.name
         path = folder / f"{name}-{compiler}.so"
         command = [compiler, *FLAGS, "-fPIC", "-shared", f"{name}.c", "-o", path.name, "-lm"]

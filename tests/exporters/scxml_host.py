@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +12,7 @@ from gms_fsm import Trace
 from gms_fsm.language import Node, evaluate, parse_value
 from gms_fsm.systems.models import Model
 
-__all__ = ["PythonStateMachine", "Scion", "Tool", "moved_by", "run", "switches_of"]
+__all__ = ["PythonStateMachine", "Tool", "moved_by", "run", "switches_of"]
 
 Switch = tuple[float, str, str]  # when, from which state, to which
 MATH = SimpleNamespace(
@@ -55,57 +53,6 @@ class PythonStateMachine:
         self.machine.send("step")
         (state,) = self.machine.configuration
         return state.id, vars(self.machine.model)
-
-
-DRIVER = """
-const scxml = require('@scion-scxml/scxml');
-const text = require('fs').readFileSync(process.argv[2], 'utf8');
-const fail = (error) => { if (error) { console.error(error); process.exit(1); } };
-scxml.documentStringToModel('', text, (error, model) => {
-  fail(error);
-  model.prepare((failed, ready) => {
-    fail(failed);
-    const chart = new scxml.core.Statechart(ready);
-    chart.start();
-    // Not earlier: lines that come before somebody listens are lost.
-    const lines = require('readline').createInterface({ input: process.stdin });
-    lines.on('line', (line) => {
-      chart.gen({ name: 'values', data: JSON.parse(line) });
-      chart.gen({ name: 'step' });
-      const [states, , , data] = chart.getSnapshot();
-      console.log(JSON.stringify([states, data]));
-    });
-  });
-});
-"""
-
-
-class Scion:
-    """The package SCION in node, in a process of its own."""
-
-    def __init__(self, path: Path, folder: Path) -> None:
-        driver = folder / "drive.js"
-        driver.write_text(DRIVER, encoding="utf-8")
-        self.process = subprocess.Popen(
-            ["node", str(driver), str(path)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            encoding="utf-8",
-        )
-
-    def step(self, values: Mapping[str, float]) -> tuple[str, Mapping[str, Any]]:
-        """Send ``values`` and ``step``; return the state, and the data model."""
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.process.stdin.write(json.dumps(dict(values)) + "\n")
-        self.process.stdin.flush()
-        (state,), data = json.loads(self.process.stdout.readline())
-        return state, data
-
-    def close(self) -> None:
-        """End the process."""
-        self.process.communicate(timeout=20)
 
 
 def moved_by(text: str) -> Callable[[float], float]:

@@ -18,7 +18,6 @@ from gms_fsm import (
     FrictionState,
     GMSParameters,
     Parameter,
-    ParameterError,
     State,
     Stribeck,
     export,
@@ -36,9 +35,15 @@ def model(k: float = 0.7, **curve: float) -> GMS:
     return GMS(GMSParameters([k, 0.9], [0.3, 0.4], [0.1, 0.05], **more), law="signed")
 
 
-def library(folder: Path, given: GMS) -> Library:
+def library(folder: Path, given: GMS | ChartModel) -> Library:
     export(given, "c99", folder, name="it")
     return Library(folder, engine_of(Subject.of(given, "c99", name="it")))
+
+
+@pytest.fixture(scope="module")
+def c(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """Return the engine of a friction."""
+    return library(tmp_path_factory.mktemp("engine"), model())
 
 
 VELOCITIES = np.cumsum(np.random.default_rng(3).normal(size=60)) * 0.3
@@ -52,8 +57,7 @@ def forces(c: Library, state: object) -> list[float]:
     return found
 
 
-def test_the_engine_in_a_struct(tmp_path: Path) -> None:
-    c = library(tmp_path, model())
+def test_the_engine_in_a_struct(c: Library) -> None:
     first, copied = c.begun(), c.State()
     begun = forces(c, first)
     ctypes.memmove(ctypes.byref(copied), ctypes.byref(first), ctypes.sizeof(first))
@@ -69,8 +73,7 @@ def test_the_engine_in_a_struct(tmp_path: Path) -> None:
     [(math.nan, 0.0, 0.1), (0.0, math.inf, 0.1), (0.0, 0.0, -0.1), (0.0, 0.0, math.nan),
      (0.0, 0.0, 1e-300), (0.0, 0.0, 1e10)],
 )  # fmt: skip
-def test_bad_arguments(numbers: tuple[float, ...], tmp_path: Path) -> None:
-    c = library(tmp_path, model())
+def test_bad_arguments(numbers: tuple[float, ...], c: Library) -> None:
     state = c.begun()
     assert c.advance(state, 0.1, 0.1, 5.0) == 0
     before = bytes(state)
@@ -80,9 +83,9 @@ def test_bad_arguments(numbers: tuple[float, ...], tmp_path: Path) -> None:
     assert bytes(state) == before
 
 
-def test_numbers_are_set_and_all_that_follows_from_them(tmp_path: Path) -> None:
+def test_numbers_are_set_and_all_that_follows_from_them(c: Library) -> None:
     """Tolerances and scales, too: the bits are those of a friction that began with the numbers."""
-    c, given = library(tmp_path, model()), {"F_s": 0.9, "v_s": 5e-3}
+    given = {"F_s": 0.9, "v_s": 5e-3}
     state = c.begun()
     k = c.place("k")
     assert [c.get(state, k), c.get(state, k + 1)] == [0.7, 0.9]
@@ -107,9 +110,7 @@ def test_the_entry_of_the_default_state_follows_a_number(tmp_path: Path) -> None
         ),
         outputs={"F": "z"},
     )
-    export(ChartModel(chart, {"z_0": 0.5, "tau": 2.0}), "c99", tmp_path, name="it")
-    subject = Subject.of(ChartModel(chart, {"z_0": 0.5, "tau": 2.0}), "c99", name="it")
-    c = Library(tmp_path, engine_of(subject))
+    c = library(tmp_path, ChartModel(chart, {"z_0": 0.5, "tau": 2.0}))
     state: Any = c.begun()
     assert state.z[0] == 1.0
     assert c.set(state, c.place("z_0"), -3.0) == 0
@@ -118,17 +119,3 @@ def test_the_entry_of_the_default_state_follows_a_number(tmp_path: Path) -> None
     friction = FrictionState(ChartModel(chart, {"z_0": -3.0, "tau": 0.01}))
     pairs = list(itertools.pairwise(VELOCITIES))
     assert forces(c, state) == [friction.advance(v0, v1, 0.1) for v0, v1 in pairs]
-
-
-def test_what_only_the_first_call_knows_is_refused(tmp_path: Path) -> None:
-    chart = Chart(
-        "memory",
-        inputs=("v",),
-        variables=("z",),
-        let={"twice": "2 * v"},
-        states=(State("only", entry={"z": "twice"}),),
-        outputs={"F": "z"},
-    )
-    with pytest.raises(ParameterError, match="begins with z = twice, and v is known only"):
-        export(ChartModel(chart, {}), "c99", tmp_path)
-    assert list(tmp_path.iterdir()) == []

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gms_fsm import Body, ChartModel, Contact, FrictionState, Settings, System, export, simulate
+from gms_fsm import Body, ChartModel, Contact, Settings, System, export, simulate
 from gms_fsm.charts import CHARTS
-from gms_fsm.errors import ParameterError
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners
 from tests.exporters.c_programs import COMPILERS, built
@@ -82,12 +81,3 @@ def test_settings_are_those_of_the_engine(tmp_path: Path) -> None:
         method = "rk4" if settings.step else "dp45"
         assert f"Method {method}" in (tmp_path / "README-it-c99.md").read_text()
     assert len(sources) == 3
-    for wrong in (
-        Settings(method="euler", step=1e-3, events="step"),
-        Settings(step=1e-3, events="held"),
-    ):
-        with pytest.raises(ParameterError, match="only the methods of gms-fsm that locate"):
-            export(model, "c99", tmp_path, name="it", settings=wrong)
-    with pytest.raises(ParameterError, match="settings: format 'st' does not use it"):
-        export(model, "st", tmp_path, name="it", settings=Settings())
-    assert FrictionState(model).t == 0.0

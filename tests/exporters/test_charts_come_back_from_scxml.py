@@ -169,13 +169,14 @@ STATE = '<state id="stick">'
         (FOREIGN, "<scxml", "it is not XML"),
         (FOREIGN, "<html/>", "its root is <html>, not <scxml"),
         ("<scxml ", '<!DOCTYPE x [<!ENTITY a "b">]><scxml ', "a document type definition"),
-        (STATE, '<parallel id="p"/>' + STATE, "<parallel> has no counterpart in a chart"),
-        (STATE, '<final id="p"/>' + STATE, "<final> has no counterpart in a chart"),
-        (STATE, "<script>x = 1</script>" + STATE, "<script> has no counterpart in a chart"),
-        (STATE, STATE + '<state id="x"/>', "state 'stick': <state> has no counterpart"),
-        (STATE, STATE + '<history id="x"/>', "state 'stick': <history> has no counterpart"),
-        (STATE, STATE + '<invoke src="x"/>', "state 'stick': <invoke> has no counterpart"),
-        (STATE, STATE + "<initial/>", "state 'stick': <initial> has no counterpart"),
+        *(
+            (STATE, f"<{each}></{each}>{STATE}", f"<{each}> has no counterpart in a chart")
+            for each in ("parallel", "final", "script")
+        ),
+        *(
+            (STATE, f"{STATE}<{each}/>", f"state 'stick': <{each}> has no counterpart")
+            for each in ("state", "history", "invoke", "initial")
+        ),
         (STATE, "<state/>" + STATE, "a <state> has no id"),
         ('initial="stick"', 'initial="stuck"', "its initial state is 'stuck'"),
         ('<data id="z" expr="0"/>', '<data id="z" src="z.json"/>', "<data src=...> has no"),

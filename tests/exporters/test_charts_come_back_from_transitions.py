@@ -150,20 +150,24 @@ class Watching:
         ),
         (AsyncMachine(states=["a"], initial="a"), "an? AsyncMachine has no counterpart"),
         (small(queued=True), "queued=True has no counterpart"),
-        (small(before_state_change=print), "its callback before_state_change 'print'"),
-        (small(after_state_change=print), "its callback after_state_change 'print'"),
-        (small(prepare_event="look"), "its callback prepare_event 'look'"),
-        (small(finalize_event="look"), "its callback finalize_event 'look'"),
-        (small(on_exception="look"), "its callback on_exception 'look'"),
-        (small(on_final="look"), "its callback on_final 'look'"),
-        (small(initial=None, model=None), "it has no initial state"),
-        (
-            small(states=["stick", State("slip", on_enter="look")]),
-            "state 'slip': its callback on_enter 'look'.*entry=",
+        *(
+            (small(**{each: "look"}), f"its callback {each} 'look'")
+            for each in (
+                "before_state_change",
+                "after_state_change",
+                "prepare_event",
+                "finalize_event",
+                "on_exception",
+                "on_final",
+            )
         ),
-        (
-            small(states=["stick", State("slip", on_exit="look")]),
-            "state 'slip': its callback on_exit 'look'.*exit=",
+        (small(initial=None, model=None), "it has no initial state"),
+        *(
+            (
+                small(states=["stick", State("slip", **{f"on_{each}": "look"})]),
+                f"state 'slip': its callback on_{each} 'look'",
+            )
+            for each in ("enter", "exit")
         ),
         (small(model=Watching()), "state 'slip': its callback on_enter 'on_enter_slip'"),
         (small(states=["stick", State("slip", final=True)]), "state 'slip': a final state"),
@@ -172,9 +176,10 @@ class Watching:
             r"state 'b': its timeout of 2 s has no counterpart.*after\(T\)",
         ),
         (small(transitions=row(unless="is_slow")), "trigger 'slips': unless has no counterpart"),
-        (small(transitions=row(before="look")), "trigger 'slips': its callback before 'look'"),
-        (small(transitions=row(after="look")), "trigger 'slips': its callback after 'look'"),
-        (small(transitions=row(prepare="look")), "trigger 'slips': its callback prepare 'look'"),
+        *(
+            (small(transitions=row(**{e: "look"})), f"trigger 'slips': its callback {e} 'look'")
+            for e in ("before", "after", "prepare")
+        ),
         (small(transitions=row(dest=None)), "its internal transition in 'stick'"),
         (
             small(transitions=[["go", "stick", "slip"], ["go", "slip", "stick"]]),

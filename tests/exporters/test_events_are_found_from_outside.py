@@ -18,7 +18,7 @@ from gms_fsm import GMS, Body, Contact, GMSParameters, System, simulate
 from gms_fsm.app.scenario import load_system
 from gms_fsm.charts.karnopp import KARNOPP
 from gms_fsm.exporters import Subject
-from gms_fsm.exporters._fmu_model import Both, both_of
+from gms_fsm.exporters._fmu_model import FmuArguments, both_of
 from gms_fsm.systems.models import ChartModel
 from integrators import exchange, stepping
 from integrators.steps import T
@@ -52,7 +52,7 @@ def servo() -> System:
 class Importer:
     """Integrates from outside."""
 
-    def __init__(self, both: Both) -> None:
+    def __init__(self, both: FmuArguments) -> None:
         plan = both.buffers.plan._replace(foreign=True)
         b = both.buffers._replace(plan=plan)
         self.functions, self.machines, self.b = both.functions, both.machines, b

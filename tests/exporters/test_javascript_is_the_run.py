@@ -21,8 +21,6 @@ from gms_fsm import (
     FrictionState,
     GMSParameters,
     Parameter,
-    ParameterError,
-    Settings,
     State,
     Stribeck,
     System,
@@ -58,7 +56,7 @@ def pulled(**numbers: float) -> System:
 
 @needs_node
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ball_screw_table", "brake_squeal", "pulled_mass", "servo"])
+@pytest.mark.parametrize("name", ["ball_screw_table", "servo"])
 def test_a_scenario_has_the_same_bits_in_c_and_in_javascript(name: str) -> None:
     differ = check(scenario(SCENARIOS / f"{name}.toml"), [(each, "-O2") for each in COMPILERS[:1]],
                    ("node",))  # fmt: skip
@@ -67,7 +65,7 @@ def test_a_scenario_has_the_same_bits_in_c_and_in_javascript(name: str) -> None:
 
 @needs_node
 @pytest.mark.slow
-@pytest.mark.parametrize("index", range(6))
+@pytest.mark.parametrize("index", range(3))
 def test_a_random_system_has_the_same_bits_in_javascript(index: int) -> None:
     differ = check(random_case(SEED, index), (), ("node",))
     assert differ == [], f"repeat with: python -m tests.platforms --seed {SEED} --first {index}"
@@ -133,41 +131,6 @@ def test_a_wrong_number_is_named(numbers: str, message: str, tmp_path: Path) -> 
         f"try {{ run({numbers}); }} catch (error) {{ console.log(error.name, error.message); }}\n"
     )
     assert ran(program).startswith(f"FrictionError {message}")
-
-
-# --------------------------------------------------------------------------- what is refused
-def push(t: float) -> float:
-    return 0.1 * t
-
-
-def test_a_python_function_is_named_with_its_place(tmp_path: Path) -> None:
-    system = System(
-        "pushed",
-        bodies=(Body("mass", inertia=1.0, force="f"),),
-        contacts=(Contact("pad", stick_slip("signed")),),
-        signals={"f": push},
-    )
-    place = rf"{Path(__file__).name}:{push.__code__.co_firstlineno}, push\)"
-    with pytest.raises(ParameterError, match=rf"signal 'f': it is a Python function \(.*{place}"):
-        export(system, "js", tmp_path, t_end=1.0)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ({}, "t_end: a run needs its end"),
-        ({"t_end": 1.0, "settings": Settings(output="end")}, "settings: only the methods"),
-    ],
-)
-def test_what_a_run_needs(more: dict[str, Any], message: str, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=message):
-        export(pulled(), "js", tmp_path, **more)
-
-
-def test_other_formats_have_no_end(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="t_end: format 'c99' does not use it"):
-        export(stick_slip("signed"), "c99", tmp_path, t_end=1.0)
 
 
 # --------------------------------------------------------------------------- step by step

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gms_fsm import GMS, Chart, ChartModel, Contact, GMSParameters, State, Transition
+from gms_fsm import Chart, ChartModel, Contact, GMSParameters, State, Transition
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._plain_c import plain_c
 from gms_fsm.exporters._subject import Subject
@@ -63,28 +63,6 @@ def test_no_memory_but_the_struct() -> None:
     assert text.count("static const") == text.count("static const double")
 
 
-@pytest.mark.parametrize(
-    ("parameter", "guard", "wrong"),
-    [
-        ("double", "z > 1", "parameter 'double'"),
-        ("k", "F > 1", "edge 'go': it reads 'F' of the contact"),
-        ("k", "a > 1", "edge 'go': it reads 'a' of the contact"),
-        ("stärke", "z > 1", "parameter 'stärke'"),
-    ],
-)
-def test_refused(parameter: str, guard: str, wrong: str) -> None:
-    chart = Chart(
-        "refused",
-        variables=("z",),
-        parameters=(parameter,),
-        states=(State("a", flow={"z": "v"}), State("b")),
-        transitions=(Transition("go", "a", "b", guard=guard),),
-        outputs={"F": "z"},
-    )
-    with pytest.raises(ParameterError, match=re.escape(wrong)):
-        plain_c(Subject.of(ChartModel(chart, {parameter: 1.0}), "c99"))
-
-
 def test_names_of_the_printer_give_way() -> None:
     """A chart may use the names that the text would use: i, dt, F_i, friction, weight, stribeck."""
     names = ("i", "dt", "F_i", "friction", "weight", "stribeck", "F_c")
@@ -101,16 +79,6 @@ def test_names_of_the_printer_give_way() -> None:
     text = plain_c(Subject.of(model, "c99", name="n"))["n_plain.c"]
     assert "for (int i2 = 0; i2 < 2; i2++)" in text
     assert "const double model_stribeck = model_F_c + (F_s - model_F_c)" in text
-
-
-def test_a_published_law_is_another_text() -> None:
-    parameters = GMSParameters.paper("stick-slip")
-    texts = {
-        law: plain_c(Subject.of(GMS(parameters, law=law), "c99", name="g"))["g_plain.c"]
-        for law in ("signed", "published")
-    }
-    assert "dz = C[i] * (g_plain_sgn(v) - z / s);" in texts["signed"]
-    assert "dz = g_plain_sgn(v) * C[i] * (1.0 - z / s);" in texts["published"]
 
 
 @needs_c

@@ -26,7 +26,6 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import CHARTS, GMS_ELEMENT
-from gms_fsm.errors import ParameterError
 from gms_fsm.language import evaluate, parse_value
 from tests.exporters.charts_to_export import MODELS, SLOW, imported, model
 from tests.helpers import stick_slip
@@ -58,8 +57,8 @@ def log_of(trace: Any) -> list[Any]:
     "name",
     [
         name
-        if name in ("gms-signed", "seven-parameter")
-        else pytest.param(name, marks=pytest.mark.slow)
+        if name in ("gms-signed", "seven-parameter", "backlash")
+        else pytest.param(name, marks=pytest.mark.matrix)
         for name in MODELS
     ],
 )
@@ -201,49 +200,3 @@ def test_the_readme_says_how_to_run_it(tmp_path: Path) -> None:
     text = (tmp_path / "README-own-transitions.md").read_text(encoding="utf-8")
     for wanted in ("python own.py", "States: stick, slip", "not located", "k, sigma, C, v_c"):
         assert wanted in text
-
-
-# --------------------------------------------------------------------------- refusals
-def chart(**parts: Any) -> Chart:
-    given: dict[str, Any] = {
-        "states": (State("a"), State("b")),
-        "transitions": (Transition("go", "a", "b", "v > 0"),),
-        "outputs": {"F": "v"},
-    }
-    return Chart("own", **{**given, **parts})
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (CHARTS["karnopp"], "state 'stuck': it locks the contact"),
-        (
-            chart(transitions=(Transition("go", "a", "b", "a < 1"),)),
-            "edge 'go': guard: it reads 'a', an acceleration",
-        ),
-        (
-            chart(transitions=(Transition("go", "a", "b", "v < 1", {"v": "0"}),)),
-            "edge 'go': action 'v': it sets the velocity",
-        ),
-        (
-            chart(variables=("z",), transitions=(Transition("go", "a", "b", "v < 1", {"z": "F"}),)),
-            "edge 'go': action 'z': it reads 'F', a force",
-        ),
-        (
-            chart(velocities=("v", "w"), outputs={"F": "v", "F_w": "w"}),
-            "it has the velocities v, w",
-        ),
-    ],
-)
-def test_what_cannot_be_written_is_named(given: Chart, said: str, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError) as caught:
-        export(given, "transitions", tmp_path / "out", name="file")
-    assert said in str(caught.value)
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("name", ["class", "math", "transitions", "../x", "1x"])
-def test_names_that_no_module_can_have(name: str, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"name '.*': "):
-        export(chart(), "transitions", tmp_path / "out", name=name)
-    assert not (tmp_path / "out").exists()

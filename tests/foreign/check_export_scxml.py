@@ -11,15 +11,16 @@ import json
 import os
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from gms_fsm import Prescribed, export, simulate
 from tests.exporters.charts_to_export import MODELS, model
-from tests.exporters.scxml_host import PythonStateMachine, Scion, moved_by, run, switches_of
+from tests.exporters.scxml_host import PythonStateMachine, moved_by, run, switches_of
 from tests.helpers import ROOT
 
 Ran = Callable[..., None]
@@ -41,6 +42,57 @@ def motion(name: str) -> tuple[str, float, float]:
     if name.startswith("gms"):
         return "0.15 * sin(2 * pi * t / 25)", 25.0, 0.05
     return GENTLE, 7.5, 5e-3
+
+
+DRIVER = """
+const scxml = require('@scion-scxml/scxml');
+const text = require('fs').readFileSync(process.argv[2], 'utf8');
+const fail = (error) => { if (error) { console.error(error); process.exit(1); } };
+scxml.documentStringToModel('', text, (error, model) => {
+  fail(error);
+  model.prepare((failed, ready) => {
+    fail(failed);
+    const chart = new scxml.core.Statechart(ready);
+    chart.start();
+    // Not earlier: lines that come before somebody listens are lost.
+    const lines = require('readline').createInterface({ input: process.stdin });
+    lines.on('line', (line) => {
+      chart.gen({ name: 'values', data: JSON.parse(line) });
+      chart.gen({ name: 'step' });
+      const [states, , , data] = chart.getSnapshot();
+      console.log(JSON.stringify([states, data]));
+    });
+  });
+});
+"""
+
+
+class Scion:
+    """The package SCION in node, in a process of its own."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        driver = folder / "drive.js"
+        driver.write_text(DRIVER, encoding="utf-8")
+        self.process = subprocess.Popen(
+            ["node", str(driver), str(path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+        )
+
+    def step(self, values: Mapping[str, float]) -> tuple[str, Mapping[str, Any]]:
+        """Send ``values`` and ``step``; return the state, and the data model."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(json.dumps(dict(values)) + "\n")
+        self.process.stdin.flush()
+        (state,), data = json.loads(self.process.stdout.readline())
+        return state, data
+
+    def close(self) -> None:
+        """End the process."""
+        self.process.communicate(timeout=20)
 
 
 def check(name: str, path: Path, start: Callable[[], PythonStateMachine | Scion]) -> int:

@@ -228,8 +228,10 @@ static bool stopped(instance *it, int64_t code)
 }
 
 /* Model Exchange: all edges that are enabled here. */
-static bool settle_here(instance *it)
+static bool settled(instance *it, const char *name)
 {
+    if (it->now.mode != EVENTS)
+        return failed(it, "%s is for the event mode", name);
     int64_t code = MODEL(settle)(address(it));
     outdated(it);
     return code == 0 || stopped(it, code);

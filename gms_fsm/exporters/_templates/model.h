@@ -7,6 +7,7 @@
 
 #define MODEL(name) ${name}_##name
 #define TOKEN "$token"
+#define FMI_VERSION $version
 $constants
 
 void ${name}_start(char *block);
