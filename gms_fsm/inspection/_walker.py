@@ -133,7 +133,7 @@ def _first_true(
     """
     before, after = branch.raw(row), branch.raw(row + 1)
     start = before.t if begin is None else begin
-    if after.microstep > 0 or after.t <= start or branch.run.start.program.ticks.at(after.t):
+    if after.microstep > 0 or after.t <= start or branch.start.program.ticks.at(after.t):
         return None, truth  # at a tick values jump: nothing is between the rows
     low, place = start, branch.behind(row)
     for look in range(1, LOOKS + 1):
