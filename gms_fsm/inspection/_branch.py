@@ -36,10 +36,10 @@ from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
 from integrators import Firing, Stop
 
-__all__ = ["Branch", "Course", "Row"]
+__all__ = ["Branch", "BranchRow", "Continuation"]
 
 
-class Row(NamedTuple):
+class BranchRow(NamedTuple):
     """A row of a branch, or a point between two rows (then with micro-step 0)."""
 
     t: float
@@ -48,7 +48,7 @@ class Row(NamedTuple):
     mode: tuple[int, ...]
 
 
-class Course(NamedTuple):
+class Continuation(NamedTuple):
     """How a branch runs: from a start, after the rows that it shares with its past.
 
     Parameters
@@ -59,17 +59,17 @@ class Course(NamedTuple):
         The branch that was poked.
     fork : int
         Row of the past that was poked; rows 0 to fork are shared.
-    begin : Row or None
+    begin : BranchRow or None
         The point of the poke, if it was between two rows; it is a row of this branch.
     """
 
     start: Start
     past: Branch | None = None
     fork: int = -1
-    begin: Row | None = None
+    begin: BranchRow | None = None
 
 
-class Whole(NamedTuple):
+class WholeBranch(NamedTuple):
     """A branch computed to its end, and why it could not reach it, if it could not."""
 
     trace: Trace
@@ -81,7 +81,7 @@ class Branch:
 
     Parameters
     ----------
-    course : Course
+    course : Continuation
         How it runs.
     parent : int or None
         Number of the branch that it comes from.
@@ -90,7 +90,7 @@ class Branch:
     """
 
     def __init__(
-        self, course: Course, parent: int | None = None, edits: Edits | None = None
+        self, course: Continuation, parent: int | None = None, edits: Edits | None = None
     ) -> None:
         self.start, self.past, self.fork, self.begin = course
         self.parent, self.edits = parent, edits
@@ -98,7 +98,7 @@ class Branch:
         self.failure: SimulationError | None = None  # why it cannot continue
         self.offset = self.fork + 1 + (self.begin is not None)
         self.cursor = 0 if self.past is None else self.offset
-        self.between: Row | None = None  # a located point after the cursor row
+        self.between: BranchRow | None = None  # a located point after the cursor row
         self.stops: set[int] = set()  # rows at which the guards were evaluated
         self.firings: list[int] = []  # rows made by firings in this branch
         self.on_row: Callable[[], object] = _nothing  # called at each row of a move; may interrupt
@@ -152,7 +152,7 @@ class Branch:
             pass
         return self.past
 
-    def raw(self, row: int) -> Row:
+    def raw(self, row: int) -> BranchRow:
         """Return time, micro-step, state and modes of a row."""
         if row <= self.fork:
             return self._shared().raw(row)
@@ -160,19 +160,19 @@ class Branch:
             assert self.begin is not None
             return self.begin
         rows, i = self.run.recorder.rows, row - self.offset
-        return Row(rows.t[i], rows.microstep[i], rows.y[i], rows.mode[i])
+        return BranchRow(rows.t[i], rows.microstep[i], rows.y[i], rows.mode[i])
 
     @property
-    def last(self) -> Row:
+    def last(self) -> BranchRow:
         """The last row computed so far."""
         return self.raw(len(self) - 1)
 
     @property
-    def here(self) -> Row:
+    def here(self) -> BranchRow:
         """The row or point at the cursor."""
         return self.place(self.cursor)
 
-    def place(self, row: int) -> Row:
+    def place(self, row: int) -> BranchRow:
         """Return a row, or for the cursor row the located point after it, if there is one."""
         if row == self.cursor and self.between is not None:
             return self.between
@@ -182,7 +182,7 @@ class Branch:
         """Return the last computed row at or before a time; -1 if it is before all of them."""
         return bisect_right(range(len(self)), t, key=lambda row: self.raw(row).t) - 1
 
-    def behind(self, row: int) -> Callable[[float], Row]:
+    def behind(self, row: int) -> Callable[[float], BranchRow]:
         """Return a function of time that gives points between a row and the next."""
         return _between(self.start.program, self.raw(row), self.raw(row + 1))
 
@@ -193,32 +193,32 @@ class Branch:
             return here.microstep
         return here.microstep + self.past.counted(self.fork)
 
-    def scope(self, row: Row, contact: str = "") -> Scope:
+    def scope(self, row: BranchRow, contact: str = "") -> Scope:
         """Return the values of a contact at a row or point; without a name of the only one."""
         start = self.start
         name = start.program.layout.contact(contact).name
         model = start.model if start.given is None else start.system.contact(name)
         return Scope.of(model, start.program, row.t, row.y, row.mode, name)
 
-    def system_scope(self, row: Row) -> SystemScope:
+    def system_scope(self, row: BranchRow) -> SystemScope:
         """Return all values at a row or point, by name."""
         start = self.start
         return SystemScope.of(start.system, start.program, row.t, row.y, row.mode)
 
-    def watches(self, row: Row) -> dict[str, Any]:
+    def watches(self, row: BranchRow) -> dict[str, Any]:
         """Return the values at a row or point of the names allowed in conditions."""
         if self.start.given is None:
             return self.scope(row).watches()
         return self.system_scope(row).watches()
 
-    def state(self, row: Row, machine: int) -> str:
+    def state(self, row: BranchRow, machine: int) -> str:
         """Return the active state of an element, counted over all contacts, at a row."""
         start = self.start
         active = row.mode[start.program.layout.elements][machine]
         bank = start.program.layout.bank(machine)
         return start.system.contact(bank.name).chart.states[active].name
 
-    def sigma(self, row: Row) -> dict[str, float]:
+    def sigma(self, row: BranchRow) -> dict[str, float]:
         """Return the signs held between -1 and 1 at a row, keyed by the quantity that is zero."""
         program = self.start.program
         found = zip(program.surface_names, sigmas(program, row.t, row.y, row.mode), strict=True)
@@ -280,11 +280,11 @@ class Branch:
         return self._joined(before, self.run.recorder.trace())
 
     @functools.cached_property
-    def whole(self) -> Whole:
+    def whole(self) -> WholeBranch:
         """The branch to its end, or until it cannot continue, by the engine of its settings."""
         if self.start.chosen.engine != "compiled":
             self.complete()
-            return Whole(self.trace(), self.failure)
+            return WholeBranch(self.trace(), self.failure)
         before = None if self.past is None else self.past.whole.trace
         run, failure = CompiledRun(self.start), None
         try:
@@ -293,7 +293,7 @@ class Branch:
             own = run.recorder.trace()
         except SimulationError as error:
             failure, own = error.with_traceback(None), error.trace
-        return Whole(self._joined(before, own), failure)
+        return WholeBranch(self._joined(before, own), failure)
 
     def _joined(self, before: Trace | None, own: Trace) -> Trace:
         """Return the trace of the past up to the poke, and what follows it."""
@@ -309,7 +309,7 @@ class Branch:
         firings = before.firings.at(made).followed_by(own.firings)
         return self.start.trace(rows, rows, firings)
 
-    def found(self, t: float, microstep: int | None) -> tuple[int, Row, bool]:
+    def found(self, t: float, microstep: int | None) -> tuple[int, BranchRow, bool]:
         """Find the place of a time in the whole run.
 
         Parameters
@@ -321,7 +321,7 @@ class Branch:
 
         Returns
         -------
-        (int, Row, bool)
+        (int, BranchRow, bool)
             The last row before it; the point there; whether it is between two rows.
 
         Raises
@@ -343,18 +343,18 @@ class Branch:
         return at, _row(rows, at), False
 
 
-def _row(rows: Rows, row: int) -> Row:
+def _row(rows: Rows, row: int) -> BranchRow:
     t, microstep, y, mode = (each[row].tolist() for each in vars(rows).values())
-    return Row(t, microstep, y, tuple(mode))
+    return BranchRow(t, microstep, y, tuple(mode))
 
 
-def _between(program: Program, before: Row, after: Row) -> Callable[[float], Row]:
+def _between(program: Program, before: BranchRow, after: BranchRow) -> Callable[[float], BranchRow]:
     """Return a function of time that gives points between two rows."""
     mode = list(before.mode)
     ends = before.t, np.array(before.y), after.t, np.array(after.y)
 
-    def place(t: float) -> Row:
-        return Row(t, 0, interpolated(program, mode, *ends, t).tolist(), before.mode)
+    def place(t: float) -> BranchRow:
+        return BranchRow(t, 0, interpolated(program, mode, *ends, t).tolist(), before.mode)
 
     return place
 

@@ -15,7 +15,7 @@ from gms_fsm._arguments import checked_integer
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.inspection._adjustable import Number, number_of, numbers_of, with_numbers
-from gms_fsm.inspection._branch import Branch, Course, Row
+from gms_fsm.inspection._branch import Branch, BranchRow, Continuation
 from gms_fsm.inspection._export import save_scenario
 from gms_fsm.inspection._poking import Edits, initial_with
 from gms_fsm.inspection._results import BranchComparison, compared
@@ -353,14 +353,14 @@ class Tree:
             number_of(subject, name)
         return {name: checked_scalar(name, value, "finite") for name, value in values.items()}
 
-    def _added(self, fork: Fork, course: Course | None = None) -> int:
+    def _added(self, fork: Fork, course: Continuation | None = None) -> int:
         number = self._next
         name = fork.name.strip() or fork.text or f"branch {number}"
         self._put(number, replace(fork, name=name), course)
         self._next, self.current = number + 1, number
         return number
 
-    def _put(self, number: int, fork: Fork, course: Course | None = None) -> None:
+    def _put(self, number: int, fork: Fork, course: Continuation | None = None) -> None:
         """Put a branch in its place and make it; if it cannot start, all is as before."""
         before = dict(self.forks), dict(self._branches)
         self.forks[number] = fork
@@ -387,27 +387,29 @@ class Tree:
     def _subject(self, law: str | None, values: Mapping[str, float]) -> Adjustable:
         return with_numbers(self.subject if law is None else self.subject.with_law(law), values)
 
-    def _made(self, number: int, course: Course) -> Branch:
+    def _made(self, number: int, course: Continuation) -> Branch:
         fork = self.forks[number]
         return Branch(course, fork.parent, None if fork.poke is None else fork.poke.edits)
 
-    def _course(self, number: int, values: Mapping[str, float], law: str | None) -> Course:
+    def _course(self, number: int, values: Mapping[str, float], law: str | None) -> Continuation:
         """Return how a branch runs, with further numbers, or another law, from its start on."""
         fork = self.forks[number]
         values, law = _then(fork.values, values), law or fork.law
         if fork.parent is None:
-            return Course(self._start(self._subject(law, values), self.t_start, self.initial))
+            return Continuation(self._start(self._subject(law, values), self.t_start, self.initial))
         if fork.poke is None:
             return self._course(fork.parent, values, law)
         same, poke = not values and law is None, fork.poke
         past = self.branch(fork.parent) if same else Branch(self._course(fork.parent, values, law))
         return self._poked(past, poke.edits, *past.found(poke.t, poke.microstep))
 
-    def _poked(self, past: Branch, edits: Edits, row: int, here: Row, between: bool) -> Course:
+    def _poked(
+        self, past: Branch, edits: Edits, row: int, here: BranchRow, between: bool
+    ) -> Continuation:
         was = past.start
         subject = Adjustable(was.given or was.model, None if was.given else was.rig)
         start = self._start(subject, here.t, initial_with(edits, was, here))
-        return Course(start, past, row, here if between else None)
+        return Continuation(start, past, row, here if between else None)
 
     def _start(self, subject: Adjustable, t: float, initial: Mapping[str, Any] | None) -> Start:
         options: Any = {"t_start": t, "initial": initial, "ticks_from": self.t_start}

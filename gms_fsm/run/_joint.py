@@ -34,7 +34,7 @@ from integrators import advance, hybrid, loop
 from integrators.stepping import CODE, FULL_LOG, RESUMED, SWITCHES
 from integrators.steps import T
 
-__all__ = ["FAILURES", "Asked", "Joint", "Line", "Switch"]
+__all__ = ["FAILURES", "Asked", "ElementSwitch", "Joint", "Line"]
 
 Line = tuple[Any, Any]  # an input at the start and at the end of a sample
 ARGUMENTS = ("self", "v0", "v1", "dt")  # of `FrictionState.advance`
@@ -51,7 +51,7 @@ FAILURES: Mapping[int, tuple[type[SimulationError], str]] = {
 }
 
 
-class Switch(NamedTuple):
+class ElementSwitch(NamedTuple):
     """An edge that was taken."""
 
     t: float  # s
@@ -116,9 +116,9 @@ class Joint:
                 raise self._within(error) from None
             b.now.y[:], b.memory.anchor[:] = start.y, start.y
 
-    def finish(self, now: float) -> list[Switch]:
+    def finish(self, now: float) -> list[ElementSwitch]:
         """Complete a sample that ended early, and return what its log lost; or raise its error."""
-        counts, lost = self.memory.sample.counts, list[Switch]()
+        counts, lost = self.memory.sample.counts, list[ElementSwitch]()
         while code := int(counts[CODE]):
             if code != FULL_LOG:
                 raise self._within(self._failure(code, now))
@@ -162,12 +162,12 @@ class Joint:
         return {name: y[list(places.all_of(self._bank.of(name)))] for name in self._bank.variables}
 
     @property
-    def logged(self) -> list[Switch]:
+    def logged(self) -> list[ElementSwitch]:
         """The switches in the log of the sample."""
         sample, edges = self.memory.sample, self._chart.transitions
         count = int(sample.counts[SWITCHES])
         log = zip(sample.t[:count], sample.machine[:count], sample.edge[:count], strict=True)
-        return [Switch(float(t), int(i), edges[int(edge)].name) for t, i, edge in log]
+        return [ElementSwitch(float(t), int(i), edges[int(edge)].name) for t, i, edge in log]
 
     def forget(self) -> None:
         """Empty the log."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.run._joint import Asked, Joint, Line, Switch
+from gms_fsm.run._joint import Asked, ElementSwitch, Joint, Line
 from gms_fsm.run._steppable import start_of
 from gms_fsm.run._stepper import BlockMemory, ListMemory, StepMemory, fast, machine_code
 from gms_fsm.run.start import LATEST
@@ -25,7 +25,7 @@ from integrators.stepping import MEAN, RESUMED
 __all__ = ["Joints", "Snapshot", "content_of", "input_lines", "made_again"]
 
 CHANGE = 1e-4  # of the last velocity, for a derivative by differences
-Lost = dict[Joint, list[Switch]]  # switches that did not fit into the log of a sample
+Lost = dict[Joint, list[ElementSwitch]]  # switches that did not fit into the log of a sample
 # When it began, v0, v1, further inputs, lost switches, and a copy of the state before it.
 LastSample = tuple[float, Any, Any, Mapping[str, Line], Lost, Any]
 
@@ -270,7 +270,7 @@ class Joints:
 
     # ------------------------------------------------------------------ what it found
     @property
-    def switches(self) -> list[tuple[Switch, ...]]:
+    def switches(self) -> list[tuple[ElementSwitch, ...]]:
         """Of each joint the edges taken in the last sample."""
         lost: Lost = {} if self._last is None else self._last[4]
         return [(*lost.get(joint, ()), *joint.logged) for joint in self.each]

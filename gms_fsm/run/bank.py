@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from gms_fsm._arguments import listed
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError
-from gms_fsm.run._joint import Asked, Line, Switch
+from gms_fsm.run._joint import Asked, ElementSwitch, Line
 from gms_fsm.run._joints import Joints, Snapshot, input_lines, made_again
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
@@ -205,7 +205,7 @@ class FrictionBank:
         return tuple(joint.variables for joint in self._joints.each)
 
     @property
-    def switches(self) -> tuple[tuple[Switch, ...], ...]:
+    def switches(self) -> tuple[tuple[ElementSwitch, ...], ...]:
         """Of each joint the edges taken in the last sample."""
         return tuple(self._joints.switches)
 

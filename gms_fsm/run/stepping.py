@@ -9,12 +9,12 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
-from gms_fsm.run._joint import Asked, Line, Switch
+from gms_fsm.run._joint import Asked, ElementSwitch, Line
 from gms_fsm.run._joints import Joints, Snapshot, input_lines, made_again
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
-__all__ = ["FrictionState", "Snapshot", "Switch"]
+__all__ = ["ElementSwitch", "FrictionState", "Snapshot"]
 
 
 class FrictionState:
@@ -181,7 +181,7 @@ class FrictionState:
         return self._joint.variables
 
     @property
-    def switches(self) -> tuple[Switch, ...]:
+    def switches(self) -> tuple[ElementSwitch, ...]:
         """The edges taken in the last sample."""
         return self._joints.switches[0]
 
