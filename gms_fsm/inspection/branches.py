@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from gms_fsm._arguments import checked_integer
+from gms_fsm._arguments import checked_integer, checked_kind
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.inspection._adjustable import Number, number_of, numbers_of, with_numbers
@@ -226,8 +226,8 @@ class Tree:
     ) -> int:
         """Begin a branch of the current one; see `gms_fsm.Session.fork`."""
         if law is not None:
-            self.subject.with_law(law)
-        own = self._own_values(self.current, values or {})
+            self.subject.with_law(checked_kind("law", law, str, "a text"))
+        own = self._own_values(self.current, {} if values is None else values)
         return self._added(Fork(name, self.current, own, law))
 
     def poke(
@@ -349,13 +349,14 @@ class Tree:
     # ------------------------------------------------------------------ making
     def _own_values(self, number: int, values: Mapping[str, float]) -> dict[str, float]:
         subject = self.made_of(number)
-        for name in values:
+        for name in checked_kind("values", values, Mapping, "a mapping, such as {'F_s': 1.8}"):
             number_of(subject, name)
         return {name: checked_scalar(name, value, "finite") for name, value in values.items()}
 
     def _added(self, fork: Fork, course: Continuation | None = None) -> int:
         number = self._next
-        name = fork.name.strip() or fork.text or f"branch {number}"
+        own = checked_kind("name", fork.name, str, "a text").strip()
+        name = own or fork.text or f"branch {number}"
         self._put(number, replace(fork, name=name), course)
         self._next, self.current = number + 1, number
         return number
