@@ -214,7 +214,7 @@ def session_html(session: Session) -> str:
                 ["branch", "from", "at row", "rows"],
                 (
                     [i, "" if each.parent is None else each.parent, max(each.fork, 0), len(each)]
-                    for i, each in enumerate(session.branches)
+                    for i, each in zip(session.tree.forks, session.branches, strict=True)
                 ),
                 caption=f"branch {session.current} of {len(session.branches)}",
             )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import integrators
-from gms_fsm.adapters._scipy_parts import Caller, Carried, Solution, Switch
+from gms_fsm.adapters._scipy_parts import Caller, Carried, ContactSwitch, Solution
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
@@ -134,7 +134,7 @@ class Located:
         t: list[float] = []
         rows: list[list[float]] = []
         modes: list[tuple[int, ...]] = []
-        switches: list[Switch] = []
+        switches: list[ContactSwitch] = []
         whole = self.equations()
         y = [*y0.tolist(), *self.carried.y]
         b = hybrid.buffers(whole, start, y, list(self.carried.mode), end, options)
@@ -147,7 +147,7 @@ class Located:
                     modes += [event.mode] * len(event.t)
                 elif isinstance(event, Firing):
                     place, edge = self.driven.place(event.machine), self.driven.edge(event.edge)
-                    switches.append(Switch(event.t, *place, edge))
+                    switches.append(ContactSwitch(event.t, *place, edge))
         except HybridError as error:
             message = f"it stopped at t = {error.t!r} s: {error}; {_advice(error)}"
         nfev = self.caller.nfev

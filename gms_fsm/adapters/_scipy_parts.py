@@ -18,10 +18,10 @@ from gms_fsm.run.stepping import FrictionState, Snapshot
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
-__all__ = ["Caller", "Carried", "Solution", "Stepped", "Switch", "numbers"]
+__all__ = ["Caller", "Carried", "ContactSwitch", "Solution", "SteppedFriction", "numbers"]
 
 
-class Switch(NamedTuple):
+class ContactSwitch(NamedTuple):
     """An edge taken by an element.
 
     Parameters
@@ -76,7 +76,7 @@ class Carried:
 
 
 @dataclass(frozen=True, eq=False)
-class Stepped:
+class SteppedFriction:
     """The frictions at the end of a call of `solve_ivp` with samples.
 
     Parameters
@@ -129,9 +129,9 @@ class Solution:
     F : ndarray, shape (rows,) or (m, rows)
         Force of the friction, N; of several frictions one row each. At a switch it is the force
         just before it.
-    switches : tuple of Switch
+    switches : tuple of ContactSwitch
         All edges taken, in order.
-    friction : Carried or Stepped
+    friction : Carried or SteppedFriction
         The frictions at the end: pass it on as `friction` to go on.
     nfev : int
         Number of calls of `fun`.
@@ -144,8 +144,8 @@ class Solution:
     t: FloatArray
     y: FloatArray
     F: FloatArray
-    switches: tuple[Switch, ...] = field(repr=False)
-    friction: Carried | Stepped = field(repr=False)
+    switches: tuple[ContactSwitch, ...] = field(repr=False)
+    friction: Carried | SteppedFriction = field(repr=False)
     nfev: int
     success: bool
     message: str

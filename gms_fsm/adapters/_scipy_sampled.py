@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.adapters._scipy_parts import Caller, Solution, Stepped, Switch
+from gms_fsm.adapters._scipy_parts import Caller, ContactSwitch, Solution, SteppedFriction
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.run.bank import FrictionBank
@@ -76,7 +76,7 @@ def samples(start: float, end: float, length: float) -> list[float]:
 
 
 def sampled(
-    caller: Caller, stepped: Stepped, y: FloatArray, ends: list[float], how: Solver
+    caller: Caller, stepped: SteppedFriction, y: FloatArray, ends: list[float], how: Solver
 ) -> Solution:
     """Integrate from sample to sample.
 
@@ -84,7 +84,7 @@ def sampled(
     ----------
     caller : Caller
         The caller's functions.
-    stepped : Stepped
+    stepped : SteppedFriction
         The frictions at the start.
     y : ndarray, shape (n,)
         The caller's state at the start.
@@ -101,7 +101,7 @@ def sampled(
     stepper = stepped.stepper
     v = _velocity(caller, y)
     t, rows, forces = [stepper.t], [y], [stepper.peek(v, v, 0.0)]
-    switches: list[Switch] = []
+    switches: list[ContactSwitch] = []
     message, steps = "", how.max_steps
     for end in ends:
         try:
@@ -121,7 +121,7 @@ def sampled(
         y=np.array(rows).T,
         F=np.array(forces).T,
         switches=tuple(switches),
-        friction=Stepped(stepper, stepper.snapshot(), stepped.given),
+        friction=SteppedFriction(stepper, stepper.snapshot(), stepped.given),
         nfev=caller.nfev,
         success=not message,
         message=message or "the end was reached",
@@ -168,12 +168,12 @@ def _one(
     return "", solver.y, steps
 
 
-def _switches(stepped: Stepped) -> list[Switch]:
+def _switches(stepped: SteppedFriction) -> list[ContactSwitch]:
     """Return the edges taken in the last sample, in order."""
     stepper = stepped.stepper
     each = stepper.switches if isinstance(stepper, FrictionBank) else (stepper.switches,)
     found = [
-        Switch(one.t, name, one.element, one.edge)
+        ContactSwitch(one.t, name, one.element, one.edge)
         for name, taken in zip(stepped.names, each, strict=True)
         for one in taken
     ]

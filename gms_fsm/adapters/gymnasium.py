@@ -14,7 +14,7 @@ from gms_fsm._arguments import checked_integer
 from gms_fsm._extras import require
 from gms_fsm.charts.parameters import checked_array, checked_scalar
 from gms_fsm.errors import ParameterError
-from gms_fsm.run.stepping import FrictionState, Switch
+from gms_fsm.run.stepping import ElementSwitch, FrictionState
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
@@ -165,7 +165,7 @@ class FrictionPositioning(gymnasium.Env[_Floats, _Floats]):
         if given.size != 1:
             raise ParameterError(f"it has {given.size} entries", place="action", advice="give 1")
         level = min(max(float(given[0]), -1.0), 1.0)
-        switches: list[Switch] = []
+        switches: list[ElementSwitch] = []
         for _ in range(self.substeps):
             self._substep(level * self.force, self.period / self.substeps)
             switches += self._friction.switches
@@ -191,7 +191,7 @@ class FrictionPositioning(gymnasium.Env[_Floats, _Floats]):
         seen = np.array([self._target - self._x, self._v])
         return np.clip(seen, bound.low, bound.high)  # type: ignore[attr-defined]
 
-    def _info(self, switches: tuple[Switch, ...]) -> dict[str, Any]:
+    def _info(self, switches: tuple[ElementSwitch, ...]) -> dict[str, Any]:
         return {
             "t": self._steps * self.period,
             "x": self._x,

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self, TypeAlias
 from gms_fsm._arguments import checked_kind
 from gms_fsm._extras import require
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.run._joint import content_of
+from gms_fsm.run._joints import content_of
 from gms_fsm.run.stepping import FrictionState, Snapshot
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact

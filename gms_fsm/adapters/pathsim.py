@@ -10,7 +10,7 @@ import numpy as np
 
 from gms_fsm._extras import require
 from gms_fsm.charts.parameters import checked_scalar
-from gms_fsm.run.stepping import FrictionState, Switch
+from gms_fsm.run.stepping import ElementSwitch, FrictionState
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
@@ -100,7 +100,7 @@ def _block_class() -> Any:
             super().__init__()
             self._last: list[float] | None = None  # the inputs at the last sample
             self._now = 0.0, [0.0] * len(names)
-            self.switches: list[Switch] = []
+            self.switches: list[ElementSwitch] = []
             # It acts at the time of the inputs, which the schedule's own time may miss by rounding
             # (or by more, if a fixed step does not divide the period).
             self.events = [schedule.Schedule(t_period=period, func_act=lambda _: self._commit())]

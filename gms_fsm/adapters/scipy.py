@@ -12,7 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 import integrators
 from gms_fsm.adapters._scipy_located import Located
-from gms_fsm.adapters._scipy_parts import Caller, Carried, Solution, Stepped, Switch, numbers
+from gms_fsm.adapters._scipy_parts import (
+    Caller,
+    Carried,
+    ContactSwitch,
+    Solution,
+    SteppedFriction,
+    numbers,
+)
 from gms_fsm.adapters._scipy_sampled import Solver, sampled, samples
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, shown
@@ -25,10 +32,10 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 from integrators import Tableau
 
-__all__ = ["Carried", "Solution", "Stepped", "Switch", "solve_ivp"]
+__all__ = ["Carried", "ContactSwitch", "Solution", "SteppedFriction", "solve_ivp"]
 
 Friction: TypeAlias = Model | Contact
-Given: TypeAlias = Friction | Sequence[Friction] | Carried | Stepped
+Given: TypeAlias = Friction | Sequence[Friction] | Carried | SteppedFriction
 Velocity: TypeAlias = (
     int | Sequence[int] | NDArray[np.integer[Any]] | Callable[[FloatArray], ArrayLike]
 )
@@ -66,7 +73,7 @@ def solve_ivp(
         s: start and end.
     y0 : array_like, shape (n,)
         The caller's state at the start.
-    friction : Model, Contact, sequence of them, Carried or Stepped
+    friction : Model, Contact, sequence of them, Carried or SteppedFriction
         What rubs. To go on from an earlier call, for example after each tick of a controller, pass
         its ``solution.friction``.
     velocity : int, sequence of int, or callable
@@ -158,7 +165,7 @@ def solve_ivp(
 
 # --------------------------------------------------------------------------- arguments
 def _carried(given: Given, start: float, initial: Mapping[str, Any] | None) -> Carried:
-    if isinstance(given, Stepped):
+    if isinstance(given, SteppedFriction):
         raise ParameterError(
             "it is from a call with sample=...", place="friction", advice="give sample=... again"
         )
@@ -170,12 +177,14 @@ def _carried(given: Given, start: float, initial: Mapping[str, Any] | None) -> C
     return Carried(driven, tuple(driven.initial), tuple(driven.start.mode), several)
 
 
-def _stepped(given: Given, start: float, initial: Mapping[str, Any] | None, rtol: float) -> Stepped:
+def _stepped(
+    given: Given, start: float, initial: Mapping[str, Any] | None, rtol: float
+) -> SteppedFriction:
     if isinstance(given, Carried):
         raise ParameterError(
             "it is from a call without sample=...", place="friction", advice="leave it out again"
         )
-    if isinstance(given, Stepped):
+    if isinstance(given, SteppedFriction):
         _has_its_state(initial)
         now = given.snapshot.t
         if now != start:
@@ -197,7 +206,7 @@ def _stepped(given: Given, start: float, initial: Mapping[str, Any] | None, rtol
             place="friction",
             advice="give the contact formulas in t (inputs=...), or use FrictionState yourself",
         )
-    made = Stepped(stepper, stepper.snapshot(), tuple(frictions))
+    made = SteppedFriction(stepper, stepper.snapshot(), tuple(frictions))
     if len({*made.names}) < len(frictions):
         raise ParameterError(
             f"they are called {', '.join(map(repr, made.names))}",
@@ -298,7 +307,7 @@ def _of_host(found: Iterable[float], atol: ArrayLike | None, n: int) -> list[flo
 
 
 def _velocities(
-    velocity: Velocity, n: int, frictions: Carried | Stepped
+    velocity: Velocity, n: int, frictions: Carried | SteppedFriction
 ) -> Callable[[FloatArray], list[float]]:
     """Return the velocities of the frictions as a function of the caller's state."""
     m, several = len(frictions.names), frictions.several

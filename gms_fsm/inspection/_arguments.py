@@ -1,14 +1,12 @@
-"""Checks of the arguments of a session: settings, counts, rows, branches."""
+"""Checks of the arguments of a session: settings, counts, rows."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 from gms_fsm._arguments import checked_integer
 from gms_fsm.errors import ParameterError, SessionError
 from gms_fsm.run.settings import SettingOptions, Settings
 
-__all__ = ["check_branch", "check_count", "check_row", "checked_settings", "chosen_pair"]
+__all__ = ["check_count", "check_row", "checked_settings"]
 
 
 def checked_settings(settings: Settings | None, options: SettingOptions) -> Settings:
@@ -39,26 +37,6 @@ def checked_settings(settings: Settings | None, options: SettingOptions) -> Sett
 def check_count(count: int) -> None:
     """Raise `SessionError` unless the argument is a count."""
     checked_integer("count", count, 0, SessionError)
-
-
-def check_branch(number: int, branches: int) -> None:
-    """Raise `SessionError` unless a branch has this number."""
-    if not 0 <= checked_integer("branch", number, None, SessionError) < branches:
-        raise SessionError(f"no branch {number}", advice=f"there are 0 to {branches - 1}")
-
-
-def chosen_pair(
-    a: int | None, b: int | None, current: int, parents: Sequence[int | None]
-) -> tuple[int, int]:
-    """Return the branches to compare: by default the current one and its parent."""
-    for number in (a, b):
-        if number is not None:
-            check_branch(number, len(parents))
-    b = current if b is None else b
-    a = parents[b] if a is None else a
-    if a is None:
-        raise SessionError(f"branch {b} has no parent", advice="give two branch numbers")
-    return a, b
 
 
 def check_row(row: int, rows: int) -> None:

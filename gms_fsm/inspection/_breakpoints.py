@@ -96,7 +96,7 @@ def hits(point: Breakpoint, branch: Branch, row: int) -> bool:
     bool
         Whether the event happens and the condition holds.
     """
-    start = branch.run.start
+    start = branch.start
     if not any(_happens(point, branch, row, machine) for machine in _machines(point, start)):
         return False
     return not point.condition or holds_at(read(start, point.condition), branch, branch.raw(row))
@@ -114,7 +114,7 @@ def _machines(point: Breakpoint, start: Start) -> list[int]:
 
 def _happens(point: Breakpoint, branch: Branch, row: int, machine: int) -> bool:
     """Return whether the event of a breakpoint happens to an element at a row."""
-    start = branch.run.start
+    start = branch.start
     bank = start.program.layout.bank(machine)
     chart, i = chart_of(start, bank), machine - bank.first
     if point.kind in ("fires", "enter", "leave"):

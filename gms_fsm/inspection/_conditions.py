@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from gms_fsm.errors import ExpressionError, SessionError
-from gms_fsm.inspection._branch import Branch, Row
+from gms_fsm.inspection._branch import Branch, BranchRow
 from gms_fsm.inspection.explain import holds
 from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
 from gms_fsm.run.start import Start
@@ -33,7 +33,7 @@ def read(start: Start, text: str) -> Condition:
         return parse_condition(text, names_of(start), states, n, own_state=n == 1, owners=owners)
 
 
-def holds_at(condition: Condition, branch: Branch, row: Row) -> bool:
+def holds_at(condition: Condition, branch: Branch, row: BranchRow) -> bool:
     """Return whether a condition holds at a row of a branch, or at a point between two rows."""
     return holds(condition, branch.watches(row))
 

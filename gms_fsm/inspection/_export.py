@@ -11,7 +11,7 @@ from gms_fsm._arguments import checked_path
 from gms_fsm._files import write_whole
 from gms_fsm._toml import written
 from gms_fsm.errors import OutputError
-from gms_fsm.inspection._branch import Row
+from gms_fsm.inspection._branch import BranchRow
 from gms_fsm.inspection._poking import initial_values
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.start import Start
@@ -51,7 +51,7 @@ def save_scenario(path: str | Path, start: Start, title: str, notes: str) -> Pat
     head = {"title": title, "notes": notes} if notes else {"title": title}
     more: dict[str, Any] = {"run": _run(start)}
     if start.initial:
-        here = Row(start.t_start, 0, list(start.y), tuple(start.mode))
+        here = BranchRow(start.t_start, 0, list(start.y), tuple(start.mode))
         more["initial"] = _nested(initial_values(start, here))
     text = f"{written(head)}{tables}\n{written(more)}"
     return write_whole(path, lambda file: file.write(text.encode()))

@@ -14,7 +14,7 @@ __all__ = ["here_at", "why_at"]
 
 def here_at(branch: Branch, row: int) -> Here:
     """Return the values at a row, or at the located point after it, if the cursor is there."""
-    place, start = branch.place(row), branch.run.start
+    place, start = branch.place(row), branch.start
     located = place is branch.between
     scope, system = branch.system_scope(place), start.system
     banks = start.program.layout.banks
@@ -70,7 +70,7 @@ def why_at(branch: Branch, machine: int, edge: str) -> Why:
     SessionError
         If there is no such edge, or it leaves a different state.
     """
-    start, row, place = branch.run.start, branch.cursor, branch.here
+    start, row, place = branch.start, branch.cursor, branch.here
     bank = start.program.layout.bank(machine)
     chart, i = chart_of(start, bank), machine - bank.first
     state, left, taken = branch.state(place, machine), "", ""

@@ -13,7 +13,7 @@ from gms_fsm.run.start import Start
 from gms_fsm.systems.models import parameter_names
 
 if TYPE_CHECKING:
-    from gms_fsm.inspection._branch import Row
+    from gms_fsm.inspection._branch import BranchRow
 
 __all__ = ["Edits", "initial_values", "initial_with", "pokeable"]
 
@@ -188,7 +188,7 @@ def _by_element(key: object, value: Any, n: int) -> dict[int, float]:
     )
 
 
-def initial_with(edits: Edits, start: Start, here: Row) -> dict[str, Any]:
+def initial_with(edits: Edits, start: Start, here: BranchRow) -> dict[str, Any]:
     """Return the ``initial`` of a run that continues from a point with edits.
 
     Parameters
@@ -197,7 +197,7 @@ def initial_with(edits: Edits, start: Start, here: Row) -> dict[str, Any]:
         The changes.
     start : Start
         Of the run.
-    here : Row
+    here : BranchRow
         The point.
 
     Returns
@@ -223,14 +223,14 @@ def initial_with(edits: Edits, start: Start, here: Row) -> dict[str, Any]:
     return initial if edits.v is None else initial | {"v": edits.v}
 
 
-def initial_values(start: Start, here: Row) -> dict[str, Any]:
+def initial_values(start: Start, here: BranchRow) -> dict[str, Any]:
     """Return the whole state at a point of a run as the ``initial`` of another.
 
     Parameters
     ----------
     start : Start
         Of the run.
-    here : Row
+    here : BranchRow
         The point.
 
     Returns

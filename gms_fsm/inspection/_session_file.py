@@ -1,11 +1,11 @@
-"""Session files: the system, the pokes, cursors, breakpoints and watches, without rows."""
+"""Session files: the system, what its branches change, cursors, breakpoints, without rows."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from gms_fsm.errors import SessionError, TraceFileError, why
 from gms_fsm.inspection import _walker
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import Breakpoint
-from gms_fsm.inspection._poking import Edits
+from gms_fsm.inspection.branches import Fork
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
@@ -27,78 +27,12 @@ from gms_fsm.traces._header import Header
 if TYPE_CHECKING:
     from gms_fsm.inspection.session import Session
 
-__all__ = ["BranchRecord", "SessionRecord", "blamed", "read", "record_of", "restore", "write"]
+__all__ = ["blamed", "read", "write"]
 
 FORMAT = "gms-fsm session 1"
 
 
-@dataclass(frozen=True)
-class BranchRecord:
-    """How a branch was made, and the position of its cursor.
-
-    Parameters
-    ----------
-    parent, fork
-        As in `Branch`.
-    edits : Edits or None
-        The changed values; None for the original run.
-    cursor : int
-        The row under the cursor.
-    begin, between : float or None
-        Times of the poke and of the cursor, s, if they are between two rows.
-    """
-
-    parent: int | None
-    fork: int
-    edits: Edits | None
-    cursor: int
-    begin: float | None
-    between: float | None
-
-    @classmethod
-    def of(cls, branch: Branch) -> BranchRecord:
-        """Describe a branch."""
-        begin, between = (
-            None if place is None else place.t for place in (branch.begin, branch.between)
-        )
-        return cls(branch.parent, branch.fork, branch.edits, branch.cursor, begin, between)
-
-
-@dataclass(frozen=True)
-class SessionRecord:
-    """Everything needed to restore a session.
-
-    Parameters
-    ----------
-    model, rig, t_end, options
-        As for `Session`; of a system the rig is None.
-    branches : sequence of BranchRecord
-        The first is the original run.
-    current : int
-        Number of the current branch.
-    breakpoints : sequence of Breakpoint
-        The breakpoints, with their hits so far.
-    watches : sequence of str
-        The watch expressions.
-    """
-
-    model: Model | System
-    rig: Rig | None
-    t_end: float
-    options: Mapping[str, Any]
-    branches: Sequence[BranchRecord]
-    current: int
-    breakpoints: Sequence[Breakpoint]
-    watches: Sequence[str]
-
-    @property
-    def arguments(self) -> tuple[Any, ...]:
-        """The positional arguments of `Session`."""
-        rig = () if self.rig is None else (self.rig,)
-        return self.model, *rig, self.t_end
-
-
-def options_of(
+def _options_of(
     settings: Settings, t_start: float, initial: Mapping[str, Any] | None
 ) -> dict[str, Any]:
     """Return the arguments of a session that differ from their defaults."""
@@ -113,114 +47,127 @@ def options_of(
     return chosen if initial is None else chosen | {"initial": dict(initial)}
 
 
-def record_of(session: Session) -> SessionRecord:
-    """Describe a session."""
-    return SessionRecord(
-        *session.made_of,
-        options_of(session.settings, session.t_start, session.initial),
-        [BranchRecord.of(branch) for branch in session.branches],
-        session.current,
-        session.breakpoints,
-        session.watches,
+def write(path: Path, session: Session) -> Path:
+    """Write a session; raise `SessionError` for anything a file cannot store."""
+    model, rig, t_end = session.made_of
+    signals = (model if rig is None else rig).signals  # type: ignore[union-attr]
+    if any(isinstance(signal, Function) for signal in signals.values()):
+        raise SessionError("a signal is a Python function, which a file cannot store")
+    tree = session.tree
+    options = _options_of(session.settings, tree.t_start, tree.initial)
+    for name, value in options.items():
+        if not isinstance(value, str | int | float | dict | type(None)):
+            raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
+    places = {number: place for place, number in enumerate(tree.forks)}  # some may be deleted
+    data = {
+        "format": FORMAT,
+        "header": json.loads(_header(model, rig).model_dump_json()),
+        "t_end": t_end,
+        "options": {name: _plain(value) for name, value in options.items()},
+        "branches": [
+            _written(
+                fork, tree.branch(number), None if fork.parent is None else places[fork.parent]
+            )
+            for number, fork in tree.forks.items()
+        ],
+        "current": places[session.current],
+        "breakpoints": [asdict(point) for point in session.breakpoints],
+        "watches": session.watches,
+    }
+    text = json.dumps(data, indent=1).encode()
+    return write_whole(path, lambda file: file.write(text))
+
+
+def _written(fork: Fork, branch: Branch, parent: int | None) -> dict[str, Any]:
+    """Describe a branch: how it was made, and the position of its cursor."""
+    begin, between = (
+        None if place is None else place.t for place in (branch.begin, branch.between)
     )
+    data: dict[str, Any] = {
+        "parent": parent,
+        "fork": -1 if fork.poke is None else branch.fork,
+        "edits": {} if fork.poke is None else asdict(fork.poke.edits),
+        "cursor": branch.cursor,
+        "from": begin,
+        "between": between,
+    }
+    if fork.name not in (fork.text, "original"):
+        data["name"] = fork.name
+    if fork.law is not None:
+        data["law"] = fork.law
+    if fork.values:
+        data["values"] = dict(fork.values)
+        if fork.poke is not None:  # made with other numbers: its row is not one of the parent
+            data |= {"t": fork.poke.t, "microstep": fork.poke.microstep}
+    return data
 
 
-def restore(session: Session, record: SessionRecord) -> None:
-    """Restore a session by moving to each of its cursors again."""
-    for branch in record.branches:
-        if branch.edits is not None:
-            assert branch.parent is not None
-            session.switch(branch.parent)
-            _walker.walk_to(session.branch, branch.fork, branch.begin)
-            session.poke(branch.edits.variables, branch.edits.v, branch.edits.state)
-    for number, branch in enumerate(record.branches):
+def _header(model: Model | System, rig: Rig | None) -> Header:
+    if isinstance(model, System):
+        return Header.of(*origin_of(model), model, {})
+    assert rig is not None
+    return Header.of(model, rig, None, {})
+
+
+def read(path: Path, made: Callable[..., Session]) -> Session:
+    """Read a session and make its branches again; a faulty file raises any kind of error.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    made : callable
+        The class.
+
+    Returns
+    -------
+    Session
+        With its cursors where they were.
+    """
+    data = json.loads(path.read_text(encoding="utf-8"))
+    if data["format"] != FORMAT:
+        raise ValueError(f"format is {data['format']!r}")
+    header = Header.model_validate(data["header"])
+    system = header.to_system()
+    what = (header.to_model(), header.to_rig()) if system is None else (system,)
+    session = made(*what, data["t_end"], **data["options"])
+    for branch in data["branches"]:
+        _make(session, branch)
+    for number, branch in enumerate(data["branches"]):
         session.switch(number)
-        _walker.walk_to(session.branch, branch.cursor, branch.between)
-    session.switch(record.current)
-    for point in record.breakpoints:
+        _walker.walk_to(session.branch, int(branch["cursor"]), branch["between"])
+    session.switch(int(data["current"]))
+    for point in (Breakpoint(**each) for each in data["breakpoints"]):
         where: int | str | None = point.element
         if point.contact:
             element = "" if point.element is None else f" {point.element + 1}"
             where = f"{point.contact}{element}"
         found = session.break_on(point.kind, point.name, where, point.condition, point.hits)
         found.seen = point.seen
-    session.watches = list(record.watches)
+    session.watches = [str(text) for text in data["watches"]]
+    return session
 
 
-def write(path: Path, record: SessionRecord) -> Path:
-    """Write a session; raise `SessionError` for anything a file cannot store."""
-    signals = (record.model if record.rig is None else record.rig).signals  # type: ignore[union-attr]
-    if any(isinstance(signal, Function) for signal in signals.values()):
-        raise SessionError("a signal is a Python function, which a file cannot store")
-    for name, value in record.options.items():
-        if not isinstance(value, str | int | float | dict | type(None)):
-            raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
-    data = {
-        "format": FORMAT,
-        "header": json.loads(_header(record).model_dump_json()),
-        "t_end": record.t_end,
-        "options": {name: _plain(value) for name, value in record.options.items()},
-        "branches": [
-            {
-                "parent": branch.parent,
-                "fork": branch.fork,
-                "edits": {} if branch.edits is None else asdict(branch.edits),
-                "cursor": branch.cursor,
-                "from": branch.begin,
-                "between": branch.between,
-            }
-            for branch in record.branches
-        ],
-        "current": record.current,
-        "breakpoints": [asdict(point) for point in record.breakpoints],
-        "watches": record.watches,
-    }
-    text = json.dumps(data, indent=1).encode()
-    return write_whole(path, lambda file: file.write(text))
-
-
-def _header(record: SessionRecord) -> Header:
-    if isinstance(record.model, System):
-        return Header.of(*origin_of(record.model), record.model, {})
-    assert record.rig is not None
-    return Header.of(record.model, record.rig, None, {})
-
-
-def read(path: Path) -> SessionRecord:
-    """Read a session; a faulty file raises any kind of error."""
-    data = json.loads(path.read_text(encoding="utf-8"))
-    if data["format"] != FORMAT:
-        raise ValueError(f"format is {data['format']!r}")
-    header = Header.model_validate(data["header"])
-    system = header.to_system()
-    return SessionRecord(
-        header.to_model() if system is None else system,
-        header.to_rig() if system is None else None,
-        data["t_end"],
-        data["options"],
-        [_branch(record) for record in data["branches"]],
-        int(data["current"]),
-        [Breakpoint(**record) for record in data["breakpoints"]],
-        [str(text) for text in data["watches"]],
-    )
-
-
-def _branch(record: Mapping[str, Any]) -> BranchRecord:
-    edits, given = None, record["edits"]
-    if given:
-        own = {
-            name: _by_number(values) if isinstance(values, Mapping) else float(values)
-            for name, values in given["variables"].items()
+def _make(session: Session, data: Mapping[str, Any]) -> None:
+    """Make a branch as it was made, from its parent."""
+    name, values, edits = data.get("name", ""), data.get("values", {}), data["edits"]
+    if data["parent"] is not None:
+        session.switch(data["parent"])
+        if not edits:
+            session.fork(values=values, law=data.get("law"), name=name)
+            return
+        given = {
+            key: _by_number(each) if isinstance(each, Mapping) else float(each)
+            for key, each in edits["variables"].items()
         }
-        edits = Edits(own, given["v"], _by_number(given["state"]))
-    return BranchRecord(
-        record["parent"],
-        int(record["fork"]),
-        edits,
-        int(record["cursor"]),
-        record["from"],
-        record["between"],
-    )
+        when = {key: data[key] for key in ("t", "microstep") if key in data}
+        if not when:
+            _walker.walk_to(session.branch, int(data["fork"]), data["from"])
+        session.poke(given, edits["v"], _by_number(edits["state"]), **when, name=name)
+    elif name:
+        session.tree.rename(0, name)
+    if values:
+        session.tree.set(values)
 
 
 def _by_number(values: Mapping[str, Any]) -> dict[Any, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.inspection._arguments import check_count
-from gms_fsm.inspection._branch import Branch, Row
+from gms_fsm.inspection._branch import Branch, BranchRow
 from gms_fsm.traces._between import first_true
 
 __all__ = [
@@ -88,7 +88,7 @@ def walk_to(branch: Branch, row: int, t: float | None) -> None:
     branch.between = None if t is None else branch.behind(branch.cursor)(t)
 
 
-def reaches(branch: Branch, holds: Callable[[Row], bool]) -> bool:
+def reaches(branch: Branch, holds: Callable[[BranchRow], bool]) -> bool:
     """Go forward to the next point where a condition becomes true, located between rows.
 
     Parameters
@@ -125,15 +125,15 @@ def reaches(branch: Branch, holds: Callable[[Row], bool]) -> bool:
 
 
 def _first_true(
-    branch: Branch, row: int, begin: float | None, holds: Callable[[Row], bool], truth: bool
-) -> tuple[Row | None, bool]:
+    branch: Branch, row: int, begin: float | None, holds: Callable[[BranchRow], bool], truth: bool
+) -> tuple[BranchRow | None, bool]:
     """Search between a row and the next for the point where a condition becomes true.
 
     The next row itself is left to the caller. Returns the point, and the last truth value.
     """
     before, after = branch.raw(row), branch.raw(row + 1)
     start = before.t if begin is None else begin
-    if after.microstep > 0 or after.t <= start or branch.run.start.program.ticks.at(after.t):
+    if after.microstep > 0 or after.t <= start or branch.start.program.ticks.at(after.t):
         return None, truth  # at a tick values jump: nothing is between the rows
     low, place = start, branch.behind(row)
     for look in range(1, LOOKS + 1):

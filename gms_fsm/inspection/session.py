@@ -1,8 +1,8 @@
 """Stepping through a run: stop at a guard, see why, go back, change a value, compare.
 
-This module has no user interface. A session has branches; a branch is a run computed row by row,
-with a cursor. A poke makes a new branch from the row under the cursor and leaves the old branch
-unchanged.
+This module has no user interface. A session has a tree of branches; a branch is a run computed row
+by row, with a cursor. A poke makes a new branch from the row under the cursor, a fork one with
+other numbers from the start; both leave the old branch unchanged.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ from typing import Any, Unpack
 
 from gms_fsm._arguments import checked_path
 from gms_fsm._display import displayed
-from gms_fsm.errors import SessionError
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
-from gms_fsm.inspection._arguments import check_branch, check_row, checked_settings, chosen_pair
+from gms_fsm.inspection._arguments import check_row, checked_settings
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
 from gms_fsm.inspection._conditions import holds_at
 from gms_fsm.inspection._elements import machine_of, title_of
 from gms_fsm.inspection._here import here_at, why_at
-from gms_fsm.inspection._poking import Edits, initial_with
-from gms_fsm.inspection._results import BranchComparison, Fired, Here, compared
+from gms_fsm.inspection._results import BranchComparison, Fired, Here
+from gms_fsm.inspection.branches import Tree
 from gms_fsm.inspection.explain import Why
 from gms_fsm.language import Condition
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.run.simulate import Run, mounted
+from gms_fsm.run.simulate import mounted
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.numbers import Adjustable
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 
@@ -48,10 +48,8 @@ class Session:
     ----------
     made_of : tuple
         Model, rig and t_end; the rig of a system is None.
-    branches : list of Branch
-        The first is the original run; each poke adds one.
-    current : int
-        Number of the current branch.
+    tree : Tree
+        The branches: what each is, their numbers, whole traces and files.
     breakpoints : list of Breakpoint
         Breakpoints at which `proceed` stops.
     watches : list of str
@@ -90,17 +88,11 @@ class Session:
         **options: Unpack[SettingOptions],
     ) -> None:
         self.settings = checked_settings(settings, options)
-        self.made_of = model, *mounted("Session", model, rig, t_end)
-        self.t_start, self.initial = t_start, initial
-        self.branches = [Branch(self._run(t_start, initial))]
-        self.current = 0
+        on, end = mounted("Session", model, rig, t_end)
+        self.made_of = model, on, end
+        self.tree = Tree(Adjustable(model, on), end, t_start, initial, self.settings)
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[str] = []
-
-    def _run(self, t_start: float, initial: Mapping[str, Any] | None) -> Run:
-        """Return a run of this model from given values."""
-        options: Any = {"t_start": t_start, "initial": initial, "ticks_from": self.t_start}
-        return Run(Start.of(*self.made_of, self.settings, rows_at_once=1, **options))
 
     def __repr__(self) -> str:
         branch = f", branch {self.current}" if self.current else ""
@@ -109,8 +101,8 @@ class Session:
     # ------------------------------------------------------------------ what runs
     @property
     def start(self) -> Start:
-        """The run, ready to start: its system, program and settings."""
-        return self.branches[0].run.start
+        """The run of the current branch, ready to start: its system, program and settings."""
+        return self.branch.start
 
     @property
     def t_end(self) -> float:
@@ -139,9 +131,19 @@ class Session:
 
     # ------------------------------------------------------------------ where we are
     @property
+    def branches(self) -> list[Branch]:
+        """All branches: the first is the original run; each poke and each fork adds one."""
+        return [self.tree.branch(number) for number in self.tree.forks]
+
+    @property
+    def current(self) -> int:
+        """Number of the current branch."""
+        return self.tree.current
+
+    @property
     def branch(self) -> Branch:
         """The current branch."""
-        return self.branches[self.current]
+        return self.tree.branch()
 
     @property
     def here(self) -> Here:
@@ -182,18 +184,7 @@ class Session:
         return self.here
 
     def back(self, count: int = 1) -> Here:
-        """Go back by rows.
-
-        Parameters
-        ----------
-        count : int
-            Number of rows.
-
-        Returns
-        -------
-        Here
-            The row reached.
-        """
+        """Go back by a number of rows, and return the row reached."""
         _walker.back(self.branch, count)
         return self.here
 
@@ -430,6 +421,10 @@ class Session:
         variables: Mapping[str, Any] | None = None,
         v: float | None = None,
         state: Mapping[Any, str] | None = None,
+        *,
+        t: float | None = None,
+        microstep: int | None = None,
+        name: str = "",
     ) -> int:
         """Change values at the cursor and continue in a new branch; the present one is kept.
 
@@ -446,6 +441,12 @@ class Session:
         state : mapping of int or str to str, optional
             New states by element; in a system ``{"gear 1": "left"}``. The time in the state is
             then 0.
+        t : float, optional
+            When, s, if not at the cursor: after the rows of this time, or between two rows.
+        microstep : int, optional
+            After the row of time t with this micro-step, if there is one.
+        name : str, optional
+            By default what is changed.
 
         Returns
         -------
@@ -455,7 +456,7 @@ class Session:
         Raises
         ------
         SessionError
-            If there is nothing to change, no such variable or element, or the cursor is at the
+            If there is nothing to change, no such variable or element, or this is not before the
             end of the run.
         ParameterError, ChartError
             If a value violates its rule, or a locked contact would move.
@@ -471,37 +472,45 @@ class Session:
         >>> session.here.z[:2], session.here.states[3]
         ((-1.4, 0.0), 'slip')
         """
-        edits = Edits.of(self.start, variables, v, state)
-        branch, here = self.branch, self.branch.here
-        if not here.t < self.t_end:
-            raise SessionError(f"t = {here.t!r} s is the end of the run", advice="go back first")
-        run = self._run(here.t, initial_with(edits, self.start, here))
-        new = Branch(run, self.current, branch.cursor, branch, edits, branch.between)
-        new.cursor = new.offset
-        self.branches.append(new)
-        self.current = len(self.branches) - 1
-        return self.current
+        return self.tree.poke(variables, v, state, t=t, microstep=microstep, name=name)
 
-    def switch(self, branch: int) -> Here:
-        """Make another branch the current one; it keeps its cursor.
+    def fork(
+        self, *, values: Mapping[str, float] | None = None, law: str | None = None, name: str = ""
+    ) -> int:
+        """Begin a branch of the current one with other numbers or law, from the start of the run.
 
         Parameters
         ----------
-        branch : int
-            Number of the branch.
+        values : mapping of str to float, optional
+            By name, as ``tree.numbers()`` has them: ``"F_s"``, ``"k2"``, ``"gear.F_s"``.
+        law : {"published", "signed"}, optional
+            Of a GMS model.
+        name : str, optional
+            By default what differs.
 
         Returns
         -------
-        Here
-            The row under its cursor.
+        int
+            Number of the new branch, which becomes the current one.
 
         Raises
         ------
-        SessionError
-            If there is no such branch.
+        ParameterError
+            If there is no such number or law, or a value violates its rule.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed
+        >>> model = GMS(GMSParameters.paper("stick-slip"), law="published")
+        >>> session = Session(model, Prescribed("0.15*sin(2*pi*t/25)"), 30.0)
+        >>> session.fork(values={"F_s": 1.7}), session.tree.forks[1].text
+        (1, 'F_s = 1.7')
         """
-        check_branch(branch, len(self.branches))
-        self.current = branch
+        return self.tree.fork(values=values, law=law, name=name)
+
+    def switch(self, branch: int) -> Here:
+        """Make the branch of this number the current one, and return the row at its cursor."""
+        self.tree.current = self.tree.checked(branch)
         return self.here
 
     def compare(self, a: int | None = None, b: int | None = None) -> BranchComparison:
@@ -536,11 +545,7 @@ class Session:
           first different transition at t = 19.3981272 s
           largest difference: z 0.598 m, F 0.374 N
         """
-        pair = chosen_pair(a, b, self.current, [branch.parent for branch in self.branches])
-        for number in pair:
-            self.branches[number].complete()
-        first, second = (self.branches[number].trace() for number in pair)
-        return compared(pair, first, second)
+        return self.tree.compare(a, b)
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
@@ -565,7 +570,7 @@ class Session:
         OutputError
             If the file cannot be written.
         """
-        return _session_file.write(checked_path("path", path), _session_file.record_of(self))
+        return _session_file.write(checked_path("path", path), self)
 
     @classmethod
     def load(cls, path: str | Path) -> Session:
@@ -588,7 +593,4 @@ class Session:
         """
         path = checked_path("path", path)
         with _session_file.blamed(path):
-            record = _session_file.read(path)
-            session = cls(*record.arguments, **record.options)
-            _session_file.restore(session, record)
-            return session
+            return _session_file.read(path, cls)

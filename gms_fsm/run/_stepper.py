@@ -1,14 +1,14 @@
-"""What carries out the steps of a `FrictionState`: machine code, or the same in Python."""
+"""The memory of joints, and what advances it: machine code, or the same functions in Python."""
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.program import equations
@@ -25,43 +25,53 @@ if TYPE_CHECKING:
     from integrators.compiled import Stepper as MachineCode
 
 __all__ = [
-    "Machine",
-    "Plain",
-    "Stepper",
+    "BlockMemory",
+    "JointMemory",
+    "ListMemory",
+    "StepMemory",
     "arguments_of",
     "fast",
     "machine_code",
     "prepared",
-    "state_of",
 ]
 
 MOST_SWITCHES = 64  # in the log of a sample; when it is full, it is emptied and the sample goes on
 
 
-class Stepper(Protocol):
-    """A state that can be advanced by a sample, and put back."""
+class JointMemory(NamedTuple):
+    """What the loop keeps of one joint, and what advances it alone (see `step_to`)."""
 
     buffers: Buffers
     tables: Any  # the straight lines: of each input its times, then its values
     sample: Sample
+    run: Callable[[], int]
 
-    def run(self) -> int:
-        """Advance; see `integrators.stepping.step_to`."""
+    def state(self) -> dict[str, Any]:
+        """Return the arrays (or lists) that make up its state, without copying them."""
+        inputs = {f"input {k}": self.tables[2 * k + 1] for k in range(len(self.sample.inputs))}
+        return {**hybrid.state_of(self.buffers), **inputs}
 
-    def keep(self) -> None:
-        """Keep the present state for `back`."""
 
-    def back(self) -> None:
-        """Return to the state that was kept last."""
+class StepMemory(Protocol):
+    """The memory of joints that are advanced together."""
 
-    def undo(self) -> None:
-        """Return to the state that was kept last, and keep again what was kept before it."""
+    @property
+    def each(self) -> Sequence[JointMemory]:
+        """The memory of each joint."""
 
-    def copy(self) -> Any:
-        """Return the present state."""
+    @property
+    def sample(self) -> Any:
+        """An item in it is a number if there is one joint, else one number per joint."""
+
+    @property
+    def run(self) -> Callable[[], int]:
+        """What advances all; it returns not 0 if `step_to` does for one of them."""
+
+    def copy(self, into: Any = None, /) -> Any:
+        """Return the present state, in the memory of an older copy if one is given."""
 
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned, here or in a stepper of the same system."""
+        """Return to what `copy` returned, here or in the memory of the same systems."""
 
 
 def fast() -> bool:
@@ -69,75 +79,32 @@ def fast() -> bool:
     return all(map(importlib.util.find_spec, ("llvmlite", "platformdirs")))
 
 
-def state_of(stepper: Stepper) -> dict[str, Any]:
-    """Return the arrays (or lists) that make up a state, without copying them.
-
-    Parameters
-    ----------
-    stepper : Stepper
-        Between two samples.
-
-    Returns
-    -------
-    dict
-        As `integrators.hybrid.state_of`, and the values of the inputs.
-    """
-    inputs = {f"input {k}": stepper.tables[2 * k + 1] for k in range(len(stepper.sample.inputs))}
-    return {**hybrid.state_of(stepper.buffers), **inputs}
-
-
 # --------------------------------------------------------------------------- in Python
-class Plain:
-    """The steps as Python functions on lists.
+class ListMemory:
+    """Of one joint, in lists; its steps are Python functions."""
 
-    Parameters
-    ----------
-    start : Start
-        The system, with its inputs as corner tables.
-    """
-
-    def __init__(self, start: Start) -> None:
+    def __init__(self, starts: Sequence[Start]) -> None:
+        (start,) = starts
         program = start.program
-        made = equations(program)
-        switch = IfElse(program)
-        self.functions = made.functions(located=True)
-        observe = program.ieee["observe"]
-        self.machines = Machines(switch.ask, switch.act, switch.tick, switch.jolts, observe)
-        self.buffers, self.sample = prepared(start)
-        _, _, self.tables = self.functions.p
-        self._kept = self._before = self.copy()
+        switch, observe = IfElse(program), program.ieee["observe"]
+        functions = equations(program).functions(located=True)
+        machines = Machines(switch.ask, switch.act, switch.tick, switch.jolts, observe)
+        buffers, self.sample = prepared(start)
+        self.run = functools.partial(step_to, functions, machines, buffers, self.sample)
+        self.each = (JointMemory(buffers, functions.p[2], self.sample, self.run),)
+        found = (
+            getattr(self.sample, n) for n in ("end", "counts", "force", "t", "machine", "edge")
+        )
+        self._lists = [*self.each[0].state().values(), *found]
 
-    def run(self) -> int:
-        """Advance; see `integrators.stepping.step_to`."""
-        return step_to(self.functions, self.machines, self.buffers, self.sample)
-
-    def keep(self) -> None:
-        """Keep the present state for `back`."""
-        self._before, self._kept = self._kept, self.copy()
-
-    def back(self) -> None:
-        """Return to the state that was kept last."""
-        self.take(self._kept)
-
-    def undo(self) -> None:
-        """Return to the state that was kept last, and keep again what was kept before it."""
-        self.back()
-        self._kept = self._before
-
-    def copy(self) -> dict[str, list[Any]]:
+    def copy(self, _into: Any = None, /) -> list[list[Any]]:
         """Return the present state."""
-        return {name: list(place) for name, place in self._all().items()}
+        return [list(place) for place in self._lists]
 
-    def take(self, copy: Mapping[str, list[Any]]) -> None:
+    def take(self, copy: list[list[Any]]) -> None:
         """Return to what `copy` returned."""
-        for name, place in self._all().items():
-            place[:] = copy[name]
-
-    def _all(self) -> dict[str, Any]:
-        """Return all lists that a copy contains."""
-        found = ("end", "counts", "force", "t", "machine", "edge")
-        sample = {f"sample {name}": getattr(self.sample, name) for name in found}
-        return {**state_of(self), **sample}
+        for place, values in zip(self._lists, copy, strict=True):
+            place[:] = values
 
 
 def prepared(start: Start) -> tuple[Buffers, Sample]:
@@ -199,66 +166,49 @@ def _clocks(start: Start) -> Clocks:
 
 
 # --------------------------------------------------------------------------- machine code
-class Machine:
-    """The steps as machine code on a block of memory.
+class BlockMemory:
+    """Of joints that differ in numbers only: blocks one after the other, for machine code."""
 
-    Parameters
-    ----------
-    start : Start
-        The system, with its inputs as corner tables.
-    memory : (ndarray of int, ndarray of int), optional
-        For the block, and for the state that is kept; its own if omitted.
-
-    Attributes
-    ----------
-    kept : ndarray of int
-        The state that was kept last.
-    """
-
-    def __init__(
-        self, start: Start, memory: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
-    ) -> None:
+    def __init__(self, starts: Sequence[Start]) -> None:
         from integrators.machine_code.layout import Block
 
-        self.code = machine_code(start)
-        arguments = arguments_of(start)
-        self.block = Block(self.code.layout, arguments, words=None if memory is None else memory[0])
-        self.block.update(self.block.contents)  # numbers; there are no columns
-        contents = self.block.contents
-        self.buffers, self.sample = contents.buffers, contents.sample
-        _, _, self.tables = contents.functions.p
-        self._one, self._address = self.code.one, self.block.address
-        self._words = self.block.words
-        self.kept = np.empty_like(self._words) if memory is None else memory[1]
-        self._before = np.empty_like(self._words)
-        self.kept[:] = self._words
+        code, count = machine_code(starts[0]), len(starts)
+        self._words = np.zeros(count * code.layout.words, dtype=np.int64)
+        each = []
+        for start, words in zip(starts, self._words.reshape(count, -1), strict=True):
+            block = Block(code.layout, arguments_of(start), words=words)
+            made = block.contents
+            block.update(made)  # numbers; there are no columns
+            run = functools.partial(code.one, block.address)
+            each.append(JointMemory(made.buffers, made.functions.p[2], made.sample, run))
+        self.each = each
+        # Items of a memoryview are written in half the time of those of an array.
+        view: Any = memoryview if count == 1 else functools.partial(_across, self._words, count)
+        first = each[0].sample
+        self.sample = first._replace(
+            end=view(first.end), inputs=[*map(view, first.inputs)], counts=view(first.counts),
+            force=view(first.force),
+        )  # fmt: skip
+        address = self._words.ctypes.data
+        self.run = each[0].run if count == 1 else functools.partial(code.each, address, count)
 
-    def run(self) -> int:
-        """Advance; see `integrators.stepping.step_to`."""
-        result: int = self._one(self._address)
-        return result
-
-    def keep(self) -> None:
-        """Keep the present state for `back`."""
-        self._before, self.kept = self.kept, self._before
-        self.kept[:] = self._words
-
-    def back(self) -> None:
-        """Return to the state that was kept last."""
-        self._words[:] = self.kept
-
-    def undo(self) -> None:
-        """Return to the state that was kept last, and keep again what was kept before it."""
-        self.back()
-        self._before, self.kept = self.kept, self._before
-
-    def copy(self) -> Any:
-        """Return the present state."""
-        return self._words.copy()
+    def copy(self, into: Any = None, /) -> Any:
+        """Return the present state, in the memory of an older copy if one is given."""
+        if into is None:
+            return self._words.copy()
+        into[:] = self._words
+        return into
 
     def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
         self._words[:] = copy
+
+
+def _across(words: Any, count: int, array: Any) -> Any:
+    """Return a view of an array in the first block and those in its place in the other blocks."""
+    place = (array.ctypes.data - words.ctypes.data) // words.itemsize
+    blocks = words.view(array.dtype).reshape(count, -1)
+    return blocks[:, place : place + array.size].T
 
 
 _known: dict[int, tuple[MachineCode, Any]] = {}

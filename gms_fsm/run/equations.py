@@ -19,7 +19,7 @@ from gms_fsm.errors import ChartError, ParameterError
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._driven import Driven
 from gms_fsm.run.machines import IfElse
-from gms_fsm.run.stepping import Switch
+from gms_fsm.run.stepping import ElementSwitch
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 from integrators import hybrid
@@ -52,7 +52,7 @@ class FrictionEquations:
         Length of y.
     initial : ndarray, shape (size,)
         y at the start.
-    switches : tuple of Switch
+    switches : tuple of ElementSwitch
         The edges taken in the last call of `settle`.
 
     Raises
@@ -81,7 +81,7 @@ class FrictionEquations:
     False
     >>> y = friction.settle(0.0, y, 0.1)
     >>> friction.switches[0]
-    Switch(t=0.0, element=0, edge='break_away_forward')
+    ElementSwitch(t=0.0, element=0, edge='break_away_forward')
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class FrictionEquations:
         program = driven.program
         self.size = len(driven.own)
         self.initial: FloatArray = np.array(driven.initial)
-        self.switches: tuple[Switch, ...] = ()
+        self.switches: tuple[ElementSwitch, ...] = ()
         self._mode = list(driven.start.mode)
         self._held = [0.0] * program.held
         self._watch = [0] * len(program.strict)
@@ -252,12 +252,12 @@ class FrictionEquations:
         )
         b.now.clock[PAUSE] = t
         functions, switch = made.functions(located=True), IfElse(program)
-        taken: list[Switch] = []
+        taken: list[ElementSwitch] = []
         motion = Motion(functions.flow, functions.margins, functions.p, functions.follow)
         while (event := run_to_event(functions, switch, motion, b, 1)) != PAUSED:
             if event == FIRED:
                 machine, edge = b.memory.counts[MACHINE], b.memory.counts[EDGE]
-                taken.append(Switch(t, machine, driven.edge(edge)))
+                taken.append(ElementSwitch(t, machine, driven.edge(edge)))
             elif event != FIRING:
                 last = taken[-1]
                 raise ChartError(

@@ -3,50 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
-from gms_fsm.run._joint import (
-    Asked,
-    Joint,
-    Line,
-    Switch,
-    check_inputs,
-    content_of,
-    in_use,
-    later,
-    line_of,
-    made_again,
-    numbers_of,
-    stepper_kind,
-    too_late,
-    too_short,
-)
-from gms_fsm.run._steppable import start_of
-from gms_fsm.run.start import LATEST
+from gms_fsm.run._joint import Asked, ElementSwitch, Line
+from gms_fsm.run._joints import Joints, Snapshot, input_lines, made_again
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
-__all__ = ["FrictionState", "Snapshot", "Switch"]
-
-
-@dataclass(frozen=True, eq=False)
-class Snapshot:
-    """A state to return to, of a `FrictionState` or a `FrictionBank`.
-
-    Parameters
-    ----------
-    t : float
-        s.
-    """
-
-    t: float
-    of: tuple[str, str] = field(repr=False)  # which friction, and its engine
-    content: Any = field(repr=False)
+__all__ = ["ElementSwitch", "FrictionState", "Snapshot"]
 
 
 class FrictionState:
@@ -95,9 +63,9 @@ class FrictionState:
         rtol: float = 1e-6,
         engine: str | None = None,
     ) -> None:
-        kind, asked = stepper_kind(engine), Asked(t, initial, rtol)
-        start = start_of(model_or_contact, *asked)
-        self._joint = Joint(model_or_contact, asked, start, kind(start))
+        asked = Asked(t, initial, rtol)
+        self._joints = Joints([model_or_contact], [asked], engine, several=False)
+        (self._joint,) = self._joints.each
 
     def __repr__(self) -> str:
         return f"<FrictionState of {self.model!r} at t = {self.t!r} s>"
@@ -139,19 +107,11 @@ class FrictionState:
         SimulationError
             If it cannot continue. In both cases the friction is as it was before.
         """
-        joint = self._joint
         v0, v1, dt = _checked(v0, v1, dt)
-        if inputs or joint.inputs:
+        if inputs or self._joint.inputs:
             inputs = self._lines(inputs)
-        if not joint.alone.acquire(False):  # as `with joint.alone`, in a third of the time
-            raise in_use()
-        try:
-            end = _sum(joint.t, dt)
-            if end == joint.t and dt > 0.0:
-                raise too_short(dt, end)
-            return joint.commit(v0, v1, end, inputs)
-        finally:
-            joint.alone.leave()
+        force: float = self._joints.advance(v0, v1, dt, inputs)
+        return force
 
     def advance_to(self, v0: float, v1: float, t: float, **inputs: Line) -> float:
         """Advance to a time; see `advance`.
@@ -174,9 +134,8 @@ class FrictionState:
             As in `advance`, or if t is before the present time.
         """
         v0, v1, _ = _checked(v0, v1, 0.0)
-        with self._joint.alone:
-            t = later(t, self._joint.t)
-            return self._joint.commit(v0, v1, _sum(t, 0.0), self._lines(inputs))
+        force: float = self._joints.advance_to(v0, v1, t, self._lines(inputs))
+        return force
 
     def peek(self, v0: float, v1: float, dt: float, **inputs: Line) -> float:
         """Return what `advance` would return, and stay: for the stages of a Runge-Kutta step.
@@ -196,30 +155,20 @@ class FrictionState:
         ParameterError, SimulationError
             As in `advance`.
         """
-        joint = self._joint
         v0, v1, dt = _checked(v0, v1, dt)
-        if inputs or joint.inputs:
+        if inputs or self._joint.inputs:
             inputs = self._lines(inputs)
-        if not joint.alone.acquire(False):
-            raise in_use()
-        try:
-            return joint.peek(v0, v1, _sum(joint.t, dt), inputs)
-        finally:
-            joint.alone.leave()
+        force: float = self._joints.peek(v0, v1, dt, inputs)
+        return force
 
     def _lines(self, inputs: Mapping[str, Any]) -> dict[str, Line]:
-        check_inputs(inputs, self._joint.inputs)
-        found = {}
-        for name, given in inputs.items():
-            start, end = (checked_scalar(name, u, "finite") for u in line_of(name, given))
-            found[name] = start, end
-        return found
+        return input_lines(inputs, self._joint.inputs, _finite)
 
     # ------------------------------------------------------------------ what it found
     @property
     def t(self) -> float:
         """The present time, s."""
-        return self._joint.t
+        return self._joints.t
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -232,9 +181,9 @@ class FrictionState:
         return self._joint.variables
 
     @property
-    def switches(self) -> tuple[Switch, ...]:
+    def switches(self) -> tuple[ElementSwitch, ...]:
         """The edges taken in the last sample."""
-        return self._joint.switches
+        return self._joints.switches[0]
 
     @property
     def mean_force(self) -> float:
@@ -243,8 +192,8 @@ class FrictionState:
         It is computed when asked for. A host that applies this force throughout the sample
         exchanges the right impulse.
         """
-        with self._joint.alone:
-            return self._joint.mean_force
+        force: float = self._joints.mean_force
+        return force
 
     @property
     def dF_dv(self) -> float:
@@ -253,13 +202,12 @@ class FrictionState:
         For hosts that solve for the velocity. It is computed when asked for, from samples with
         slightly other velocities at the end; deflections and switches within the sample follow.
         """
-        with self._joint.alone:
-            return self._joint.dF_dv
+        slope: float = self._joints.dF_dv
+        return slope
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how to make a copy: memory of machine code is not copied."""
-        joint = self._joint
-        arguments = {**joint.asked._asdict(), "engine": joint.engine}
+        arguments = {**self._joint.asked._asdict(), "engine": self._joints.engine}
         return made_again, (type(self), self.model, arguments, self.to_array())
 
     # ------------------------------------------------------------------ going back
@@ -271,9 +219,7 @@ class FrictionState:
         Snapshot
             For this friction, or another one of the same model and engine.
         """
-        joint = self._joint
-        with joint.alone:
-            return Snapshot(joint.t, joint.identity, joint.stepper.copy())
+        return self._joints.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot.
@@ -288,10 +234,7 @@ class FrictionState:
         ParameterError
             If it is of another model; the state stays as it was.
         """
-        joint = self._joint
-        with joint.alone:
-            joint.stepper.take(content_of(snapshot, Snapshot, joint.identity))
-            joint.moved_to(snapshot.t)
+        self._joints.restore(snapshot)
 
     def to_array(self) -> FloatArray:
         """Return the present state as finite numbers, for hosts that keep all states in a vector.
@@ -301,8 +244,7 @@ class FrictionState:
         ndarray, shape (m,)
             Its length depends on the model only. It cannot be interpolated.
         """
-        with self._joint.alone:
-            return self._joint.to_array()
+        return self._joints.to_array()
 
     def from_array(self, array: ArrayLike) -> None:
         """Return to what `to_array` returned, also of another friction of the same model.
@@ -317,26 +259,16 @@ class FrictionState:
         ParameterError
             If it cannot be such an array; the state stays as it was.
         """
-        joint = self._joint
-        with joint.alone:
-            joint.from_array(numbers_of(array, joint.length))
+        self._joints.from_array(array)
 
 
 def _checked(v0: Any, v1: Any, dt: Any) -> tuple[float, float, float]:
     """Return the arguments of a sample as floats, or refuse them."""
     usual = isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float)
-    if usual and isfinite(v0) and isfinite(v1) and 0.0 <= dt <= LATEST:
+    if usual and isfinite(v0) and isfinite(v1) and isfinite(dt) and dt >= 0.0:
         return v0, v1, dt
-    v0, v1 = checked_scalar("v0", v0, "finite"), checked_scalar("v1", v1, "finite")
-    dt = checked_scalar("dt", dt, ">= 0")
-    if dt > LATEST:
-        raise too_late("dt", dt)
-    return v0, v1, dt
+    return _finite("v0", v0), _finite("v1", v1), checked_scalar("dt", dt, ">= 0")
 
 
-def _sum(t: float, dt: float) -> float:
-    """Return the end of a sample."""
-    end = t + dt
-    if end > LATEST:
-        raise too_late("t", end)
-    return end
+def _finite(name: str, value: Any) -> float:
+    return checked_scalar(name, value, "finite")

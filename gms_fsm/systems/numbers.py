@@ -13,7 +13,7 @@ from gms_fsm.charts.gms import GMS_ELEMENT
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems._parts import Contact
-from gms_fsm.systems.models import GMS, Model, parameters_of, with_values
+from gms_fsm.systems.models import GMS, ChartModel, Model, parameters_of, with_values
 from gms_fsm.systems.rigs import Rig, numbers_of, with_numbers
 from gms_fsm.systems.system import System
 
@@ -116,7 +116,7 @@ class Adjustable:
     def law(self) -> str | None:
         """The slip law of the GMS model, or of the first one in a system; None without."""
         models = (each.model if isinstance(each, Contact) else each for each in self.contacts)
-        return next((each.law for each in models if isinstance(each, GMS)), None)
+        return next((law for each in models if (law := _law_of(each)) is not None), None)
 
     def with_law(self, law: str) -> Adjustable:
         """Return the same with another slip law; raise `ParameterError` if there is none."""
@@ -156,5 +156,18 @@ def _value_in(each: Model | Contact, name: str) -> float | FloatArray:
     return float(getattr(each.stribeck, name))
 
 
+def _law_of(model: Model | None) -> str | None:
+    """Return the slip law of a GMS model, also of one from a file, which is its chart."""
+    if model is None:
+        return None
+    return next((law for law, chart in GMS_ELEMENT.items() if model.chart == chart), None)
+
+
 def _lawful(model: Model, law: Any) -> Model:
-    return GMS(model.parameters, law=law) if isinstance(model, GMS) else model
+    if isinstance(model, GMS):
+        return GMS(model.parameters, law=law)
+    was = _law_of(model)
+    if was is None or not isinstance(model, ChartModel):
+        return model
+    title = model.title.replace(f"{was} law", f"{law} law")
+    return replace(model, chart=GMS_ELEMENT[law], title=title)

@@ -7,6 +7,7 @@ values of a slider the latest wins.
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import tempfile
 import time
@@ -25,7 +26,8 @@ from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, SessionError
 from gms_fsm.inspection._poking import pokeable
 from gms_fsm.inspection._results import BranchComparison
-from gms_fsm.inspection.forks import Fork, Forks
+from gms_fsm.inspection.branches import Fork, Tree
+from gms_fsm.inspection.session import Session
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
@@ -95,10 +97,13 @@ class Explorer(anywidget.AnyWidget):
         height: int = 720,
         **options: Unpack[SettingOptions],
     ) -> None:
-        self._forks = Forks(
+        if settings is None and "engine" not in options:
+            fast = importlib.util.find_spec("llvmlite") is not None
+            options["engine"] = "compiled" if fast else "ifelse"
+        self._tree = Session(
             model, rig, t_end, t_start=t_start, initial=initial, settings=settings, **options
-        )
-        self._sliders = _checked_sliders(self._forks, sliders)
+        ).tree
+        self._sliders = _checked_sliders(self._tree, sliders)
         self._shown: tuple[int, ...] = (0,)
         self._pictures: list[tuple[Chart, int, str]] = []
         self._answer: dict[str, Any] = {"done": "", "said": "", "file": None}
@@ -116,12 +121,12 @@ class Explorer(anywidget.AnyWidget):
     @property
     def branches(self) -> dict[int, Fork]:
         """The branches by number; `Fork.text` is what differs from the parent."""
-        return dict(self._forks.branches)
+        return dict(self._tree.forks)
 
     @property
     def current(self) -> int:
         """Number of the branch that sliders, pokes and forks refer to."""
-        return self._forks.current
+        return self._tree.current
 
     @property
     def shown(self) -> tuple[int, ...]:
@@ -131,12 +136,12 @@ class Explorer(anywidget.AnyWidget):
     @property
     def values(self) -> dict[str, float]:
         """The numbers of the current branch that have a slider."""
-        numbers = self._forks.numbers()
+        numbers = self._tree.numbers()
         return {name: numbers[name].value for name in self._sliders if name in numbers}
 
     def trace(self, branch: int | None = None) -> Trace:
         """Return the run of a branch, by default of the current one."""
-        return self._forks.trace(branch)
+        return self._tree.trace(branch)
 
     # ------------------------------------------------------------------ changes
     def set(self, values: Mapping[str, float] | None = None, /, **more: float) -> None:
@@ -155,7 +160,7 @@ class Explorer(anywidget.AnyWidget):
             If there is no such number, or a value violates its rule.
         """
         with self._changing():
-            self._forks.set({**(values or {}), **more})
+            self._tree.set({**(values or {}), **more})
 
     def fork(
         self, *, law: str | None = None, values: Mapping[str, float] | None = None, name: str = ""
@@ -178,7 +183,7 @@ class Explorer(anywidget.AnyWidget):
         """
         with self._changing():
             before = self.current
-            number = self._forks.fork(law=law, values=values, name=name)
+            number = self._tree.fork(law=law, values=values, name=name)
             self._shown = before, number
         return number
 
@@ -217,15 +222,15 @@ class Explorer(anywidget.AnyWidget):
         """
         with self._changing():
             before = self.current
-            number = self._forks.poke(variables, v, state, t=t, microstep=microstep, name=name)
+            number = self._tree.poke(variables, v, state, t=t, microstep=microstep, name=name)
             self._shown = before, number
         return number
 
     def show(self, branch: int) -> None:
         """Show one branch, which becomes the current one."""
         with self._changing():
-            self._forks.trace(branch)
-            self._forks.current, self._shown = branch, (branch,)
+            self._tree.current = self._tree.checked(branch)
+            self._shown = (branch,)
 
     def compare(self, a: int, b: int) -> BranchComparison:
         """Show two branches side by side; the second becomes the current one.
@@ -243,24 +248,24 @@ class Explorer(anywidget.AnyWidget):
         with self._changing():
             if a == b:
                 raise SessionError("give two branches", place="b", value=b)
-            found = self._forks.compare(a, b)
-            self._forks.current, self._shown = b, (a, b)
+            found = self._tree.compare(a, b)
+            self._tree.current, self._shown = b, (a, b)
         return found
 
     def rename(self, branch: int, name: str) -> None:
         """Give a branch another name."""
         with self._changing():
-            self._forks.rename(branch, name)
+            self._tree.rename(branch, name)
 
     def delete(self, branch: int) -> None:
         """Remove a branch that no other comes from."""
         with self._changing():
-            self._forks.delete(branch)
+            self._tree.delete(branch)
             if branch in self._shown:
                 self._shown = (self.current,)
 
     def export(self, path: str | Path, branch: int | None = None) -> Path:
-        """Write a branch as a scenario file; see `gms_fsm.inspection.forks.Forks.save_scenario`.
+        """Write a branch as a scenario file; see `gms_fsm.inspection.branches.Tree.save_scenario`.
 
         Parameters
         ----------
@@ -274,7 +279,7 @@ class Explorer(anywidget.AnyWidget):
         Path
             The file.
         """
-        return self._forks.save_scenario(path, branch)
+        return self._tree.save_scenario(path, branch)
 
     # ------------------------------------------------------------------ what the browser shows
     @contextmanager
@@ -284,16 +289,16 @@ class Explorer(anywidget.AnyWidget):
         before = time.perf_counter()
         yield
         for number in self._shown:
-            self._forks.trace(number)
+            self._tree.trace(number)
         self._took = time.perf_counter() - before
         data, charts = self._drawn()
         with self.hold_sync():
             self.runs, self.charts, self.panel = data, charts, self._described()
 
     def _drawn(self) -> tuple[dict[str, Any], list[str]]:
-        forks = self._forks
-        traces = [forks.trace(number) for number in self._shown]
-        names = [forks.branches[number].name for number in self._shown]
+        tree = self._tree
+        traces = [tree.trace(number) for number in self._shown]
+        names = [tree.forks[number].name for number in self._shown]
         return page_data(traces, names=names, draw=self._picture)
 
     def _picture(self, chart: Chart, n: int) -> str:
@@ -305,8 +310,8 @@ class Explorer(anywidget.AnyWidget):
 
     def _described(self) -> dict[str, Any]:
         """Return what the controls show."""
-        forks = self._forks
-        numbers, law = forks.numbers(), forks.made_of().law
+        tree = self._tree
+        numbers, law = tree.numbers(), tree.made_of().law
         sliders = [
             {
                 "name": name,
@@ -326,22 +331,22 @@ class Explorer(anywidget.AnyWidget):
                 "name": fork.name,
                 "text": fork.text,
                 "parent": fork.parent,
-                "begin": forks.beginning(number),
+                "begin": tree.beginning(number),
             }
-            for number, fork in forks.branches.items()
+            for number, fork in tree.forks.items()
         ]
-        failures = [forks.failure(number) for number in self._shown]
+        failures = [tree.failure(number) for number in self._shown]
         return {
             "sliders": sliders,
             "law": law,
             "laws": [] if law is None else list(GMS_ELEMENT),
             "branches": branches,
-            "current": forks.current,
+            "current": tree.current,
             "shown": list(self._shown),
-            "t_start": forks.t_start,
-            "t_end": forks.t_end,
+            "t_start": tree.t_start,
+            "t_end": tree.t_end,
             "took": 1e3 * self._took,
-            "engine": forks.settings.engine,
+            "engine": tree.settings.engine,
             "failed": "; ".join(str(each) for each in failures if each is not None),
             "pokes": self._pokes(),
             **self._answer,
@@ -349,7 +354,7 @@ class Explorer(anywidget.AnyWidget):
 
     def _pokes(self) -> dict[str, Any]:
         """Return what can be poked: of each contact, and other names of a system."""
-        start = self._forks.start()
+        start = self._tree.branch().start
         contacts = []
         own: list[str] = []
         for bank in start.program.layout.banks:
@@ -415,13 +420,15 @@ class Explorer(anywidget.AnyWidget):
             edits = {"variables": {f"{contact}.{what}" if contact else what: {element: value}}}
         else:
             edits = (
-                {"v": value} if self._forks.start().given is None else {"variables": {what: value}}
+                {"v": value}
+                if self._tree.branch().start.given is None
+                else {"variables": {what: value}}
             )
         self.poke(**edits, t=t, microstep=microstep)
 
 
 def _checked_sliders(
-    forks: Forks, sliders: Mapping[str, tuple[float, float]]
+    tree: Tree, sliders: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
     """Return the ranges of the sliders; raise `ParameterError` for one that is none."""
     if not isinstance(sliders, Mapping):
@@ -430,7 +437,7 @@ def _checked_sliders(
         )
     found = {}
     for name, ends in sliders.items():
-        number = forks.number(name, 0)
+        number = tree.number(name, 0)
         try:
             low, high = (checked_scalar(f"sliders[{name!r}]", end, "finite") for end in ends)
         except (TypeError, ValueError) as error:

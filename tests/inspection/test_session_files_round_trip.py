@@ -90,7 +90,12 @@ def test_other_files_are_rejected(text: str, tmp_path: Path) -> None:
         Session.load(path)
 
 
+FORK = {"fork": -1, "edits": {}, "cursor": 0, "from": None, "between": None}
+ORIGINAL = {"parent": None, **FORK}
 DAMAGE: list[tuple[str, Any]] = [
+    ("branches", [ORIGINAL, {"parent": 0, **FORK, "law": "another"}]),
+    ("branches", [ORIGINAL, {"parent": 0, **FORK, "values": {"F_s": "x"}}]),
+    ("branches", [ORIGINAL, {"parent": 1, **FORK}]),
     ("current", 7),
     ("current", "one"),
     ("t_end", -1.0),
@@ -108,7 +113,7 @@ DAMAGE: list[tuple[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize(("key", "value"), DAMAGE, ids=[f"{k}={v}"[:50] for k, v in DAMAGE])
+@pytest.mark.parametrize(("key", "value"), DAMAGE, ids=[f"{k}={v}"[-50:] for k, v in DAMAGE])
 def test_a_damaged_file_is_rejected_on_reading(key: str, value: Any, tmp_path: Path) -> None:
     path = Session(stick_slip("signed"), Prescribed(FIG4_SINE), 5.0).save(tmp_path / "s.json")
     data = json.loads(path.read_text())

@@ -82,8 +82,7 @@ def test_every_call_from_another_thread_is_refused_meanwhile(kind: Any) -> None:
             except ParameterError as error:
                 said[name] = str(error)
 
-    alone = friction._alone if kind is FrictionBank else friction._joint.alone
-    with alone:  # as during a call
+    with friction._joints.alone:  # as during a call
         other = threading.Thread(target=call_all)
         other.start()
         other.join()

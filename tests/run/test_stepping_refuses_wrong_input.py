@@ -40,14 +40,16 @@ ROOT = Chart(
 )  # fmt: skip
 
 
-def started() -> FrictionState:
-    friction = FrictionState(GIVEN)
+def started(kind: str = "state") -> Any:
+    """Return a friction after some samples: of one joint, or a bank of two."""
+    friction: Any = FrictionState(GIVEN) if kind == "state" else FrictionBank([GIVEN, OTHER])
+    v = 0.1 if kind == "state" else [0.1, 0.2]
     for _ in range(7):
-        friction.advance(0.1, 0.1, 0.3)
+        friction.advance(v, v, 0.3)
     return friction
 
 
-WRONG: dict[str, tuple[Callable[[FrictionState], Any], str]] = {
+STATE: dict[str, tuple[Callable[[FrictionState], Any], str]] = {
     "NaN": (lambda f: f.advance(math.nan, 0.1, 0.1), "v0 is nan; it must be finite"),
     "infinity": (lambda f: f.peek(0.1, math.inf, 0.1), "v1 is inf; it must be finite"),
     "a text": (lambda f: f.advance("fast", 0.1, 0.1), "v0 is 'fast'; it must be a number"),
@@ -86,20 +88,6 @@ WRONG: dict[str, tuple[Callable[[FrictionState], Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_a_state(name: str) -> None:
-    friction = started()
-    before = friction.to_array(), friction.t, friction.states, friction.switches
-    call, text = WRONG[name]
-    with pytest.raises(ParameterError) as caught:
-        call(friction)
-    assert text in str(caught.value)
-    np.testing.assert_array_equal(friction.to_array(), before[0])
-    assert (friction.t, friction.states, friction.switches) == before[1:]
-    twin = started()
-    assert friction.advance(0.1, -0.1, 1.0) == twin.advance(0.1, -0.1, 1.0)
-
-
 @pytest.mark.parametrize("kind", [int, np.float32, np.float64, np.array, Fraction])
 def test_other_kinds_of_numbers(kind: Callable[[Any], Any]) -> None:
     assert started().advance(kind(1), kind(0), kind(2)) == started().advance(1.0, 0.0, 2.0)
@@ -119,17 +107,23 @@ BANKS: dict[str, tuple[Callable[[FrictionBank], Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("name", BANKS)
-def test_a_bank(name: str) -> None:
-    bank = FrictionBank([GIVEN, OTHER])
-    bank.advance([0.1, 0.1], [0.2, 0.1], 2.0)
-    before, t = bank.to_array(), bank.t
-    call, text = BANKS[name]
+WRONG = {("state", name): row for name, row in STATE.items()}
+WRONG |= {("bank", name): row for name, row in BANKS.items()}
+
+
+@pytest.mark.parametrize(("kind", "name"), WRONG)
+def test_a_wrong_call_changes_nothing(kind: str, name: str) -> None:
+    friction = started(kind)
+    before = friction.to_array(), friction.t, friction.states, friction.switches
+    call, text = WRONG[kind, name]
     with pytest.raises(ParameterError) as caught:
-        call(bank)
+        call(friction)
     assert text in str(caught.value)
-    np.testing.assert_array_equal(bank.to_array(), before)
-    assert bank.t == t
+    np.testing.assert_array_equal(friction.to_array(), before[0])
+    assert (friction.t, friction.states, friction.switches) == before[1:]
+    v = (0.1, -0.1) if kind == "state" else ([0.1, 0.2], [-0.1, 0.2])
+    after = friction.advance(*v, 1.0), started(kind).advance(*v, 1.0)
+    np.testing.assert_array_equal(*after)
 
 
 MADE: dict[str, tuple[Callable[[], Any], str]] = {

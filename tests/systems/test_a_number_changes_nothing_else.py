@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gms_fsm import GMS, Body, Chart, ChartModel, Contact, GMSParameters, State, System
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.registry import entry
-from gms_fsm.inspection.forks import Forks
+from gms_fsm.inspection.session import Session
 from gms_fsm.systems.models import demonstration
 from gms_fsm.systems.numbers import Adjustable
 from tests.helpers import FASTEST
@@ -93,7 +93,7 @@ def test_the_load_of_another_contact_in_a_fork_with_another_law() -> None:
             Contact("gms", bank(), v="v_a"),
         ),
     )
-    forks = Forks(system, 1.0, engine=FASTEST)
-    forks.fork(law="published")
-    before, after = (forks.trace(k).contact("pad").F[-1] for k in (0, 1))
+    session = Session(system, 1.0, engine=FASTEST)
+    session.fork(law="published")
+    before, after = (session.tree.trace(k).contact("pad").F[-1] for k in (0, 1))
     assert before == after == 3.0

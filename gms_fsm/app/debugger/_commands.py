@@ -173,7 +173,7 @@ class Commands:
             case "help":
                 return list(COMMANDS)
             case "branch" | "compare":
-                return [str(i) for i in range(len(session.branches))]
+                return list(map(str, session.tree.forks))
             case "clear":
                 return [*(str(i + 1) for i in range(len(session.breakpoints))), "all"]
             case "unwatch":
@@ -317,7 +317,7 @@ class Commands:
         """Compute to the end."""
         _nothing("run", arg)
         self.session.branch.complete()
-        current = branches(self.session)[self.session.current]
+        current = next(each for each in branches(self.session) if each.current)
         yield f"branch {current.number}: {text_of.progress(current)}"
 
     # ------------------------------------------------------------------ looking
@@ -497,14 +497,13 @@ class Commands:
         from plots import figures
 
         runs = {}
-        for number, branch in enumerate(self.session.branches):
-            branch.complete()
-            trace = branch.trace()
+        for number, fork in self.session.tree.forks.items():
+            trace = self.session.tree.trace(number)
             if not trace.t[-1] > trace.t[0]:
                 raise SessionError(
                     f"branch {number} failed immediately", advice="there is nothing to draw"
                 )
-            edits = f": {branch.edits}" if branch.edits else ""
+            edits = f": {fork.changes}" if fork.changes else ""
             bank = self.elements.bank(self.element)
             if len(trace.contacts) > 1:
                 trace = trace.contact(bank.name)

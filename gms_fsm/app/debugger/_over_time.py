@@ -76,7 +76,7 @@ def ribbons(
         The states in the middle of each part.
     """
     start, end = span or (session.branch.raw(0).t, session.t_end)
-    shown = session.branch if branch is None else session.branches[branch]
+    shown = session.tree.branch(branch)
     rows = _sampled(shown, start, end, parts)
     modes = tuple(None if row is None else shown.raw(row).mode for row in rows)
     now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))

@@ -449,8 +449,8 @@ def branches(session: Session) -> tuple[BranchView, ...]:
             branch.last.t,
             _outcome(branch),
             branch.parent,
-            None if branch.parent is None else branch.raw(branch.fork + 1).t,
-            "" if branch.edits is None else str(branch.edits),
+            None if branch.parent is None else session.tree.beginning(number),
+            session.tree.forks[number].changes,
         )
-        for number, branch in enumerate(session.branches)
+        for number, branch in zip(session.tree.forks, session.branches, strict=True)
     )

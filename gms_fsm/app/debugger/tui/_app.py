@@ -448,8 +448,9 @@ class FullScreen(App[int]):
 
     def action_branch(self) -> None:
         """Switch to the next branch."""
-        session = self.commands.session
-        self.give(f"branch {(session.current + 1) % len(session.branches)}")
+        tree = self.commands.session.tree
+        numbers = list(tree.forks)
+        self.give(f"branch {numbers[(numbers.index(tree.current) + 1) % len(numbers)]}")
 
     def action_prompt(self, text: str) -> None:
         """Go to the command line."""

@@ -6,7 +6,7 @@ Values are those of the view, in engineering units; sentences are those of the l
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from gms_fsm.app._quantities import quantity
 from gms_fsm.app.debugger._over_time import EventView
@@ -270,9 +270,9 @@ def session_rows(
     list of Row
         The rows.
     """
-    rows = []
+    rows, numbered = list[Row](), {each.number: each for each in branches}
     for each in branches:
-        mark, indent = ("▶" if each.current else " "), "  " * _depth(each, branches)
+        mark, indent = ("▶" if each.current else " "), "  " * _depth(each, numbered)
         fork = "" if each.parent is None else f" from {each.parent} at {each.t_fork:.9g} s:"
         text = f"{mark}{indent}branch {each.number}{fork} {each.edits}".rstrip()
         role, command = ("head" if each.current else "", f"branch {each.number}")
@@ -286,7 +286,7 @@ def session_rows(
     return rows
 
 
-def _depth(each: BranchView, branches: Sequence[BranchView]) -> int:
+def _depth(each: BranchView, branches: Mapping[int, BranchView]) -> int:
     return 0 if each.parent is None else 1 + _depth(branches[each.parent], branches)
 
 
