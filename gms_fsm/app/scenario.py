@@ -33,9 +33,10 @@ from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import mounted, mounted_alone
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.systems.signals import Corners, SignalLike, as_signal
-from gms_fsm.systems.system import System, origin_of
+from gms_fsm.systems.system import System
 from gms_fsm.traces.monitors import Monitor, checked
 from gms_fsm.traces.trace import Trace
 
@@ -284,10 +285,10 @@ def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
         arguments["initial"] = initial
     if scenario.output.every is not None:
         arguments["t_eval"] = _rows(path, scenario.output.every, start, end)
-    model, rig = origin_of(system)
+    what = mounted(system)
     if run.monitors:
         arguments["monitors"] = tuple(run.monitors)  # checked by the run
-    return Loaded(path, scenario, model, rig, arguments, None, None, system)
+    return Loaded(path, scenario, what.model, what.rig, arguments, None, None, system)
 
 
 def _rows(path: Path, every: float, start: float, end: float) -> FloatArray:
@@ -305,7 +306,7 @@ def _rows(path: Path, every: float, start: float, end: float) -> FloatArray:
 
 def _monitors(path: Path, given: Sequence[str], model: Model) -> tuple[Monitor, ...]:
     try:
-        return tuple(checked(given, model).values())
+        return tuple(checked(given, mounted_alone(model)).values())
     except GMSError as error:
         raise ScenarioError.of(error).inside("run.monitors").inside(path) from None
 

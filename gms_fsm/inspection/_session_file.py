@@ -19,9 +19,10 @@ from gms_fsm.inspection._breakpoints import Breakpoint
 from gms_fsm.inspection._poking import Edits
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Function
-from gms_fsm.systems.system import System, origin_of
+from gms_fsm.systems.system import System
 from gms_fsm.traces._header import Header
 
 if TYPE_CHECKING:
@@ -149,15 +150,15 @@ def restore(session: Session, record: SessionRecord) -> None:
 
 def write(path: Path, record: SessionRecord) -> Path:
     """Write a session; raise `SessionError` for anything a file cannot store."""
-    signals = (record.model if record.rig is None else record.rig).signals  # type: ignore[union-attr]
-    if any(isinstance(signal, Function) for signal in signals.values()):
+    what = mounted(record.model, record.rig)
+    if any(isinstance(signal, Function) for signal in what.system.signals.values()):
         raise SessionError("a signal is a Python function, which a file cannot store")
     for name, value in record.options.items():
         if not isinstance(value, str | int | float | dict | type(None)):
             raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
     data = {
         "format": FORMAT,
-        "header": json.loads(_header(record).model_dump_json()),
+        "header": json.loads(Header.of(what, {}).model_dump_json()),
         "t_end": record.t_end,
         "options": {name: _plain(value) for name, value in record.options.items()},
         "branches": [
@@ -179,23 +180,16 @@ def write(path: Path, record: SessionRecord) -> Path:
     return write_whole(path, lambda file: file.write(text))
 
 
-def _header(record: SessionRecord) -> Header:
-    if isinstance(record.model, System):
-        return Header.of(*origin_of(record.model), record.model, {})
-    assert record.rig is not None
-    return Header.of(record.model, record.rig, None, {})
-
-
 def read(path: Path) -> SessionRecord:
     """Read a session; a faulty file raises any kind of error."""
     data = json.loads(path.read_text(encoding="utf-8"))
     if data["format"] != FORMAT:
         raise ValueError(f"format is {data['format']!r}")
     header = Header.model_validate(data["header"])
-    system = header.to_system()
+    what = header.to_mounted()
     return SessionRecord(
-        header.to_model() if system is None else system,
-        header.to_rig() if system is None else None,
+        what.given or what.model,
+        None if what.named else what.rig,
         data["t_end"],
         data["options"],
         [_branch(record) for record in data["branches"]],

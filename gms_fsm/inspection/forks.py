@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from gms_fsm._arguments import checked_integer
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import SessionError, shown
-from gms_fsm.inspection._adjustable import Number, number_of, numbers_of, with_numbers
 from gms_fsm.inspection._arguments import checked_settings
 from gms_fsm.inspection._branch import Row
 from gms_fsm.inspection._export import save_scenario
@@ -28,10 +27,11 @@ from gms_fsm.inspection._poking import Edits, initial_with
 from gms_fsm.inspection._results import BranchComparison, compared
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.run.simulate import Run, mounted
+from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import Mounted, arguments_of, mounted
+from gms_fsm.systems.numbers import Number, number_of, numbers_of, with_law, with_numbers
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 from gms_fsm.traces._between import interpolated
@@ -155,8 +155,8 @@ class Forks:
             fast = importlib.util.find_spec("llvmlite") is not None
             options["engine"] = "compiled" if fast else "ifelse"
         self.settings = checked_settings(settings, options)
-        on, self.t_end = mounted("Forks", model, rig, t_end)
-        self.subject = Adjustable(model, on)
+        on, self.t_end = arguments_of("Forks", model, rig, t_end)
+        self.subject = mounted(model, on, self.settings.held_period)
         self.t_start, self.initial = t_start, initial
         self.branches: dict[int, Fork] = {0: Fork("original")}
         self.current, self._next = 0, 1
@@ -164,11 +164,11 @@ class Forks:
         self.trace(0)  # errors in the arguments belong here
 
     # ------------------------------------------------------------------ what runs
-    def made_of(self, branch: int | None = None) -> Adjustable:
+    def made_of(self, branch: int | None = None) -> Mounted:
         """Return model and rig of a branch, by default the current one."""
         number = self._checked(branch)
         law, values = self._given(number)
-        lawful = self.subject if law is None else self.subject.with_law(law)
+        lawful = self.subject if law is None else with_law(self.subject, law)
         return with_numbers(lawful, values)
 
     def numbers(self, branch: int | None = None) -> dict[str, Number]:
@@ -267,7 +267,7 @@ class Forks:
         """
         number = self._checked(parent)
         if law is not None:
-            self.subject.with_law(law)
+            with_law(self.subject, law)
         own = self._own_values(number, values or {})
         return self._added(Fork(name, number, own, law))
 
@@ -465,7 +465,7 @@ class Forks:
             if pokes:
                 found = self._poked(self._run(law, values, pokes[:-1]), pokes[-1])
             else:
-                subject = self.subject if law is None else self.subject.with_law(law)
+                subject = self.subject if law is None else with_law(self.subject, law)
                 changed = with_numbers(subject, dict(values))
                 found = self._from(changed, self.t_start, self.initial)
             self._ran[key] = found
@@ -474,11 +474,11 @@ class Forks:
         self._ran.move_to_end(key)
         return self._ran[key]
 
-    def _from(self, subject: Adjustable, t: float, initial: Mapping[str, Any] | None) -> _Ran:
+    def _from(self, subject: Mounted, t: float, initial: Mapping[str, Any] | None) -> _Ran:
         options: Any = {"t_start": t, "initial": initial}
         if t != self.t_start or initial is not self.initial:
             options["ticks_from"] = self.t_start
-        start = Start.of(subject.what, subject.rig, self.t_end, self.settings, **options)
+        start = Start.on(subject, self.t_end, self.settings, **options)
         compiled = self.settings.engine == "compiled"
         run: CompiledRun | Run = CompiledRun(start) if compiled else Run(start)
         failure: SimulationError | None = None
@@ -494,8 +494,7 @@ class Forks:
         """Return a run that goes on from a point of another with edits."""
         place, here = _place(before, poke)
         was = before.start
-        subject = Adjustable(was.given or was.model, None if was.given else was.rig)
-        after = self._from(subject, here.t, initial_with(poke.edits, was, here))
+        after = self._from(was.what, here.t, initial_with(poke.edits, was, here))
         shared = before.trace.rows.at(slice(place + 1))
         if here.t != shared.t[-1]:  # between two rows: the point is a row of this branch
             own = [here.t], [0], [here.y], [here.mode]

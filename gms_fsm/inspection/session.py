@@ -26,9 +26,10 @@ from gms_fsm.inspection._results import BranchComparison, Fired, Here, compared
 from gms_fsm.inspection.explain import Why
 from gms_fsm.language import Condition
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.run.simulate import Run, mounted
+from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import arguments_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 
@@ -90,7 +91,7 @@ class Session:
         **options: Unpack[SettingOptions],
     ) -> None:
         self.settings = checked_settings(settings, options)
-        self.made_of = model, *mounted("Session", model, rig, t_end)
+        self.made_of = model, *arguments_of("Session", model, rig, t_end)
         self.t_start, self.initial = t_start, initial
         self.branches = [Branch(self._run(t_start, initial))]
         self.current = 0

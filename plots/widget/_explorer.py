@@ -28,6 +28,7 @@ from gms_fsm.inspection._results import BranchComparison
 from gms_fsm.inspection.forks import Fork, Forks
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.numbers import law_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 from gms_fsm.traces.trace import Trace
@@ -306,7 +307,7 @@ class Explorer(anywidget.AnyWidget):
     def _described(self) -> dict[str, Any]:
         """Return what the controls show."""
         forks = self._forks
-        numbers, law = forks.numbers(), forks.made_of().law
+        numbers, law = forks.numbers(), law_of(forks.made_of())
         sliders = [
             {
                 "name": name,
