@@ -95,8 +95,8 @@ class Loaded:
     @property
     def contacts(self) -> tuple[str, ...]:
         """The names of the contacts, if there are several."""
-        several = self.system is not None and len(self.system.contacts) > 1
-        return tuple(each.name for each in self.system.contacts) if self.system and several else ()
+        names = () if self.system is None else tuple(each.name for each in self.system.contacts)
+        return names if len(names) > 1 else ()
 
     def simulate(self, **options: Any) -> Trace:
         """Run it.
@@ -112,9 +112,8 @@ class Loaded:
             The run.
         """
         given: Any = {**self.arguments, **options}
-        if self.system is not None:
-            return simulate(self.system, given.pop("t_end"), **given)
-        return simulate(self.model, self.rig, **given)
+        what: Any = (*self.subject[:-1], given.pop("t_end"))
+        return simulate(*what, **given)
 
 
 def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:

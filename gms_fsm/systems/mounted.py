@@ -144,6 +144,10 @@ class Mounted:
         """Return the name of a contact; nothing if its user gave none."""
         return contact if self.named else ""
 
+    def element(self, contact: str, i: int) -> str:
+        """Return what an element is called in text: ``gear 2``, or ``element 2``."""
+        return f"{self.whose(contact) or 'element'} {i + 1}"
+
     def of(self, contact: str, name: str) -> str:
         """Return what is called by a name in a contact: ``gear.k``, or ``k``."""
         return f"{contact}.{name}" if self.named else name

@@ -17,9 +17,8 @@ from gms_fsm.charts.gms import GMS_ELEMENT
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.systems._parts import Contact
-from gms_fsm.systems.models import GMS, Model, parameters_of, with_values
+from gms_fsm.systems.models import GMS, Model, parameters_of
 from gms_fsm.systems.mounted import Mounted, mounted
-from gms_fsm.systems.rigs import numbers_of as numbers_of_rig
 from gms_fsm.systems.rigs import with_numbers as with_numbers_of_rig
 
 __all__ = ["Number", "column_name", "joined", "known_in", "law_of", "number_of", "numbers_of"]
@@ -95,7 +94,10 @@ def known_in(what: Mounted) -> dict[str, tuple[Parameter, int]]:
     >>> list(known_in(one)), value_in(varied(one, {"pad.F_s": 2.0}), "pad.F_s")
     (['numbers.m', 'pad.F_c', 'pad.F_s', 'pad.b'], 2.0)
     """
-    rest = {what.of(NUMBERS, each.name): (each, 0) for each in numbers_of_rig(what.rig)}
+    units = {each.name: each for each in getattr(what.rig, "parameters", ())}
+    rest = {
+        what.of(NUMBERS, name): (units.get(name, Parameter(name)), 0) for name in what.rig.numbers
+    }
     found = dict(rest) if what.named else {}
     for contact in what.system.contacts:
         for name, each in _known(contact).items():
@@ -123,20 +125,27 @@ def varied(what: Mounted, values: Mapping[str, ArrayLike]) -> Mounted:
     """Return the same with other numbers; a `ParameterError` if one breaks its rule."""
     if not values:
         return what
-    if not what.named:  # a number of the rig may have the name of one of the model
-        model, rig = with_values(what.model, values), with_numbers_of_rig(what.rig, values)
-        return mounted(model, rig, what.system.contacts[0].period)
     groups: dict[str, dict[str, Any]] = {}
     for name, given in values.items():
         owner, own = _owner(what, name)
         groups.setdefault(owner, {})[own] = given
-    system = what.system
     contacts = tuple(
         each.with_values(groups[each.name]) if each.name in groups else each
-        for each in system.contacts
+        for each in what.system.contacts
     )
-    numbers = {**system.numbers, **groups.get(NUMBERS, {})}
-    return mounted(replace(system, contacts=contacts, numbers=numbers))
+    return _remade(what, contacts, groups.get(NUMBERS, {}))
+
+
+def _remade(
+    what: Mounted, contacts: tuple[Contact, ...], numbers: Mapping[str, ArrayLike]
+) -> Mounted:
+    """Return the same with other contacts, and some other numbers beside theirs."""
+    if what.named:
+        every: Any = {**what.system.numbers, **numbers}
+        return mounted(replace(what.system, contacts=contacts, numbers=every))
+    model = contacts[0].model
+    assert model is not None
+    return mounted(model, with_numbers_of_rig(what.rig, numbers), contacts[0].period)
 
 
 def _owner(what: Mounted, name: str) -> tuple[str, str]:
@@ -157,19 +166,23 @@ def _known(contact: Contact) -> dict[str, tuple[Parameter, int]]:
 
 
 # --------------------------------------------------------------------------- single numbers
+def _parts(what: Mounted, whole: str, parameter: Parameter, n: int) -> list[Number]:
+    """Return a parameter as numbers: one, or one for each element."""
+    values = np.ravel(np.broadcast_to(np.asarray(value_in(what, whole), dtype=float), n or ()))
+    if not n:
+        return [Number(whole, parameter, float(values[0]), whole, None)]
+    return [
+        Number(column_name(whole, i), parameter, each, whole, i)
+        for i, each in enumerate(values.tolist())
+    ]
+
+
 def parts_of(what: Mounted, name: object) -> list[Number]:
     """Return the numbers that a name stands for: k1, k2 ... for k; none if nothing is called so."""
     for whole, (parameter, n) in known_in(what).items():
-        named = [column_name(whole, i) for i in range(n)]
-        if name != whole and name not in named:
-            continue
-        values = np.broadcast_to(np.asarray(value_in(what, whole), dtype=float), n or ())
-        if not n:
-            return [Number(whole, parameter, float(values), whole, None)]
-        every = [
-            Number(each, parameter, float(values[i]), whole, i) for i, each in enumerate(named)
-        ]
-        return every if name == whole else [every[named.index(str(name))]]
+        parts = _parts(what, whole, parameter, n)
+        if found := [each for each in parts if name in (whole, each.name)]:
+            return found
     return []
 
 
@@ -179,14 +192,12 @@ def numbers_of(what: Mounted) -> dict[str, Number]:
     A name without the number of an element stands for all elements; it is absent if they differ.
     """
     found: dict[str, Number] = {}
-    for whole, (parameter, _) in known_in(what).items():
-        values = np.asarray(value_in(what, whole), dtype=np.float64)
-        if values.ndim == 0 or (values == values.flat[0]).all():
-            found[whole] = Number(whole, parameter, float(values.flat[0]), whole, None)
-        if values.ndim and values.size > 1:
-            for i, each in enumerate(values.tolist()):
-                name = column_name(whole, i)
-                found[name] = Number(name, parameter, each, whole, i)
+    for whole, (parameter, n) in known_in(what).items():
+        parts = _parts(what, whole, parameter, n)
+        if len({each.value for each in parts}) == 1:
+            found[whole] = replace(parts[0], name=whole, element=None)
+        if n > 1:
+            found |= {each.name: each for each in parts}
     return found
 
 
@@ -242,13 +253,11 @@ def with_law(what: Mounted, law: str) -> Mounted:
         raise ParameterError(f"it must be {known}", place="law", value=law)
     if law_of(what) is None:
         raise ParameterError("only a GMS model has a slip law", place="law", value=law)
-    if not what.named:
-        return mounted(_lawful(what.model, law), what.rig, what.system.contacts[0].period)
     contacts = tuple(
         each if each.model is None else each.with_model(_lawful(each.model, law))
         for each in what.system.contacts
     )
-    return mounted(replace(what.system, contacts=contacts))
+    return _remade(what, contacts, {})
 
 
 def _lawful(model: Model, law: Any) -> Model:

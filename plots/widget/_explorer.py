@@ -359,13 +359,13 @@ class Explorer(anywidget.AnyWidget):
             own += [bank.of(name) for name in names]
             contacts.append(
                 {
-                    "name": "" if start.given is None else bank.name,
+                    "name": start.what.whose(bank.name),
                     "n": bank.n,
                     "variables": [[name, contact.chart.unit(name)] for name in names],
                     "states": [state.name for state in contact.chart.states],
                 }
             )
-        if start.given is None:
+        if not start.what.named:
             free = any(not body.driven for body in start.system.bodies)
             return {"contacts": contacts, "others": ["v"] if free else []}
         return {
@@ -415,9 +415,8 @@ class Explorer(anywidget.AnyWidget):
         elif element >= 0:
             edits = {"variables": {f"{contact}.{what}" if contact else what: {element: value}}}
         else:
-            edits = (
-                {"v": value} if self._forks.start().given is None else {"variables": {what: value}}
-            )
+            named = self._forks.start().what.named
+            edits = {"variables": {what: value}} if named else {"v": value}
         self.poke(**edits, t=t, microstep=microstep)
 
 
