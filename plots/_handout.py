@@ -21,7 +21,7 @@ from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import parse_value
-from gms_fsm.systems.models import Model
+from gms_fsm.systems.models import Model, is_model
 from gms_fsm.systems.system import loaded
 from plots import formats, panels, presets
 from plots._excitation import Excited, excited
@@ -100,7 +100,7 @@ def handout_figure(
     model: Model, *, velocity: str | None = None, t_end: float | None = None
 ) -> Figure:
     """Return the page of `handout` as a figure; its parameters and errors are the same."""
-    if not (hasattr(model, "chart") and hasattr(model, "weights")):
+    if not is_model(model):
         raise ParameterError(
             f"model is {model!r:.60}", advice="give a model, such as GMS(parameters, law='signed')"
         )

@@ -20,6 +20,7 @@ arXiv 2512.03049 (2025), Fig. 2a, eq. (2)-(4).
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import graphviz
@@ -112,8 +113,11 @@ def block_diagram(elements: int | System = 4) -> DrawnGraph:
     >>> sum("class=body" in line for line in graph.body)
     1
     """
-    if isinstance(elements, System):
-        return system_diagram(elements)
+    return _drawn(elements)
+
+
+@functools.singledispatch
+def _drawn(elements: object) -> DrawnGraph:
     if isinstance(elements, bool) or not isinstance(elements, int) or elements < 1:
         raise ParameterError(
             "it must be a System, or the number of elements, an integer of at least 1",
@@ -121,6 +125,9 @@ def block_diagram(elements: int | System = 4) -> DrawnGraph:
             value=elements,
         )
     return _model_diagram(int(elements))
+
+
+_drawn.register(System, system_diagram)
 
 
 def _model_diagram(elements: int) -> DrawnGraph:

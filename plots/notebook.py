@@ -7,6 +7,7 @@ are several; results are tables.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from io import BytesIO
@@ -24,7 +25,7 @@ from gms_fsm.inspection.explain import Explanation, Why
 from gms_fsm.inspection.session import Session
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, ChartModel, LuGre, Model
-from gms_fsm.systems.system import Contact, Several, System
+from gms_fsm.systems.system import Contact, System
 from gms_fsm.traces._log import Log
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import (
@@ -93,13 +94,14 @@ def figure_png(figure: Any) -> tuple[bytes, dict[str, int]]:
 
 
 # --------------------------------------------------------------------------- drawings
-def graph_of(subject: Chart | Model | Contact | System) -> DrawnGraph:
+@functools.singledispatch
+def graph_of(subject: Any) -> DrawnGraph:
     """Return what is drawn of a chart, a model, a contact or a system."""
-    if isinstance(subject, System):
-        return block_diagram(subject)
-    if isinstance(subject, Chart):
-        return statechart(subject)
     return statechart(subject.chart, subject.n if subject.n <= MOST_ELEMENTS else 1)
+
+
+graph_of.register(System, block_diagram)
+graph_of.register(Chart, statechart)
 
 
 def subject_svg(subject: Chart | Model | Contact | System) -> str | None:
@@ -119,7 +121,7 @@ def subject_html(subject: Chart | Model | Contact | System) -> str:
 # --------------------------------------------------------------------------- runs
 def trace_png(trace: Trace) -> bytes | None:
     """Return a run's overview as PNG, or None without matplotlib or with several contacts."""
-    if isinstance(trace.model, Several):
+    if trace.subject.several:
         return None
     try:
         from plots.figures import overview
@@ -132,7 +134,7 @@ def trace_png(trace: Trace) -> bytes | None:
 
 def trace_html(trace: Trace) -> str | None:
     """Return a table of the contacts of a run that has no overview."""
-    several = isinstance(trace.model, Several)
+    several = trace.subject.several
     if not several and find_spec("matplotlib") is not None:
         return None
     parts = [trace.contact(name) for name in trace.contacts] if several else [trace]

@@ -374,9 +374,7 @@ def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
 
 def _short(trace: Trace) -> str:
     """Return the name of what runs."""
-    if trace.system is not None and not trace.which:
-        return trace.system.name
-    return trace.model.title
+    return trace.subject.title
 
 
 def _language() -> dict[str, Any]:

@@ -303,7 +303,7 @@ def _end_tables(trace: Trace, system: System) -> list[str]:
 
 def _contact_lines(trace: Trace) -> list[str]:
     """Return the section of one contact."""
-    velocities = trace.system.contact(trace.which).v if trace.system else ()
+    velocities = trace.what.system.contact(trace.which).v
     return [
         "",
         f"## Contact {plain(trace.model.title)}",

@@ -33,9 +33,10 @@ from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import mounted, mounted_alone
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.systems.signals import Corners, SignalLike, as_signal
-from gms_fsm.systems.system import System, origin_of
+from gms_fsm.systems.system import System
 from gms_fsm.traces.monitors import Monitor, checked
 from gms_fsm.traces.trace import Trace
 
@@ -94,8 +95,8 @@ class Loaded:
     @property
     def contacts(self) -> tuple[str, ...]:
         """The names of the contacts, if there are several."""
-        several = self.system is not None and len(self.system.contacts) > 1
-        return tuple(each.name for each in self.system.contacts) if self.system and several else ()
+        names = () if self.system is None else tuple(each.name for each in self.system.contacts)
+        return names if len(names) > 1 else ()
 
     def simulate(self, **options: Any) -> Trace:
         """Run it.
@@ -111,9 +112,8 @@ class Loaded:
             The run.
         """
         given: Any = {**self.arguments, **options}
-        if self.system is not None:
-            return simulate(self.system, given.pop("t_end"), **given)
-        return simulate(self.model, self.rig, **given)
+        what: Any = (*self.subject[:-1], given.pop("t_end"))
+        return simulate(*what, **given)
 
 
 def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
@@ -284,10 +284,10 @@ def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
         arguments["initial"] = initial
     if scenario.output.every is not None:
         arguments["t_eval"] = _rows(path, scenario.output.every, start, end)
-    model, rig = origin_of(system)
+    what = mounted(system)
     if run.monitors:
         arguments["monitors"] = tuple(run.monitors)  # checked by the run
-    return Loaded(path, scenario, model, rig, arguments, None, None, system)
+    return Loaded(path, scenario, what.model, what.rig, arguments, None, None, system)
 
 
 def _rows(path: Path, every: float, start: float, end: float) -> FloatArray:
@@ -305,7 +305,7 @@ def _rows(path: Path, every: float, start: float, end: float) -> FloatArray:
 
 def _monitors(path: Path, given: Sequence[str], model: Model) -> tuple[Monitor, ...]:
     try:
-        return tuple(checked(given, model).values())
+        return tuple(checked(given, mounted_alone(model)).values())
     except GMSError as error:
         raise ScenarioError.of(error).inside("run.monitors").inside(path) from None
 

@@ -18,7 +18,8 @@ from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import ParameterError, cut
 from gms_fsm.run.sweep import Sweep, sweep
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import mounted
+from gms_fsm.systems.numbers import known_in
 
 __all__ = ["Axis", "axis", "sweep_scenario", "sweep_summary"]
 
@@ -156,8 +157,8 @@ def sweep_scenario(
 
 def _known(loaded: Loaded) -> tuple[Parameter, ...]:
     """Return the parameters that can be varied."""
-    what = Adjustable(loaded.system) if loaded.system else Adjustable(loaded.model, loaded.rig)
-    return tuple(replace(each, name=name) for name, (each, _) in what.known.items())
+    what = mounted(loaded.system or loaded.model, loaded.rig)
+    return tuple(replace(each, name=name) for name, (each, _) in known_in(what).items())
 
 
 def _check(axes: Sequence[Axis], known: Sequence[Parameter]) -> None:

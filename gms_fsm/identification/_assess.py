@@ -23,8 +23,8 @@ from gms_fsm.identification._statistics import (
 )
 from gms_fsm.identification._task import Task, stretches
 from gms_fsm.identification._unknowns import Unknown
-from gms_fsm.systems.numbers import Adjustable
-from gms_fsm.systems.system import System
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import known_in, value_in, varied
 
 __all__ = ["Assessed", "Estimate", "assessed", "sorted_elements", "unassessed"]
 
@@ -346,7 +346,7 @@ def _entries(
         low, high = each.low, each.high
         base = 0.0
         if each.kind == "excess":
-            base = float(values.get(each.other, np.min(experiment.subject.value(each.other))))
+            base = float(values.get(each.other, np.min(value_in(experiment.subject, each.other))))
             low = max(low, each.least) if each.other in values else max(low, base)
         by_name[each.name] = _Entry(
             each.name,
@@ -465,8 +465,8 @@ def _are(names: Sequence[str]) -> str:
 
 # --------------------------------------------------------------------------- order of elements
 def sorted_elements(
-    subject: Adjustable, unknowns: Sequence[Unknown], bounded: Collection[str]
-) -> Adjustable:
+    subject: Mounted, unknowns: Sequence[Unknown], bounded: Collection[str]
+) -> Mounted:
     """Return a bank with its elements in the order of their thresholds.
 
     Elements that may change places in a search are named from the first to slip to the last; all
@@ -474,7 +474,7 @@ def sorted_elements(
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         Fitted.
     unknowns : sequence of Unknown
         What was free.
@@ -483,26 +483,26 @@ def sorted_elements(
 
     Returns
     -------
-    Adjustable
+    Mounted
         The same as given if elements cannot change places: a name stands for one element only, in
         `free` or in the bounds; or if no parameter is a threshold.
     """
-    if isinstance(subject.what, System):
+    if subject.named:
         return subject
-    wide = {key: n for key, (_, n) in subject.known.items() if n > 1}
+    wide = {key: n for key, (_, n) in known_in(subject).items() if n > 1}
     own = [each for each in unknowns if each.element is not None]
     whole = [key for key, n in wide.items() if sum(each.key == key for each in own) == n]
     if len(own) != sum(wide[key] for key in whole) or {each.name for each in own} & {*bounded}:
         return subject
-    lengths = [key for key in wide if subject.known[key][0].unit == QUANTITIES["z"].unit]
+    lengths = [key for key in wide if known_in(subject)[key][0].unit == QUANTITIES["z"].unit]
     by = [key for key in (WEIGHTS.name, *lengths) if key in whole]
     if not by:
         return subject
-    order = np.argsort(np.asarray(subject.value(by[0])), kind="stable")
+    order = np.argsort(np.asarray(value_in(subject, by[0])), kind="stable")
     if (np.diff(order) > 0).all():
         return subject
-    return subject.varied({key: _each(subject, key, n)[order] for key, n in wide.items()})
+    return varied(subject, {key: _each(subject, key, n)[order] for key, n in wide.items()})
 
 
-def _each(subject: Adjustable, key: str, n: int) -> FloatArray:
-    return np.broadcast_to(np.asarray(subject.value(key), dtype=float), n).copy()
+def _each(subject: Mounted, key: str, n: int) -> FloatArray:
+    return np.broadcast_to(np.asarray(value_in(subject, key), dtype=float), n).copy()

@@ -18,7 +18,8 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError
 from gms_fsm.identification._runs import LOST, Course, Driver, Measured, Ran, with_numbers
 from gms_fsm.identification._unknowns import Coordinates, Unknown, values_by_key
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import value_in, varied
 
 __all__ = ["MASS", "NUISANCE", "Experiment", "Point", "split_unknowns", "value_of"]
 
@@ -65,7 +66,7 @@ class Experiment:
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         The model with its start values.
     searched, solved : tuple of Unknown
         The unknowns that are searched, and those that are solved for.
@@ -83,7 +84,7 @@ class Experiment:
         One number: how many runs were made.
     """
 
-    subject: Adjustable
+    subject: Mounted
     searched: tuple[Unknown, ...]
     solved: tuple[Unknown, ...]
     names: tuple[str, ...]
@@ -125,7 +126,7 @@ class Experiment:
         columns = [known[name] for name in self.nuisance]
         return np.stack(columns, axis=1) if columns else np.empty((course.t.size, 0))
 
-    def columns(self, subject: Adjustable, course: Course) -> tuple[Ran, FloatArray, FloatArray]:
+    def columns(self, subject: Mounted, course: Course) -> tuple[Ran, FloatArray, FloatArray]:
         """Run a course; return the force without its linear parts, and one column for each part.
 
         The columns are differences of the force between two values of a parameter: exact, because
@@ -138,7 +139,7 @@ class Experiment:
         for each in self.solved:
             present = value_of(subject, each)
             step = present if present != 0.0 else 1.0
-            moved = subject.varied(values_by_key(subject, [each], [present + step]))
+            moved = varied(subject, values_by_key(subject, [each], [present + step]))
             program = with_numbers(ran.program, moved, course, self.driver)
             column = (self.measured.values(ran, program) - whole) / step
             rest -= present * column
@@ -146,9 +147,9 @@ class Experiment:
         own = np.stack(columns, axis=1) if columns else np.empty((whole.size, 0))
         return ran, rest, np.concatenate([own, self.nuisance_columns(course)], axis=1)
 
-    def reference(self, numbers: FloatArray) -> Adjustable:
+    def reference(self, numbers: FloatArray) -> Mounted:
         """Return the subject with what was searched; linear parameters keep their start values."""
-        return self.subject.varied(self.coordinates.values(numbers))
+        return varied(self.subject, self.coordinates.values(numbers))
 
     # ------------------------------------------------------------------ evaluation
     def at(self, u: FloatArray) -> Point:
@@ -214,7 +215,7 @@ class Experiment:
         return solved
 
     # ------------------------------------------------------------------ results
-    def fitted(self, point: Point) -> Adjustable:
+    def fitted(self, point: Point) -> Mounted:
         """Return the subject with all numbers found."""
         subject = self.reference(self.coordinates.numbers(point.u))
         if not self.solved:
@@ -225,19 +226,19 @@ class Experiment:
             max(value, TINY * largest) if each.parameter.rule.startswith("> 0") else value
             for each, value in zip(self.solved, own, strict=True)
         ]
-        return subject.varied(values_by_key(subject, self.solved, values))
+        return varied(subject, values_by_key(subject, self.solved, values))
 
     def start_point(self) -> Point:
         """Evaluate the start values."""
         return self.at(self.coordinates.start)
 
 
-def value_of(subject: Adjustable, unknown: Unknown) -> float:
+def value_of(subject: Mounted, unknown: Unknown) -> float:
     """Return the present value of an unknown.
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         Whose.
     unknown : Unknown
         Which.
@@ -247,7 +248,7 @@ def value_of(subject: Adjustable, unknown: Unknown) -> float:
     float
         In its unit.
     """
-    value = np.asarray(subject.value(unknown.key), dtype=float)
+    value = np.asarray(value_in(subject, unknown.key), dtype=float)
     if unknown.element is None or value.ndim == 0:
         return float(value.flat[0])
     return float(value[unknown.element])

@@ -12,47 +12,45 @@ from collections.abc import Iterable, Iterator
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import SIGMA_2
 from gms_fsm.language import Condition, Value, derivative, names_in, renamed
-from gms_fsm.systems.numbers import Adjustable
-from gms_fsm.systems.system import System
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import known_in
 
 __all__ = ["linear_names"]
 
 
-def linear_names(subject: Adjustable) -> tuple[str, ...]:
+def linear_names(subject: Mounted) -> tuple[str, ...]:
     """Return the names of the parameters that the friction force is linear in.
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         A model driven by a record, or a system; of a system with a free body, a sampled value or a
         further state there are none, because its motion depends on the force.
 
     Returns
     -------
     tuple of str
-        In the order of ``subject.known``.
+        In the order of `gms_fsm.systems.numbers.known`.
 
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters
-    >>> linear_names(Adjustable(GMS(GMSParameters.paper("stick-slip"), law="signed")))
+    >>> from gms_fsm.systems.mounted import mounted_alone
+    >>> linear_names(mounted_alone(GMS(GMSParameters.paper("stick-slip"), law="signed")))
     ('k', 'sigma', 'sigma_2')
     """
-    what = subject.what
-    if not isinstance(what, System):
-        found = {*_linear_in(what.chart), SIGMA_2.name}
-        return tuple(name for name in subject.known if name in found)
-    if what.flow or what.sampled or not all(body.driven for body in what.bodies):
+    system = subject.system
+    if system.flow or system.sampled or not all(body.driven for body in system.bodies):
         return ()
     names = {
-        f"{contact.name}.{name}"
-        for contact in what.contacts
+        subject.of(contact.name, name)
+        for contact in system.contacts
         for name in (
             *_linear_in(contact.chart),
             *([SIGMA_2.name] if contact.model is not None else ()),
         )
     }
-    return tuple(name for name in subject.known if name in names)
+    return tuple(name for name in known_in(subject) if name in names)
 
 
 def _linear_in(chart: Chart) -> tuple[str, ...]:

@@ -21,16 +21,14 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ParameterError, shown
 from gms_fsm.lowering._compiled import check_llvmlite
-from gms_fsm.lowering.program import Program, arguments
+from gms_fsm.lowering.program import Program, arguments, same_text
 from gms_fsm.records.record import Record
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
-from gms_fsm.systems.numbers import Adjustable
-from gms_fsm.systems.rigs import Prescribed
+from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.signals import Corners
-from gms_fsm.systems.system import System, system_of
 from gms_fsm.traces._observed import Observed
 from gms_fsm.traces.trace import Trace
 
@@ -87,15 +85,13 @@ class Measured:
     body: str = ""
 
     @classmethod
-    def of(cls, text: Any, subject: Adjustable) -> Measured:
+    def of(cls, text: Any, subject: Mounted) -> Measured:
         """Read what is measured; a `ParameterError` if the subject has no such thing."""
-        what = subject.what
-        contacts = [each.name for each in what.contacts] if isinstance(what, System) else []
-        bodies = [each.name for each in what.bodies] if isinstance(what, System) else []
+        contacts, bodies = subject.contacts, subject.bodies
         owner, _, which = text.rpartition(".") if isinstance(text, str) else ("", "", "")
         if which == "F":
             if not owner and len(contacts) <= 1:
-                return cls(text, "force", contact=contacts[0] if contacts else "friction")
+                return cls(text, "force", contact=subject.system.contacts[0].name)
             if owner in contacts:
                 return cls(text, "force", contact=owner)
         elif owner in bodies and which in ("x", "v"):
@@ -318,25 +314,19 @@ class Driver:
     budgets: int
     _own: threading.local = field(default_factory=threading.local, repr=False)
 
-    def run(self, subject: Adjustable, course: Course) -> Ran:
+    def run(self, subject: Mounted, course: Course) -> Ran:
         """Run; a `GMSError` if the numbers break a rule or the run fails."""
-        kept = self._runs.get(id(course))
-        what = subject.what
-        if (
-            kept is not None
-            and not isinstance(what, System)
-            and kept.run.start.has_texts_of(what, kept.run.start.rig)
-        ):
-            kept.run.reset(what, kept.run.start.rig)
+        kept, what = self._runs.get(id(course)), self.driven(subject, course)
+        if kept is not None and same_text(kept.run.start.system, what.system):
+            kept.run.reset(what)
             run: Run | CompiledRun = kept.run
         else:
             start = self.start(subject, course)
             if start.chosen.engine == "compiled":
                 run = CompiledRun(start)
-                if start.given is None:
-                    while len(self._runs) >= MOST_KEPT:  # the oldest goes first
-                        del self._runs[next(iter(self._runs))]
-                    self._runs[id(course)] = _Kept(course, run)
+                while len(self._runs) >= MOST_KEPT:  # the oldest goes first
+                    del self._runs[next(iter(self._runs))]
+                self._runs[id(course)] = _Kept(course, run)
             else:
                 run = Run(start)
         while run.advance():
@@ -349,27 +339,26 @@ class Driver:
         runs: dict[int, _Kept] = vars(self._own).setdefault("runs", {})
         return runs
 
-    def start(self, subject: Adjustable, course: Course) -> Start:
+    def driven(self, subject: Mounted, course: Course) -> Mounted:
+        """Return a subject that the motion of a course drives."""
+        return subject.driven(self.drive, course.signal) if self.drive else subject
+
+    def start(self, subject: Mounted, course: Course) -> Start:
         """Return the start of a run along a course."""
         settings = Settings(
             engine=engine(), rtol=self.rtol, t_eval=course.t, max_steps=course.budget * self.budgets
         )
-        what: Any = subject.what
-        rig = None
-        if not isinstance(what, System):
-            rig = Prescribed(course.signal)
-        elif self.drive:
-            what = replace(what, signals={**what.signals, self.drive: course.signal})
-        first = course.signal.times[0] if self.drive or rig is not None else course.t[0]
-        return Start.of(what, rig, float(course.t[-1]), settings, t_start=float(first))
+        first = course.signal.times[0] if self.drive else course.t[0]
+        what = self.driven(subject, course)
+        return Start.on(what, float(course.t[-1]), settings, t_start=float(first))
 
 
-def driver_of(subject: Adjustable, drive: str | None, rtol: float, budgets: int) -> Driver:
+def driver_of(subject: Mounted, drive: str | None, rtol: float, budgets: int) -> Driver:
     """Return what runs a subject.
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         A model, or a system.
     drive : str or None
         As the user gave it.
@@ -388,8 +377,8 @@ def driver_of(subject: Adjustable, drive: str | None, rtol: float, budgets: int)
     ParameterError
         If there is no such signal, or it cannot be told which one is meant.
     """
-    what = subject.what
-    if not isinstance(what, System):
+    system = subject.system
+    if not subject.named:
         if drive is not None:
             raise ParameterError(
                 "a model is driven by the velocity of the record",
@@ -397,35 +386,30 @@ def driver_of(subject: Adjustable, drive: str | None, rtol: float, budgets: int)
                 value=drive,
                 advice="leave it out; only a system has signals to choose from",
             )
-        return Driver("", rtol, budgets)
+        return Driver("v", rtol, budgets)
     if drive is not None:
-        if drive not in what.signals:
+        if drive not in system.signals:
             raise ParameterError(
-                f"system {what.name!r} has no signal {shown(drive)}",
+                f"system {system.name!r} has no signal {shown(drive)}",
                 place="drive",
-                advice=f"there are {', '.join(what.signals) or 'none'}",
+                advice=f"there are {', '.join(system.signals) or 'none'}",
             )
         return Driver(drive, rtol, budgets)
-    driven = [each.velocity for each in what.bodies if each.driven]
+    driven = [each.velocity for each in system.bodies if each.driven]
     if not driven:
         return Driver("", rtol, budgets)
-    if len(driven) == 1 and driven[0] in what.signals:
+    if len(driven) == 1 and driven[0] in system.signals:
         return Driver(str(driven[0]), rtol, budgets)
     raise ParameterError(
         "it cannot be told which signal the velocity of the record replaces",
         place="drive",
-        advice=f"name one of {', '.join(what.signals) or 'the signals of the system'}",
+        advice=f"name one of {', '.join(system.signals) or 'the signals of the system'}",
     )
 
 
-def with_numbers(program: Program, subject: Adjustable, course: Course, driver: Driver) -> Program:
+def with_numbers(program: Program, subject: Mounted, course: Course, driver: Driver) -> Program:
     """Return a program with the numbers of a subject in place of its own."""
-    what: Any = subject.what
-    if not isinstance(what, System):
-        what = system_of(what, Prescribed(course.signal))
-    elif driver.drive:
-        what = replace(what, signals={**what.signals, driver.drive: course.signal})
-    return replace(program, p=arguments(what))
+    return replace(program, p=arguments(driver.driven(subject, course).system))
 
 
 # --------------------------------------------------------------------------- side by side

@@ -24,7 +24,8 @@ from gms_fsm.identification._runs import (
 from gms_fsm.identification._search import Best, de, hops, refine
 from gms_fsm.identification._unknowns import Unknown, unknowns_of, values_by_key
 from gms_fsm.records.record import Record
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import varied
 
 __all__ = ["Options", "Task", "Window", "inside", "training_rows"]
 
@@ -65,7 +66,7 @@ class Task:
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         With the start values.
     records : tuple of Record
         The records.
@@ -77,7 +78,7 @@ class Task:
         One number: how many runs were made.
     """
 
-    subject: Adjustable
+    subject: Mounted
     records: tuple[Record, ...]
     options: Options
     begin: str = BEGINS[1]
@@ -163,7 +164,7 @@ class Task:
         """Return the same task with one of its unknowns held at a value."""
         gone = next(each for each in self.unknowns if each.name == name)
         kept = [each for each in self.unknowns if each.name != name]
-        subject = self.subject.varied(values_by_key(self.subject, [gone], [value]))
+        subject = varied(self.subject, values_by_key(self.subject, [gone], [value]))
         tied = tuple(key for key in self.options.tied if any(e.key == key for e in kept))
         names = {*(each.name for each in kept), *(each.key for each in kept)}
         bounds = {key: pair for key, pair in self.options.bounds.items() if key in names}

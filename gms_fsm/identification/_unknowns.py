@@ -16,8 +16,8 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray, Parameter, checked_scalar
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.systems.numbers import Adjustable
-from gms_fsm.traces.rows import column_name
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import Number, joined, known_in, parts_of, value_in
 
 __all__ = ["Coordinates", "Unknown", "unknowns_of", "values_by_key"]
 
@@ -78,7 +78,7 @@ class Unknown:
 
 
 def unknowns_of(
-    subject: Adjustable,
+    subject: Mounted,
     free: Iterable[str],
     tied: Sequence[str],
     bounds: Mapping[str, tuple[float, float]],
@@ -87,7 +87,7 @@ def unknowns_of(
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         Whose numbers.
     free : iterable of str
         ``k`` for all elements, ``k2`` for one of them.
@@ -106,10 +106,9 @@ def unknowns_of(
     ParameterError
         If a name is unknown or given twice, or bounds contradict a rule.
     """
-    known = subject.known
     found: dict[str, Unknown] = {}
     for name in free:
-        for each in _named(subject, known, name, tied):
+        for each in _named(subject, name, tied):
             if each.name in found:
                 raise ParameterError(f"{each.name!r} is given twice", place="free")
             found[each.name] = each
@@ -131,55 +130,49 @@ def unknowns_of(
             )
         for key in hit:
             other = found[key].other
-            base = float(np.min(subject.value(other))) if other else 0.0
+            base = float(np.min(value_in(subject, other))) if other else 0.0
             bounded[key] = _bounded(found[key], pair, base)
     return tuple(bounded.values())
 
 
-def _named(
-    subject: Adjustable, known: Mapping[str, tuple[Parameter, int]], name: str, tied: Sequence[str]
-) -> list[Unknown]:
+def _named(subject: Mounted, name: str, tied: Sequence[str]) -> list[Unknown]:
     """Return the unknowns that one name stands for."""
-    if name in known:
-        parameter, n = known[name]
-        value = subject.value(name)
-        if not n or name in tied:
-            return [_unknown(subject, name, None, parameter, float(np.mean(value)), name)]
-        values = np.broadcast_to(np.asarray(value, dtype=float), n)
-        return [
-            _unknown(subject, name, i, parameter, float(start), column_name(name, i))
-            for i, start in enumerate(values)
-        ]
-    for key, (parameter, n) in known.items():
-        for i in range(n):
-            if isinstance(name, str) and name == column_name(key, i):
-                start = float(np.broadcast_to(np.asarray(subject.value(key)), n)[i])
-                return [_unknown(subject, key, i, parameter, start, name)]
-    near = difflib.get_close_matches(str(name), known, 1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    raise ParameterError(
-        f"there is no parameter {shown(name)}",
-        place="free",
-        advice=f"{hint}known here are {', '.join(known)}; k2 is k of the second element",
-    )
+    found = parts_of(subject, name)
+    if not found:
+        names = known_in(subject)
+        near = difflib.get_close_matches(str(name), names, 1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise ParameterError(
+            f"there is no parameter {shown(name)}",
+            place="free",
+            advice=f"{hint}known here are {', '.join(names)}; k2 is k of the second element",
+        )
+    if name in tied and found[0].whole == name:
+        mean = float(np.mean(value_in(subject, name)))
+        found = [replace(found[0], name=name, value=mean, element=None)]
+    return [
+        Unknown(
+            each.name,
+            each.whole,
+            each.element,
+            each.parameter,
+            each.value,
+            other=_lower_bound(subject, each),
+        )
+        for each in found
+    ]
 
 
-def _unknown(
-    subject: Adjustable,
-    key: str,
-    element: int | None,
-    parameter: Parameter,
-    start: float,
-    name: str,
-) -> Unknown:
-    lead = key.rpartition(".")[0]
-    known = subject.known
-    for bound in parameter.bounds:
+def _lower_bound(subject: Mounted, number: Number) -> str:
+    """Return the name of the number that is the lower bound of another, if there is one."""
+    lead, dot, _ = number.whole.rpartition(".")
+    names = known_in(subject)
+    for bound in number.parameter.bounds:
         if isinstance(bound.limit, str) and bound.op in (">", ">="):
-            other = f"{lead}.{bound.limit}" if lead else bound.limit
-            if other in known and float(np.min(subject.value(other))) > 0.0:
-                return Unknown(name, key, element, parameter, start, other=other)
-    return Unknown(name, key, element, parameter, start)
+            other = f"{lead}{dot}{bound.limit}"
+            if other in names and float(np.min(value_in(subject, other))) > 0.0:
+                return other
+    return ""
 
 
 def _bounded(unknown: Unknown, pair: Any, base: float) -> Unknown:
@@ -220,13 +213,13 @@ class Coordinates:
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         Supplies all numbers that are not searched.
     unknowns : tuple of Unknown
         What is searched.
     """
 
-    subject: Adjustable
+    subject: Mounted
     unknowns: tuple[Unknown, ...]
 
     def __len__(self) -> int:
@@ -269,7 +262,7 @@ class Coordinates:
         )
 
     def _base(self, each: Unknown) -> float:
-        return float(np.min(self.subject.value(each.other)))
+        return float(np.min(value_in(self.subject, each.other)))
 
     def _scale(self, each: Unknown) -> float:
         return abs(each.start) or 1.0
@@ -326,13 +319,13 @@ class Coordinates:
 
 
 def values_by_key(
-    subject: Adjustable, unknowns: Sequence[Unknown], numbers: Iterable[float]
+    subject: Mounted, unknowns: Sequence[Unknown], numbers: Iterable[float]
 ) -> dict[str, Any]:
     """Return values of unknowns by the names of their parameters.
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         Supplies the elements that are not among the unknowns.
     unknowns : sequence of Unknown
         Some unknowns.
@@ -345,4 +338,4 @@ def values_by_key(
         A number, or an array where elements differ.
     """
     pairs = zip(unknowns, numbers, strict=True)
-    return subject.joined((each.key, each.element, value) for each, value in pairs)
+    return joined(subject, ((each.key, each.element, number) for each, number in pairs))

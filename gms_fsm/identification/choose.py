@@ -26,11 +26,11 @@ from gms_fsm.identification._statistics import correlation_time
 from gms_fsm.identification._task import Options, Task, at_all_rows, bar, stretches, training_rows
 from gms_fsm.identification._unknowns import unknowns_of
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, Start
-from gms_fsm.identification.fit import check_model, fitted, options_of, task_of, window_of
+from gms_fsm.identification.fit import fitted, options_of, task_of, window_of
 from gms_fsm.identification.result import Choice, ChoiceRow, Fit
 from gms_fsm.records._parts import only, thinned
 from gms_fsm.records.record import Record
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import mounted_alone
 
 __all__ = ["choose", "period_of"]
 
@@ -190,9 +190,9 @@ def _checked_candidates(given: Any) -> list[Candidate]:
         name, model, free = _parts(f"candidates[{i}]", each, 3)
         checked_kind(f"name of candidates[{i}]", name, str, "a text")
         names = (free,) if isinstance(free, str) else tuple(listed("free", free, "names"))
-        check_model(model, f"model of candidate {shown(name)}")
+        what = mounted_alone(model, f"model of candidate {shown(name)}")
         try:
-            unknowns_of(Adjustable(model), names, (), {})
+            unknowns_of(what, names, (), {})
         except GMSError as error:
             raise error.inside(f"candidate {shown(name)}") from None
         found.append(Candidate(name, "given", _given(Start(model, names))))
@@ -502,5 +502,5 @@ def _final(best: _Tried, records: Sequence[Record], options: Options) -> Fit:
         search="local",
         begin=best.task.begin,
     )
-    model = best.task.coarse.fitted(best.point).what
+    model = best.task.coarse.fitted(best.point).made_of
     return fitted(task_of(records, model, {}, own))

@@ -34,10 +34,11 @@ from gms_fsm.identification._unknowns import values_by_key
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import Mounted, mounted_alone
+from gms_fsm.systems.numbers import known_in, varied
 from gms_fsm.systems.system import System
 
-__all__ = ["check_model", "fit", "fitted", "options_of", "task_of", "window_of"]
+__all__ = ["fit", "fitted", "options_of", "task_of", "window_of"]
 
 STOPPED = "The search was interrupted: this is the best so far."
 STOPPED_LATE = "Interrupted before the intervals were known: this is the best so far."
@@ -255,8 +256,7 @@ def task_of(
         raise ParameterError("there is none", place="records", advice="give at least one Record")
     for each in every:
         checked_kind("records", each, Record, "a Record, for example Record.from_csv(path)")
-    check_model(model, "model")
-    subject = _with_fixed(Adjustable(model), fixed, options.free)
+    subject = _with_fixed(mounted_alone(model), fixed, options.free)
     task = Task(subject, tuple(every), options, begin=options.begin or BEGINS[1])
     _ = task.unknowns  # raises errors of names and bounds
     if MASS in options.nuisance and task.measured.column != "force":
@@ -266,55 +266,31 @@ def task_of(
             advice="leave it out",
         )
     for name in options.linear:
-        if name not in subject.known:
+        if name not in known_in(subject):
             raise ParameterError(
                 f"there is no parameter {shown(name)}",
                 place="linear",
-                advice=f"known here are {', '.join(subject.known)}",
+                advice=f"known here are {', '.join(known_in(subject))}",
             )
     _check_records(task)
     _check_linear(task)
     return task
 
 
-def check_model(model: object, place: str) -> None:
-    """Refuse what is neither a model nor a system.
-
-    Parameters
-    ----------
-    model : object
-        As given.
-    place : str
-        What it is called, for the message.
-
-    Raises
-    ------
-    ParameterError
-        If it is something else.
-    """
-    if isinstance(model, System) or (hasattr(model, "chart") and hasattr(model, "weights")):
-        return
-    raise ParameterError(
-        "it must be a model or a system, for example initial_bank(record, 4)",
-        place=place,
-        value=model,
-    )
-
-
-def _with_fixed(subject: Adjustable, fixed: Any, free: tuple[str, ...]) -> Adjustable:
+def _with_fixed(subject: Mounted, fixed: Any, free: tuple[str, ...]) -> Mounted:
     checked_kind("fixed", fixed, Mapping, "a mapping, for example {'v_c': 1e-6}")
     for name in fixed:
-        if name not in subject.known:
+        if name not in known_in(subject):
             raise ParameterError(
                 f"there is no parameter {shown(name)}",
                 place="fixed",
-                advice=f"known here are {', '.join(subject.known)}",
+                advice=f"known here are {', '.join(known_in(subject))}",
             )
         if name in free:
             raise ParameterError(
                 f"{name!r} is free, too", place="fixed", advice="leave it out of one of them"
             )
-    return subject.varied(dict(fixed))
+    return varied(subject, dict(fixed))
 
 
 def _check_records(task: Task) -> None:
@@ -382,7 +358,7 @@ def _check_linear(task: Task) -> None:
     for each in (one for one in experiment.solved if one.key not in known):
         here = task.subject
         value = value_of(here, each)
-        there = here.varied(values_by_key(here, [each], [1.5 * value or 1.0]))
+        there = varied(here, values_by_key(here, [each], [1.5 * value or 1.0]))
         _, rest, columns = experiment.columns(here, course)
         _, other_rest, others = experiment.columns(there, course)
         # Where only the force depends on a parameter, no other term of it changes.

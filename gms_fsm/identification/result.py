@@ -99,7 +99,7 @@ class Fit:
     @property
     def model(self) -> Model | System:
         """The model, or the system, with the values found."""
-        return self.task.subject.what
+        return self.task.subject.made_of
 
     @property
     def title(self) -> str:
@@ -157,7 +157,7 @@ class Fit:
 
         Whatever a record does before these rows, in them such an element acts as a spring.
         """
-        if not any(contact.chart.transitions for contact in self.task.subject.contacts):
+        if not any(contact.chart.transitions for contact in self.task.subject.system.contacts):
             return ()
         kept: NDArray[np.bool_] = np.array(True)
         for course in self.task.courses:

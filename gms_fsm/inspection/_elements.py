@@ -102,8 +102,7 @@ def contact_named(name: str, start: Start) -> BankPlaces:
 def element_name(start: Start, machine: int) -> str:
     """Return what an element is called in text: ``element 2``, or in a system ``gear 2``."""
     bank = start.program.layout.bank(machine)
-    number = machine - bank.first + 1
-    return f"element {number}" if start.given is None else f"{bank.name} {number}"
+    return start.what.element(bank.name, machine - bank.first)
 
 
 def title_of(start: Start) -> str:

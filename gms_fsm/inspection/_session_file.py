@@ -18,10 +18,7 @@ from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import Breakpoint
 from gms_fsm.inspection.branches import Fork
 from gms_fsm.run.settings import Settings
-from gms_fsm.systems.models import Model
-from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Function
-from gms_fsm.systems.system import System, origin_of
 from gms_fsm.traces._header import Header
 
 if TYPE_CHECKING:
@@ -49,9 +46,8 @@ def _options_of(
 
 def write(path: Path, session: Session) -> Path:
     """Write a session; raise `SessionError` for anything a file cannot store."""
-    model, rig, t_end = session.made_of
-    signals = (model if rig is None else rig).signals  # type: ignore[union-attr]
-    if any(isinstance(signal, Function) for signal in signals.values()):
+    what = session.tree.subject
+    if any(isinstance(signal, Function) for signal in what.system.signals.values()):
         raise SessionError("a signal is a Python function, which a file cannot store")
     tree = session.tree
     options = _options_of(session.settings, tree.t_start, tree.initial)
@@ -61,8 +57,8 @@ def write(path: Path, session: Session) -> Path:
     places = {number: place for place, number in enumerate(tree.forks)}  # some may be deleted
     data = {
         "format": FORMAT,
-        "header": json.loads(_header(model, rig).model_dump_json()),
-        "t_end": t_end,
+        "header": json.loads(Header.of(what, {}).model_dump_json()),
+        "t_end": session.t_end,
         "options": {name: _plain(value) for name, value in options.items()},
         "branches": [
             _written(
@@ -102,13 +98,6 @@ def _written(fork: Fork, branch: Branch, parent: int | None) -> dict[str, Any]:
     return data
 
 
-def _header(model: Model | System, rig: Rig | None) -> Header:
-    if isinstance(model, System):
-        return Header.of(*origin_of(model), model, {})
-    assert rig is not None
-    return Header.of(model, rig, None, {})
-
-
 def read(path: Path, made: Callable[..., Session]) -> Session:
     """Read a session and make its branches again; a faulty file raises any kind of error.
 
@@ -128,9 +117,9 @@ def read(path: Path, made: Callable[..., Session]) -> Session:
     if data["format"] != FORMAT:
         raise ValueError(f"format is {data['format']!r}")
     header = Header.model_validate(data["header"])
-    system = header.to_system()
-    what = (header.to_model(), header.to_rig()) if system is None else (system,)
-    session = made(*what, data["t_end"], **data["options"])
+    what = header.to_mounted()
+    given = (what.given,) if what.named else (what.model, what.rig)
+    session = made(*given, data["t_end"], **data["options"])
     for branch in data["branches"]:
         _make(session, branch)
     for number, branch in enumerate(data["branches"]):

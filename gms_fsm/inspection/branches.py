@@ -14,14 +14,14 @@ from typing import Any
 from gms_fsm._arguments import checked_integer, checked_kind
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import SessionError, shown
-from gms_fsm.inspection._adjustable import Number, number_of, numbers_of, with_numbers
 from gms_fsm.inspection._branch import Branch, BranchRow, Continuation
 from gms_fsm.inspection._export import save_scenario
 from gms_fsm.inspection._poking import Edits, initial_with
 from gms_fsm.inspection._results import BranchComparison, compared
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.start import Start
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import Number, number_of, numbers_of, with_law, with_numbers
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace
 
@@ -89,7 +89,7 @@ class Tree:
 
     Parameters
     ----------
-    subject : Adjustable
+    subject : Mounted
         What runs.
     t_end, t_start, initial, settings
         As for `gms_fsm.Session`.
@@ -119,7 +119,7 @@ class Tree:
 
     def __init__(
         self,
-        subject: Adjustable,
+        subject: Mounted,
         t_end: float,
         t_start: float,
         initial: Mapping[str, Any] | None,
@@ -167,7 +167,7 @@ class Tree:
             self._branches[number] = self._made(number, self._course(number, {}, None))
         return self._branches[number]
 
-    def made_of(self, branch: int | None = None) -> Adjustable:
+    def made_of(self, branch: int | None = None) -> Mounted:
         """Return model and rig, or the system, of a branch, by default of the current one."""
         return self._subject(*self._given(self.checked(branch)))
 
@@ -226,7 +226,7 @@ class Tree:
     ) -> int:
         """Begin a branch of the current one; see `gms_fsm.Session.fork`."""
         if law is not None:
-            self.subject.with_law(checked_kind("law", law, str, "a text"))
+            with_law(self.subject, checked_kind("law", law, str, "a text"))
         own = self._own_values(self.current, {} if values is None else values)
         return self._added(Fork(name, self.current, own, law))
 
@@ -385,8 +385,8 @@ class Tree:
         law, values = (None, {}) if fork.parent is None else self._given(fork.parent)
         return fork.law or law, _then(values, fork.values)
 
-    def _subject(self, law: str | None, values: Mapping[str, float]) -> Adjustable:
-        return with_numbers(self.subject if law is None else self.subject.with_law(law), values)
+    def _subject(self, law: str | None, values: Mapping[str, float]) -> Mounted:
+        return with_numbers(self.subject if law is None else with_law(self.subject, law), values)
 
     def _made(self, number: int, course: Continuation) -> Branch:
         fork = self.forks[number]
@@ -408,15 +408,12 @@ class Tree:
         self, past: Branch, edits: Edits, row: int, here: BranchRow, between: bool
     ) -> Continuation:
         was = past.start
-        subject = Adjustable(was.given or was.model, None if was.given else was.rig)
-        start = self._start(subject, here.t, initial_with(edits, was, here))
+        start = self._start(was.what, here.t, initial_with(edits, was, here))
         return Continuation(start, past, row, here if between else None)
 
-    def _start(self, subject: Adjustable, t: float, initial: Mapping[str, Any] | None) -> Start:
+    def _start(self, subject: Mounted, t: float, initial: Mapping[str, Any] | None) -> Start:
         options: Any = {"t_start": t, "initial": initial, "ticks_from": self.t_start}
-        return Start.of(
-            subject.what, subject.rig, self.t_end, self.settings, rows_at_once=1, **options
-        )
+        return Start.on(subject, self.t_end, self.settings, rows_at_once=1, **options)
 
 
 def _then(before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:

@@ -266,7 +266,7 @@ def explain(trace: Trace, row: int, element: int) -> Why:
     now, source = (chart.states[int(modes[r])].name for r in (row, before))
     edges = explain_state(chart, source, values_at(trace, before, element), fired)
     left = source if fired else ""
-    contact = "" if trace.system is None else trace.places.name
+    contact = trace.what.whose(trace.places.name)
     return Why(element, float(trace.t[row]), now, left, tuple(edges), trace.sigma(row), contact)
 
 

@@ -25,10 +25,9 @@ from gms_fsm.inspection.branches import Tree
 from gms_fsm.inspection.explain import Why
 from gms_fsm.language import Condition
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.run.simulate import mounted
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import arguments_of, mounted
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 
@@ -88,9 +87,10 @@ class Session:
         **options: Unpack[SettingOptions],
     ) -> None:
         self.settings = checked_settings(settings, options)
-        on, end = mounted("Session", model, rig, t_end)
+        on, end = arguments_of("Session", model, rig, t_end)
         self.made_of = model, on, end
-        self.tree = Tree(Adjustable(model, on), end, t_start, initial, self.settings)
+        what = mounted(model, on, self.settings.held_period)
+        self.tree = Tree(what, end, t_start, initial, self.settings)
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[str] = []
 

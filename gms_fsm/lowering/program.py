@@ -44,6 +44,7 @@ from gms_fsm.lowering.layout import Layout
 from gms_fsm.systems._numbers import numbers_of
 from gms_fsm.systems._texts import ByIdentity
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (
     Corners,
@@ -51,10 +52,10 @@ from gms_fsm.systems.signals import (
     Function,
     Signal,
 )
-from gms_fsm.systems.system import System, system_of
+from gms_fsm.systems.system import System
 from integrators import LIVE
 
-__all__ = ["Arguments", "Program", "arguments", "equations", "lower"]
+__all__ = ["Arguments", "Program", "arguments", "equations", "lower", "same_text"]
 
 Arguments = tuple[list[float], list[list[float]], list[list[float]]]
 
@@ -162,9 +163,7 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
     >>> "if z >= s and v > v_c:" in program.source
     True
     """
-    if not isinstance(system, System):
-        assert rig is not None
-        system = system_of(system, rig)
+    system = mounted(system, rig).system
     shape = _Shape(_key(system), system)
     corners = [s for s in system.signals.values() if isinstance(s, Corners)]
     return dataclasses.replace(
@@ -173,6 +172,14 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
         knots=sorted({float(t) for s in corners for t in s.times}),
         jumps=sorted({float(t) for s in corners for t in s.jumps}),
     )
+
+
+def same_text(one: System, other: System) -> bool:
+    """Return whether two systems differ in numbers only, and none of these is written in the text.
+
+    A Stribeck exponent of 2, and a number that is 0, give another text than others.
+    """
+    return _key(one) == _key(other)
 
 
 def _key(system: System) -> tuple[Any, ...]:

@@ -17,7 +17,7 @@ from gms_fsm.errors import ExpressionError, ParameterError, shown
 from gms_fsm.language import parse_value
 from gms_fsm.phenomena._bench import Bench, Motion, run
 from gms_fsm.systems.gms_parameters import GMSParameters
-from gms_fsm.systems.models import ChartModel, Model, demonstration
+from gms_fsm.systems.models import ChartModel, Model, demonstration, is_model
 from gms_fsm.systems.system import Contact
 
 __all__ = ["Specimen", "specimens_of"]
@@ -215,7 +215,7 @@ def unfit(chart: Chart) -> str:
 
 def _own(name: str, model: Model | Contact, bench: Bench) -> Specimen:
     if not isinstance(model, Contact):
-        if not hasattr(model, "chart") or not hasattr(model, "weights"):
+        if not is_model(model):
             raise ParameterError(
                 "it must be a model such as GMS(parameters, law='signed'), or a Contact",
                 place=f"models[{name!r}]",

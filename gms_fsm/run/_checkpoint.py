@@ -156,7 +156,7 @@ def _identity(start: Start) -> str:
     """Return a hash of everything that determines a run."""
     from gms_fsm.traces._header import Header  # only files need pydantic
 
-    header = Header.of(start.model, start.rig, start.given, start.settings)
+    header = Header.of(start.what, start.settings)
     head = header.model_dump_json()
     functions = {}
     for name, signal in start.system.signals.items():
@@ -198,7 +198,7 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
     groups = [[name for name in kept if name.startswith(kind)] for kind in ("rows_", "stops_")]
     if "log" in kept:  # from a run in Python
         contacts = {each.name: each for each in start.system.contacts}
-        _check_log(kept["log"], contacts, named=start.given is not None)
+        _check_log(kept["log"], contacts, named=start.what.named)
     else:  # from a compiled run
         groups.append(["t", "machine", "edge", "numbers"])
         firings, stops = kept["counts"]

@@ -17,8 +17,7 @@ from gms_fsm.run._pace import LATER, PATIENCE, check_pace
 from gms_fsm.run._recording import check_end, explained, interference_error
 from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.start import Start
-from gms_fsm.systems.models import Model
-from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces._firings import Firings
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.rows import Rows
@@ -77,15 +76,15 @@ class CompiledRun:
                 _, edge = self.start.edge(machine, int(counts[loop.EDGE]))
                 self.engine.set_state(machine, edge.target)
 
-    def reset(self, model: Model, rig: Rig) -> None:
+    def reset(self, what: Mounted) -> None:
         """Start over with different numbers; signals and initial values stay.
 
         Parameters
         ----------
-        model, rig
-            Of the same kind as the previous ones.
+        what : Mounted
+            With the same text as the previous one.
         """
-        self.columns.reset(model, rig)
+        self.columns.reset(what)
         self.next_look = PATIENCE
 
     def advance(self) -> bool:
@@ -221,9 +220,9 @@ class Columns:
         )
         return self.engine(self.block, most_steps, pause)
 
-    def reset(self, model: Model, rig: Rig) -> None:
-        """Empty the columns and return to the start, with the numbers of a model and a rig."""
-        self.start = self.start.with_numbers(model, rig)
+    def reset(self, what: Mounted) -> None:
+        """Empty the columns and return to the start, with other numbers."""
+        self.start = self.start.with_numbers(what)
         self.p = compiled.packed(self.start.program.p)
         self.empty()
 
@@ -368,8 +367,7 @@ class Columns:
         start, count = self.start, int(self.log.counts[FIRINGS])
         names = ("t", "machine", "edge", "numbers")
         columns = {name: getattr(self.log, name)[:count] for name in names}
-        of_system = start.given is not None
-        return Firings.copied(columns, start.program.layout, of_system=of_system)
+        return Firings.copied(columns, start.program.layout, of_system=start.what.named)
 
     def trace(self) -> Trace:
         """Return the trace of all recorded data."""

@@ -185,7 +185,7 @@ class Recorder:
             s=before.s[i],
             F_before=before.F,
             F_after=after.F,
-            contact="" if start.given is None else bank.name,
+            contact=start.what.whose(bank.name),
         )
 
     def trace(self) -> Trace:
@@ -312,7 +312,7 @@ def _livelock(error: Livelock, start: Start, trace: Trace) -> LivelockError:
     z = f"{chart.variables[0]} = {scope.z[i]:.6g}, " if chart.variables else ""
     s = f"s = {scope.s[i]:.6g}, " if "s" in chart.inputs else ""
     values = f"{z}{s}v = {scope.v:.6g}"
-    place = f"element {i + 1}" if start.given is None else f"{bank.name} {i + 1}"
+    place = start.what.element(bank.name, i)
     if error.machine is not None:
         log = trace.transitions
         mine = log.element == i
@@ -444,7 +444,7 @@ def _not_finite(error: NotFinite, recorder: Recording) -> str:
     for bank in start.program.layout.banks:
         chart = start.system.contact(bank.name).chart
         scope = scope_of(start, error.t, error.y, error.mode, bank.name)
-        whose = "" if start.given is None else f" of {bank.name}"
+        whose = f" of {bank.name}" if start.what.named else ""
         if not math.isfinite(scope.v):
             return f"the velocity v{whose} is not finite"
         states = {state.name: state for state in chart.states}

@@ -17,9 +17,9 @@ from gms_fsm._files import write_whole
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError, cut, shown, why
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
+from gms_fsm.systems.numbers import column_name
 from gms_fsm.traces._archives import member, write_arrays
 from gms_fsm.traces._log import Log
-from gms_fsm.traces.rows import column_name
 
 if TYPE_CHECKING:
     import pandas

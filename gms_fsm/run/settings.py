@@ -199,6 +199,11 @@ class Settings:
             )
         return self.output
 
+    @property
+    def held_period(self) -> float | None:
+        """The period of outputs that are held, s."""
+        return self.step if self.events == "held" else None
+
     @classmethod
     def of(
         cls, settings: Settings | None, whose: str, **options: Unpack[SettingOptions]

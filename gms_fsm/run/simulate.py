@@ -20,6 +20,7 @@ from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineE
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import arguments_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 from gms_fsm.traces.failures import SimulationError
@@ -29,7 +30,7 @@ from integrators import Arc, HybridError, hybrid
 from integrators.advance import ROW, STEPS
 from integrators.steps import T
 
-__all__ = ["Moment", "Run", "mounted", "simulate"]
+__all__ = ["Moment", "Run", "simulate"]
 
 
 def simulate(
@@ -121,7 +122,7 @@ def simulate(
     >>> len(trace.transitions)
     48
     """
-    on, end = mounted("simulate", model, rig, t_end)
+    on, end = arguments_of("simulate", model, rig, t_end)
     if isinstance(engine, ElementMachines):
         if machines is not None:
             raise ParameterError(
@@ -138,9 +139,7 @@ def simulate(
     if machines is not None and chosen.engine == "ifelse":
         raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")
     start = Start.of(model, on, end, chosen, t_start=t_start, initial=initial)
-    watching = (
-        checked(monitors, start.given or start.model, start.output).values() if monitors else ()
-    )
+    watching = checked(monitors, start.what, start.output).values() if monitors else ()
     own = {} if machines is None else own_machines(machines, start)
     run: CompiledRun | Run
     if chosen.engine == "compiled":
@@ -167,47 +166,6 @@ def simulate(
         keeper.finish()
     trace = run.recorder.trace()
     return watched(trace, watching) if watching else trace
-
-
-def mounted(
-    caller: str, model: object, rig: Rig | float, t_end: float | None
-) -> tuple[Rig | None, float]:
-    """Return the rig, if there is one, and the end of the run.
-
-    Parameters
-    ----------
-    caller : str
-        Name of the function or class, for messages.
-    model, rig, t_end
-        As for `simulate`.
-
-    Returns
-    -------
-    (Rig or None, float)
-        The rig is None for a system.
-
-    Raises
-    ------
-    ParameterError
-        If a system has a rig, or the end of the run is missing.
-    """
-    if isinstance(model, System):
-        if t_end is not None and not isinstance(rig, float | int):
-            raise ParameterError(
-                "a system has no rig",
-                place="rig",
-                value=rig,
-                advice=f"write {caller}(system, t_end)",
-            )
-        return None, rig if t_end is None else t_end  # type: ignore[return-value]
-    if t_end is None:
-        raise ParameterError(
-            "it must be a number",
-            place="t_end",
-            value=None,
-            advice=f"write {caller}(model, rig, t_end), or {caller}(system, t_end)",
-        )
-    return rig, t_end  # type: ignore[return-value]
 
 
 class Run:

@@ -23,9 +23,10 @@ from gms_fsm.lowering.scales import Setting, Tolerance, scales_of_system
 from gms_fsm.run._ticks import clocks_of, ticks_of
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
-from gms_fsm.systems.system import Mounting, System, origin_of, system_of, with_model
+from gms_fsm.systems.system import System
 from gms_fsm.traces._firings import Firings
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
@@ -43,10 +44,8 @@ class Start:
 
     Parameters
     ----------
-    system : System
+    what : Mounted
         What runs.
-    model, rig
-        What it was made from; of a system of the user's its only contact, and the rest.
     program : Program
         Its generated program.
     t_start, t_end, last : float
@@ -65,9 +64,7 @@ class Start:
         As given.
     """
 
-    system: System
-    model: Model
-    rig: Rig
+    what: Mounted
     program: Program
     t_start: float
     t_end: float
@@ -80,9 +77,24 @@ class Start:
     initial: Mapping[str, Any]
 
     @property
+    def system(self) -> System:
+        """What runs."""
+        return self.what.system
+
+    @property
+    def model(self) -> Model:
+        """The model; of a system of the user's its only contact."""
+        return self.what.model
+
+    @property
+    def rig(self) -> Rig:
+        """What moves it."""
+        return self.what.rig
+
+    @property
     def given(self) -> System | None:
         """The system, if it is the user's and not a model on a rig."""
-        return self.system if isinstance(self.rig, Mounting) else None
+        return self.what.given
 
     def before_entry(self) -> tuple[list[float], list[int]]:
         """Return the state vector before any entry, and 1 for what the initial values give."""
@@ -113,13 +125,13 @@ class Start:
         Trace
             With what it was made from.
         """
-        trace = Trace(rows, stops, firings, self.model, self.rig, self.settings, system=self.given)
+        trace = Trace(rows, stops, firings, self.what, self.settings)
         vars(trace)["program"] = self.program  # it need not be generated again
         return trace
 
     def firings(self, records: Iterable[LogRecord]) -> Firings:
         """Return the firings of a run from its records."""
-        return Firings.of(records, self.program.layout, of_system=self.given is not None)
+        return Firings.of(records, self.program.layout, of_system=self.what.named)
 
     def edge(self, machine: int, edge: int) -> tuple[BankPlaces, Transition]:
         """Return the contact of a machine and one of its edges, by their numbers in the run."""
@@ -146,6 +158,18 @@ class Start:
         rig: Rig | None,
         t_end: float,
         settings: Settings | None = None,
+        **more: Any,
+    ) -> Start:
+        """Return the start of a model on a rig, or of a system; the rest is as for `on`."""
+        chosen = Settings() if settings is None else settings
+        return cls.on(mounted(model, rig, chosen.held_period), t_end, chosen, **more)
+
+    @classmethod
+    def on(
+        cls,
+        what: Mounted,
+        t_end: float,
+        settings: Settings,
         *,
         t_start: float = 0.0,
         initial: Mapping[str, Any] | None = None,
@@ -156,10 +180,12 @@ class Start:
 
         Parameters
         ----------
-        model, rig, t_end, t_start, initial
+        what : Mounted
+            What runs.
+        t_end, t_start, initial
             See `gms_fsm.simulate`.
-        settings : Settings, optional
-            Method, tolerances and output; the defaults if omitted.
+        settings : Settings
+            Method, tolerances and output.
         rows_at_once : int
             Maximum number of steps in an arc.
         ticks_from : float, optional
@@ -176,8 +202,7 @@ class Start:
         ParameterError, SignalError
             If an argument breaks its rule.
         """
-        chosen = Settings() if settings is None else settings
-        system = _system(model, rig, chosen)
+        chosen, system = settings, what.system
         t_start, t_end = _times(t_start, t_end)
         _check_resolution(chosen, t_start, t_end)
         program = lower(system)
@@ -216,11 +241,8 @@ class Start:
         y, mode = _initial(system, program, t_start, initial)
         floor = floor_of(program, tolerances, (t_start, last), y, mode)
         options = replace(options, floor=floor)
-        made: tuple[Any, Any] = origin_of(system) if isinstance(model, System) else (model, rig)
         return cls(
-            system=system,
-            model=made[0],
-            rig=made[1],
+            what=what,
             program=program,
             t_start=t_start,
             t_end=t_end,
@@ -233,40 +255,29 @@ class Start:
             initial=initial,
         )
 
-    def has_texts_of(self, model: Model, rig: Rig) -> bool:
-        """Return whether another model on a rig differs in numbers only.
-
-        A Stribeck exponent of 2 gives another text than any other exponent.
-        """
-        return _system(model, rig, self.chosen).shape is self.system.shape
-
-    def with_numbers(self, model: Model, rig: Rig) -> Start:
+    def with_numbers(self, what: Mounted) -> Start:
         """Return the same start with different numbers; signals and initial values stay.
 
         Parameters
         ----------
-        model, rig
-            Of the same kind as the previous ones.
+        what : Mounted
+            With the `same_text`.
 
         Returns
         -------
         Start
-            With the tolerances of the new model, and its entry of the default state.
+            With the tolerances of its numbers, and the entries of its default states.
         """
-        system = with_model(self.system, model, rig)
-        program, y = replace(self.program, p=arguments(system)), self.y
+        program = replace(self.program, p=arguments(what.system))
         scales = scales_of_system(program)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
-        if _enters(system):
-            y, _ = _initial(system, program, self.t_start, self.initial)
+        y, _ = _initial(what.system, program, self.t_start, self.initial)
         span = self.t_start, self.last
         floor = floor_of(program, tolerances, span, y, self.mode)
         return replace(
             self,
-            system=system,
-            model=model,
-            rig=rig,
+            what=what,
             program=program,
             y=y,
             options=replace(
@@ -278,22 +289,6 @@ class Start:
             ),
             settings={**self.settings, "atol": used},
         )
-
-
-def _system(model: Model | System, rig: Rig | None, chosen: Settings) -> System:
-    """Return what runs as a system."""
-    if isinstance(model, System):
-        return model
-    for what, given, mark, example in (
-        ("model", model, "chart", "GMS(parameters, law='signed')"),
-        ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
-    ):
-        if not hasattr(given, mark):
-            raise ParameterError(
-                f"it must be a {what}, for example {example}", place=what, value=given
-            )
-    assert rig is not None
-    return system_of(model, rig, chosen.step if chosen.events == "held" else None)
 
 
 def _recorded(chosen: Settings, atol: Setting, t_start: float, t_end: float) -> dict[str, Setting]:

@@ -21,18 +21,20 @@ from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.lowering._compiled import check_llvmlite
 from gms_fsm.lowering._observing import observe
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
+from gms_fsm.lowering.program import Program, same_text
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import Mounted, mounted, shifted
+from gms_fsm.systems.numbers import column_name, known_in, varied
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.system import Contact, System
+from gms_fsm.systems.system import System
 from gms_fsm.traces._firings import Firings
 from gms_fsm.traces._log import Log
-from gms_fsm.traces.rows import Rows, column_name
+from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 
 if TYPE_CHECKING:
@@ -104,8 +106,9 @@ def sweep(
     >>> result.outcome.tolist(), result.transition_count.tolist()
     (['ok', 'ok'], [4, 4])
     """
-    what, end, given = _arguments(model, rig, t_end, parameters)
+    on, end, given = shifted("sweep(system, t_end, parameters)", model, rig, t_end, parameters)
     begin = _Common(end, t_start, initial, _chosen(settings, options))
+    what = mounted(model, on, begin.settings.held_period)
     if begin.settings.engine == "compiled":
         check_llvmlite()
     begin.start(what)  # errors common to all runs are raised once, here
@@ -143,50 +146,36 @@ def sweep(
     return collected.sweep(values)
 
 
-def _arguments(model: Any, rig: Any, t_end: Any, parameters: Any) -> tuple[Adjustable, float, Any]:
-    """Return what is run, the end of the runs, and the parameters; a system has no rig."""
-    if not isinstance(model, System):
-        return Adjustable(model, rig), t_end, parameters
-    if not isinstance(rig, float | int) or parameters is not None:
-        raise ParameterError(
-            "a system has no rig",
-            place="rig",
-            value=rig,
-            advice="write sweep(system, t_end, parameters)",
-        )
-    return Adjustable(model), rig, t_end
-
-
 # --------------------------------------------------------------------------- parameters
 def _values(
-    what: Adjustable, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
+    what: Mounted, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
 ) -> dict[str, FloatArray]:
     """Check the names and shapes of the parameters."""
     if not hasattr(parameters, "keys"):
-        called = "system" if what.rig is None else "model, rig"
+        called = "system" if what.named else "model, rig"
         raise ParameterError(
             "it must give values by name, for example {'k': [1.0, 2.0]}: "
             f"sweep({called}, t_end, parameters)",
             place="parameters",
             value=parameters,
         )
-    known = what.known
+    names = known_in(what)
     given = {str(name): parameters[name] for name in parameters}
     if not isinstance(parameters, Mapping):
-        given = _elements_joined(given, known)
+        given = _elements_joined(given, names)
     if not given:
         raise ParameterError("parameters is empty", advice="give at least one name with its values")
     arrays: dict[str, FloatArray] = {}
     for name, value in given.items():
-        if name not in known:
+        if name not in names:
             raise ParameterError(
-                f"parameters has {name!r}", advice=f"known here are {', '.join(known)}"
+                f"parameters has {name!r}", advice=f"known here are {', '.join(names)}"
             )
         try:
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"parameters[{name!r}] is not an array of numbers") from None
-        _, n = known[name]
+        _, n = names[name]
         if array.shape[1:] not in (((), (n,)) if n else ((),)) or array.ndim == 0:
             wanted = f"(runs,) or (runs, {n})" if n else "(runs,)"
             raise ParameterError(
@@ -203,11 +192,11 @@ def _values(
 
 
 def _elements_joined(
-    columns: Mapping[str, Any], known: Mapping[str, tuple[Parameter, int]]
+    columns: Mapping[str, Any], names: Mapping[str, tuple[Parameter, int]]
 ) -> dict[str, Any]:
     """Join the columns k1, k2 ... of a DataFrame into an array of shape (runs, n)."""
     joined: dict[str, Any] = {}
-    for name, (_, n) in known.items():
+    for name, (_, n) in names.items():
         parts = [column_name(name, i) for i in range(n)]
         if any(part in columns for part in parts) and name not in columns:
             missing = [part for part in parts if part not in columns]
@@ -217,7 +206,7 @@ def _elements_joined(
                     f"{', '.join(missing)}"
                 )
             joined[name] = np.stack([np.asarray(columns[part]) for part in parts], axis=1)
-    taken = {column_name(name, i) for name in joined for i in range(known[name][1])}
+    taken = {column_name(name, i) for name in joined for i in range(names[name][1])}
     return {name: value for name, value in columns.items() if name not in taken} | joined
 
 
@@ -231,7 +220,7 @@ class _Result:
     end: Mapping[str, Any] | None  # t, x, v, F, z, mode
     log: NDArray[Any]
     rows: Mapping[str, FloatArray] | None
-    ends: Mapping[str, float] = field(default_factory=dict)  # of a system
+    ends: Mapping[str, float] = field(default_factory=dict)  # of bodies, states, sampled values
 
 
 @dataclass(frozen=True)
@@ -243,15 +232,8 @@ class _Common:
     initial: Mapping[str, Any] | None
     settings: Settings
 
-    def start(self, what: Adjustable) -> Start:
-        return Start.of(
-            what.what,
-            what.rig,
-            self.t_end,
-            self.settings,
-            t_start=self.t_start,
-            initial=self.initial,
-        )
+    def start(self, what: Mounted) -> Start:
+        return Start.on(what, self.t_end, self.settings, t_start=self.t_start, initial=self.initial)
 
 
 def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
@@ -272,7 +254,7 @@ def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
 
 
 def _run_chunk(
-    what: Adjustable,
+    what: Mounted,
     begin: _Common,
     part: Mapping[str, FloatArray],
     _sweep: str,
@@ -285,14 +267,9 @@ def _run_chunk(
         run: Run | CompiledRun | None = None
         outcome, message = "ok", ""
         try:
-            its = what.varied(values)
-            if (
-                compiled is not None
-                and its.rig is not None
-                and not isinstance(its.what, System)
-                and compiled.start.has_texts_of(its.what, its.rig)
-            ):
-                compiled.reset(its.what, its.rig)  # the same buffers and machine code
+            its = varied(what, values)
+            if compiled is not None and same_text(compiled.start.system, its.system):
+                compiled.reset(its)  # the same buffers and machine code
                 run = compiled
             elif begin.settings.engine == "compiled":
                 run = compiled = CompiledRun(begin.start(its))
@@ -307,39 +284,42 @@ def _run_chunk(
 
 
 def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Result:
+    """Return values of each contact, and of everything else that the user has named."""
     if run is None:
         return _Result(outcome, message, None, np.empty(0, dtype=LOG), None)
-    if run.start.given is not None:
-        return _result_of_system(run, outcome, message)
-    recorder, trace = run.recorder, run.recorder.trace()
-    rows = None
-    if recorder.start.output == "t_eval":
-        rows = {name: getattr(trace, name) for name in ("x", "v", "F", "z")}
-    t, y, mode = recorder.latest
-    program = recorder.start.program
-    layout, bank = program.layout, program.layout.contact()
-    seen = layout.y.named(y) | layout.observed.named(observe(program, t, y, mode))
-    names = {"x": bank.position, "v": bank.of(bank.velocity), "F": bank.of("F")}
-    end = {"t": t, "mode": mode[layout.elements]} | {u: seen[name] for u, name in names.items()}
-    end["z"] = seen[bank.of(bank.variables[0])] if bank.variables else np.nan
-    return _Result(outcome, message, end, _log_of(trace.firings), rows)
-
-
-def _result_of_system(run: Run | CompiledRun, outcome: str, message: str) -> _Result:
-    """Return the result of a system: values of each contact, and of everything else."""
-    start, recorder = run.start, run.recorder
-    trace, layout = recorder.trace(), start.program.layout
-    t, y, mode = recorder.latest
-    now = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
-    last = start.trace(now, now, trace.firings)
-    end = {name: values[0] for name, values in _of_contacts(last).items()}
-    end |= {"t": t, "mode": list(mode)[layout.elements]}
-    ends = {name: float(values[0]) for name, values in _of_parts(last).items()}
+    start, trace = run.start, run.recorder.trace()
+    t, y, mode = run.recorder.latest
+    ends: dict[str, float] = {}
+    if start.what.values:
+        now = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
+        last = start.trace(now, now, trace.firings)
+        ends = {name: float(values[0]) for name, values in _of_parts(last).items()}
     rows = None
     if start.output == "t_eval":
         rows = {row_name(name): values for name, values in _of_parts(trace).items()}
         rows |= _of_contacts(trace)
+    end = _end_of_contacts(start.program, t, y, mode)
     return _Result(outcome, message, end, _log_of(trace.firings), rows, ends)
+
+
+def _end_of_contacts(
+    program: Program, t: float, y: list[float], mode: tuple[int, ...]
+) -> dict[str, Any]:
+    """Return the state reached, as `_of_contacts`, with its time and modes."""
+    layout = program.layout
+    seen = layout.y.named(y) | layout.observed.named(observe(program, t, y, mode))
+    found: dict[str, Any] = {"t": t, "mode": mode[layout.elements], "z": []}
+    for bank in layout.banks:
+        own = seen[bank.of(bank.variables[0])] if bank.variables else [np.nan] * bank.n
+        found["z"] += own
+    places = [
+        {"x": bank.position, "v": bank.of(bank.velocity), "F": bank.of("F")}
+        for bank in layout.banks
+    ]
+    for name in ("x", "v", "F"):
+        values = [seen[place[name]] for place in places]
+        found[name] = values if len(values) > 1 else values[0]
+    return found
 
 
 def _log_of(firings: Firings) -> NDArray[Any]:
@@ -360,19 +340,10 @@ def _of_contacts(trace: Trace) -> dict[str, FloatArray]:
     return found | {"z": np.concatenate([part.z for part in parts], axis=1)}
 
 
-def _part_names(what: Model | System) -> list[str]:
-    """Return the names of the rest of a system: bodies, further states, sampled values."""
-    if not isinstance(what, System):
-        return []
-    bodies = [f"{each.name}.{which}" for each in what.bodies for which in "xv"]
-    return [*bodies, *what.flow, *(name for each in what.sampled for name in each.updates)]
-
-
 def _of_parts(trace: Trace) -> dict[str, FloatArray]:
     """Return the columns of the bodies, and the further states and sampled values."""
-    assert trace.system is not None
     found: dict[str, FloatArray] = {}
-    for name in _part_names(trace.system):
+    for name in trace.what.values:
         body, _, which = name.rpartition(".")
         found[name] = getattr(trace.body(body), which) if body else trace.value(name)
     return found
@@ -405,17 +376,16 @@ def _results(future: Future[list[_Result]], count: int) -> list[_Result]:
 class _Collected:
     """Preallocated columns, filled in any order."""
 
-    def __init__(self, what: Adjustable, runs: int, t_eval: ArrayLike | None) -> None:
+    def __init__(self, what: Mounted, runs: int, t_eval: ArrayLike | None) -> None:
         self.what = what
-        n, several = sum(each.n for each in what.contacts), len(what.contacts)
+        n, several = sum(each.n for each in what.system.contacts), len(what.system.contacts)
         columns = (several,) if several > 1 else ()
         self.times = np.array([] if t_eval is None else t_eval, dtype=np.float64)
         self.outcome, self.message = ["lost"] * runs, [""] * runs
         self.t = np.full(runs, np.nan)
         self.end = {name: np.full((runs, *columns), np.nan) for name in ("x", "v", "F")}
         self.end["z"] = np.full((runs, n), np.nan)
-        parts = _part_names(what.what)
-        self.ends = {name: np.full(runs, np.nan) for name in parts}
+        self.ends = {name: np.full(runs, np.nan) for name in what.values}
         self.mode = np.full((runs, n), -1, dtype=np.int64)
         self.logs: list[NDArray[Any]] = [np.empty(0, dtype=LOG)] * runs
         rows = runs, self.times.size
@@ -423,7 +393,7 @@ class _Collected:
         if t_eval is not None:
             self.rows = {name: np.full((*rows, *columns), np.nan) for name in ("x", "v", "F")}
             self.rows["z"] = np.full((*rows, n), np.nan)
-            self.rows |= {row_name(name): np.full(rows, np.nan) for name in parts}
+            self.rows |= {row_name(name): np.full(rows, np.nan) for name in what.values}
 
     def take(self, chunk: range, results: Sequence[_Result]) -> None:
         """Store results in their rows."""
@@ -442,16 +412,14 @@ class _Collected:
 
     def sweep(self, parameters: Mapping[str, FloatArray]) -> Sweep:
         """Return the sweep with all results."""
-        contacts, states, edges, owners = self.what.contacts, [], list[str](), list[str]()
+        contacts, states, edges, owners = self.what.system.contacts, [], list[str](), list[str]()
         borders = np.cumsum([each.n for each in contacts])[:-1]
         for each, modes in zip(contacts, np.split(self.mode, borders, axis=1), strict=True):
             names = np.array([*(state.name for state in each.chart.states), ""])
             states.append(names[modes])
-            name = each.name if isinstance(each, Contact) else ""
-            owners += [name] * each.n
-            lead = f"{name}." if len(contacts) > 1 else ""
+            owners += [each.name] * each.n
+            lead = f"{each.name}." if len(contacts) > 1 else ""
             edges += [f"{lead}{edge.name}" for edge in each.chart.transitions]
-        of_system = isinstance(self.what.what, System)
         return Sweep(
             parameters,
             np.array(self.outcome),
@@ -464,7 +432,7 @@ class _Collected:
             times=self.times,
             rows=self.rows,
             ends=self.ends,
-            owners=np.array(owners if of_system else [], dtype=np.str_),
+            owners=np.array(owners if self.what.named else [], dtype=np.str_),
         )
 
 

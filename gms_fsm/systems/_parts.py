@@ -23,7 +23,7 @@ from gms_fsm.systems._given import (
     several,
     texts_of,
 )
-from gms_fsm.systems.models import Model, check_bank, with_values
+from gms_fsm.systems.models import Model, check_bank, is_model, with_values
 
 __all__ = ["LEAST_LOAD", "LOAD", "Body", "Contact", "Sampled", "loaded"]
 
@@ -148,7 +148,7 @@ class Contact:
         model = None
         if isinstance(chart, Chart):
             values = checked_numbers(chart, {} if values is None else values, n, here)
-        elif hasattr(chart, "chart") and hasattr(chart, "weights"):
+        elif is_model(chart):
             model = chart
             if values is not None or n != 1:
                 raise ParameterError(

@@ -41,6 +41,7 @@ __all__ = [
     "Model",
     "check_bank",
     "demonstration",
+    "is_model",
     "parameter_names",
     "parameters_of",
     "with_values",
@@ -77,6 +78,22 @@ class Model(Protocol):
     @property
     def sigma_2(self) -> float:
         """Viscous friction, Ns/m."""
+
+
+def is_model(given: object) -> bool:
+    """Tell whether an object has what marks a `Model`.
+
+    Parameters
+    ----------
+    given : object
+        Anything.
+
+    Returns
+    -------
+    bool
+        True for those of a user's own class, too.
+    """
+    return hasattr(given, "chart") and hasattr(given, "weights")
 
 
 @displayed("svg", "html")

@@ -1,4 +1,8 @@
-"""The numbers of what runs, by name: a system's, or those of a model and of its rig."""
+"""The numbers of what runs, read and written by name: by sweeps, fits, sessions and pages.
+
+Those of a system are called ``numbers.m`` and ``gear.k``, those of a model on a rig ``stiffness``
+and ``k``; ``k2`` is k of the second element.
+"""
 
 from __future__ import annotations
 
@@ -11,149 +15,249 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.gms import GMS_ELEMENT
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.systems._parts import Contact
-from gms_fsm.systems.models import GMS, ChartModel, Model, parameters_of, with_values
-from gms_fsm.systems.rigs import Rig, numbers_of, with_numbers
-from gms_fsm.systems.system import System
+from gms_fsm.systems.models import GMS, ChartModel, Model, parameters_of
+from gms_fsm.systems.mounted import Mounted, mounted
+from gms_fsm.systems.rigs import with_numbers as with_numbers_of_rig
 
-__all__ = ["Adjustable"]
+__all__ = ["Number", "column_name", "joined", "known_in", "law_of", "number_of", "numbers_of"]
+__all__ += ["parts_of", "value_in", "varied", "with_law", "with_numbers"]
 
-NUMBERS = "numbers"
+NUMBERS = "numbers"  # the owner of those that belong to no contact
 
 
-@dataclass(frozen=True, eq=False)
-class Adjustable:
-    """A system, a model on a rig, or a model alone, whose numbers can be replaced.
-
-    Numbers of a system are called ``"numbers.m"``, those of its contact pad ``"pad.F_s"``.
+@dataclass(frozen=True)
+class Number:
+    """A number that can be changed by itself.
 
     Parameters
     ----------
-    what : Model or System
-        As the user gave it.
-    rig : Rig, optional
-        What a model is mounted on.
+    name : str
+        Its own: ``"k2"``.
+    parameter : Parameter
+        Its unit, rule and meaning.
+    value : float
+        The present value.
+    whole : str
+        Name of the parameter that it is a part of: ``"k"``.
+    element : int or None
+        Element index, from 0, if it is the value of one element; None if it is that of all.
+    """
+
+    name: str
+    parameter: Parameter
+    value: float
+    whole: str
+    element: int | None
+
+
+def column_name(name: str, i: int) -> str:
+    """Return the name of a quantity of element i: z1, but z1_1 for a variable called z1.
+
+    Parameters
+    ----------
+    name : str
+        A quantity of the elements.
+    i : int
+        Element index, from 0.
+
+    Returns
+    -------
+    str
+        The name, in which elements are numbered from 1.
+    """
+    return f"{name}{'_' if name[-1].isdigit() or name[-1] == '_' else ''}{i + 1}"
+
+
+# --------------------------------------------------------------------------- whole parameters
+def known_in(what: Mounted) -> dict[str, tuple[Parameter, int]]:
+    """Return all numbers by name.
+
+    Parameters
+    ----------
+    what : Mounted
+        Whose numbers.
+
+    Returns
+    -------
+    dict
+        The parameter, and for how many elements it can differ (0: one number).
 
     Examples
     --------
-    >>> from gms_fsm import Body
+    >>> from gms_fsm import Body, Contact, System
     >>> from gms_fsm.charts import CHARTS
     >>> pad = Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.0})
     >>> mass = Body("mass", inertia="m", force="2 * t")
-    >>> one = Adjustable(System("one", bodies=(mass,), contacts=(pad,), numbers={"m": 1.0}))
-    >>> list(one.known), one.varied({"pad.F_s": 2.0}).value("pad.F_s")
+    >>> one = mounted(System("one", bodies=(mass,), contacts=(pad,), numbers={"m": 1.0}))
+    >>> list(known_in(one)), value_in(varied(one, {"pad.F_s": 2.0}), "pad.F_s")
     (['numbers.m', 'pad.F_c', 'pad.F_s', 'pad.b'], 2.0)
     """
+    units = {each.name: each for each in getattr(what.rig, "parameters", ())}
+    rest = {
+        what.of(NUMBERS, name): (units.get(name, Parameter(name)), 0) for name in what.rig.numbers
+    }
+    found = dict(rest) if what.named else {}
+    for contact in what.system.contacts:
+        for name, each in _known(contact).items():
+            found.setdefault(what.of(contact.name, name), each)
+    return found | rest
 
-    what: Model | System
-    rig: Rig | None = None
 
-    @property
-    def known(self) -> dict[str, tuple[Parameter, int]]:
-        """By name: the parameter, and for how many elements it can differ (0: one number)."""
-        if not isinstance(self.what, System):
-            rig = () if self.rig is None else numbers_of(self.rig)
-            return _known(self.what) | {each.name: (each, 0) for each in rig}
-        found = {f"{NUMBERS}.{name}": (Parameter(name), 0) for name in self.what.numbers}
-        for contact in self.what.contacts:
-            for name, each in _known(contact).items():
-                found.setdefault(f"{contact.name}.{name}", each)
-        return found
+def value_in(what: Mounted, name: str) -> float | FloatArray:
+    """Return the present value of a number by its name in `known_in`."""
+    owner, own = _owner(what, name)
+    if owner == NUMBERS:
+        return what.rig.numbers[own]
+    each = what.system.contact(owner)
+    if own in each.values:  # the chart's own one takes precedence
+        return each.values[own]
+    if own == WEIGHTS.name:
+        return each.weights
+    if own == SIGMA_2.name:
+        return each.sigma_2
+    assert each.stribeck is not None  # else the name would not be known
+    return float(getattr(each.stribeck, own))
 
-    def value(self, name: str) -> float | FloatArray:
-        """Return the present value of a number by its name in `known`."""
-        if not isinstance(self.what, System):
-            rig = {} if self.rig is None else self.rig.numbers
-            return rig[name] if name in rig else _value_in(self.what, name)
+
+def varied(what: Mounted, values: Mapping[str, ArrayLike]) -> Mounted:
+    """Return the same with other numbers; a `ParameterError` if one breaks its rule."""
+    if not values:
+        return what
+    groups: dict[str, dict[str, Any]] = {}
+    for name, given in values.items():
+        owner, own = _owner(what, name)
+        groups.setdefault(owner, {})[own] = given
+    contacts = tuple(
+        each.with_values(groups[each.name]) if each.name in groups else each
+        for each in what.system.contacts
+    )
+    return _remade(what, contacts, groups.get(NUMBERS, {}))
+
+
+def _remade(
+    what: Mounted, contacts: tuple[Contact, ...], numbers: Mapping[str, ArrayLike]
+) -> Mounted:
+    """Return the same with other contacts, and some other numbers beside theirs."""
+    if what.named:
+        every: Any = {**what.system.numbers, **numbers}
+        return mounted(replace(what.system, contacts=contacts, numbers=every))
+    model = contacts[0].model
+    assert model is not None
+    return mounted(model, with_numbers_of_rig(what.rig, numbers), contacts[0].period)
+
+
+def _owner(what: Mounted, name: str) -> tuple[str, str]:
+    """Return the contact that a number belongs to, or `NUMBERS`, and its name there."""
+    if what.named:
         owner, _, own = name.partition(".")
-        if owner == NUMBERS:
-            return self.what.numbers[own]
-        return _value_in(self.what.contact(owner), own)
-
-    def joined(self, parts: Iterable[tuple[str, int | None, float]]) -> dict[str, Any]:
-        """Return values by name: a number, or an array where some are those of one element."""
-        known, found = self.known, dict[str, Any]()
-        for name, element, value in parts:
-            if element is None:
-                found[name] = float(value)
-                continue
-            if np.ndim(found.get(name, 0.0)) == 0:
-                present = np.asarray(found.get(name, self.value(name)), dtype=float)
-                found[name] = np.broadcast_to(present, known[name][1]).copy()
-            found[name][element] = value
-        return found
-
-    def varied(self, values: Mapping[str, ArrayLike]) -> Adjustable:
-        """Return the same with other numbers; a `ParameterError` if one breaks its rule."""
-        if not values:
-            return self
-        if not isinstance(self.what, System):
-            rig = None if self.rig is None else with_numbers(self.rig, values)
-            return Adjustable(with_values(self.what, values), rig)
-        groups: dict[str, dict[str, Any]] = {}
-        for name, value in values.items():
-            owner, _, own = name.partition(".")
-            groups.setdefault(owner, {})[own] = value
-        contacts = tuple(
-            each.with_values(groups[each.name]) if each.name in groups else each
-            for each in self.what.contacts
-        )
-        numbers = {**self.what.numbers, **groups.get(NUMBERS, {})}
-        return Adjustable(replace(self.what, contacts=contacts, numbers=numbers))
-
-    @property
-    def contacts(self) -> tuple[Model | Contact, ...]:
-        """What has elements."""
-        return self.what.contacts if isinstance(self.what, System) else (self.what,)
-
-    @property
-    def title(self) -> str:
-        """The model's title, or the system's name."""
-        return self.what.name if isinstance(self.what, System) else self.what.title
-
-    @property
-    def law(self) -> str | None:
-        """The slip law of the GMS model, or of the first one in a system; None without."""
-        models = (each.model if isinstance(each, Contact) else each for each in self.contacts)
-        return next((law for each in models if (law := _law_of(each)) is not None), None)
-
-    def with_law(self, law: str) -> Adjustable:
-        """Return the same with another slip law; raise `ParameterError` if there is none."""
-        if law not in GMS_ELEMENT:
-            known = " or ".join(map(repr, GMS_ELEMENT))
-            raise ParameterError(f"it must be {known}", place="law", value=law)
-        if self.law is None:
-            raise ParameterError("only a GMS model has a slip law", place="law", value=law)
-        if not isinstance(self.what, System):
-            return replace(self, what=_lawful(self.what, law))
-        contacts = tuple(
-            each if each.model is None else each.with_model(_lawful(each.model, law))
-            for each in self.what.contacts
-        )
-        return Adjustable(replace(self.what, contacts=contacts))
+        return owner, own
+    return NUMBERS if name in what.rig.numbers else what.system.contacts[0].name, name
 
 
-def _known(each: Model | Contact) -> dict[str, tuple[Parameter, int]]:
-    """Return the parameters of a model or a contact that can be varied, as `Adjustable.known`."""
-    model = each.model if isinstance(each, Contact) else each
-    found: dict[str, tuple[Parameter, int]] = {}
-    for own in each.chart.parameters if model is None else parameters_of(model):
-        wide = own.name == WEIGHTS.name or np.ndim(each.values.get(own.name, 0.0)) > 0
-        found.setdefault(own.name, (own, each.n if wide else 0))
+def _known(contact: Contact) -> dict[str, tuple[Parameter, int]]:
+    """Return the parameters of a contact, as `known_in`."""
+    model, found = contact.model, dict[str, tuple[Parameter, int]]()
+    for own in contact.chart.parameters if model is None else parameters_of(model):
+        wide = own.name == WEIGHTS.name or np.ndim(contact.values.get(own.name, 0.0)) > 0
+        found.setdefault(own.name, (own, contact.n if wide else 0))
     return found
 
 
-def _value_in(each: Model | Contact, name: str) -> float | FloatArray:
-    """Return the value of a parameter; the chart's own one takes precedence."""
-    if name in each.values:
-        return each.values[name]
-    if name == WEIGHTS.name:
-        return each.weights
-    if name == SIGMA_2.name:
-        return each.sigma_2
-    assert each.stribeck is not None  # else the name would not be known
-    return float(getattr(each.stribeck, name))
+# --------------------------------------------------------------------------- single numbers
+def _parts(what: Mounted, whole: str, parameter: Parameter, n: int) -> list[Number]:
+    """Return a parameter as numbers: one, or one for each element."""
+    values = np.ravel(np.broadcast_to(np.asarray(value_in(what, whole), dtype=float), n or ()))
+    if not n:
+        return [Number(whole, parameter, float(values[0]), whole, None)]
+    return [
+        Number(column_name(whole, i), parameter, each, whole, i)
+        for i, each in enumerate(values.tolist())
+    ]
+
+
+def parts_of(what: Mounted, name: object) -> list[Number]:
+    """Return the numbers that a name stands for: k1, k2 ... for k; none if nothing is called so."""
+    for whole, (parameter, n) in known_in(what).items():
+        parts = _parts(what, whole, parameter, n)
+        if found := [each for each in parts if name in (whole, each.name)]:
+            return found
+    return []
+
+
+def numbers_of(what: Mounted) -> dict[str, Number]:
+    """Return the numbers by name, such as ``"F_s"``, ``"k2"`` and ``"stiffness"``.
+
+    A name without the number of an element stands for all elements; it is absent if they differ.
+    """
+    found: dict[str, Number] = {}
+    for whole, (parameter, n) in known_in(what).items():
+        parts = _parts(what, whole, parameter, n)
+        if len({each.value for each in parts}) == 1:
+            found[whole] = replace(parts[0], name=whole, element=None)
+        if n > 1:
+            found |= {each.name: each for each in parts}
+    return found
+
+
+def number_of(what: Mounted, name: object) -> Number:
+    """Return the number of this name; raise `ParameterError` if there is none."""
+    numbers = numbers_of(what)
+    if isinstance(name, str) and name in numbers:
+        return numbers[name]
+    if any(each.whole == name for each in numbers.values()):
+        raise ParameterError(
+            f"the elements differ in {name}",
+            advice=f"name that of one element, for example {column_name(str(name), 0)!r}",
+        )
+    raise ParameterError(
+        f"there is no number {shown(name)}", advice=f"known here are {', '.join(numbers)}"
+    )
+
+
+def with_numbers(what: Mounted, values: Mapping[str, float]) -> Mounted:
+    """Return the same with other single numbers."""
+    if not values:
+        return what
+    numbers = numbers_of(what)
+    parts = ((numbers[name].whole, numbers[name].element, each) for name, each in values.items())
+    return varied(what, joined(what, parts))
+
+
+def joined(what: Mounted, parts: Iterable[tuple[str, int | None, float]]) -> dict[str, Any]:
+    """Return values by name: a number, or an array where some are those of one element."""
+    names, found = known_in(what), dict[str, Any]()
+    for name, element, each in parts:
+        if element is None:
+            found[name] = float(each)
+            continue
+        if np.ndim(found.get(name, 0.0)) == 0:
+            present = np.asarray(found.get(name, value_in(what, name)), dtype=float)
+            found[name] = np.broadcast_to(present, names[name][1]).copy()
+        found[name][element] = each
+    return found
+
+
+# --------------------------------------------------------------------------- the slip law
+def law_of(what: Mounted) -> str | None:
+    """Return the slip law of the first GMS model; None without."""
+    laws = (_law_of(each.model) for each in what.system.contacts)
+    return next((each for each in laws if each is not None), None)
+
+
+def with_law(what: Mounted, law: str) -> Mounted:
+    """Return the same with another slip law; raise `ParameterError` if there is none."""
+    if law not in GMS_ELEMENT:
+        known = " or ".join(map(repr, GMS_ELEMENT))
+        raise ParameterError(f"it must be {known}", place="law", value=law)
+    if law_of(what) is None:
+        raise ParameterError("only a GMS model has a slip law", place="law", value=law)
+    contacts = tuple(
+        each if each.model is None else each.with_model(_lawful(each.model, law))
+        for each in what.system.contacts
+    )
+    return _remade(what, contacts, {})
 
 
 def _law_of(model: Model | None) -> str | None:

@@ -17,7 +17,7 @@ from gms_fsm.charts.parameters import Parameter, checked_scalar
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring
 
-__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "TextRig", "numbers_of", "with_numbers"]
+__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "TextRig", "with_numbers"]
 
 MASS = Parameter("mass", "kg", "> 0", per_element=False, meaning="mass")
 
@@ -195,28 +195,6 @@ def _check(rig: Slider | PulledSlider) -> None:
     for each in rig.parameters:
         number = checked_scalar(each.name, getattr(rig, each.name), each.rule)
         object.__setattr__(rig, each.name, number)
-
-
-def numbers_of(rig: Rig) -> tuple[Parameter, ...]:
-    """Return the numbers that `with_numbers` can vary in a rig.
-
-    Parameters
-    ----------
-    rig : Rig
-        Any rig; without ``parameters`` its numbers have unknown units.
-
-    Returns
-    -------
-    tuple of Parameter
-        In the order of ``rig.numbers``.
-
-    Examples
-    --------
-    >>> [(each.name, each.unit) for each in numbers_of(PulledSlider(1.0, 2.0, 0.1))]
-    [('mass', 'kg'), ('stiffness', 'N/m'), ('speed', 'm/s')]
-    """
-    known = {each.name: each for each in getattr(rig, "parameters", ())}
-    return tuple(known.get(name, Parameter(name)) for name in rig.numbers)
 
 
 def with_numbers(rig: Rig, values: Mapping[str, ArrayLike]) -> Rig:

@@ -53,9 +53,7 @@ __all__ = [
     "LOAD",
     "Body",
     "Contact",
-    "Mounting",
     "Sampled",
-    "Several",
     "Spring",
     "System",
     "loaded",
@@ -356,68 +354,6 @@ def _found(parts: tuple[Named, ...], name: str, reason: str) -> Named:
     raise ParameterError(f"{reason} {shown(name)}", advice=f"there are {known}")
 
 
-@dataclass(frozen=True)
-class Mounting:
-    """What moves the contacts of a system, as a `Rig` for everything that reads rigs.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    """
-
-    system: System
-
-    @property
-    def title(self) -> str:
-        """The system's name."""
-        return self.system.name
-
-    @property
-    def signals(self) -> Mapping[str, Signal]:
-        """The system's signals that are functions of time alone."""
-        every = self.system.signals.items()
-        return {name: signal for name, signal in every if not isinstance(signal, str)}
-
-    @property
-    def numbers(self) -> Mapping[str, float]:
-        """The system's."""
-        return self.system.numbers
-
-    @property
-    def acceleration(self) -> str | None:
-        """The balance of the first free body; None if all bodies are driven."""
-        read = self.system.assembly
-        for body in read.free:
-            return f"({spell(read.forces[body.name])} - F) / ({spell(read.inertias[body.name])})"
-        return None
-
-
-class Several:
-    """Stands where a run has one model, in a system with several contacts.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    """
-
-    def __init__(self, system: System) -> None:
-        self._system = system
-
-    def __repr__(self) -> str:
-        return f"<{len(self._system.contacts)} contacts of {self._system!r}>"
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        known = ", ".join(repr(each.name) for each in self._system.contacts)
-        raise ParameterError(
-            f"system {self._system.name!r} has the contacts {known}",
-            advice=f"say which one: trace.contact({self._system.contacts[0].name!r})",
-        )
-
-
 def with_model(system: System, model: Model, rig: Rig) -> System:
     """Return a model on a rig as a system, given that of others of the same shape.
 
@@ -448,23 +384,6 @@ def with_model(system: System, model: Model, rig: Rig) -> System:
         _like=system.shape,
     )
     return new
-
-
-def origin_of(system: System) -> tuple[Any, Mounting]:
-    """Return what stands for model and rig of a system, for everything that reads these.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-
-    Returns
-    -------
-    Contact or Several, Mounting
-        Its only contact, if it has one only; and the rest.
-    """
-    single = system.contacts[0] if len(system.contacts) == 1 else Several(system)
-    return single, Mounting(system)
 
 
 # --------------------------------------------------------------------------- from a model on a rig

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from gms_fsm.lowering.layout import Layout
+from gms_fsm.systems.numbers import column_name
 from gms_fsm.traces._parts import stored_names
-from gms_fsm.traces.rows import column_name
 
 if TYPE_CHECKING:
     from gms_fsm.traces.trace import Trace
@@ -52,11 +52,11 @@ def columns_of(trace: Trace) -> dict[str, NDArray[Any]]:
     dict of str to ndarray, shape (rows,)
         See `Trace.columns`.
     """
-    layout, system = trace.program.layout, trace.system
+    layout, system = trace.program.layout, trace.what.system
     table: dict[str, NDArray[Any]] = {"t": trace.t, "microstep": trace.microstep}
     slid = trace.rows.mode[:, layout.slides].T
     slides = {column_name("slides", k): flags for k, flags in enumerate(slid)}
-    if system is None or trace.which:
+    if not trace.subject.named:
         shared, own = _of_contact(trace)
         return table | shared | slides | own
     table |= {name: trace.rows.y[:, layout.y.index(name)] for name in layout.y.shared}
@@ -74,7 +74,7 @@ def _of_contact(trace: Trace) -> tuple[dict[str, NDArray[Any]], dict[str, NDArra
     start = bank.of("")
     kept = [
         name
-        for name in stored_names(trace.system, layout).values()
+        for name in stored_names(trace.what, layout).values()
         if name.startswith(start) and name in trace.seen
     ]
     shared = {"x": trace.x}

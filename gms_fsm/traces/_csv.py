@@ -22,11 +22,12 @@ from gms_fsm._files import folder_lock, leftovers, write_together
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS
+from gms_fsm.systems.numbers import column_name
 from gms_fsm.traces._columns import column_title
 from gms_fsm.traces._firings import Firings
 from gms_fsm.traces._header import Header
 from gms_fsm.traces._parts import Parts, Ran
-from gms_fsm.traces.rows import Rows, column_name
+from gms_fsm.traces.rows import Rows
 
 __all__ = ["AT_ONCE", "log_path", "log_texts", "read", "write"]
 
@@ -104,11 +105,11 @@ def read(path: Path) -> Parts:
     with folder_lock(path.parent, shared=True):  # rows and log must come from the same run
         with path.open(encoding="utf-8", newline="") as file:
             header = _header(path, file.readline())
-            ran = Ran.of(header)
+            ran = Ran(header.to_mounted())
             table = _read_columns(file, path, 2, lambda head: _kinds(ran, head))
         text = io.StringIO(_log_of(path, header.log))
         log = _read_columns(text, log_path(path), 1, _log_kinds)
-    layout, short = ran.layout, ran.system is None
+    layout, short = ran.layout, not ran.what.named
     rows = _rows(table, ran)
     observed = {}
     for name in ran.names.values():
@@ -119,7 +120,7 @@ def read(path: Path) -> Parts:
             else table[title]
         )
     log["element"] -= 1
-    firings = Firings.coded(log, layout, of_system=ran.system is not None)
+    firings = Firings.coded(log, layout, of_system=ran.what.named)
     return Parts(header, ran, rows, rows, firings, observed)
 
 
@@ -134,7 +135,7 @@ def _header(path: Path, line: str) -> Header:
 
 def _kinds(ran: Ran, head: Sequence[str]) -> dict[str, Kind]:
     """Return the columns of a trace that are read."""
-    layout, short = ran.layout, ran.system is None
+    layout, short = ran.layout, not ran.what.named
     kinds: dict[str, Kind] = {"t": NUMBER, "microstep": INTEGER}
     for name, i in layout.y:
         title = column_title(layout, name, short=short)
@@ -146,7 +147,7 @@ def _kinds(ran: Ran, head: Sequence[str]) -> dict[str, Kind]:
             kinds |= {column_name(title, i): NUMBER for i in range(count)}
         else:
             kinds[title] = NUMBER
-    for bank, contact in zip(layout.banks, ran.whole.contacts, strict=True):
+    for bank, contact in zip(layout.banks, ran.what.system.contacts, strict=True):
         states = {state.name: k for k, state in enumerate(contact.chart.states)}
         title = column_title(layout, bank.of("state"), short=short)
         kind = Kind(states.__getitem__, np.dtype(np.int64))
@@ -167,7 +168,7 @@ def _log_kinds(head: Sequence[str]) -> dict[str, Kind]:
 
 
 def _rows(table: Mapping[str, NDArray[Any]], ran: Ran) -> Rows:
-    layout, short = ran.layout, ran.system is None
+    layout, short = ran.layout, not ran.what.named
     titles = {name: column_title(layout, name, short=short) for name, _ in layout.y}
     y = [table[titles[name] if i is None else column_name(titles[name], i)] for name, i in layout.y]
     mode = []

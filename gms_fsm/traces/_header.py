@@ -16,7 +16,7 @@ from gms_fsm.systems._record import (
     signal_of,
     signal_table,
 )
-from gms_fsm.systems.models import ChartModel, Model
+from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider, TextRig
 from gms_fsm.systems.system import System
 from gms_fsm.traces.verdicts import Verdict
@@ -98,28 +98,22 @@ class Header(BaseModel):
     @classmethod
     def of(
         cls,
-        model: Model,
-        rig: Rig,
-        system: System | None,
+        what: Mounted,
         settings: Mapping[str, Setting],
         monitors: Mapping[str, Verdict] | None = None,
     ) -> Header:
-        """Describe a run of a system, if there is one, else of a model on a rig."""
+        """Describe a run."""
         rest: Any = {"settings": dict(settings), "monitors": dict(monitors or {})}
-        if system is not None:
-            return cls(system=SystemTable.of(system), **rest)
-        return cls(model=ModelTable.of(model), rig=RigTable.of(rig), **rest)
+        if what.named:
+            return cls(system=SystemTable.of(what.system), **rest)
+        return cls(model=ModelTable.of(what.model), rig=RigTable.of(what.rig), **rest)
 
-    def to_model(self) -> ChartModel:
-        """Return an equivalent model."""
+    def to_mounted(self) -> Mounted:
+        """Return an equivalent of what ran, in which a Python function becomes one that raises."""
+        if self.system is not None:
+            return mounted(self.system.build(System))
         assert self.model is not None
-        return self.model.build()
-
-    def to_rig(self) -> Rig:
-        """Return an equivalent rig, in which a Python function becomes one that raises."""
         assert self.rig is not None
-        return self.rig.build()
-
-    def to_system(self) -> System | None:
-        """Return an equivalent system, if it is one and not a model on a rig."""
-        return None if self.system is None else self.system.build(System)
+        step = self.settings.get("step")
+        held = self.settings.get("events") == "held" and isinstance(step, float)
+        return mounted(self.model.build(), self.rig.build(), step if held else None)  # type: ignore[arg-type]

@@ -10,7 +10,6 @@ from gms_fsm.language import evaluate
 from gms_fsm.lowering._locks import ENDLESS
 from gms_fsm.lowering._observing import observe
 from gms_fsm.systems._assembly import Bank, of
-from gms_fsm.systems.system import system_of
 
 if TYPE_CHECKING:
     from gms_fsm.traces.trace import Trace
@@ -30,7 +29,7 @@ def impulses_of(trace: Trace) -> np.recarray:
     the energy is P times the mean of the velocities before and after. With ``output="end"`` there
     are none.
     """
-    system = trace.system or system_of(trace.model, trace.rig)
+    system = trace.what.system
     read, layout, stops = system.assembly, trace.program.layout, trace.stops
     firings = trace.firings if trace.every is None else trace.every
     free = [layout.y.index(body.v) for body in read.free]

@@ -56,7 +56,7 @@ def read(path: Path) -> Parts:
     with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
         array = partial(member, file)
         header = Header.model_validate_json(str(array("header")))
-        ran = Ran.of(header)
+        ran = Ran(header.to_mounted())
         layout = ran.layout
         rows = _table(array, "rows", layout)
         stops = _table(array, "stops", layout) if "stops_t" in file.files else rows
@@ -85,7 +85,7 @@ def _firings(array: Member, ran: Ran) -> Firings:
     t = array("log_t")
     machine, edge = (array(f"log_{name}", 8 * t.size) for name in ("machine", "edge"))
     numbers = array("log_numbers", 8 * len(LOG_NUMBERS) * t.size)
-    return Firings(t, machine, edge, numbers, ran.layout, ran.system is not None and t.size > 0)
+    return Firings(t, machine, edge, numbers, ran.layout, ran.what.named and t.size > 0)
 
 
 def _coded(log: Any, ran: Ran) -> Firings:
@@ -97,7 +97,7 @@ def _coded(log: Any, ran: Ran) -> Firings:
     if log.ndim != 1 or log.dtype != np.dtype([(name, kinds.get(name, "f8")) for name in names]):
         raise TraceFileError("the transition log does not have the columns of a trace")
     columns = {name: log[name].tolist() for name in names}
-    return Firings.coded(columns, ran.layout, of_system=ran.system is not None)
+    return Firings.coded(columns, ran.layout, of_system=ran.what.named)
 
 
 def _small(array: Any) -> Any:

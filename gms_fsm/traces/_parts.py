@@ -14,23 +14,14 @@ from gms_fsm.errors import TraceFileError
 from gms_fsm.lowering.layout import Layout
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.lowering.program import lower
-from gms_fsm.lowering.scales import Setting
-from gms_fsm.systems.models import Model
-from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.system import System, origin_of, system_of
+from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces._firings import Firings
 from gms_fsm.traces.rows import Rows
 
 if TYPE_CHECKING:
     from gms_fsm.traces._header import Header
 
-__all__ = ["Parts", "Ran", "checked", "held_period", "stored_names"]
-
-
-def held_period(settings: Mapping[str, Setting]) -> float | None:
-    """Return the period of a run with ``events="held"``; None of any other."""
-    step = settings.get("step")
-    return step if settings.get("events") == "held" and isinstance(step, float) else None
+__all__ = ["Parts", "Ran", "checked", "stored_names"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,53 +30,30 @@ class Ran:
 
     Parameters
     ----------
-    model, rig
-        A model on a rig; of a system what stands for them.
-    system : System or None
-        The system, if it is one.
-    period : float or None
-        s: of the contact, in a run of a model on a rig with ``events="held"``.
+    what : Mounted
+        A system, or a model on a rig.
     """
 
-    model: Model
-    rig: Rig
-    system: System | None
-    period: float | None
-
-    @classmethod
-    def of(cls, header: Header) -> Ran:
-        """Return what a header describes."""
-        system = header.to_system()
-        if system is None:
-            period = held_period(header.settings)
-            return cls(header.to_model(), header.to_rig(), None, period)
-        return cls(*origin_of(system), system, None)
-
-    @cached_property
-    def whole(self) -> System:
-        """The system, also where it is a model on a rig."""
-        if self.system is not None:
-            return self.system
-        return system_of(self.model, self.rig, self.period)
+    what: Mounted
 
     @cached_property
     def layout(self) -> Layout:
         """Where everything is."""
-        return lower(self.whole).layout
+        return lower(self.what.system).layout
 
     @cached_property
     def names(self) -> Mapping[str, str]:
         """For each observed quantity in the file its name in the layout."""
-        return stored_names(self.system, self.layout)
+        return stored_names(self.what, self.layout)
 
 
-def stored_names(system: System | None, layout: Layout) -> dict[str, str]:
+def stored_names(what: Mounted, layout: Layout) -> dict[str, str]:
     """Return for each observed quantity in a file its name in the layout.
 
     Parameters
     ----------
-    system : System or None
-        None for a model on a rig, whose files have short names.
+    what : Mounted
+        What ran; the files of a model on a rig have short names.
     layout : Layout
         Of the run.
 
@@ -94,8 +62,8 @@ def stored_names(system: System | None, layout: Layout) -> dict[str, str]:
     dict of str to str
         With the velocities of driven bodies, which are in no layout, under their own names.
     """
-    if system is not None:
-        driven = [body.v for body in system.bodies if body.driven]
+    if what.named:
+        driven = [body.v for body in what.system.bodies if body.driven]
         return {name: name for name in (*layout.observed.shared, *layout.observed.own, *driven)}
     bank = layout.contact()
     names = {"v": bank.of(bank.velocity)}
@@ -150,7 +118,7 @@ def checked(parts: Parts) -> Parts:
     TraceFileError
         If they are inconsistent.
     """
-    layout, system = parts.ran.layout, parts.ran.whole
+    layout, system = parts.ran.layout, parts.ran.what.system
     states = [len(each.chart.states) for each in system.contacts for _ in range(each.n)]
     tables = {"rows": _with_slides(parts.rows, layout)}
     if parts.stops is not parts.rows:

@@ -16,7 +16,7 @@ from gms_fsm.lowering._observing import armed, rate, sigmas
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.system import Body
 from gms_fsm.traces._log import Log
-from gms_fsm.traces._parts import Parts, Ran, checked, held_period
+from gms_fsm.traces._parts import Parts, Ran, checked
 from gms_fsm.traces.rows import Rows, merged
 
 if TYPE_CHECKING:
@@ -195,16 +195,18 @@ def write_trace(trace: Trace, path: Path) -> Path:
     from gms_fsm.traces import _csv, _npz  # only files need pydantic
     from gms_fsm.traces._header import Header
 
-    system = trace.system
-    header = Header.of(trace.model, trace.rig, system, trace.settings, trace.monitors)
+    header = Header.of(trace.what, trace.settings, trace.monitors)
     if path.suffix == ".csv":
         starts = range(0, len(trace), _csv.AT_ONCE)
         parts = (picked(trace, slice(start, start + _csv.AT_ONCE)) for start in starts)
         return _csv.write(path, header, (part.columns() for part in parts), trace.firings)
-    ran = Ran(trace.model, trace.rig, system, held_period(trace.settings))
-    driven = () if system is None else (body for body in system.bodies if body.driven)
-    stored = {**trace.seen, **{body.v: trace.body(body.name).v for body in driven}}
-    return _npz.write(path, Parts(header, ran, trace.rows, trace.stops, trace.firings, stored))
+    stored = dict(trace.seen)
+    for name in trace.what.bodies:
+        if trace.what.system.body(name).driven:
+            stored[trace.what.system.body(name).v] = trace.body(name).v
+    return _npz.write(
+        path, Parts(header, Ran(trace.what), trace.rows, trace.stops, trace.firings, stored)
+    )
 
 
 def read_parts(path: Path) -> Parts:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gms_fsm._display import short_repr
 from gms_fsm.charts.parameters import FloatArray
 
-__all__ = ["Rows", "column_name", "merged"]
+__all__ = ["Rows", "merged"]
 
 
 @short_repr
@@ -79,21 +79,3 @@ def _found_in(rows: Rows, stops: Rows) -> NDArray[np.bool_]:
     known = set(texts(stops))
     found[found] = [text in known for text in texts(rows.at(found))]
     return found
-
-
-def column_name(name: str, i: int) -> str:
-    """Return the column name of element i in a flat table: z1, but z1_1 for a variable called z1.
-
-    Parameters
-    ----------
-    name : str
-        A quantity of the elements.
-    i : int
-        Element index, from 0.
-
-    Returns
-    -------
-    str
-        The name, in which elements are numbered from 1.
-    """
-    return f"{name}{'_' if name[-1].isdigit() or name[-1] == '_' else ''}{i + 1}"

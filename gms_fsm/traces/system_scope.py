@@ -202,8 +202,7 @@ class SystemScope:
         SystemScope
             With arrays as values, whose last axis is the row.
         """
-        system, rows = trace.system, trace.rows
-        assert system is not None
+        system, rows = trace.what.system, trace.rows
         at_rows = [given_values(system, t) for t in rows.t.tolist()]
         given = {name: np.array([at[name] for at in at_rows]) for name in (at_rows or [{}])[0]}
         contacts = {name: Scope.over(trace.contact(name)) for name in trace.contacts}

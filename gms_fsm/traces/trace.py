@@ -29,14 +29,14 @@ from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.system import System, system_of
+from gms_fsm.systems.system import System
 from gms_fsm.traces._between import between
 from gms_fsm.traces._columns import columns_of
 from gms_fsm.traces._firings import Firings
 from gms_fsm.traces._impulses import impulses_of
 from gms_fsm.traces._observed import Observed
-from gms_fsm.traces._parts import held_period
 from gms_fsm.traces._views import (
     BodyTrace,
     driven_velocity,
@@ -56,18 +56,7 @@ __all__ = ["BodyTrace", "Trace", "check_trace", "dwell_times", "files_of"]
 
 
 def check_trace(trace: object) -> None:
-    """Raise unless an object to be drawn is a trace of one contact.
-
-    Parameters
-    ----------
-    trace : object
-        The object.
-
-    Raises
-    ------
-    ParameterError
-        If it is not; the message says how to make one, or to choose a contact.
-    """
+    """Raise `ParameterError` unless an object to be drawn is a trace of one contact."""
     if not isinstance(trace, Trace):
         raise ParameterError(
             "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
@@ -96,8 +85,8 @@ class Trace:
         Records with ``t, element`` (from 0), ``edge, source, target, z, v, s, F_before, F_after``.
     firings : Firings
         The same with codes in place of names, in a third of the memory.
-    model, rig
-        The simulated system; after `load` the model is a generic `ChartModel`.
+    what : Mounted
+        What ran; after `load` its model is a generic `ChartModel`.
     settings : dict
         Method, tolerances, engine and other settings.
     monitors : mapping of str to Verdict
@@ -115,12 +104,10 @@ class Trace:
     rows: Rows
     stops: Rows  # both sides of every stop; needed if `rows` has requested times only
     firings: Firings  # the log, with codes in place of names
-    model: Model
-    rig: Rig
+    what: Mounted = field(repr=False)
     settings: Mapping[str, Setting]
     stored: Mapping[str, FloatArray] = field(default_factory=dict, repr=False)
     monitors: Mapping[str, Verdict] = field(default_factory=dict, repr=False)
-    system: System | None = field(default=None, repr=False)  # where it is not a model on a rig
     which: str = field(default="", repr=False)  # the contact, of a system with several
     every: Firings | None = field(default=None, repr=False)  # of all contacts, where one is chosen
 
@@ -130,9 +117,9 @@ class Trace:
     @property
     def title(self) -> str:
         """What ran: model and rig, or a system and its contacts."""
-        if self.system is None or self.which:
+        if not self.subject.named:
             return f"{self.model.title}; {self.rig.title}"
-        return f"{self.system.name}; contacts {', '.join(self.contacts)}"
+        return f"{self.what.title}; contacts {', '.join(self.contacts)}"
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -140,6 +127,27 @@ class Trace:
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: generated functions cannot be, and are made again."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    # ------------------------------------------------------------------ what ran
+    @cached_property
+    def subject(self) -> Mounted:
+        """What is looked at: all that ran, or the contact chosen."""
+        return self.what.only(self.which) if self.which else self.what
+
+    @property
+    def model(self) -> Model:
+        """The model; of a system its contact, if it has only one or one is chosen."""
+        return self.subject.model
+
+    @property
+    def rig(self) -> Rig:
+        """The rig; of a system what moves its contacts."""
+        return self.what.rig
+
+    @property
+    def system(self) -> System | None:
+        """The system, where it is not a model on a rig."""
+        return self.what.given
 
     # ------------------------------------------------------------------ columns
     @property
@@ -189,12 +197,11 @@ class Trace:
             If there is no such contact.
         """
         bank = self.program.layout.contact(name)
-        if self.system is None:
+        if not self.what.named:
             return self
         every = self.firings if self.every is None else self.every
         mine = every.at(every.within(bank.name))
-        model: Any = self.system.contact(bank.name)
-        chosen = replace(self, model=model, firings=mine, which=bank.name, every=every)
+        chosen = replace(self, firings=mine, which=bank.name, every=every)
         vars(chosen).update({k: u for k, u in vars(self).items() if k in ("program", "seen")})
         return chosen
 
@@ -216,7 +223,7 @@ class Trace:
         ParameterError
             If there is no such body.
         """
-        body = (self.system or system_of(self.model, self.rig)).body(name)
+        body = self.what.system.body(name)
         velocity = self.stored.get(body.v)
         if velocity is None or not body.driven:
             velocity = driven_velocity(self, body) if body.driven else self._named(body.v)
@@ -386,9 +393,7 @@ class Trace:
     @cached_property
     def program(self) -> Program:
         """The generated program of the run."""
-        if self.system is not None:
-            return lower(self.system)
-        return lower(system_of(self.model, self.rig, held_period(self.settings)))
+        return lower(self.what.system)
 
     @cached_property
     def seen(self) -> Mapping[str, FloatArray]:
@@ -475,18 +480,7 @@ class Trace:
         return replace(self, rows=table, stops=table, stored={})
 
     def with_monitors(self, found: Mapping[str, Verdict]) -> Trace:
-        """Return the same run with the verdicts of its monitors.
-
-        Parameters
-        ----------
-        found : mapping of str to Verdict
-            Verdicts by name.
-
-        Returns
-        -------
-        Trace
-            A copy that keeps everything already computed from the rows.
-        """
+        """Return the same run with the verdicts of its monitors, and all that was computed."""
         trace = replace(self, monitors=found)
         vars(trace).update({**vars(self), "monitors": found})
         return trace
@@ -542,12 +536,10 @@ class Trace:
             parts.rows,
             parts.stops,
             parts.firings,
-            parts.ran.model,
-            parts.ran.rig,
+            parts.ran.what,
             parts.header.settings,
             parts.stored,
             parts.header.monitors,
-            parts.ran.system,
         )
 
     # ------------------------------------------------------------------ tables

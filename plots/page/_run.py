@@ -60,7 +60,6 @@ def stored_run(page: PageRows, charts: Sequence[int], reports: Sequence[Report])
     contacts = [
         _contact(view, pool, picture, reports) for view, picture in zip(views, charts, strict=True)
     ]
-    whole = trace.system is None or bool(trace.which)
     return {
         "rows": len(trace),
         "instants": packed(instants),
@@ -69,15 +68,15 @@ def stored_run(page: PageRows, charts: Sequence[int], reports: Sequence[Report])
         "microstep": packed(trace.microstep),
         "t": pool.add(trace.t),
         "contacts": contacts,
-        "system": None if whole else _system(trace, pool),
-        "names": _watched(views[0], pool) if whole else _watched_in_system(trace, pool),
+        "system": _system(trace, pool) if trace.subject.named else None,
+        "names": (_watched_in_system if trace.subject.named else _watched)(trace, pool),
         "pool": pool.columns,
     }
 
 
 def views_of(trace: Trace) -> list[Trace]:
     """Return the run as each of its contacts sees it; a contact chosen before stays alone."""
-    if trace.system is None or trace.which:
+    if not trace.subject.named:
         return [trace]
     return [trace.contact(name) for name in trace.contacts]
 
@@ -92,7 +91,7 @@ def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) 
     rows, elements = np.nonzero(np.diff(modes, axis=0, prepend=modes[:1]))
     curve = None if loaded(model) else model.stribeck  # else s is that of the row
     return {
-        "name": trace.places.name if trace.system is not None else "",
+        "name": trace.what.whose(trace.places.name),
         "chart": picture,
         "n": n,
         "states": [state.name for state in chart.states],
@@ -304,9 +303,7 @@ def _watched_in_system(trace: Trace, pool: Pool) -> dict[str, Any]:
 # --------------------------------------------------------------------------- a system
 def _system(trace: Trace, pool: Pool) -> dict[str, Any]:
     """Return the motion of bodies, further states, sampled values and signals."""
-    system = trace.system
-    assert system is not None
-    bodies = []
+    system, bodies = trace.what.system, []
     for body in system.bodies:
         motion = trace.body(body.name)
         bodies.append({"name": body.name, "x": pool.add(motion.x), "v": pool.add(motion.v)})

@@ -30,6 +30,7 @@ from gms_fsm.inspection.branches import Fork, Tree
 from gms_fsm.inspection.session import Session
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.numbers import law_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 from gms_fsm.traces.trace import Trace
@@ -311,7 +312,7 @@ class Explorer(anywidget.AnyWidget):
     def _described(self) -> dict[str, Any]:
         """Return what the controls show."""
         tree = self._tree
-        numbers, law = tree.numbers(), tree.made_of().law
+        numbers, law = tree.numbers(), law_of(tree.made_of())
         sliders = [
             {
                 "name": name,
@@ -419,11 +420,8 @@ class Explorer(anywidget.AnyWidget):
         elif element >= 0:
             edits = {"variables": {f"{contact}.{what}" if contact else what: {element: value}}}
         else:
-            edits = (
-                {"v": value}
-                if self._tree.branch().start.given is None
-                else {"variables": {what: value}}
-            )
+            named = self._tree.branch().start.what.named
+            edits = {"variables": {what: value}} if named else {"v": value}
         self.poke(**edits, t=t, microstep=microstep)
 
 

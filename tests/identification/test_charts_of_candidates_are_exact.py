@@ -11,7 +11,7 @@ import pytest
 from gms_fsm import ChartModel, Prescribed, simulate
 from gms_fsm.identification._linear import linear_names
 from gms_fsm.identification.candidates import BEHIND_BACKLASH, STIFFER_ONE_WAY
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import mounted_alone
 from tests.helpers import FASTEST
 
 TURNS = np.array([0.0, 1.0, -1.0, 0.4, -0.3, 0.8, -1.2, 1.2, -1.2])
@@ -96,4 +96,4 @@ def test_a_closed_cycle_never_gives_energy(seed: int) -> None:
 def test_stiffnesses_are_solved_for_and_not_searched(chart: object) -> None:
     model = backlash() if chart is BEHIND_BACKLASH else None
     model = model or ChartModel(STIFFER_ONE_WAY, {"k": 3.0, "b": -1.0, "z_c": 0.4})
-    assert linear_names(Adjustable(model)) == ("k", "b", "sigma_2")
+    assert linear_names(mounted_alone(model)) == ("k", "b", "sigma_2")

@@ -14,7 +14,8 @@ from gms_fsm import Body, Chart, ChartModel, Contact, Prescribed, State, System,
 from gms_fsm.charts.registry import registered
 from gms_fsm.identification._linear import linear_names
 from gms_fsm.systems.models import demonstration, with_values
-from gms_fsm.systems.numbers import Adjustable
+from gms_fsm.systems.mounted import mounted_alone
+from gms_fsm.systems.numbers import value_in
 
 RIG = Prescribed("0.1 * sin(3 * t) * exp(0.1 * t)")
 CASES = [
@@ -33,8 +34,8 @@ def test_force_is_affine_in_them(name: str, law: str) -> None:
     model = demonstration(registered()[name], law)
     options: dict[str, Any] = {"t_eval": np.linspace(0.0, 4.0, 41), "atol": 1e-9, "rtol": 1e-8}
     at = simulate(model, RIG, 4.0, **options)
-    for each in linear_names(Adjustable(model)):
-        start = np.asarray(Adjustable(model).value(each))
+    for each in linear_names(mounted_alone(model)):
+        start = np.asarray(value_in(mounted_alone(model), each))
         step = np.maximum(np.abs(start), 0.1)
         runs = [
             simulate(with_values(model, {each: start + k * step}), RIG, 4.0, **options)
@@ -51,7 +52,7 @@ def test_what_the_elements_feel_is_searched() -> None:
     for name, linear in expected.items():
         entry = registered()[name]
         model = demonstration(entry, entry.laws[-1] if entry.laws else "")
-        assert {*linear_names(Adjustable(model))} - {"sigma_2"} == linear - {"sigma_2"}, name
+        assert {*linear_names(mounted_alone(model))} - {"sigma_2"} == linear - {"sigma_2"}, name
 
 
 def _own(force: str, flow: str = "v", let: dict[str, str] | None = None) -> ChartModel:
@@ -81,7 +82,7 @@ def _own(force: str, flow: str = "v", let: dict[str, str] | None = None) -> Char
     ],
 )
 def test_own_charts(force: str, flow: str, let: dict[str, str], linear: set[str]) -> None:
-    assert {*linear_names(Adjustable(_own(force, flow, let)))} - {"sigma_2"} == linear
+    assert {*linear_names(mounted_alone(_own(force, flow, let)))} - {"sigma_2"} == linear
 
 
 def test_a_free_body_leaves_none() -> None:
@@ -90,5 +91,5 @@ def test_a_free_body_leaves_none() -> None:
         "driven", bodies=(Body("b", velocity="w"),), contacts=(contact,), signals={"w": "sin(t)"}
     )
     free = System("free", bodies=(Body("b", inertia=1.0, force="sin(t)"),), contacts=(contact,))
-    assert "pad.k" in linear_names(Adjustable(driven))
-    assert linear_names(Adjustable(free)) == ()
+    assert "pad.k" in linear_names(mounted_alone(driven))
+    assert linear_names(mounted_alone(free)) == ()

@@ -9,6 +9,7 @@ from gms_fsm import simulate, sweep
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.start import Start
+from gms_fsm.systems.mounted import mounted
 from tests.helpers import pulled_mass
 
 pytest.importorskip("llvmlite", reason="needs the extra fast")
@@ -23,7 +24,7 @@ def test_the_next_run_does_not_write_into_the_rows_of_the_one_before() -> None:
     first = run.recorder.trace()
     kept = [first.t.copy(), first.rows.y.copy(), first.modes.copy(), first.microstep.copy()]
     other, rig = pulled_mass(np.array([50.0, 20.0, 20.0, 10.0]))
-    run.reset(other, rig)
+    run.reset(mounted(other, rig))
     while run.advance():
         pass
     second = run.recorder.trace()

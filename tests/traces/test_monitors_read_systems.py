@@ -7,6 +7,7 @@ import pytest
 from gms_fsm import Body, Chart, Contact, Prescribed, State, System, Trace, Transition, simulate
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.systems.models import ChartModel
+from gms_fsm.systems.mounted import mounted, mounted_alone
 from gms_fsm.traces.failures import LivelockError
 from gms_fsm.traces.monitors import Coverage, Invariant, Passivity, checked, examine
 from gms_fsm.traces.verdicts import ChatteringVerdict, CoverageVerdict, PassivityVerdict
@@ -40,7 +41,7 @@ def test_all_stands_for_each_contact() -> None:
 
 
 def test_one_contact_is_chosen_by_text_or_field() -> None:
-    found = checked(["bank: all", Coverage("pad"), "pad: F < 2"], mixed())
+    found = checked(["bank: all", Coverage("pad"), "pad: F < 2"], mounted(mixed()))
     assert [*found] == [
         *(f"bank: {kind}" for kind in ("chattering", "passivity", "coverage")),
         "pad: coverage",
@@ -172,9 +173,9 @@ def test_a_wrong_monitor_is_refused_before_the_run(
     monitor: str | Coverage, error: type[Exception], said: str
 ) -> None:
     with pytest.raises(error, match=said):
-        checked([monitor], mixed())
+        checked([monitor], mounted(mixed()))
 
 
 def test_a_model_on_a_rig_has_no_contact_names() -> None:
     with pytest.raises(ParameterError, match="a model on a rig has one contact, so leave"):
-        checked("pad: passivity", stick_slip("signed"))
+        checked("pad: passivity", mounted_alone(stick_slip("signed")))

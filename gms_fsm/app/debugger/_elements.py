@@ -41,8 +41,7 @@ class Elements:
     @property
     def named(self) -> dict[str, BankPlaces]:
         """The contacts of a system by name; none for a model on a rig."""
-        given = self.session.start.given is not None
-        return {bank.name: bank for bank in self.banks} if given else {}
+        return {bank.name: bank for bank in self.banks} if self.session.start.what.named else {}
 
     @property
     def pattern(self) -> str:

@@ -172,7 +172,7 @@ def names_for(session: Session) -> dict[str, str]:
         Replacement text by name.
     """
     start, system = session.start, session.system
-    given, several = start.given is not None, len(system.contacts) > 1
+    given, several = start.what.named, len(system.contacts) > 1
     contact = system.contacts[0]
     chart, n = contact.chart, min(2, contact.n)
     lead = f"{contact.name}." if several else ""
@@ -218,7 +218,7 @@ def _names(session: Session) -> str:
     system, first = session.system, session.system.contacts[0]
     own = [*first.chart.variables, *(["s"] if first.stribeck is not None else []), "F", "state"]
     numbered = [f"{name}1" if name != "state" else "state(1)" for name in own]
-    if session.start.given is None:
+    if not session.start.what.named:
         curve = ", s" if first.stribeck is not None else ""
         return f"t, x, v, F{curve}, and with an element number {', '.join(numbered)}"
     lead = f"{first.name}."

@@ -278,7 +278,7 @@ def view(session: Session) -> View:
     here, start = session.here, session.start
     bodies: tuple[BodyView, ...] = ()
     values: tuple[ValueView, ...] = ()
-    if start.given is not None:
+    if start.what.named:
         bodies = tuple(
             BodyView(
                 body.name,
@@ -305,7 +305,7 @@ def view(session: Session) -> View:
 def _contact(session: Session, bank: BankPlaces) -> ContactView:
     start, here = session.start, session.here.contacts[bank.name]
     part = start.system.contact(bank.name)
-    name, title = (bank.name, part.title) if start.given is not None else ("", "")
+    name, title = (bank.name, part.title) if start.what.named else ("", "")
     elements = tuple(_element(session, bank.first + i) for i in range(bank.n))
     return ContactView(
         name,

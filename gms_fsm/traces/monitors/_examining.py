@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from gms_fsm._arguments import listed
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.systems.models import Model
-from gms_fsm.systems.system import System
+from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces.monitors._chattering import chattering
 from gms_fsm.traces.monitors._coverage import coverage
 from gms_fsm.traces.monitors._invariants import invariant_verdict, read_invariant
@@ -30,7 +29,7 @@ __all__ = ["checked", "examine", "watched"]
 
 
 def checked(
-    monitors: str | Iterable[str | Monitor], model: Model | System, output: str = "all"
+    monitors: str | Iterable[str | Monitor], what: Mounted, output: str = "all"
 ) -> dict[str, Monitor]:
     """Check monitors and return them by name.
 
@@ -39,9 +38,9 @@ def checked(
     monitors : str or iterable of str or Monitor
         ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"`` for these three, or the text
         of an invariant; in a system also with a contact before it: ``"gear: passivity"``.
-    model : Model or System
-        The model or the system to be monitored. In a system with several contacts a monitor without
-        a contact, unless it is an invariant, stands for one of each.
+    what : Mounted
+        What is to be monitored. In a system with several contacts a monitor without a contact,
+        unless it is an invariant, stands for one of each.
     output : {"all", "t_eval", "end"}
         Rows that the run will have.
 
@@ -59,8 +58,10 @@ def checked(
 
     Examples
     --------
-    >>> from gms_fsm import GMS, GMSParameters
-    >>> list(checked(["all", "z <= s"], GMS(GMSParameters.paper("stick-slip"), law="signed")))
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> from gms_fsm.systems.mounted import mounted
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> list(checked(["all", "z <= s"], mounted(model, Prescribed("0.2"))))
     ['chattering', 'passivity', 'coverage', 'z <= s']
     """
     given = (
@@ -69,15 +70,14 @@ def checked(
         else listed("monitors", monitors, "names of monitors, or monitors")
     )
     found: dict[str, Monitor] = {}
-    system = model if isinstance(model, System) else None
     for each in given:
-        for monitor in _monitors(each, system):
+        for monitor in _monitors(each, what.contacts):
             if monitor.name in found:
                 raise ParameterError(
                     f"monitors contains {shown(monitor.name)} twice", advice="give it once"
                 )
             if isinstance(monitor, Invariant):
-                read_invariant(monitor, model if system is None else system)
+                read_invariant(monitor, what)
             if output == "end" and not isinstance(monitor, Chattering):
                 raise ParameterError(
                     f"the monitor {shown(monitor.name)} needs the rows of a run, but "
@@ -88,14 +88,13 @@ def checked(
     return found
 
 
-def _monitors(given: str | Monitor, system: System | None) -> list[Monitor]:
+def _monitors(given: str | Monitor, known: Sequence[str]) -> list[Monitor]:
     """Return the monitors that an entry stands for."""
     contact, text = "", given
     if isinstance(given, str) and ":" in given:
         contact, _, text = (part.strip() for part in given.partition(":"))
     elif isinstance(given, Monitor):
         contact = given.contact
-    known = [] if system is None else [each.name for each in system.contacts]
     if contact and contact not in known:
         raise ParameterError(
             f"monitors contains {shown(given if isinstance(given, str) else given.name)}: "
@@ -174,8 +173,7 @@ def examine(
     """
     whole = trace.whole()
     found: dict[str, Verdict] = {}
-    system = None if trace.which else trace.system
-    for name, monitor in checked(monitors, trace.model if system is None else system).items():
+    for name, monitor in checked(monitors, trace.subject).items():
         run, rows = trace, whole
         if monitor.contact:
             run, rows = (each.contact(monitor.contact) for each in (trace, whole))

@@ -14,7 +14,7 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, SignalError
 from gms_fsm.language import Condition, names_in, parse_condition, states_in, truths
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.system import System
+from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces._between import first_true, interpolated
 from gms_fsm.traces.monitors._kinds import Invariant
 from gms_fsm.traces.monitors._words import elements_text, values_text
@@ -27,15 +27,13 @@ from gms_fsm.traces.verdicts import InvariantVerdict
 __all__ = ["invariant_verdict", "read_invariant"]
 
 
-def read_invariant(monitor: Invariant, of: Model | System) -> Condition:
-    """Parse an invariant of a model, or of a system or its contact."""
-    model, system = (None, of) if isinstance(of, System) else (of, None)
+def read_invariant(monitor: Invariant, what: Mounted) -> Condition:
+    """Parse an invariant of what runs, or of its contact."""
+    what = what.only(monitor.contact) if monitor.contact else what
     names, owners = [], {}
-    if system is not None and monitor.contact:
-        model, system = system.contact(monitor.contact), None
-    if system is not None:
-        names, owners = system_names(system), owners_of(system)
-        model = system.contacts[0] if len(system.contacts) == 1 else None
+    if what.named:
+        names, owners = system_names(what.system), owners_of(what.system)
+    model = None if what.several else what.model
     states: list[str] = []
     if model is not None:
         names += invariant_names(model)
@@ -87,12 +85,11 @@ def _of_elements(tree: Condition, model: Model) -> bool:
 
 
 def invariant_verdict(monitor: Invariant, trace: Trace) -> InvariantVerdict:
-    system = None if trace.which else trace.system
-    single = len(trace.contacts) == 1 or bool(trace.which)
-    of = trace.model if system is None else system
-    tree = read_invariant(replace(monitor, contact=""), of)
+    what = trace.subject
+    single = not what.several
+    tree = read_invariant(replace(monitor, contact=""), what)
     by_element = single and _of_elements(tree, trace.model)
-    invariant, rows = _Held(tree, by_element, single, system is not None), len(trace)
+    invariant, rows = _Held(tree, by_element, single, what.named), len(trace)
     broken = np.flatnonzero(~invariant.at(trace).all(axis=0))
     if not broken.size:
         text = f"held at all {rows} rows"

@@ -14,7 +14,6 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SignalError
 from gms_fsm.language import MATLAB_LIKE, Binary, Name, Value, evaluate, spell
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.system import system_of
 from gms_fsm.traces._between import slopes
 from gms_fsm.traces.monitors._kinds import Passivity
 from gms_fsm.traces.monitors._words import elements_text
@@ -152,7 +151,7 @@ def _lost(trace: Trace, k: FloatArray, sigma: FloatArray) -> tuple[FloatArray, F
 
 def _velocity(trace: Trace, rates: FloatArray) -> FloatArray:
     """Return the velocity of the contact, given the rates of the state vector on the last axis."""
-    system = trace.system or system_of(trace.model, trace.rig)
+    system = trace.what.system
     index = [contact.name for contact in system.contacts].index(trace.places.name)
     row = system.assembly.banks[index].jacobian[0]
     total = np.zeros(rates.shape[:-1])

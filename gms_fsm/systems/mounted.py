@@ -1,0 +1,300 @@
+"""The door: a system, or a model on a rig, becomes what runs. Behind it nobody asks which it was.
+
+A model on a rig is a system with one contact and one body, which have no names for its user:
+``z1``, not ``friction.z1``. What depends on that is asked of `Mounted`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.language import spell
+from gms_fsm.systems.models import Model, is_model
+from gms_fsm.systems.rigs import Prescribed, Rig
+from gms_fsm.systems.signals import Signal
+from gms_fsm.systems.system import System, system_of
+
+__all__ = ["Mounted", "Mounting", "Several", "arguments_of", "mounted", "mounted_alone", "shifted"]
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """What moves the contacts of a system, as a `Rig` for everything that reads rigs.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    """
+
+    system: System
+
+    @property
+    def title(self) -> str:
+        """The system's name."""
+        return self.system.name
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """The system's signals that are functions of time alone."""
+        every = self.system.signals.items()
+        return {name: signal for name, signal in every if not isinstance(signal, str)}
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """The system's."""
+        return self.system.numbers
+
+    @property
+    def acceleration(self) -> str | None:
+        """The balance of the first free body; None if all bodies are driven."""
+        read = self.system.assembly
+        for body in read.free:
+            return f"({spell(read.forces[body.name])} - F) / ({spell(read.inertias[body.name])})"
+        return None
+
+
+class Several:
+    """Stands where a run has one model, in a system with several contacts.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    """
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+
+    def __repr__(self) -> str:
+        return f"<{len(self._system.contacts)} contacts of {self._system!r}>"
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        known = ", ".join(repr(each.name) for each in self._system.contacts)
+        raise ParameterError(
+            f"system {self._system.name!r} has the contacts {known}",
+            advice=f"say which one: trace.contact({self._system.contacts[0].name!r})",
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Mounted:
+    """What runs: a system, and what its user calls its parts.
+
+    Parameters
+    ----------
+    system : System
+        What runs.
+    model : Model
+        The model; of a user's system its only contact, or `Several`.
+    rig : Rig
+        What moves it.
+    named : bool
+        Whether bodies and contacts have names that the user gave: not those of a model on a rig.
+    """
+
+    system: System
+    model: Model
+    rig: Rig
+    named: bool
+
+    @property
+    def given(self) -> System | None:
+        """The system, if it is the user's."""
+        return self.system if self.named else None
+
+    @property
+    def several(self) -> bool:
+        """Whether there are several contacts, of which a model must be named."""
+        return self.named and len(self.system.contacts) > 1
+
+    @property
+    def made_of(self) -> Model | System:
+        """What the user gave, without a rig."""
+        return self.system if self.named else self.model
+
+    @property
+    def title(self) -> str:
+        """The model's title, or the system's name."""
+        return self.system.name if self.named else self.model.title
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """The names of contacts that the user can say."""
+        return tuple(each.name for each in self.system.contacts) if self.named else ()
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The names of bodies that the user can say."""
+        return tuple(each.name for each in self.system.bodies) if self.named else ()
+
+    @property
+    def values(self) -> tuple[str, ...]:
+        """What a user can ask for beside contacts: bodies, further states, sampled values."""
+        moved = (f"{name}.{which}" for name in self.bodies for which in "xv")
+        sampled = (name for each in self.system.sampled for name in each.updates)
+        return *moved, *self.system.flow, *sampled
+
+    def whose(self, contact: str) -> str:
+        """Return the name of a contact; nothing if its user gave none."""
+        return contact if self.named else ""
+
+    def element(self, contact: str, i: int) -> str:
+        """Return what an element is called in text: ``gear 2``, or ``element 2``."""
+        return f"{self.whose(contact) or 'element'} {i + 1}"
+
+    def of(self, contact: str, name: str) -> str:
+        """Return what is called by a name in a contact: ``gear.k``, or ``k``."""
+        return f"{contact}.{name}" if self.named else name
+
+    def only(self, contact: str) -> Mounted:
+        """Return what is seen of one contact: like a model, which has no names."""
+        return replace(self, model=self.system.contact(contact), named=False)
+
+    def driven(self, name: str, signal: Signal) -> Mounted:
+        """Return the same with another signal; of a model its velocity, whatever moved it."""
+        if self.named:
+            system = replace(self.system, signals={**self.system.signals, name: signal})
+            return mounted(system)
+        return mounted(self.model, Prescribed(signal))
+
+
+def mounted(model: Model | System, rig: Rig | None = None, period: float | None = None) -> Mounted:
+    """Return what runs.
+
+    Parameters
+    ----------
+    model : Model or System
+        A model needs a rig, a system has none.
+    rig : Rig, optional
+        The rig.
+    period : float, optional
+        s: of a model on a rig whose outputs are held.
+
+    Returns
+    -------
+    Mounted
+        With its system.
+
+    Raises
+    ------
+    ParameterError
+        If it is no model, or no rig, or the two do not fit together.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, PulledSlider
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> what = mounted(model, PulledSlider(1.0, 2.0, 0.1))
+    >>> what.system.contacts[0].name, what.whose("friction")
+    ('friction', '')
+    """
+    if isinstance(model, System):
+        single: Any = model.contacts[0] if len(model.contacts) == 1 else Several(model)
+        return Mounted(model, single, Mounting(model), named=True)
+    for what, given, mark, example in (
+        ("model", model, "chart", "GMS(parameters, law='signed')"),
+        ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
+    ):
+        if not hasattr(given, mark):
+            raise ParameterError(
+                f"it must be a {what}, for example {example}", place=what, value=given
+            )
+    assert rig is not None
+    return Mounted(system_of(model, rig, period), model, rig, named=False)
+
+
+def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
+    """Return a system, or a model whose velocity is still to be given, as the signal v.
+
+    Parameters
+    ----------
+    model : Model or System
+        What a fit is for.
+    place : str
+        For the message.
+
+    Returns
+    -------
+    Mounted
+        With its system.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither a model nor a system.
+    """
+    if isinstance(model, System):
+        return mounted(model)
+    if not is_model(model):
+        raise ParameterError(
+            "it must be a model or a system, for example initial_bank(record, 4)",
+            place=place,
+            value=model,
+        )
+    return mounted(model, Prescribed("0"))
+
+
+def shifted(call: str, model: Model | System, rig: Any, *rest: Any) -> tuple[Any, ...]:
+    """Return the rig and the arguments behind it; a system has no rig, and they begin one earlier.
+
+    Parameters
+    ----------
+    call : str
+        How a system is given, for the message: ``simulate(system, t_end)``.
+    model, rig, *rest
+        As given.
+
+    Returns
+    -------
+    tuple
+        The rig, None for a system, and as many arguments as before.
+
+    Raises
+    ------
+    ParameterError
+        If a system was given a rig.
+    """
+    if not isinstance(model, System):
+        return rig, *rest
+    if rest[-1] is not None:
+        raise ParameterError("a system has no rig", place="rig", value=rig, advice=f"write {call}")
+    return None, rig, *rest[:-1]
+
+
+def arguments_of(
+    caller: str, model: Model | System, rig: Rig | float, t_end: float | None
+) -> tuple[Rig | None, float]:
+    """Return the rig, if there is one, and the end of the run.
+
+    Parameters
+    ----------
+    caller : str
+        For messages: the function that was called.
+    model, rig, t_end
+        Its arguments: ``(model, rig, t_end)``, or ``(system, t_end)``.
+
+    Returns
+    -------
+    Rig or None, float
+        The rig is None for a system.
+
+    Raises
+    ------
+    ParameterError
+        If a system is given a rig, or a model has no end.
+    """
+    on, end = shifted(f"{caller}(system, t_end)", model, rig, t_end)
+    if end is None:
+        raise ParameterError(
+            "it must be a number",
+            place="t_end",
+            value=None,
+            advice=f"write {caller}(model, rig, t_end), or {caller}(system, t_end)",
+        )
+    return on, end
