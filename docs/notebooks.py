@@ -225,7 +225,7 @@ def write_all(folder: Path) -> None:
         for old in folder.glob(f"{name}_*.png"):
             old.unlink()
         markdown, pictures = page(
-            executed(text, folder, f"{WITHOUT_DOCS}\n{STRICT}"), name, LESSONS[number].TITLE
+            executed(text, folder, f"{WITHOUT_DOCS}\n{STRICT}"), name, LESSONS[number].title
         )
         for file, data in pictures.items():
             (folder / file).write_bytes(data)

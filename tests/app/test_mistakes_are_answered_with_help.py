@@ -157,7 +157,7 @@ def test_an_unknown_lesson_lists_the_lessons(gms_fsm: CommandLine, asked: str) -
     assert done.code == 2
     assert done.message.startswith(f"there is no lesson '{asked}'; choose one of")
     for number, each in LESSONS.items():
-        assert f"{number}  {each.TITLE}: {each.QUESTION}" in done.message
+        assert f"{number}  {each.title}: {each.question}" in done.message
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,11 @@
 """Eleven lessons: the behaviour of friction models, and the pitfalls of simulating and fitting.
 
-Each lesson is a module that answers one question: ``run()`` makes the runs, measures, and returns a
-result; ``figure(result)`` draws it; ``result.lines()`` summarizes it in five lines, in which every
-number is measured in that run.
+Each lesson answers one question: ``run()`` makes the runs and measures, ``figure(result)`` draws
+what it returns, and ``result.lines()`` summarizes it in five lines, in which every number is
+measured in that run. A module ``lN_name`` in this folder with a `LESSON` is a lesson.
 
 >>> for number, lesson in LESSONS.items():
-...     print(number, lesson.QUESTION)
+...     print(number, lesson.question)
 1 What is pre-sliding hysteresis?
 2 Why does LuGre drift and GMS not?
 3 What happens when an integrator misses v_c?
@@ -28,51 +28,22 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
 
 from gms_fsm._files import output_folder, write_whole
+from gms_fsm.app.lessons._lesson import Lesson, Result
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
-from gms_fsm.traces.trace import Trace
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["LESSONS", "Lesson", "Result", "Taught", "lesson", "listed", "numbered", "teach"]
 
 
-class Result(Protocol):
-    """The result of ``run()`` of a lesson."""
-
-    @property
-    def replayed(self) -> dict[str, Trace]:
-        """One or two runs for the replay page, by name."""
-
-    def lines(self) -> tuple[str, ...]:
-        """Question, runs, two lines of measured values, conclusion."""
-
-
-class Lesson(Protocol):
-    """Interface of a lesson module."""
-
-    TITLE: str
-    QUESTION: str
-
-    def run(self) -> Result:
-        """Make the runs and measure."""
-
-    def figure(self, result: Any) -> Figure:
-        """Draw the figure of the result."""
-
-
 def _found() -> Mapping[int, Lesson]:
     """Return the lessons in this folder: a module ``l3_name`` is lesson 3."""
-    names = (each.name for each in pkgutil.iter_modules(__path__))
-    numbers = {int(match[1]): name for name in names if (match := re.match(r"l(\d+)_", name))}
-    modules: dict[int, Any] = {
-        number: importlib.import_module(f"{__name__}.{numbers[number]}")
-        for number in sorted(numbers)
+    names = (re.match(r"l(\d+)_", each.name) for each in pkgutil.iter_modules(__path__))
+    modules = {int(name[1]): name.string for name in names if name}
+    return {
+        number: importlib.import_module(f"{__name__}.{modules[number]}").LESSON
+        for number in sorted(modules)
     }
-    return modules
 
 
 LESSONS: Mapping[int, Lesson] = _found()
@@ -105,7 +76,7 @@ def lesson(number: int) -> Lesson:
     Returns
     -------
     Lesson
-        The module of the lesson.
+        With its title, its question, ``run()`` and ``figure(result)``.
 
     Raises
     ------
@@ -114,7 +85,7 @@ def lesson(number: int) -> Lesson:
 
     Examples
     --------
-    >>> lesson(7).TITLE
+    >>> lesson(7).title
     'Frictional lag'
     """
     return LESSONS[numbered(str(number))]
@@ -152,7 +123,7 @@ def listed() -> str:
     str
         Number, title and question.
     """
-    return "\n".join(f"{key}  {each.TITLE}: {each.QUESTION}" for key, each in LESSONS.items())
+    return "\n".join(f"{key}  {each.title}: {each.question}" for key, each in LESSONS.items())
 
 
 def teach(number: int, folder: str | Path) -> Taught:
@@ -192,27 +163,24 @@ def teach(number: int, folder: str | Path) -> Taught:
     result = chosen.run()
     text = ("\n".join(result.lines()) + "\n").encode()
     files = [write_whole(folder / f"{stem}.txt", lambda file: file.write(text))]
-    for kind, write in (("figure", _draw), ("replay page", _replay)):
+    for kind, names, write in (("figure", pictures, _draw), ("replay page", pages, _replay)):
         try:
-            files += write(number, result, folder)
+            files += write(result, [folder / name for name in names])
         except MissingExtraError as error:
             warnings.warn(f"no {kind} was written: {error}", stacklevel=2)
     return Taught(result.lines(), tuple(files))
 
 
-def _draw(number: int, result: Result, folder: Path) -> list[Path]:
-    from plots import figures, formats
+def _draw(result: Result, paths: list[Path]) -> list[Path]:
+    from plots import figures
 
-    figure = LESSONS[number].figure(result)
-    names = formats.files(f"lesson_{number}", "figure")
-    return [figures.save(figure, folder / name) for name in names]
+    figure = result.lesson.figure(result)
+    return [figures.save(figure, path) for path in paths]
 
 
-def _replay(number: int, result: Result, folder: Path) -> list[Path]:
-    from plots import formats
+def _replay(result: Result, paths: list[Path]) -> list[Path]:
     from plots.replay import replay
 
     runs = result.replayed
-    title = f"Lesson {number}: {LESSONS[number].QUESTION}"
-    page = replay(*runs.values(), title=title, names=list(runs))
-    return [page.save(folder / name) for name in formats.files(f"lesson_{number}", "page")]
+    page = replay(*runs.values(), title=result.lesson.heading, names=list(runs))
+    return [page.save(path) for path in paths]

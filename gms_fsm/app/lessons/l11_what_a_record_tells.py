@@ -1,4 +1,6 @@
-"""Lesson 11: what a record can tell about the parameters of a model.
+"""Lesson 11: What a record can tell.
+
+What can a record tell about the parameters?
 
 A fit always returns numbers, and with a good model the curves lie on each other. That says nothing
 about the numbers. Here the truth is known: a GMS bank of two elements makes records with noise, and
@@ -13,13 +15,139 @@ four questions are asked of each fit.
   of sigma² (JᵀJ)⁻¹ with the derivatives J of the force, takes all n for independent.
 - Does the force know the parameter at all, or a product only? A threshold is w s(v). With all
   weights halved and F_c and F_s doubled it is the same: no record can tell the two factors apart.
+
+## Predict
+
+A GMS bank of two elements makes records, with noise of 20 mN in a force of about 2 N. Its weights
+are 50 and 200 µm/N; with F_c = 1 N its elements slip at a deflection of 50 µm and 200 µm or more. A
+fit is to find k1, k2, weights1 and weights2 again.
+
+1. From a sine of ±160 µm the fit has R² = 0.9998. Which of the four parameters is nevertheless
+   unknown?
+2. The noise of a second record is correlated by 0.95 from one row to the next. For how many
+   independent rows do 100 of its rows count?
+3. By which factor are intervals too short if all rows are taken for independent?
+4. In a third fit F_c is free as well. Two fits begin at F_c = 0.5 N and 2 N. What is the ratio of
+   the values of F_c that they find?
+
+```python
+unknown = None  # "k1" or another
+of_a_hundred = None
+too_short = None
+ratio = None
+```
+
+## Measure
+
+Run: {title}, with k = {TRUTH[0]:g}, {TRUTH[1]:g} N/m, weights = {TRUTH[2]!u:g},
+{TRUTH[3]!u:g} µm/N, F_c = {F_c:g} N makes records at {RATE:g} Hz with noise of {NOISE!m:g} mN: a
+sine of ±{AMPLITUDE!u:g} µm, and a designed motion with a stroke of {STROKE!m:g} mm (all values
+chosen by us). k and weights are fitted from other values.
+
+Measured: on the sine R² is {on_sine.training[r2]:.4f}. Elements that never slipped:
+{on_sine.never_slipped}. Cannot be told: {on_sine.open}; any value above {least!u:.0f} µm/N fits as
+well, ten times the truth changes the force by {unseen:g} N. On the designed motion R² is
+{designed.training[r2]:.4f}. Cannot be told: {opened}; {hits} of 4 intervals contain the truth,
+weights2 is known to ±{wide!p:.2g} %.
+
+Measured: with noise that is correlated by {CORRELATION:g} from row to row, {rows} rows count for
+{correlated.effective_rows:.0f}; intervals from rows are {too_short:.1f} times shorter. Of
+{REPEATED} such records (linearised) they contain the truth in {coverage[0]!p:.0f} %, those from
+effective rows in {coverage[1]!p:.3g} %. With F_c and F_s free, too, two fits find {pairs}: products
+of {thresholds} µm. They say: {weakest}.
+
+So: a good fit is no evidence for its numbers. Ask which elements slipped, count effective rows, fix
+one factor of each product, and design the motion before measuring.
+
+## Compare
+
+```python
+from gms_fsm.app.lessons.predict import reveal, vary
+
+rows = result.correlated.training["rows"]
+found = [each["F_c"].value for each in result.products]
+reveal(unknown, ", ".join(result.on_sine.open))
+reveal(of_a_hundred, 100 * result.correlated.effective_rows / rows)
+reveal(too_short, result.too_short)
+reveal(ratio, max(found) / min(found))
+```
+
+<details>
+<summary>Why?</summary>
+
+An element slips once it is deflected by its threshold. With ±160 µm the second element is a spring:
+every threshold above 160 µm gives the same force, and the fit returns the value at which it began.
+
+n rows count for n (1 - 0.95)/(1 + 0.95), about 1 in 39; intervals are therefore √39 = 6.2 times
+longer. The estimate from one record scatters around that. It is on the safe side here: it takes the
+noise at its slowest, where it is largest, and the motion is faster.
+
+Every threshold is w s(v). With twice the curve s(v) and half the weights w nothing changes, so that
+the ratio of the two values of F_c is that of the starts: the fit has no reason to move.
+
+</details>
+
+The tables say so. Each fit names what cannot be told, and the direction that changes the force
+least:
+
+```python
+for name, each in {"sine": result.on_sine, "F_c free": result.products[0]}.items():
+    print(name)
+    for line in str(each).splitlines():
+        print(textwrap.fill(line, 100))
+    print()
+```
+
+## Vary a parameter
+
+The amplitude of the sine. At which amplitude can the second threshold be told? The search for the
+second weight starts at the truth, so that it is not to blame.
+
+```python
+from matplotlib.figure import Figure
+
+from gms_fsm.app.lessons.l11_what_a_record_tells import START, TRUTH, bank, fitted, recorded, sine
+
+
+def known(amplitude):
+    record = recorded(sine(1e-6 * amplitude), 0.0, 1)
+    told = fitted(record, bank([*START[:3], TRUTH[3]]))
+    second = told["weights2"]
+    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    ax = figure.subplots()
+    (each,) = told.residuals()
+    ax.plot(1e6 * each.x, each.measured, ".", color="0.7", markersize=4)
+    ax.plot(1e6 * each.x, each.modelled, color="0.1", linewidth=0.8)
+    ax.set(xlabel="x [µm]", ylabel="F [N]")
+    interval = f"{1e6 * second.low:.1f} to {1e6 * second.high:.1f} µm/N"
+    value = interval if second.told else second.note
+    ax.set_title(f"R² = {told.training['r2']:.4f}; weights2: {value}", fontsize=9)
+    return figure
+
+
+vary(known, 250, 40, 400, 10, "µm")
+```
+
+## Try
+
+- `fitted(recorded(sine(3e-4), 0.0, 1))` starts with a second weight of 300 µm/N, at which the
+  second element never slips: there the force does not depend on it, and a local search has no slope
+  to follow. Why is the truth found all the same? (Looking for the ends of the interval meets a
+  better fit, and the search goes on from there.)
+- How much noise is needed until R² on the sine falls below 0.99? Is the threshold then told less?
+- Double the number of rows with `RATE`. By how much do the intervals become shorter under
+  independent noise, and by how much under correlated noise of the same correlation time in seconds?
+- Fix F_c and free F_s and v_s instead: `fit(..., free=("k", "weights", "F_s", "v_s"))`. Are they
+  told by the designed motion? And by the designed motion with its lowest speed only?
+- `result.on_sine.profile("weights2")` moves the threshold and fits all others again. Where does it
+  begin to rise?
+- Fit a record of your own, and read `.open`, `.never_slipped` and `.weakest` before the values.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,16 +164,9 @@ from gms_fsm import (
     fit,
     simulate,
 )
+from gms_fsm.app.lessons._lesson import DOTS, GUIDE, Lesson, grid, note, ticks
 from gms_fsm.charts.parameters import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-__all__ = ["QUESTION", "TITLE", "Result", "bank", "figure", "fitted", "moved", "run", "sine"]
-
-TITLE = "What a record can tell"
-QUESTION = "What can a record tell about the parameters?"
+from plots.style import INK, LINE_GREY, PALE_GREY, TEXT_GREY
 
 # All values are chosen by us.
 NAMES = ("k1", "k2", "weights1", "weights2")
@@ -61,197 +182,49 @@ STEP = 1e-3  # relative, of the derivatives
 GAP = 165.0  # mN, between two curves of residuals
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
-    """The runs, the fits and what is read from them.
+def run() -> dict[str, Any]:
+    """Make the records, and fit them."""
+    truth, waving, motion = bank(TRUTH), sine(), excite(STROKE, SPEEDS, rate=RATE)
+    waved = moved(truth, waving)
+    replayed = {"sine": waved, "designed motion": moved(truth, motion)}
+    title = truth.title
 
-    Parameters
-    ----------
-    moved : dict of str to Trace
-        The bank that makes the records, on both motions, without noise.
-    sine, designed : Fit
-        To a sine, and to the designed motion, with white noise.
-    correlated : Fit
-        To the designed motion, with correlated noise.
-    products : tuple of Fit
-        As `designed`, with F_c and F_s free too, from two starts.
-    unseen : float
-        Largest change of the force on the sine if the second threshold is ten times larger, N.
-    slopes : ndarray, shape (rows, 5)
-        Derivatives J of the force by the logarithms of `NAMES`, and by the offset, N.
-    """
+    on_sine = fitted(recorded(waving, 0.0, 1))
+    # The smallest second weight with which that element does not slip on the sine, m/N.
+    least = (abs(waved.z[:, 1]) / truth.parameters.stribeck(waved.v)).max()
+    beyond = bank(TRUTH * [1.0, 1.0, 1.0, 10.0])
+    unseen = abs(force(beyond, waving) - force(truth, waving)).max()
 
-    moved: dict[str, Trace]
-    sine: Fit
-    designed: Fit
-    correlated: Fit
-    products: tuple[Fit, ...]
-    unseen: float
-    slopes: FloatArray
-
-    @property
-    def replayed(self) -> dict[str, Trace]:
-        """The runs for the replay page, by name."""
-        return self.moved
-
-    @property
-    def least(self) -> float:
-        """The smallest second weight with which that element does not slip on the sine, m/N."""
-        trace, curve = self.moved["sine"], bank(TRUTH).parameters.stribeck
-        return float((np.abs(trace.z[:, 1]) / curve(trace.v)).max())
-
-    @property
-    def hits(self) -> int:
-        """How many of the four intervals of `designed` contain the truth."""
-        pairs = zip(NAMES, TRUTH, strict=True)
-        return sum(
-            self.designed[name].low <= true <= self.designed[name].high for name, true in pairs
-        )
-
-    @property
-    def weakest(self) -> str:
-        """What the first of `products` says of the direction that changes the force least."""
-        return self.products[0].weakest.partition("direction: ")[2].partition(";")[0]
-
-    @cached_property
-    def unit(self) -> FloatArray:
-        """Standard deviations of `NAMES`, relative, for independent noise of 1 N."""
-        found: FloatArray = np.sqrt(np.diag(np.linalg.inv(self.slopes.T @ self.slopes)))
-        return found[: len(NAMES)]
-
-    @property
-    def from_rows(self) -> FloatArray:
-        """Half intervals of `correlated` as if rows were independent, relative, shape (4,)."""
-        return SURE * self.correlated.training["rmse"] * self.unit
-
-    @property
-    def from_effective(self) -> FloatArray:
-        """Half intervals of `correlated` as its table gives them, relative, shape (4,)."""
-        every = [self.correlated[name] for name in NAMES]
-        return np.array([0.5 * (each.high - each.low) / each.value for each in every])
-
-    @property
-    def too_short(self) -> float:
-        """How many times shorter intervals from rows are, the median of the four."""
-        return float(np.median(self.from_effective / self.from_rows))
-
-    @cached_property
-    def coverage(self) -> tuple[float, float]:
-        """Share of intervals with the truth: from rows, and from effective rows.
-
-        Of `REPEATED` records with new noise, fitted with the derivatives at the truth.
-        """
-        rows, p = self.slopes.shape
-        inverse = np.linalg.pinv(self.slopes)
-        longer = np.sqrt((1.0 + CORRELATION) / (1.0 - CORRELATION))
-        inside = np.zeros(2)
-        for seed in range(REPEATED):
-            error = noise(rows, CORRELATION, seed)
-            missed = inverse @ error
-            rest = error - self.slopes @ missed
-            half = SURE * np.sqrt(rest @ rest / (rows - p)) * self.unit
-            distance = np.abs(missed[: len(NAMES)])
-            inside += (distance <= half).mean(), (distance <= longer * half).mean()
-        short, long = inside / REPEATED
-        return float(short), float(long)
-
-    def lines(self) -> tuple[str, ...]:
-        """Return the lesson as five lines.
-
-        Returns
-        -------
-        tuple of str
-            Question, runs, two lines of measured values, conclusion.
-        """
-        never = ", ".join(map(str, self.sine.never_slipped)) or "none"
-        second = self.designed["weights2"]
-        wide = 50.0 * (second.high - second.low) / second.value
-        found = [(each["F_c"].value, each["weights1"].value) for each in self.products]
-        pairs = " and ".join(
-            f"F_c = {F:.3g} N with weights1 = {1e6 * w:.4g} µm/N" for F, w in found
-        )
-        thresholds = [F * w for F, w in found]
-        short, long = (100.0 * each for each in self.coverage)
-        return (
-            f"Question: {QUESTION}",
-            f"Run: {bank(TRUTH).title}, with k = {TRUTH[0]:g}, "
-            f"{TRUTH[1]:g} N/m, weights = {1e6 * TRUTH[2]:g}, {1e6 * TRUTH[3]:g} µm/N, F_c = "
-            f"{F_c:g} N makes records at {RATE:g} Hz with noise of {1e3 * NOISE:g} mN: a sine of "
-            f"±{1e6 * AMPLITUDE:g} µm, and a designed motion with a stroke of {1e3 * STROKE:g} mm "
-            "(all values chosen by us). k and weights are fitted from other values.",
-            f"Measured: on the sine R² is {self.sine.training['r2']:.4f}. Elements that never "
-            f"slipped: {never}. Cannot be told: {_listed(self.sine.open)}; any value above "
-            f"{1e6 * self.least:.0f} µm/N fits as well, ten times the truth changes the force by "
-            f"{self.unseen:g} N. On the designed motion R² is "
-            f"{self.designed.training['r2']:.4f}. Cannot be told: {_listed(self.designed.open)}; "
-            f"{self.hits} of {len(NAMES)} intervals contain the truth, weights2 is known to "
-            f"±{wide:.2g} %.",
-            f"Measured: with noise that is correlated by {CORRELATION:g} from row to row, "
-            f"{self.slopes.shape[0]} rows count for {self.correlated.effective_rows:.0f}; "
-            f"intervals from rows are {self.too_short:.1f} times shorter. Of {REPEATED} such "
-            f"records (linearised) they contain the truth in {short:.0f} %, those from effective "
-            f"rows in {long:.3g} %. With F_c and F_s free, too, two fits find {pairs}: products of "
-            f"{' and '.join(f'{1e6 * each:.2f}' for each in thresholds)} µm. They say: "
-            f"{self.weakest}.",
-            "So: a good fit is no evidence for its numbers. Ask which elements slipped, count "
-            "effective rows, fix one factor of each product, and design the motion before "
-            "measuring.",
-        )
-
-
-def _listed(names: tuple[str, ...]) -> str:
-    return ", ".join(names) or "nothing"
-
-
-def run() -> Result:
-    """Make the records, and fit them.
-
-    Returns
-    -------
-    Result
-        Runs and fits.
-    """
-    truth = bank(TRUTH)
-    waving, motion = sine(), excite(STROKE, SPEEDS, rate=RATE)
-    waved, driven = moved(truth, waving), moved(truth, motion)
-    beyond = TRUTH * [1.0, 1.0, 1.0, 10.0]
-    unseen = float(np.abs(force(bank(beyond), waving) - force(truth, waving)).max())
     white = recorded(motion, 0.0, 2)
-    products = [
-        fit(
-            white,
-            bank(START, scale),
-            free=("k", "weights", "F_c", "F_s"),
-            search="local",
-            begin="relaxed",
-        )
-        for scale in BEGINNINGS
-    ]
-    return Result(
-        moved={"sine": waved, "designed motion": driven},
-        sine=fitted(recorded(waving, 0.0, 1)),
-        designed=fitted(white),
-        correlated=fitted(recorded(motion, CORRELATION, 3)),
-        products=tuple(products),
-        unseen=unseen,
-        slopes=_slopes(motion),
-    )
+    designed, correlated = fitted(white), fitted(recorded(motion, CORRELATION, 3))
+    opened, wide = designed.open or "nothing", _half(designed, "weights2")
+    ends = np.array([(designed[name].low, designed[name].high) for name in NAMES])
+    hits = ((ends[:, 0] <= TRUTH) & (ends[:, 1] >= TRUTH)).sum()
+
+    slopes = _slopes(motion)
+    rows = len(slopes)
+    # Standard deviations of `NAMES`, relative, for independent noise of 1 N.
+    unit = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))[: len(NAMES)]
+    # Half intervals, relative: as if rows were independent, and as the table gives them.
+    from_rows = SURE * correlated.training["rmse"] * unit
+    from_effective = np.array([_half(correlated, name) for name in NAMES])
+    too_short = np.median(from_effective / from_rows)
+    coverage = _coverage(slopes, unit)
+
+    free = ("k", "weights", "F_c", "F_s")
+    products = [fitted(white, bank(START, scale), free) for scale in BEGINNINGS]
+    found = [(each["F_c"].value, each["weights1"].value) for each in products]
+    pairs = " and ".join(f"F_c = {F:.3g} N with weights1 = {1e6 * w:.4g} µm/N" for F, w in found)
+    thresholds = " and ".join(f"{1e6 * F * w:.2f}" for F, w in found)
+    # What the first of them says of the direction that changes the force least.
+    weakest = products[0].weakest.partition("direction: ")[2].partition(";")[0]
+    return locals()
 
 
 def bank(numbers: ArrayLike, scale: float = 1.0) -> GMS:
-    """Return two elements of plain springs and sliders.
+    """Return two elements of plain springs and sliders, from the values of `NAMES`.
 
-    Parameters
-    ----------
-    numbers : array_like, shape (4,)
-        Values of `NAMES`: stiffnesses, N/m, and weights, m/N.
-    scale : float
-        F_c and F_s times this, and weights over it: the thresholds stay the same.
-
-    Returns
-    -------
-    GMS
-        The model.
+    F_c and F_s are multiplied by the scale, and weights divided by it: the thresholds stay.
 
     Examples
     --------
@@ -260,30 +233,13 @@ def bank(numbers: ArrayLike, scale: float = 1.0) -> GMS:
     """
     k, weights = np.split(np.asarray(numbers, dtype=float), 2)
     curve = Stribeck(scale * F_c, scale * F_s, V_S)
-    parameters = GMSParameters(
-        k,
-        np.zeros(2),
-        np.full(2, 1e-3),
-        sigma_2=0.0,
-        stribeck=curve,
-        v_c=1e-6,
-        weights=weights / scale,
-    )
+    damping: dict[str, Any] = {"sigma": np.zeros(2), "C": np.full(2, 1e-3), "sigma_2": 0.0}
+    parameters = GMSParameters(k, stribeck=curve, v_c=1e-6, weights=weights / scale, **damping)
     return GMS(parameters, law="signed")
 
 
 def sine(amplitude: float = AMPLITUDE) -> Record:
-    """Return a sine that begins in the middle.
-
-    Parameters
-    ----------
-    amplitude : float
-        m.
-
-    Returns
-    -------
-    Record
-        Time, position and velocity.
+    """Return a sine [m] that begins in the middle.
 
     Examples
     --------
@@ -296,31 +252,18 @@ def sine(amplitude: float = AMPLITUDE) -> Record:
 
 
 def moved(model: GMS, motion: Record) -> Trace:
-    """Return the run of a model that follows a motion.
-
-    Parameters
-    ----------
-    model : GMS
-        At rest, all springs relaxed.
-    motion : Record
-        With time and velocity.
-
-    Returns
-    -------
-    Trace
-        With rows at the times of the record, and at switches.
-    """
+    """Return the run of a model, relaxed at the begin, at the times of a motion and at switches."""
     t, v = motion.columns["time"], motion.columns["velocity"]
     return simulate(model, Prescribed((t, v)), float(t[-1]), t_eval=t)
 
 
 def force(model: GMS, motion: Record) -> FloatArray:
-    """Return the force at the rows of a motion, N, shape (rows,)."""
+    """Return the force at the rows of a motion, N."""
     return moved(model, motion).sample(motion.columns["time"]).F
 
 
 def noise(rows: int, correlation: float, seed: int) -> FloatArray:
-    """Return noise of the size `NOISE`, N, with a correlation from row to row, shape (rows,).
+    """Return noise of the size `NOISE`, N, with a correlation from row to row.
 
     ``e[i] = a e[i-1] + white noise``, filtered around the end, so that it has no beginning.
     """
@@ -333,203 +276,145 @@ def noise(rows: int, correlation: float, seed: int) -> FloatArray:
 def recorded(motion: Record, correlation: float, seed: int) -> Record:
     """Return a motion with the force of the truth, and noise."""
     measured = force(bank(TRUTH), motion)
-    return Record.from_arrays(
-        time=motion.columns["time"],
-        position=motion.columns["position"],
-        velocity=motion.columns["velocity"],
-        force=measured + noise(measured.size, correlation, seed),
-        name=motion.name,
-    )
+    columns: dict[str, Any] = {**motion.columns}
+    columns["force"] = measured + noise(measured.size, correlation, seed)
+    return Record.from_arrays(**columns, name=motion.name)
 
 
-def fitted(record: Record, second: float = START[3]) -> Fit:
-    """Fit stiffnesses and weights, from `START`.
+def fitted(
+    record: Record, start: GMS | None = None, free: tuple[str, ...] = ("k", "weights")
+) -> Fit:
+    """Fit a record that begins relaxed, by default from `START`; an offset is a nuisance."""
+    return fit(record, start or bank(START), free=free, search="local", begin="relaxed")
 
-    Parameters
-    ----------
-    record : Record
-        Which begins relaxed.
-    second : float
-        The second weight to start from, m/N.
 
-    Returns
-    -------
-    Fit
-        With the offset of the sensor as nuisance.
-    """
-    start = bank([*START[:3], second])
-    return fit(record, start, free=("k", "weights"), search="local", begin="relaxed")
+def _half(found: Fit, name: str) -> float:
+    """Return half of an interval, relative."""
+    return 0.5 * (found[name].high - found[name].low) / found[name].value
 
 
 def _slopes(motion: Record) -> FloatArray:
     """Return the derivatives of the force at the truth by the logarithms of `NAMES`, and offset."""
     columns = []
-    for i in range(len(NAMES)):
-        step = 1.0 + STEP * np.eye(len(NAMES))[i]
+    for step in 1.0 + STEP * np.eye(len(NAMES)):
         ahead, behind = (force(bank(each), motion) for each in (TRUTH * step, TRUTH / step))
         columns.append((ahead - behind) / (2.0 * np.log1p(STEP)))
     return np.stack([*columns, np.ones_like(columns[0])], axis=1)
 
 
-def figure(result: Result) -> Figure:
-    """Draw both motions, what is known of the thresholds, residuals, intervals, and the product.
+def _coverage(slopes: FloatArray, unit: FloatArray) -> FloatArray:
+    """Return the share of intervals that contain the truth: from rows, and from effective rows.
 
-    Parameters
-    ----------
-    result : Result
-        From `run`.
-
-    Returns
-    -------
-    Figure
-        Panels a to f.
+    Of `REPEATED` records with new noise, fitted with the derivatives at the truth.
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    from plots.style import RC
-
-    with rc_context(RC):
-        sheet = Figure(figsize=(8.8, 6.4), layout="constrained")
-        (wave, motion, told), (rest, sure, product) = sheet.subplots(2, 3)
-        _draw_loop(wave, result.sine, "a", "a sine, signed law")
-        _draw_loop(motion, result.designed, "b", "a designed motion")
-        _draw_thresholds(told, result)
-        _draw_residuals(rest, result)
-        _draw_intervals(sure, result)
-        _draw_product(product, result)
-        sheet.suptitle(f"Lesson 11: {QUESTION}", x=0.01, ha="left", fontsize=12)
-    return sheet
+    rows, p = slopes.shape
+    inverse = np.linalg.pinv(slopes)
+    longer = np.sqrt((1.0 + CORRELATION) / (1.0 - CORRELATION))
+    inside = np.zeros(2)
+    for seed in range(REPEATED):
+        error = noise(rows, CORRELATION, seed)
+        missed = inverse @ error
+        rest = error - slopes @ missed
+        half = SURE * np.sqrt(rest @ rest / (rows - p)) * unit
+        distance = abs(missed[: len(NAMES)])
+        inside += (distance <= half).mean(), (distance <= longer * half).mean()
+    return inside / REPEATED
 
 
-def _draw_loop(ax: Axes, found: Fit, letter: str, name: str) -> None:
-    """Draw the force over the position: the record, the fitted model, and R²."""
-    from plots import panels
-    from plots.style import INK, PALE_GREY, TEXT_GREY
-
+def _loop(ax: Any, r: Any, name: str, title: str) -> str:
+    found = r.values[name]
     (each,) = found.residuals()
     ax.plot(1e6 * each.x, each.measured, ".", color=PALE_GREY, markersize=4, label="record")
     ax.plot(1e6 * each.x, each.modelled, color=INK, linewidth=0.8, label="fit")
     ax.set(xlabel="x [µm]", ylabel="F [N]", xlim=(-560, 560), ylim=(-3.2, 3.9))
     never = [f"element {i} never slips" for i in found.never_slipped] or ["all elements slip"]
-    ax.annotate(
-        "\n".join([f"R² = {found.training['r2']:.4f}", *never]),
-        (0.03, 0.97),
-        xycoords="axes fraction",
-        va="top",
-        color=TEXT_GREY,
-        fontsize=8,
-    )
-    if letter == "a":
+    note(ax, "\n".join([f"R² = {found.training['r2']:.4f}", *never]), (0.03, 0.97), inside=True)
+    if name == "on_sine":
         ax.legend(loc="lower right")
-    panels.lettered(ax, letter, name)
+    return title
 
 
-def _draw_thresholds(ax: Axes, result: Result) -> None:
+def _weights(ax: Any, r: Any) -> str:
     """Draw the intervals of the weights from both motions."""
-    from plots import panels
-    from plots.style import INK, LINE_GREY, TEXT_GREY
-
-    for name, true, up in zip(NAMES[2:], TRUTH[2:], (1.0, 0.0), strict=True):
-        ax.plot([1e6 * true] * 2, [up - 0.32, up + 0.32], color=LINE_GREY, linewidth=0.9)
-        ax.annotate(
-            f"{name}, truth {1e6 * true:g}", (1e6 * true, up + 0.36), ha="center", fontsize=8
-        )
-        for found, place, marker in ((result.sine, 0.13, "o"), (result.designed, -0.17, "s")):
-            each, y = found[name], up + place
+    for name, true, up in zip(NAMES[2:], 1e6 * TRUTH[2:], (1.0, 0.0), strict=True):
+        ax.vlines(true, up - 0.32, up + 0.32, **GUIDE)
+        note(ax, f"{name}, truth {true:g}", (true, up + 0.36), ha="center", color=INK)
+        for found, y, marker in ((r.on_sine, up + 0.13, "o"), (r.designed, up - 0.17, "s")):
+            each = found[name]
             if each.told:
-                ends = 1e6 * np.array([each.low, each.high])
-                ax.plot(ends, [y, y], color=INK, linewidth=2.4)
+                ax.hlines(y, 1e6 * each.low, 1e6 * each.high, color=INK, linewidth=2.4)
                 ax.plot(1e6 * each.value, y, marker, color=INK, markersize=4)
                 continue
             arrow = {"arrowstyle": "->", "color": TEXT_GREY}
-            ax.annotate("", (500, y), (1e6 * result.least, y), arrowprops=arrow)
-            note = each.note.partition(":")[0]
-            ax.annotate(note, (125, y), ha="right", va="center", color=TEXT_GREY, fontsize=8)
+            ax.annotate("", (500, y), (1e6 * r.least, y), arrowprops=arrow)
+            note(ax, each.note.partition(":")[0], (125, y), ha="right", va="center")
     for marker, label in (("o", "sine"), ("s", "designed")):
         ax.plot([], [], marker, color=INK, markersize=4, label=label)
     ax.legend(loc="lower left")
-    ax.set_yticks([])
     ax.set(xlabel="weight [µm/N]", xscale="log", xlim=(18, 560), ylim=(-1.0, 1.7))
-    ax.set_xticks([20, 50, 100, 200, 500], ["20", "50", "100", "200", "500"])
-    ax.set_xticks([], minor=True)
-    panels.lettered(ax, "c", "what is known of the weights")
+    ticks(ax, "x", (20, 50, 100, 200, 500))
+    ticks(ax, "y", ())
+    return "what is known of the weights"
 
 
-def _draw_residuals(ax: Axes, result: Result) -> None:
+def _residuals(ax: Any, r: Any) -> str:
     """Draw residuals with white and with correlated noise."""
-    from plots import panels
-    from plots.style import INK, TEXT_GREY
-
     shown = slice(1000, 1600)  # rows, of which single ones can be seen
-    for found, middle, text in (
-        (result.designed, GAP, "independent"),
-        (result.correlated, 0.0, f"correlated by {CORRELATION:g}"),
-    ):
+    kinds = ((r.designed, GAP, "independent"), (r.correlated, 0.0, f"correlated by {CORRELATION}"))
+    for found, middle, text in kinds:
         (each,) = found.residuals()
-        left = 1e3 * (each.measured - each.modelled)[shown]
-        ax.plot(each.t[shown], middle + left, color=INK, linewidth=0.6)
-        rows = f"{text}: {found.effective_rows:.0f} of {each.t.size} rows"
-        ax.annotate(rows, (each.t[shown][0], middle + 74.0), color=TEXT_GREY, fontsize=8)
-    ticks = (-50, 0, 50)
-    places = [middle + tick for middle in (0.0, GAP) for tick in ticks]
-    ax.set_yticks(places, [f"{tick}" for tick in 2 * ticks])
+        t, left = each.t[shown], 1e3 * (each.measured - each.modelled)[shown]
+        ax.plot(t, middle + left, color=INK, linewidth=0.6)
+        count = f"{text}: {found.effective_rows:.0f} of {each.t.size} rows"
+        note(ax, count, (t[0], middle + 74.0))
+    marks = (-50, 0, 50)
+    places = [middle + mark for middle in (0.0, GAP) for mark in marks]
+    ticks(ax, "y", places, [f"{mark}" for mark in 2 * marks])
     ax.set(xlabel="t [s]", ylabel="residual [mN], twice", ylim=(-80, GAP + 100))
-    panels.lettered(ax, "d", "how many rows count")
+    return "how many rows count"
 
 
-def _draw_intervals(ax: Axes, result: Result) -> None:
+def _intervals(ax: Any, r: Any) -> str:
     """Draw the intervals under correlated noise around the truth: from rows, effective rows."""
-    from plots import panels
-    from plots.style import INK, LINE_GREY
-
     places = np.arange(len(NAMES))
-    found = np.array([result.correlated[name].value for name in NAMES])
-    off = 100.0 * (found / TRUTH - 1.0)
+    off = 100.0 * (np.array([r.correlated[name].value for name in NAMES]) / TRUTH - 1.0)
     for half, aside, colour, label in (
-        (result.from_effective, 0.0, LINE_GREY, "from effective rows"),
-        (result.from_rows, 0.25, INK, "from rows"),
+        (100.0 * r.from_effective, 0.0, LINE_GREY, "from effective rows"),
+        (100.0 * r.from_rows, 0.25, INK, "from rows"),
     ):
-        ends = off + 100.0 * np.array([-half, half])
-        ax.vlines(places + aside, *ends, color=colour, linewidth=1.8, label=label)
+        ax.vlines(places + aside, off - half, off + half, color=colour, linewidth=1.8, label=label)
         ax.plot(places + aside, off, "o", color=colour, markersize=3.5)
     ax.axhline(0.0, color=INK, linestyle=":", linewidth=0.9)
     ax.legend(loc="upper right")
-    ax.set_xticks(places + 0.12, NAMES, fontsize=8)
+    ticks(ax, "x", places + 0.12, NAMES)
     ax.set(ylabel="deviation from the truth [%]", ylim=(-2.4, 3.4))
-    panels.lettered(ax, "e", "95 % intervals, correlated")
+    return "95 % intervals, correlated"
 
 
-def _draw_product(ax: Axes, result: Result) -> None:
+def _product(ax: Any, r: Any) -> str:
     """Draw what the fits of the product found, on the curve of equal thresholds."""
-    from plots import panels
-    from plots.style import INK, LINE_GREY, TEXT_GREY
-
-    F = np.geomspace(0.2, 3.0, 100)
-    ax.loglog(F, 1e6 * TRUTH[2] * F_c / F, color=LINE_GREY, linewidth=0.9)
-    ax.annotate(
-        f"weights1 · $F_c$ = {1e6 * TRUTH[2] * F_c:g} µm", (0.22, 17), color=TEXT_GREY, fontsize=8
-    )
-    ax.plot(F_c, 1e6 * TRUTH[2], "x", color=INK, markersize=6)
-    ax.annotate("truth", (F_c, 1e6 * TRUTH[2]), (6, 3), textcoords="offset points", fontsize=8)
-    for each, side, (right, up) in zip(
-        result.products, ("left", "right"), ((6, 3), (-6, -9)), strict=True
-    ):
+    F, true = np.geomspace(0.2, 3.0, 100), (F_c, 1e6 * TRUTH[2])
+    ax.loglog(F, true[0] * true[1] / F, **GUIDE)
+    note(ax, f"weights1 · $F_c$ = {true[0] * true[1]:g} µm", (0.22, 17))
+    ax.plot(*true, "x", color=INK, markersize=6)
+    note(ax, "truth", true, (6, 3), color=INK)
+    for each, shift in zip(r.products, ((6, 3), (-6, -2)), strict=True):
         here = each["F_c"].value, 1e6 * each["weights1"].value
-        ax.plot(*here, "o", color=INK, markersize=5)
-        text = f"RMSE {1e3 * each.training['rmse']:.3f} mN"
-        ax.annotate(
-            text,
-            here,
-            (right, up),
-            textcoords="offset points",
-            color=TEXT_GREY,
-            fontsize=8,
-            ha=side,
-        )
-    ax.set_xticks([0.2, 0.5, 1, 2], ["0.2", "0.5", "1", "2"])
-    ax.set_yticks([20, 50, 100, 200], ["20", "50", "100", "200"])
-    ax.set_xticks([], minor=True)
-    ax.set_yticks([], minor=True)
+        ax.plot(*here, **DOTS)
+        note(ax, f"RMSE {1e3 * each.training['rmse']:.3f} mN", here, shift)
+    ticks(ax, "x", (0.2, 0.5, 1, 2))
+    ticks(ax, "y", (20, 50, 100, 200))
     ax.set(xlabel="$F_c$ [N]", ylabel="weights1 [µm/N]", xlim=(0.2, 4.5), ylim=(15, 260))
-    panels.lettered(ax, "f", "only the product is told")
+    return "only the product is told"
+
+
+LOOPS = {"on_sine": "a sine, signed law", "designed": "a designed motion"}
+LESSON = Lesson(
+    __name__,
+    run,
+    (
+        *(partial(_loop, name=name, title=title) for name, title in LOOPS.items()),
+        *(_weights, _residuals, _intervals, _product),
+    ),
+    grid("abc;def", (8.8, 6.4)),
+)

@@ -1,4 +1,6 @@
-"""Lesson 7: frictional lag.
+"""Lesson 7: Frictional lag.
+
+Why does friction lag behind the speed?
 
 In steady sliding the friction is s(v) + sigma_2 v. When the speed changes, the deflections follow
 with a delay: by ``dz = C (1 - z/s)`` z approaches s with the time constant s/C. While the slider
@@ -7,26 +9,95 @@ decelerates the friction is lower: a loop around the steady curve.
 
 The usual rule says that the loop grows with the frequency. It does, as long as the deflections can
 follow. Above w = C/s they follow less and less, and the loop closes again.
+
+## Predict
+
+A contact slides at 1.5 + cos(w t) mm/s and never stops. In steady sliding friction falls with
+speed.
+
+1. While it accelerates, is the friction "higher", "lower", or the "same" as while it decelerates,
+   at the same speed?
+2. From 1 to 600 rad/s: at which w is the loop of friction over speed widest, in rad/s?
+
+```python
+accelerating = None  # "higher", "lower" or "same"
+widest = None  # rad/s
+```
+
+## Measure
+
+Run: {MODEL.title}, all in slip, v = {MEAN!m:g} + {SWING!m:g} cos(w t) mm/s, F_s = {STRIBECK.F_s:g},
+F_c = {STRIBECK.F_c:g} N, v_s = {STRIBECK.v_s!m:g} mm/s, C = {C:g} N/s (chosen by us), w =
+{OMEGAS[0]:g} to {fastest:g} rad/s.
+
+Measured: at {MEAN!m:g} mm/s friction is higher during acceleration than during deceleration, by
+{said_widths}.
+
+Measured: of {count} loops the widest is at {widest:g} rad/s ({at_widest!m:.0f} mN; C/F_c =
+{corner:g}/s) and they close again above that: {at_100!m:.0f} mN at 100, {at_600!m:.0f} mN at 600
+rad/s.
+
+So: friction depends on the speed a time s/C ago. "Wider with frequency" holds up to about w = C/s;
+the frequency of the widest loop reveals C.
+
+## Compare
+
+```python
+from gms_fsm.app.lessons.l7_frictional_lag import OMEGAS
+from gms_fsm.app.lessons.predict import reveal, vary
+
+reveal(accelerating, "higher" if min(result.widths) > 0 else "lower")
+reveal(widest, OMEGAS[int(result.widths.argmax())], "rad/s")
+```
+
+<details>
+<summary>Why?</summary>
+
+The deflections follow s(v) with the time constant s/C, 1 N / 50 N/s = 20 ms. While the speed rises
+the friction is still that of a lower speed, which is higher. Below w = C/s the delay grows with w;
+above it the deflections hardly move any more.
+
+</details>
+
+## Vary a parameter
+
+The loop opens as the frequency rises to about w = C/s, and closes again beyond that.
+
+```python
+from matplotlib.figure import Figure
+
+from gms_fsm.app.lessons.l7_frictional_lag import SIGMA_2, STRIBECK, last_period, moved
+
+
+def loop(w):
+    cycle = last_period(moved(w), w)
+    figure = Figure(figsize=(6.4, 3.8), layout="constrained")
+    ax = figure.subplots()
+    ax.plot(1e3 * cycle.v, STRIBECK(cycle.v) + SIGMA_2 * cycle.v, color="0.75", linewidth=5)
+    ax.plot(1e3 * cycle.v, cycle.F)
+    ax.set(xlabel="v [mm/s]", ylabel="F [N]", title=f"w = {w:.3g} rad/s (grey: steady sliding)")
+    return figure
+
+
+vary(loop, 45.0, 0.0, 2.7, 0.05, "w [rad/s]", log=True)
+```
+
+## Try
+
+- Double C. At which frequency is the loop widest now?
+- In which direction is the loop traversed? Does it depend on the frequency?
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, Trace, simulate
-from gms_fsm.charts.parameters import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["QUESTION", "TITLE", "Result", "figure", "last_period", "run"]
-
-TITLE = "Frictional lag"
-QUESTION = "Why does friction lag behind the speed?"
+from gms_fsm.app.lessons._lesson import BROAD, DOTS, GUIDE, Lesson, grid, note, ticks
+from plots.style import ELEMENT_DASHES, INK, LINE_GREY, ramp
 
 MEAN, SWING = 1.5e-3, 1e-3  # m/s: v = MEAN + SWING cos(w t), never zero
 SHOWN = (1.0, 10.0, 25.0)  # rad/s
@@ -40,189 +111,70 @@ PARAMETERS = GMSParameters.from_shares(
 MODEL = GMS(PARAMETERS, law="signed")
 RTOL, ATOL = 1e-9, 1e-12  # 1, m: z is in micrometres here
 SETTLED = 1.0  # s: by then all elements slip and the initial transient has decayed
+SHADES = dict(zip(SHOWN, ramp("compared", len(SHOWN)), strict=True))
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
-    """The runs and the measured values.
-
-    Parameters
-    ----------
-    runs : dict of float to Trace
-        Complete runs, by the frequency w, rad/s.
-    loops : dict of float to Trace
-        Last period of each run.
-    widths : ndarray, shape (10,), N
-        Friction during acceleration minus friction during deceleration, at the mean speed.
-    """
-
-    runs: dict[float, Trace]
-    loops: dict[float, Trace]
-    widths: FloatArray
-
-    @property
-    def replayed(self) -> dict[str, Trace]:
-        """The runs for the replay page, by name."""
-        return {"10 rad/s": self.runs[10.0]}
-
-    def lines(self) -> tuple[str, ...]:
-        """Return the lesson as five lines.
-
-        Returns
-        -------
-        tuple of str
-            Question, runs, two lines of measured values, conclusion.
-        """
-        width = dict(zip(OMEGAS, 1e3 * self.widths, strict=True))
-        shown = ", ".join(f"{width[w]:.1f} mN at {w:g} rad/s" for w in SHOWN)
-        widest = OMEGAS[int(self.widths.argmax())]
-        return (
-            f"Question: {QUESTION}",
-            f"Run: {MODEL.title}, all in slip, v = {1e3 * MEAN:g} + {1e3 * SWING:g} cos(w t) mm/s, "
-            f"F_s = {STRIBECK.F_s:g}, F_c = {STRIBECK.F_c:g} N, v_s = {1e3 * STRIBECK.v_s:g} mm/s, "
-            f"C = {C:g} N/s (chosen by us), w = {OMEGAS[0]:g} to {OMEGAS[-1]:g} rad/s.",
-            f"Measured: at {1e3 * MEAN:g} mm/s friction is higher during acceleration than "
-            f"during deceleration, by {shown}.",
-            f"Measured: of {len(OMEGAS)} loops the widest is at {widest:g} rad/s "
-            f"({width[widest]:.0f} mN; C/F_c = {C / STRIBECK.F_c:g}/s) and they close again "
-            f"above that: {width[100.0]:.0f} mN at 100, {width[600.0]:.0f} mN at 600 rad/s.",
-            'So: friction depends on the speed a time s/C ago. "Wider with frequency" holds up to '
-            "about w = C/s; the frequency of the widest loop reveals C.",
-        )
-
-
-def run() -> Result:
-    """Move the model at ten frequencies.
-
-    Returns
-    -------
-    Result
-        Traces and measured values.
-
-    Examples
-    --------
-    >>> result = run()
-    >>> bool((result.widths > 0).all()), OMEGAS[int(result.widths.argmax())]
-    (True, 45.0)
-    """
-    runs = {w: simulate(MODEL, _rig(w), _end(w), rtol=RTOL, atol=ATOL) for w in OMEGAS}
+def run() -> dict[str, Any]:
+    """Move the model at ten frequencies."""
+    runs = {w: moved(w) for w in OMEGAS}
+    replayed = {"10 rad/s": runs[10.0]}
     loops = {w: last_period(trace, w) for w, trace in runs.items()}
-    widths = []
-    for w, trace in runs.items():
-        # From the top speed, the mean speed comes after a quarter and three quarters of a period.
-        top = _end(w) - 2 * math.pi / w
-        down, up = trace.sample(top + np.array([0.25, 0.75]) * 2 * math.pi / w).F
-        widths.append(up - down)
-    return Result(runs, loops, np.array(widths))
+    # From the top speed, the mean speed comes after a quarter and three quarters of a period.
+    widths = np.array([loop.F[750] - loop.F[250] for loop in loops.values()])
+    width = dict(zip(OMEGAS, widths, strict=True))
+    widest = max(width, key=lambda w: float(width[w]))
+    said_widths = [f"{1e3 * width[w]:.1f} mN at {w:g} rad/s" for w in SHOWN]
+    count, fastest, corner = len(OMEGAS), OMEGAS[-1], C / STRIBECK.F_c
+    at_widest, at_100, at_600 = width[widest], width[100.0], width[600.0]
+    return locals()
 
 
-def _rig(w: float) -> Prescribed:
-    return Prescribed(f"{MEAN} + {SWING}*cos({w}*t)")
+def moved(w: float) -> Trace:
+    """Run to the end of the first complete period after `SETTLED`, at a frequency w [rad/s]."""
+    return simulate(
+        MODEL, Prescribed(f"{MEAN} + {SWING}*cos({w}*t)"), _end(w), rtol=RTOL, atol=ATOL
+    )
 
 
 def _end(w: float) -> float:
-    """Return the end of the first complete period that begins after `SETTLED`, s."""
     period = 2 * math.pi / w
     return period * (math.ceil(SETTLED / period) + 1)
 
 
 def last_period(trace: Trace, w: float) -> Trace:
-    """Return the last period of a run.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-    w : float
-        Frequency, rad/s.
-
-    Returns
-    -------
-    Trace
-        1001 evenly spaced samples, from top speed to top speed.
-    """
+    """Return the last period of a run: 1001 samples, from top speed to top speed."""
     end = _end(w)
     return trace.sample(np.linspace(end - 2 * math.pi / w, end, 1001).clip(max=trace.t[-1]))
 
 
-def figure(result: Result) -> Figure:
-    """Draw three loops around the steady curve, and the loop width over frequency.
+def _loops(ax: Any, r: Any) -> str:
+    v = np.linspace(MEAN - SWING, MEAN + SWING, 300)
+    ax.plot(1e3 * v, STRIBECK(v) + SIGMA_2 * v, **BROAD, label=r"steady: s(v) + $\sigma_2$ v")
+    for (w, colour), dash in zip(SHADES.items(), ELEMENT_DASHES, strict=False):
+        loop = r.loops[w]
+        path = np.column_stack([1e3 * loop.v, loop.F])
+        look = {"color": colour, "linestyle": dash, "linewidth": 1.6}
+        ax.plot(*path.T, **look, label=f"{w:g} rad/s")
+        head = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 13}
+        for row in (250, 750):  # an arrowhead on each branch, at the mean speed
+            ax.annotate("", path[row + 4], path[row - 4], arrowprops=head)
+    note(ax, "accelerating", (1.55, 1.235), fontsize=9)
+    note(ax, "decelerating", (0.75, 0.99), fontsize=9)
+    ax.set(xlabel="v [mm/s]", ylabel="F [N]", ylim=(0.96, None))
+    ax.legend(loc="upper right", handlelength=3.2)
+    return f"loops, {MODEL.title}"
 
-    Parameters
-    ----------
-    result : Result
-        From `run`.
 
-    Returns
-    -------
-    Figure
-        Panels a and b.
-    """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
+def _widths(ax: Any, r: Any) -> str:
+    ax.semilogx(OMEGAS, 1e3 * r.widths, color=LINE_GREY, zorder=1)
+    for w, width in zip(OMEGAS, 1e3 * r.widths, strict=True):
+        size = 7 if w in SHOWN else 4
+        ax.plot(w, width, **DOTS | {"color": SHADES.get(w, INK), "markersize": size})
+    ax.axvline(r.corner, **GUIDE, linestyle="--")
+    note(ax, "C/F$_c$", (r.corner, 4), (4, 0), fontsize=9)
+    ticks(ax, "x", (1, 3, 10, 30, 100, 300))
+    ax.set(xlabel="w [rad/s]", ylabel=f"width at {1e3 * MEAN:g} mm/s [mN]", ylim=(0, 200))
+    return "width of the loop"
 
-    from plots import panels
-    from plots.style import (
-        ELEMENT_DASHES,
-        INK,
-        LINE_GREY,
-        PALE_GREY,
-        RC,
-        TEXT_GREY,
-        ramp,
-    )
 
-    shades = ramp("compared", len(SHOWN))
-    looks = list(zip(SHOWN, shades, ELEMENT_DASHES, strict=False))
-    colours = dict(zip(SHOWN, shades, strict=True))
-    with rc_context(RC):
-        sheet = Figure(figsize=(8.2, 4.8), layout="constrained")
-        loops, widths = sheet.subplots(1, 2, width_ratios=(1.5, 1))
-        v = np.linspace(MEAN - SWING, MEAN + SWING, 300)
-        loops.plot(
-            1e3 * v,
-            STRIBECK(v) + SIGMA_2 * v,
-            color=PALE_GREY,
-            linewidth=6,
-            zorder=1,
-            label=r"steady: s(v) + $\sigma_2$ v",
-        )
-        for w, colour, dash in looks:
-            loop = result.loops[w]
-            loops.plot(
-                1e3 * loop.v,
-                loop.F,
-                color=colour,
-                linestyle=dash,
-                linewidth=1.6,
-                label=f"{w:g} rad/s",
-            )
-            for row in (250, 750):  # an arrowhead on each branch, at the mean speed
-                loops.annotate(
-                    "",
-                    (1e3 * loop.v[row + 4], loop.F[row + 4]),
-                    (1e3 * loop.v[row - 4], loop.F[row - 4]),
-                    arrowprops={"arrowstyle": "-|>", "color": colour, "mutation_scale": 13},
-                )
-        loops.annotate("accelerating", (1.55, 1.235), color=TEXT_GREY)
-        loops.annotate("decelerating", (0.75, 0.99), color=TEXT_GREY)
-        loops.set(xlabel="v [mm/s]", ylabel="F [N]", ylim=(0.96, None))
-        panels.lettered(loops, "a", f"loops, {MODEL.title}")
-        loops.legend(loc="upper right", handlelength=3.2)
-
-        widths.semilogx(OMEGAS, 1e3 * result.widths, "-", color=LINE_GREY, zorder=1)
-        marked = dict(zip(OMEGAS, 1e3 * result.widths, strict=True))
-        for w, width in marked.items():
-            colour = colours.get(w, INK)
-            widths.plot(w, width, "o", color=colour, markersize=7 if w in SHOWN else 4)
-        widths.axvline(C / STRIBECK.F_c, color=LINE_GREY, linestyle="--", linewidth=0.9, zorder=0)
-        widths.annotate(
-            "C/F$_c$", (C / STRIBECK.F_c, 4), (4, 0), textcoords="offset points", color=TEXT_GREY
-        )
-        widths.set(xlabel="w [rad/s]", ylabel=f"width at {1e3 * MEAN:g} mm/s [mN]", ylim=(0, 200))
-        panels.lettered(widths, "b", "width of the loop")
-        ticks = (1, 3, 10, 30, 100, 300)
-        widths.set_xticks(ticks, [str(tick) for tick in ticks])
-        widths.minorticks_off()
-        sheet.suptitle(f"Lesson 7: {QUESTION}", x=0.01, ha="left", fontsize=12)
-    return sheet
+LESSON = Lesson(__name__, run, (_loops, _widths), grid("ab", (8.2, 4.8), widths=(1.5, 1)))

@@ -1,4 +1,6 @@
-"""Lesson 8: state chart and if-else code.
+r"""Lesson 8: Chart or if-else.
+
+Does it matter whether a chart or if-else code decides?
 
 The paper runs the model twice, as a state chart and as if-else code, and finds a difference of
 about 1e-3 N, with spikes at the transitions. It attributes this to the two implementations.
@@ -13,30 +15,98 @@ depends on the delay of the switch.
 A chart in a block diagram may also have a sample time: its outputs are then held between the ticks.
 The held force lags even where nothing switches, in proportion to the sample time. This explains the
 residuals of both figures of the paper within a factor of 10. What the paper ran is not printed.
+
+## Predict
+
+One chart is run twice: by state machines, and by if-else code made from the same chart. Every
+number of the two traces is compared.
+
+1. How many differ, with the same driver and located switches?
+2. Now the if-else code evaluates its guards once per step of 1 ms. How large is the largest
+   difference of the force just after the first break-away, in N?
+3. And in the whole run of 30 s, in N?
+
+```python
+numbers_that_differ = None
+spike = None  # N
+largest = None  # N
+```
+
+## Measure
+
+Run: {MODEL.title}, Table I (stick-slip), v = {VELOCITY} m/s (chosen by us), {END:g} s; transitions
+machines and generated if-else code, with located switches, with guards evaluated once per step (max
+step {PAPER_STEP!m:g} ms, rtol {PAPER_RTOL:.0e}), and with outputs held for {PAPER_STEP!m:g} ms.
+
+Measured with the same driver: {differ[0]} of {differ[1]} numbers differ with located switches,
+{differ_once[0]} of {differ_once[1]} once per step, {differ_held[0]} of {differ_held[1]} with held
+outputs.
+
+Measured, once per step minus located: {before:.0e} N before the first break-away, a spike of
+{spike:.2f} N at it, then {after:.0e} N; the arrests at {arrest:.1f} s are missed, and the runs
+diverge by up to {diverged:.1f} N. The paper's {PAPERS:.0e} N needs a switch that is
+{late_for_the_papers!m:.1f} ms late. Held minus located: {early:.1e} N, {near:.2f} N, then
+{later:.1e} N; in the experiment of Fig. 3 up to {pushed_largest[0]:.1e} N on the ramp and
+{pushed_largest[1]:.1e} N while the force oscillates, in proportion to the sample time.
+
+So: chart and if-else code are one program; what differs is when guards are evaluated and how long
+outputs are held. Steps of {PAPER_STEP!m:g} ms explain the shape of the paper's residual, including
+the spikes, but here it is {smaller:.0f} times smaller; outputs held for {PAPER_STEP!m:g} ms explain
+it within a factor of {within:.0f}.
+
+## Compare
+
+```python
+from gms_fsm.app.lessons.predict import reveal
+
+reveal(numbers_that_differ, result.differ[0])
+reveal(spike, result.between(4.9, 5.0).max(), "N")
+reveal(largest, result.between(0.0, 30.0).max(), "N")
+```
+
+<details>
+<summary>Why?</summary>
+
+Both are made from one chart, so the same driver gives the same bits. A guard that is evaluated up
+to 1 ms late leaves the force of the old state for that time: a spike of the size of the drop at
+break-away. At a reversal the window |v| <= v_c is missed altogether, and from there on the two runs
+are different motions.
+
+</details>
+
+## The if-else text
+
+This is the program that was compared: generated from the chart, as the if-else engine runs it.
+
+```python
+from gms_fsm.lowering.program import lower
+
+source = lower(result.ifelse.model, result.ifelse.rig).source
+print(source[source.index("def switch") :].split("\n\n\n")[0])
+```
+
+## Try
+
+- Run both drivers with `law="signed"`. Do they still diverge at the first reversal?
+- How late must a guard be checked to produce the residual in the paper? Which step does that?
+- Hold outputs for 0.7 ms (`events="held", step=7e-4`). Which transitions of `result.chart` are
+  missed, and why?
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Slider, Trace, simulate
+from gms_fsm.app.lessons._lesson import DOTS, FASTEST, FIRST, SECOND, Lesson, draw, grid, note
 from gms_fsm.app.paper import FORCE, HELD_STEPS, PAPER_RTOL, PAPER_STEP, VELOCITY
 from gms_fsm.app.paper.claims import differing_numbers, force_difference
-from gms_fsm.app.paper.held import OSCILLATION, PAPERS_FORCE, PAPERS_PLACE, RAMP, Lag, lag_of
+from gms_fsm.app.paper.held import OSCILLATION, PAPERS_FORCE, PAPERS_PLACE, RAMP, lag_of
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.systems.rigs import Rig
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-__all__ = ["QUESTION", "TITLE", "Result", "figure", "predicted", "run"]
-
-TITLE = "Chart or if-else"
-QUESTION = "Does it matter whether a chart or if-else code decides?"
+from plots.style import LINE_GREY, REPORTED, TEXT_GREY
 
 MODEL = GMS(GMSParameters.paper("stick-slip"), law="published")
 RIG = Prescribed(VELOCITY)
@@ -46,150 +116,45 @@ LOOK = 5.0  # s: time at which the residual is read, after the first break-away
 PAPERS = 1e-3  # N: the residual in the paper
 PUSHED = GMS(GMSParameters.paper("non-drifting"), law="published"), Slider(1.0, FORCE)
 HELD_END, PUSHED_END = 12.0, 6.0  # s: ends of the runs with held outputs, of both experiments
+ENGINES = ("machines", "ifelse")
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
-    """The runs and the measured values.
+def run() -> dict[str, Any]:
+    """Run the chart and the if-else code with each driver, with delays, and with held outputs."""
+    once: dict[str, Any] = {"events": "step", "max_step": PAPER_STEP, "rtol": PAPER_RTOL}
+    chart, ifelse = (simulate(MODEL, RIG, END, engine=each) for each in ENGINES)
+    chart_once, ifelse_once = (simulate(MODEL, RIG, END, engine=each, **once) for each in ENGINES)
+    replayed = {"chart, located": chart, "if-else, once per step": ifelse_once}
+    held_chart, held_ifelse = (hold(MODEL, RIG, HELD_END, PAPER_STEP, each) for each in ENGINES)
+    differ = differing_numbers(chart, ifelse)
+    differ_once = differing_numbers(chart_once, ifelse_once)
+    differ_held = differing_numbers(held_chart, held_ifelse)
 
-    Parameters
-    ----------
-    chart, ifelse : Trace
-        Runs with located switches, decided by the machines and by the if-else code.
-    chart_once, ifelse_once : Trace
-        Runs with guards evaluated once per step, with the settings of the paper.
-    differ, differ_once : (int, int)
-        How many numbers differ between the two, and how many there are.
-    t, residual : ndarray, shape (m,), s and N
-        Difference between if-else code once per step and the chart with located switches.
-    late, left : ndarray, shape (8,), s and N
-        Delay of the first break-away for each of `STEPS`, and the residual at `LOOK`.
-    differ_held : (int, int)
-        As `differ`, with outputs held for `PAPER_STEP`.
-    held : Lag
-        Difference between the chart with outputs held for `PAPER_STEP` and the chart with located
-        switches.
-    pushed : tuple of Lag
-        The same in the experiment of Fig. 3, where nothing switches, for each of `HELD_STEPS`.
-    """
-
-    chart: Trace
-    ifelse: Trace
-    chart_once: Trace
-    ifelse_once: Trace
-    differ: tuple[int, int]
-    differ_once: tuple[int, int]
-    t: FloatArray
-    residual: FloatArray
-    late: FloatArray
-    left: FloatArray
-    differ_held: tuple[int, int]
-    held: Lag
-    pushed: tuple[Lag, ...]
-
-    @property
-    def replayed(self) -> dict[str, Trace]:
-        """The runs for the replay page, by name."""
-        return {"chart, located": self.chart, "if-else, once per step": self.ifelse_once}
-
-    @property
-    def late_for_the_papers(self) -> float:
-        """Delay of a switch that leaves the residual of the paper, s."""
-        return float(PAPERS * np.median(self.late / self.left))  # they are proportional
-
-    def between(self, begin: float, end: float) -> FloatArray:
-        """Return the magnitude of the residual from begin to end [s], N."""
-        return np.abs(self.residual[(self.t > begin) & (self.t < end)])
-
-    @property
-    def pushed_largest(self) -> tuple[float, float]:
-        """Largest difference of F at the ticks in Fig. 3, held for `PAPER_STEP`, N.
-
-        On the ramp, and while the force oscillates.
-        """
-        lag = self.pushed[HELD_STEPS.index(PAPER_STEP)]
-        return lag.during(RAMP).largest[0], lag.during(OSCILLATION).largest[0]
-
-    def lines(self) -> tuple[str, ...]:
-        """Return the lesson as five lines.
-
-        Returns
-        -------
-        tuple of str
-            Question, runs, two lines of measured values, conclusion.
-        """
-        log = self.chart.transitions
-        first, arrest = float(log.t[0]), float(log.t[log.edge == "arrest"][0])
-        spike = np.abs(self.residual[self.t == first])[0]
-        after = float(np.median(self.between(LOOK, arrest - 0.1)))
-        early, later = self.held.during((0.0, first)), self.held.during((LOOK, HELD_END))
-        near = self.held.during((first - 0.01, first + 0.01))
-        ramp, swing = self.pushed_largest
-        return (
-            f"Question: {QUESTION}",
-            f"Run: {MODEL.title}, Table I (stick-slip), v = {VELOCITY} m/s (chosen by us), "
-            f"{END:g} s; transitions machines and generated if-else code, with located switches, "
-            f"with guards evaluated once per step (max step {1e3 * PAPER_STEP:g} ms, rtol "
-            f"{PAPER_RTOL:.0e}), and with outputs held for {1e3 * PAPER_STEP:g} ms.",
-            f"Measured with the same driver: {self.differ[0]} of {self.differ[1]} numbers differ "
-            f"with located switches, {self.differ_once[0]} of {self.differ_once[1]} once per step, "
-            f"{self.differ_held[0]} of {self.differ_held[1]} with held outputs.",
-            f"Measured, once per step minus located: {np.median(self.between(0.0, 4.9)):.0e} N "
-            f"before the first break-away, a spike of {spike:.2f} N at it, then "
-            f"{after:.0e} N; the arrests at {arrest:.1f} s "
-            f"are missed, and the runs diverge by up to {self.between(arrest, END).max():.1f} N. "
-            f"The paper's {PAPERS:.0e} N needs a switch that is "
-            f"{1e3 * self.late_for_the_papers:.1f} ms late. Held minus located: "
-            f"{early.median[0]:.1e} N, {near.largest[0]:.2f} N, then {later.median[0]:.1e} N; in "
-            f"the experiment of Fig. 3 up to {ramp:.1e} N on the ramp and {swing:.1e} N while the "
-            "force oscillates, in proportion to the sample time.",
-            "So: chart and if-else code are one program; what differs is when guards are "
-            f"evaluated and how long outputs are held. Steps of {1e3 * PAPER_STEP:g} ms explain "
-            "the shape of the paper's residual, including the spikes, but here it is "
-            f"{PAPERS / after:.0f} times smaller; outputs held for {1e3 * PAPER_STEP:g} ms explain "
-            f"it within a factor of {max(PAPERS / early.median[0], swing / PAPERS_FORCE):.0f}.",
-        )
-
-
-def run() -> Result:
-    """Run the chart and the if-else code with each driver, with delays, and with held outputs.
-
-    Returns
-    -------
-    Result
-        Traces and measured values.
-    """
-    chart, ifelse = (simulate(MODEL, RIG, END, engine=e) for e in ("machines", "ifelse"))
-    chart_once, ifelse_once = (
-        simulate(
-            MODEL, RIG, END, engine=engine, events="step", max_step=PAPER_STEP, rtol=PAPER_RTOL
-        )
-        for engine in ("machines", "ifelse")
-    )
     t, residual = force_difference(ifelse_once, chart)
-    late, left = zip(*(_late(step, chart) for step in STEPS), strict=True)
-    held, held_ifelse = (
-        _held(MODEL, RIG, HELD_END, PAPER_STEP, engine) for engine in ("machines", "ifelse")
-    )
-    inside = simulate(*PUSHED, PUSHED_END, engine="ifelse", max_step=PAPER_STEP)
-    return Result(
-        chart=chart,
-        ifelse=ifelse,
-        chart_once=chart_once,
-        ifelse_once=ifelse_once,
-        differ=differing_numbers(chart, ifelse),
-        differ_once=differing_numbers(chart_once, ifelse_once),
-        t=t,
-        residual=residual,
-        late=np.array(late),
-        left=np.array(left),
-        differ_held=differing_numbers(held, held_ifelse),
-        held=lag_of(held, chart),
-        pushed=tuple(lag_of(_held(*PUSHED, PUSHED_END, h), inside) for h in HELD_STEPS),
-    )
+    log = chart.transitions
+    first, arrest = float(log.t[0]), float(log.t[log.edge == "arrest"][0])
+
+    def between(begin: float, end: float) -> FloatArray:
+        return np.abs(residual[(t > begin) & (t < end)])
+
+    spike, diverged = abs(residual[t == first])[0], between(arrest, END).max()
+    before, after = np.median(between(0.0, 4.9)), np.median(between(LOOK, arrest - 0.1))
+    late, left = np.array([_late(step, chart) for step in STEPS]).T
+    late_for_the_papers = PAPERS * np.median(late / left)  # they are proportional
+
+    held = lag_of(held_chart, chart)
+    early = held.during((0.0, first)).median[0]
+    near = held.during((first - 0.01, first + 0.01)).largest[0]
+    later = held.during((LOOK, HELD_END)).median[0]
+    inside = simulate(*PUSHED, PUSHED_END, engine=FASTEST, max_step=PAPER_STEP)
+    pushed = [lag_of(hold(*PUSHED, PUSHED_END, h), inside) for h in HELD_STEPS]
+    paced = pushed[HELD_STEPS.index(PAPER_STEP)]
+    pushed_largest = [paced.during(span).largest[0] for span in (RAMP, OSCILLATION)]
+    smaller, within = PAPERS / after, max(PAPERS / early, pushed_largest[1] / PAPERS_FORCE)
+    return locals()
 
 
-def _held(model: GMS, rig: Rig, t_end: float, step: float, engine: str = "machines") -> Trace:
+def hold(model: GMS, rig: Rig, t_end: float, step: float, engine: str = FASTEST) -> Trace:
     """Run with outputs held between ticks; the rows are the ticks and the end."""
     ticks = np.append(step * np.arange(round(t_end / step)), t_end)
     return simulate(model, rig, t_end, events="held", step=step, engine=engine, t_eval=ticks)
@@ -197,28 +162,16 @@ def _held(model: GMS, rig: Rig, t_end: float, step: float, engine: str = "machin
 
 def _late(step: float, chart: Trace) -> tuple[float, float]:
     """Return the delay of the first break-away [s] and the residual at `LOOK` [N]."""
-    looked = simulate(MODEL, RIG, LOOK, method="rk4", step=step, events="step", engine="ifelse")
+    looked = simulate(MODEL, RIG, LOOK, method="rk4", step=step, events="step", engine=FASTEST)
     left = looked.sample([LOOK]).F - chart.sample([LOOK]).F
-    return float(looked.transitions.t[0] - chart.transitions.t[0]), float(np.abs(left)[0])
+    return looked.transitions.t[0] - chart.transitions.t[0], abs(left)[0]
 
 
 def predicted(late: FloatArray, chart: Trace) -> FloatArray:
-    """Return the residual at `LOOK` expected from a late first break-away.
+    """Return the residual at `LOOK` [N] expected from late first break-aways [s].
 
     During the delay the slider moves by v late, and so do the deflections; afterwards each excess
     decays as exp(-C t / s).
-
-    Parameters
-    ----------
-    late : ndarray, shape (m,), s
-        Delays.
-    chart : Trace
-        The run with located switches.
-
-    Returns
-    -------
-    ndarray, shape (m,), N
-        The residuals.
     """
     p, first = MODEL.parameters, chart.transitions[0]
     rate = p.C / first.s  # 1/s
@@ -226,139 +179,67 @@ def predicted(late: FloatArray, chart: Trace) -> FloatArray:
     return np.asarray(first.v * late * per_metre)
 
 
-def figure(result: Result) -> Figure:
-    """Draw the friction, its residual over time and over the delay, and that of held outputs.
-
-    Parameters
-    ----------
-    result : Result
-        From `run`.
-
-    Returns
-    -------
-    Figure
-        Panels a to f.
-    """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    from plots import panels
-    from plots.style import INK, RC, REPORTED, TEXT_GREY
-
-    log = result.chart.transitions
-    first, arrest = float(log.t[0]), float(log.t[log.edge == "arrest"][0])
-    with rc_context(RC):
-        sheet = Figure(figsize=(8.2, 10.6), layout="constrained")
-        axes = sheet.subplot_mosaic(
-            [["a", "a"], ["b", "b"], ["c", "d"], ["e", "f"]], height_ratios=(1, 1.2, 1.5, 1.5)
-        )
-        force, residual, zoom, lateness = (axes[letter] for letter in "abcd")
-        looks = (
-            (result.chart, "chart, located", INK, "-"),
-            (result.ifelse_once, "if-else, once per step", TEXT_GREY, "--"),
-        )
-        for trace, name, colour, dash in looks:
-            (line,) = panels.force(force, trace)
-            line.set(color=colour, linestyle=dash, label=name, linewidth=1.4)
-        panels.lettered(force, "a", f"friction, {MODEL.title}")
-        force.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
-        force.set_xlabel("")
-        force.tick_params(labelbottom=False)
-
-        panels.difference(residual, result.t, result.residual)
-        residual.set(ylim=(1e-7, 30), xlim=(0, END))
-        panels.lettered(residual, "b", "their difference")
-        residual.axhline(PAPERS, **REPORTED)
-        for text, place, align in (
-            ("the paper's $10^{-3}$ N", (0.3, 1.5 * PAPERS), "left"),
-            ("spike at the\nbreak-away", (first + 0.25, 0.06), "left"),
-            ("missed arrests →", (arrest - 0.2, 2.0), "right"),
-            (
-                f"same driver: {result.differ[0]} of {result.differ[1]} numbers differ (located), "
-                f"{result.differ_once[0]} of {result.differ_once[1]} (once per step)",
-                (END - 0.3, 3e-7),
-                "right",
-            ),
-        ):
-            residual.annotate(text, place, ha=align, fontsize=8, color=TEXT_GREY)
-
-        window = (first - 0.8e-3, first + 1.2e-3)
-        for trace, _, colour, dash in looks:
-            part = panels.shown(trace, window)
-            zoom.plot(1e3 * (part.t - first), part.F, color=colour, linestyle=dash, linewidth=1.6)
-        rows = result.ifelse_once
-        near = (rows.t > window[0]) & (rows.t < window[1]) & (rows.microstep == 0)
-        zoom.plot(1e3 * (rows.t[near] - first), rows.F[near], "o", color=TEXT_GREY, markersize=5)
-        zoom.set(xlabel=f"t − {first:.4f} s [ms]", ylabel="F [N]", xlim=(-0.8, 1.2))
-        panels.lettered(zoom, "c", "the break-away: late if once per step")
-        zoom.annotate(
-            "dots: ends of steps",
-            (0.97, 0.94),
-            xycoords="axes fraction",
-            ha="right",
-            va="top",
-            color=TEXT_GREY,
-            fontsize=8,
-        )
-
-        _draw_lateness(lateness, result)
-        _draw_held(axes["e"], axes["f"], result)
-        sheet.suptitle(f"Lesson 8: {QUESTION}", x=0.01, ha="left", fontsize=12)
-    return sheet
+def _friction(ax: Any, r: Any) -> str:
+    for (name, trace), look in zip(r.replayed.items(), (FIRST, SECOND), strict=True):
+        draw("force", ax, trace)[0].set(label=name, **look)
+    ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
+    return f"friction, {MODEL.title}"
 
 
-def _draw_lateness(ax: Axes, result: Result) -> None:
-    """Draw the residual of a switch over its delay."""
-    from plots import panels
-    from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
-
-    times = np.geomspace(0.5 * result.late.min(), 2 * result.late.max(), 20)
-    ax.loglog(1e3 * times, predicted(times, result.chart), color=LINE_GREY, zorder=1)
-    ax.loglog(1e3 * result.late, result.left, "o", color=INK, markersize=5)
+def _residual(ax: Any, r: Any) -> str:
+    draw("difference", ax, r.t, r.residual)
+    ax.set(ylim=(1e-7, 30), xlim=(0, END))
     ax.axhline(PAPERS, **REPORTED)
-    ax.annotate(
-        f"the paper's $10^{{-3}}$ N:\n{1e3 * result.late_for_the_papers:.1f} ms late",
-        (1e3 * times[0], PAPERS),
-        (2, 4),
-        textcoords="offset points",
-        color=TEXT_GREY,
-        fontsize=8,
-    )
-    ax.annotate(
-        "line: v late Σ k, decaying\nas exp(−C t/s)",
-        (0.97, 0.05),
-        xycoords="axes fraction",
-        ha="right",
-        color=TEXT_GREY,
-        fontsize=8,
-    )
+    note(ax, "the paper's $10^{-3}$ N", (0.3, 1.5 * PAPERS))
+    note(ax, "spike at the\nbreak-away", (r.first + 0.25, 0.06))
+    note(ax, "missed arrests →", (r.arrest - 0.2, 2.0), ha="right")
+    same = "same driver: {} of {} numbers differ (located), {} of {} (once per step)"
+    note(ax, same.format(*r.differ, *r.differ_once), (END - 0.3, 3e-7), ha="right")
+    return "their difference"
+
+
+def _breakaway(ax: Any, r: Any) -> str:
+    window = (r.first - 0.8e-3, r.first + 1.2e-3)
+    for trace, look in ((r.chart, FIRST), (r.ifelse_once, SECOND)):
+        (line,) = draw("force", ax, trace, window=window)
+        line.set(xdata=1e3 * (line.get_xdata() - r.first), **look)
+    rows = r.ifelse_once
+    near = (rows.t > window[0]) & (rows.t < window[1]) & (rows.microstep == 0)
+    ax.plot(1e3 * (rows.t[near] - r.first), rows.F[near], **DOTS | {"color": TEXT_GREY})
+    ax.set(xlabel=f"t − {r.first:.4f} s [ms]", ylabel="F [N]", xlim=(-0.8, 1.2))
+    note(ax, "dots: ends of steps", (0.03, 0.4), inside=True)
+    return "the break-away: late if once per step"
+
+
+def _lateness(ax: Any, r: Any) -> str:
+    times = np.geomspace(0.5 * r.late.min(), 2 * r.late.max(), 20)
+    ax.loglog(1e3 * times, predicted(times, r.chart), color=LINE_GREY, zorder=1)
+    ax.loglog(1e3 * r.late, r.left, **DOTS)
+    ax.axhline(PAPERS, **REPORTED)
+    text = f"the paper's $10^{{-3}}$ N:\n{1e3 * r.late_for_the_papers:.1f} ms late"
+    note(ax, text, (1e3 * times[0], PAPERS), (2, 4))
+    note(ax, "line: v late Σ k, decaying\nas exp(−C t/s)", (0.97, 0.05), inside=True)
     ax.set(xlabel="delay of the switch [ms]", ylabel=f"difference at {LOOK:g} s [N]")
-    panels.lettered(ax, "d", "residual of a late switch")
+    return "residual of a late switch"
 
 
-def _draw_held(over_time: Axes, over_period: Axes, result: Result) -> None:
-    """Draw the residual of held outputs in the experiment of Fig. 3."""
-    from plots import panels
-    from plots.style import TEXT_GREY
+def _held_over_time(ax: Any, r: Any) -> str:
+    draw("lag_over_time", ax, r.pushed, PAPERS_FORCE, window=(0.0, PUSHED_END))
+    ax.legend(loc="upper left")
+    note(ax, "the paper's $10^{-4}$ N", (0.1, -1e3 * PAPERS_FORCE), (2, -4))
+    return "outputs held for h, in Fig. 3"
 
-    panels.lag_over_time(over_time, result.pushed, PAPERS_FORCE, window=(0.0, PUSHED_END))
-    over_time.legend(loc="upper left")
-    over_time.annotate(
-        "the paper's $10^{-4}$ N",
-        (0.02, -1e3 * PAPERS_FORCE),
-        (2, -4),
-        xycoords=("axes fraction", "data"),
-        textcoords="offset points",
-        va="top",
-        color=TEXT_GREY,
-        fontsize=8,
-    )
-    panels.lettered(over_time, "e", "outputs held for h, in Fig. 3")
-    panels.lag_over_period(
-        over_period,
-        result.pushed,
-        (PAPERS_FORCE, PAPERS_PLACE),
-        phases={"ramp": RAMP, "oscillation": OSCILLATION},
-    )
-    over_period.legend(loc="upper left", ncols=2)
-    panels.lettered(over_period, "f", "the same at its largest, over h")
+
+def _held_over_period(ax: Any, r: Any) -> str:
+    phases = {"ramp": RAMP, "oscillation": OSCILLATION}
+    draw("lag_over_period", ax, r.pushed, (PAPERS_FORCE, PAPERS_PLACE), phases=phases)
+    ax.legend(loc="upper left", ncols=2)
+    return "the same at its largest, over h"
+
+
+LESSON = Lesson(
+    __name__,
+    run,
+    (_friction, _residual, _breakaway, _lateness, _held_over_time, _held_over_period),
+    grid("aa;bb;cd;ef", (8.2, 10.6), (1, 1.2, 1.5, 1.5)),
+)

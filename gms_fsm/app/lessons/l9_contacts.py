@@ -1,4 +1,6 @@
-"""Lesson 9: what counts as a contact.
+"""Lesson 9: Contacts.
+
+What counts as a contact?
 
 A machine has a bearing, a gear, an end stop, a clutch. They look like different kinds of models.
 Here they are one kind. Whatever moves is a body: it has inertia and smooth forces, and its
@@ -17,28 +19,131 @@ know the bodies, and the bodies do not know its states.
 Because a contact acts on both bodies with the same impulse, momentum is kept in an impact and when
 a clutch closes; energy is not. Because a lock is exact, the velocity of a stuck contact is 0, not
 merely small. Each of these statements is checked here on a run, against a formula.
+
+## Predict
+
+1. A mass with Coulomb stiction (F_s = 1.5 N) is pulled through a spring of 2 N/m at 0.1 m/s. When
+   is it released, in s?
+2. What is the largest speed it has while it is stuck, in m/s?
+3. A motor turns a load through a gear with 0.04 rad of backlash at 0.05 rad/s. How long is the
+   load without contact at a reversal, in s?
+4. A mass of 1 kg at 1 m/s hits one of 3 kg at rest; the restitution is 0.5. How much energy is
+   lost, in J?
+
+```python
+released = None  # s
+speed_while_stuck = None  # m/s
+dead_time_of_gear = None  # s
+lost = None  # J
+```
+
+## Measure
+
+Run: a mass of {MASS:g} kg, pulled through {STIFFNESS:g} N/m at {SPEED:g} m/s, with stiction and
+with {title}; a motor that turns a load to and fro through a backlash; two masses
+with a stop between them; two shafts with a dog clutch (all values chosen by us).
+
+Measured: with stiction the mass is stuck at {rows} rows, where the largest |v| is {fastest:g} m/s;
+it is released at {released:.6f} s (F_s / (K V) = {due:g} s). With the bank it has crept
+{crept[1]!m:.1f} mm when all elements slip, at {crept[0]:.2f} s. The gear has a dead time of
+{gap_time:.4f} s at each reversal (2 gap / V + d / k = {gap_due:.4f} s), during which the load
+stands still.
+
+Measured: the impact changes the velocities from {v[0]:g} and {v[1]:g} m/s to {v[2]:g} and {v[3]:g}
+m/s; momentum changes by {moved[0]:g} kg m/s, energy by {gained[0]:.4f} J. The clutch changes
+{w[0]:g} and {w[1]:g} rad/s to {w[2]:.4f} and {w[3]:.4f} rad/s; angular momentum changes by
+{moved[1]:g} Nms, energy by {gained[1]:.2f} J.
+
+So: whatever switches is a contact, a chart on a relative velocity; whatever moves is a body. To
+exchange stiction for a bank, or a clutch for a bearing, exchange the chart: the bodies stay as they
+are.
+
+## Compare
+
+```python
+from gms_fsm.app.lessons.predict import reveal, vary
+
+reveal(released, result.released, "s")
+reveal(speed_while_stuck, abs(result.speeds_while_stuck).max(), "m/s")
+reveal(dead_time_of_gear, result.gap_time, "s")
+reveal(lost, -result.gained[0], "J")
+```
+
+<details>
+<summary>Why?</summary>
+
+The spring needs F_s/(K V) = 7.5 s to pull with 1.5 N. A lock holds the velocity at 0, exactly. The
+motor crosses 0.04 rad at 0.05 rad/s in 0.8 s; the damping of the flanks adds 2 ms. An impact loses
+(1 - e²)/2 of the reduced mass, 0.75 kg, times the speed squared: 0.28 J.
+
+</details>
+
+## A system as code
+
+Two bodies, two contacts. Nothing in the bodies says that they touch.
+
+```python
+import inspect
+
+from gms_fsm.app.lessons import l9_contacts
+
+source = inspect.getsource(l9_contacts.gear)
+print("return System(" + source.partition("return System(")[2])
+```
+
+## Vary a parameter
+
+The same gear with a different gap. While the motor crosses it, the load stands still.
+
+```python
+from matplotlib.figure import Figure
+
+from gms_fsm import simulate
+from gms_fsm.app.lessons.l9_contacts import PERIOD, dead_time, dead_times, gear
+
+
+def with_gap(gap):
+    trace = simulate(gear(gap), 2 * PERIOD)
+    dead = dead_times(trace)
+    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+    ax = figure.subplots()
+    ax.plot(trace.t, trace.body("motor").x, "--", color="0.3", label="motor")
+    ax.plot(trace.t, trace.body("load").x, label="load")
+    ax.set(xlabel="t [s]", ylabel="angle [rad]")
+    measured = f"{(dead[:, 1] - dead[:, 0]).mean():.4f}"
+    ax.set_title(f"dead time {measured} s; formula {dead_time(gap):.4f} s")
+    ax.legend()
+    return figure
+
+
+vary(with_gap, 0.02, 0.005, 0.05, 0.005, "gap [rad]")
+```
+
+## Try
+
+- Set the restitution to 0 and to 0.9 (`impact(e=...)`). How much energy is lost? Derive it from
+  the reduced mass, and compare.
+- Give the clutch a ratio: `v="v_1 - 3 * v_2"`. Which combination of the two angular momenta is
+  kept now?
+- Replace stiction by the bank in the bearing of the gear. Does the load still stand exactly
+  still?
+- Damp the flanks twenty times as much (`FLANK`, d = 8). Why does the formula for the dead time
+  fail? Look at the speed of the load when the flank lets go.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from gms_fsm import Body, Contact, Spring, System, Trace, simulate
+from gms_fsm.app.lessons._lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
 from gms_fsm.app.lessons.l6_stick_slip import SIGMA_2, F_c, F_s, bank
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.parameters import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-__all__ = ["QUESTION", "TITLE", "Result", "clutch", "figure", "gear", "impact", "pulled", "run"]
-
-TITLE = "Contacts"
-QUESTION = "What counts as a contact?"
+from plots.style import INK, LINE_GREY
 
 MASS, STIFFNESS, SPEED = 1.0, 2.0, 0.1  # kg, N/m, m/s: the pulled mass
 DRY = {"F_c": F_c, "F_s": F_s, "b": SIGMA_2}  # N, N, Ns/m
@@ -46,23 +151,13 @@ FLANK = {"k": 200.0, "d": 0.4, "gap": 0.02}  # Nm/rad, Nms/rad, rad
 MOTOR, PERIOD = 0.05, 8.0  # rad/s, s: the motor turns at this speed, forward and backward
 BEARING = {"F_c": 0.1, "F_s": 0.15, "b": 0.01}  # Nm, Nm, Nms/rad
 STOP = {"x_s": 0.1, "e": 0.5, "v_r": 1e-6}  # m, 1, m/s
-MASSES, FIRST = (1.0, 3.0), 1.0  # kg, m/s: speed of the mass that hits the other
+MASSES, PUSH = (1.0, 3.0), 1.0  # kg, m/s: speed of the mass that hits the other
 DOG = {"t_on": 1.0, "t_off": 10.0}  # s
 INERTIAS, SPUN = (1.0, 2.0), 10.0  # kg m2, rad/s: speed of the shaft that turns
 
 
 def pulled(*, bristles: bool = False) -> System:
-    """Return a mass pulled through a spring, with stiction or with a bank of GMS elements.
-
-    Parameters
-    ----------
-    bristles : bool
-        Whether the contact is the bank of lesson 6.
-
-    Returns
-    -------
-    System
-        One body, one contact.
+    """Return a mass pulled through a spring, with stiction or with the bank of lesson 6.
 
     Examples
     --------
@@ -80,17 +175,7 @@ def pulled(*, bristles: bool = False) -> System:
 
 
 def gear(gap: float = FLANK["gap"]) -> System:
-    """Return a motor that turns to and fro, and a load with stiction behind a backlash.
-
-    Parameters
-    ----------
-    gap : float
-        Half of the gap, rad.
-
-    Returns
-    -------
-    System
-        A driven body, a load, and two contacts.
+    """Return a motor that turns to and fro, and a load with stiction behind a backlash [rad].
 
     Examples
     --------
@@ -112,171 +197,71 @@ def gear(gap: float = FLANK["gap"]) -> System:
 
 
 def impact(e: float = STOP["e"]) -> System:
-    """Return two masses with a stop between them.
-
-    Parameters
-    ----------
-    e : float
-        Restitution.
-
-    Returns
-    -------
-    System
-        Two bodies, one contact.
+    """Return two masses with a stop between them, of restitution e.
 
     Examples
     --------
     >>> impact().contacts[0].v
     ('v_1 - v_2',)
     """
-    return System(
-        "impact",
-        bodies=(
-            Body("one", inertia="m_1", x="x_1", v="v_1"),
-            Body("two", inertia="m_2", x="x_2", v="v_2"),
-        ),
-        contacts=(Contact("stop", CHARTS["end-stop"], {**STOP, "e": e}, v="v_1 - v_2"),),
-        numbers={"m_1": MASSES[0], "m_2": MASSES[1]},
-    )
+    return _pair(Contact("stop", CHARTS["end-stop"], {**STOP, "e": e}, v="v_1 - v_2"), MASSES)
 
 
 def clutch() -> System:
     """Return two shafts with a dog clutch.
-
-    Returns
-    -------
-    System
-        Two bodies, one contact.
 
     Examples
     --------
     >>> clutch().contacts[0].chart.locks
     True
     """
-    return System(
-        "dog clutch",
-        bodies=(
-            Body("one", inertia="J_1", x="q_1", v="w_1"),
-            Body("two", inertia="J_2", x="q_2", v="w_2"),
-        ),
-        contacts=(Contact("dog", CHARTS["dog-clutch"], DOG, v="w_1 - w_2"),),
-        numbers={"J_1": INERTIAS[0], "J_2": INERTIAS[1]},
+    return _pair(Contact("dog", CHARTS["dog-clutch"], DOG, v="v_1 - v_2"), INERTIAS)
+
+
+def _pair(contact: Contact, inertias: tuple[float, float]) -> System:
+    bodies = (
+        Body(name, inertia=f"m_{i}", x=f"x_{i}", v=f"v_{i}")
+        for i, name in enumerate(("one", "two"), 1)
     )
+    numbers = dict(zip(("m_1", "m_2"), inertias, strict=True))
+    return System(contact.name, bodies=tuple(bodies), contacts=(contact,), numbers=numbers)
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
-    """The runs and the measured values.
+def run() -> dict[str, Any]:
+    """Run the five systems."""
+    stiction, bristles = (simulate(pulled(bristles=each), 25.0) for each in (False, True))
+    replayed = {"stiction": stiction, "GMS bank": bristles}
+    speeds_while_stuck = stiction.v[stiction.states[:, 0] == "stuck"]
+    rows, fastest = speeds_while_stuck.size, abs(speeds_while_stuck).max()
+    released, due = float(stiction.transitions.t[0]), F_s / (STIFFNESS * SPEED)
+    slips = np.flatnonzero((bristles.states == "slip").all(axis=1))[0]
+    crept = bristles.t[slips], bristles.x[slips]
+    title = bank().title
 
-    Parameters
-    ----------
-    stiction, bristles : Trace
-        The pulled mass, with stiction and with a bank of GMS elements.
-    gear : Trace
-        The gear with backlash.
-    impact : Trace
-        Two masses, before and after the impact.
-    clutch : Trace
-        Two shafts, before and after the clutch closes.
-    """
+    turned = simulate(gear(), 2 * PERIOD)
+    dead = dead_times(turned)
+    gap_time, gap_due = np.diff(dead).mean(), dead_time()
 
-    stiction: Trace
-    bristles: Trace
-    gear: Trace
-    impact: Trace
-    clutch: Trace
+    hit = simulate(impact(), 0.3, initial={"one.v": PUSH})
+    closed = simulate(clutch(), 2.0, initial={"one.v": SPUN})
+    pairs = ((hit, MASSES), (closed, INERTIAS))
+    v, w = (_speeds(trace)[:, [0, -1]].T.ravel() for trace, _ in pairs)
+    momentum, spin = (_total(inertias, trace) for trace, inertias in pairs)
+    moved = np.ptp(momentum), np.ptp(spin)
+    gained = [np.diff(0.5 * _total(m, trace, 2)[[0, -1]])[0] for trace, m in pairs]
+    return locals()
 
-    @property
-    def replayed(self) -> dict[str, Trace]:
-        """The runs for the replay page, by name."""
-        return {"stiction": self.stiction, "GMS bank": self.bristles}
 
-    @property
-    def speeds_while_stuck(self) -> FloatArray:
-        """Velocity of the pulled mass at all rows at which it is stuck, m/s."""
-        stuck: FloatArray = self.stiction.v[self.stiction.states[:, 0] == "stuck"]
-        return stuck
-
-    @property
-    def released(self) -> float:
-        """Time at which stiction releases the mass, s."""
-        return float(self.stiction.transitions.t[0])
-
-    @property
-    def crept(self) -> tuple[float, float]:
-        """Time at which all elements of the bank slip [s], and how far it has crept by then [m]."""
-        trace = self.bristles
-        row = int(np.flatnonzero((trace.states == "slip").all(axis=1))[0])
-        return float(trace.t[row]), float(trace.x[row])
-
-    @property
-    def dead(self) -> FloatArray:
-        """Begin and end of the intervals without contact in the gear after the first, s."""
-        log = self.gear.contact("gear").transitions
-        leaves = log.t[log.target == "apart"]
-        touches = log.t[log.source == "apart"][1:]
-        return np.column_stack([leaves, touches])
-
-    @property
-    def momentum(self) -> FloatArray:
-        """Momentum of the two masses, at all rows, kg m/s."""
-        return _sum(MASSES, self.impact)
-
-    @property
-    def spin(self) -> FloatArray:
-        """Angular momentum of the two shafts, at all rows, Nms."""
-        return _sum(INERTIAS, self.clutch)
-
-    def lines(self) -> tuple[str, ...]:
-        """Return the lesson as five lines.
-
-        Returns
-        -------
-        tuple of str
-            Question, runs, two lines of measured values, conclusion.
-        """
-        stuck, dead = self.speeds_while_stuck, self.dead[:, 1] - self.dead[:, 0]
-        slipped, crept = self.crept
-        v = [self.impact.body(name).v for name in ("one", "two")]
-        w = [self.clutch.body(name).v for name in ("one", "two")]
-        lost_v, lost_w = _lost(MASSES, self.impact), _lost(INERTIAS, self.clutch)
-        return (
-            f"Question: {QUESTION}",
-            f"Run: a mass of {MASS:g} kg, pulled through {STIFFNESS:g} N/m at {SPEED:g} m/s, with "
-            f"stiction and with {bank().title}; a motor that turns a load to and fro through a "
-            "backlash; two masses with a stop between them; two shafts with a dog clutch (all "
-            "values chosen by us).",
-            f"Measured: with stiction the mass is stuck at {stuck.size} rows, where the largest "
-            f"|v| is {np.abs(stuck).max():g} m/s; it is released at {self.released:.6f} s "
-            f"(F_s / (K V) = {F_s / (STIFFNESS * SPEED):g} s). With the bank it has crept "
-            f"{1e3 * crept:.1f} mm when all elements slip, at {slipped:.2f} s. The gear has a dead "
-            f"time of {dead.mean():.4f} s at each reversal (2 gap / V + d / k = "
-            f"{dead_time():.4f} s), during which the load stands still.",
-            f"Measured: the impact changes the velocities from {v[0][0]:g} and {v[1][0]:g} m/s to "
-            f"{v[0][-1]:g} and {v[1][-1]:g} m/s; momentum changes by {np.ptp(self.momentum):g} kg "
-            f"m/s, energy by {-lost_v:.4f} J. The clutch changes {w[0][0]:g} and {w[1][0]:g} rad/s "
-            f"to {w[0][-1]:.4f} and {w[1][-1]:.4f} rad/s; angular momentum changes by "
-            f"{np.ptp(self.spin):g} Nms, energy by {-lost_w:.2f} J.",
-            "So: whatever switches is a contact, a chart on a relative velocity; whatever moves is "
-            "a body. To exchange stiction for a bank, or a clutch for a bearing, exchange the "
-            "chart: the bodies stay as they are.",
-        )
+def dead_times(trace: Trace) -> FloatArray:
+    """Return begin and end of the intervals without contact in the gear, after the first, s."""
+    log = trace.contact("gear").transitions
+    return np.column_stack([log.t[log.target == "apart"], log.t[log.source == "apart"][1:]])
 
 
 def dead_time(gap: float = FLANK["gap"]) -> float:
-    """Return the time in which the motor crosses the gap while the load stands still.
+    """Return the time in which the motor crosses the gap [rad] while the load stands still, s.
 
     With damping a flank lets go early, d V / k before the gap opens, since it cannot pull.
-
-    Parameters
-    ----------
-    gap : float
-        Half of the gap, rad.
-
-    Returns
-    -------
-    float
-        s.
 
     Examples
     --------
@@ -286,134 +271,73 @@ def dead_time(gap: float = FLANK["gap"]) -> float:
     return 2 * gap / MOTOR + FLANK["d"] / FLANK["k"]
 
 
-def _sum(inertias: tuple[float, float], trace: Trace, power: int = 1) -> FloatArray:
+def _speeds(trace: Trace) -> FloatArray:
+    return np.stack([trace.body(name).v for name in ("one", "two")])
+
+
+def _total(inertias: tuple[float, float], trace: Trace, power: int = 1) -> FloatArray:
     """Return inertia times speed**power, summed over the bodies, at all rows."""
-    one, two = (trace.body(name).v for name in ("one", "two"))
-    total: FloatArray = inertias[0] * one**power + inertias[1] * two**power
-    return total
+    one, two = _speeds(trace) ** power
+    return np.asarray(inertias[0] * one + inertias[1] * two)
 
 
-def _lost(inertias: tuple[float, float], trace: Trace) -> float:
-    """Return the kinetic energy lost from the first to the last row, J."""
-    energy = 0.5 * _sum(inertias, trace, power=2)
-    return float(energy[0] - energy[-1])
-
-
-def run() -> Result:
-    """Run the five systems.
-
-    Returns
-    -------
-    Result
-        Traces and measured values.
-    """
-    return Result(
-        stiction=simulate(pulled(), 25.0),
-        bristles=simulate(pulled(bristles=True), 25.0),
-        gear=simulate(gear(), 2 * PERIOD),
-        impact=simulate(impact(), 0.3, initial={"one.v": FIRST}),
-        clutch=simulate(clutch(), 2.0, initial={"one.v": SPUN}),
-    )
-
-
-def figure(result: Result) -> Figure:
-    """Draw each system: velocities, angles, and what is kept.
-
-    Parameters
-    ----------
-    result : Result
-        From `run`.
-
-    Returns
-    -------
-    Figure
-        Panels a to f.
-    """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    from plots import panels
-    from plots.style import RC
-
-    with rc_context(RC):
-        sheet = Figure(figsize=(8.2, 8.6), layout="constrained")
-        axes = sheet.subplot_mosaic(
-            [["a", "c"], ["b", "c"], ["d", "d"], ["e", "f"]], height_ratios=(1.6, 0.5, 1.8, 1.8)
-        )
-        _draw_pulled(axes["a"], axes["c"], result)
-        panels.ribbons(axes["b"], result.stiction)
-        axes["b"].set(yticklabels=["pad"])
-        panels.lettered(axes["b"], "b", "states with stiction")
-        _draw_gear(axes["d"], result)
-        _draw_pair(axes["e"], result.impact, MASSES, "v [m/s]", "centre of mass")
-        panels.lettered(axes["e"], "e", "impact at a stop")
-        _draw_pair(axes["f"], result.clutch, INERTIAS, "speed [rad/s]", "mean by inertia")
-        panels.lettered(axes["f"], "f", "a dog clutch closes")
-        sheet.suptitle(f"Lesson 9: {QUESTION}", x=0.01, ha="left", fontsize=12)
-    return sheet
-
-
-def _draw_pulled(moving: Axes, before: Axes, result: Result) -> None:
-    from plots import panels
-    from plots.style import INK, TEXT_GREY
-
-    for trace, look, colour in ((result.stiction, "-", INK), (result.bristles, "--", TEXT_GREY)):
+def _moving(ax: Any, r: Any) -> str:
+    for trace, look in ((r.stiction, FIRST), (r.bristles, SECOND)):
         fine = trace.sample(np.linspace(0.0, trace.t[-1], 2001))
-        moving.plot(fine.t, fine.v, look, color=colour)
-        shown = fine.t <= result.released
-        before.plot(fine.t[shown], 1e3 * fine.x[shown], look, color=colour)
-    moving.set(ylabel="v [m/s]", xlim=(0, result.stiction.t[-1]))
-    moving.tick_params(labelbottom=False)
-    panels.lettered(moving, "a", f"pulled mass; dashed: {bank().title}")
-    for text, height, colour in (
-        ("bank: the bristles yield", 0.6 * 1e3 * result.crept[1], TEXT_GREY),
-        ("stiction: x = 0", 1.0, INK),
-    ):
-        before.annotate(text, (3.0, height), color=colour, fontsize=8)
-    before.set(xlabel="t [s]", ylabel="x [mm]", xlim=(0, 8))
-    panels.lettered(before, "c", "before stiction lets go")
+        ax.plot(fine.t, fine.v, **look)
+    ax.set(xlabel="t [s]", ylabel="v [m/s]", xlim=(0, r.stiction.t[-1]))
+    return f"pulled mass; dashed: {bank().title}"
 
 
-def _draw_gear(ax: Axes, result: Result) -> None:
-    from plots import panels
-    from plots.style import INK, LINE_GREY, TEXT_GREY
+def _states(ax: Any, r: Any) -> str:
+    draw("ribbons", ax, r.stiction)
+    ax.set(yticklabels=["pad"])
+    return "states with stiction"
 
-    for begin, end in result.dead:
+
+def _before(ax: Any, r: Any) -> str:
+    for trace, look in ((r.stiction, FIRST), (r.bristles, SECOND)):
+        fine = trace.sample(np.linspace(0.0, r.released, 1001))
+        ax.plot(fine.t, 1e3 * fine.x, **look)
+    note(ax, "bank: the bristles yield", (3.0, 600 * r.crept[1]))
+    note(ax, "stiction: x = 0", (3.0, 1.0), color=INK)
+    ax.set(xlabel="t [s]", ylabel="x [mm]", xlim=(0, 8))
+    return "before stiction lets go"
+
+
+def _gear(ax: Any, r: Any) -> str:
+    for begin, end in r.dead:
         ax.axvspan(begin, end, color=LINE_GREY, alpha=0.25, linewidth=0, zorder=0)
-    for name, look, colour in (("motor", "--", TEXT_GREY), ("load", "-", INK)):
-        body = result.gear.body(name)
-        ax.plot(result.gear.t, body.x, look, color=colour, label=name)
-    ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
-    begin, end = result.dead[0]
-    ax.annotate(
-        f"dead time {end - begin:.3f} s",
-        (end, 0.005),
-        (4, 0),
-        textcoords="offset points",
-        color=TEXT_GREY,
-        fontsize=8,
-    )
+    for name, look in (("motor", SECOND), ("load", FIRST)):
+        ax.plot(r.turned.t, r.turned.body(name).x, **look, label=name)
+    ax.axhline(0, **GUIDE)
+    begin, end = r.dead[0]
+    note(ax, f"dead time {end - begin:.3f} s", (end, 0.005), (4, 0))
     ax.legend(loc="upper right")
     ax.set(xlabel="t [s]", ylabel="angle [rad]", xlim=(0, 2 * PERIOD))
-    panels.lettered(ax, "d", "gear with backlash; shaded: no contact")
+    return "gear with backlash; shaded: no contact"
 
 
-def _draw_pair(
-    ax: Axes, trace: Trace, inertias: tuple[float, float], label: str, mean: str
-) -> None:
+def _both(ax: Any, r: Any, pair: tuple[str, ...]) -> str:
     """Draw two velocities, and the mean weighted by inertia, which the contact cannot change."""
-    from plots.style import INK, LINE_GREY, TEXT_GREY
-
-    speeds = [trace.body(name).v for name in ("one", "two")]
-    ax.plot(trace.t, speeds[0], color=INK, label="one")
-    ax.plot(trace.t, speeds[1], "--", color=TEXT_GREY, label="two")
-    ax.plot(
-        trace.t,
-        np.average(speeds, axis=0, weights=inertias),
-        ":",
-        color=LINE_GREY,
-        linewidth=2,
-        label=mean,
-    )
+    name, kept, unit, mean, title = pair
+    trace = r.values[name]
+    for speed, look, body in zip(_speeds(trace), (FIRST, SECOND), ("one", "two"), strict=True):
+        ax.plot(trace.t, speed, **look, label=body)
+    total = r.values[kept] / sum(MASSES if name == "hit" else INERTIAS)
+    ax.plot(trace.t, total, ":", color=LINE_GREY, linewidth=2, label=mean)
     ax.legend(loc="upper right")
-    ax.set(xlabel="t [s]", ylabel=label, xlim=(0, trace.t[-1]))
+    ax.set(xlabel="t [s]", ylabel=unit, xlim=(0, trace.t[-1]))
+    return title
+
+
+PAIRS = (
+    ("hit", "momentum", "v [m/s]", "centre of mass", "impact at a stop"),
+    ("closed", "spin", "speed [rad/s]", "mean by inertia", "a dog clutch closes"),
+)
+LESSON = Lesson(
+    __name__,
+    run,
+    (_moving, _states, _before, _gear, *(partial(_both, pair=pair) for pair in PAIRS)),
+    grid("ac;bc;dd;ef", (8.2, 8.6), (1.6, 0.5, 1.8, 1.8)),
+)

@@ -1,9 +1,6 @@
-"""Lessons as notebooks: composed from the module of a lesson and the Markdown file next to it.
+"""Lessons as notebooks, composed of ``notebook.md`` and the words of a lesson.
 
-``l1_hysteresis.md`` contains what only the notebook has: before the line ``<!-- run -->`` questions
-to answer before the run, with a cell for the reader's prediction; after it the answers, a parameter
-to vary, and things to try. A fenced ``python`` block is a cell. The text, the runs and the figure
-are those of the module.
+A fenced ``python`` block is a cell.
 
 A notebook is a JSON file (nbformat 4.5), written here without Jupyter's packages. It has no
 outputs. To run it, a kernel is needed: ``pip install ipykernel``, and a program that opens
@@ -17,15 +14,16 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from string import Template
 from typing import Any
 
 from gms_fsm._files import output_folder, write_whole
 from gms_fsm.app.lessons import lesson
-from gms_fsm.errors import ParameterError
 
 __all__ = ["cells_of", "composed", "notebook", "write_notebook"]
 
-RUN = "<!-- run -->"
+TEMPLATE = Template(Path(__file__).with_name("notebook.md").read_text(encoding="utf-8"))
+NEW = "<!-- a new cell -->\n"
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
 # Left out of cells: comments, and pictures, which the cells draw themselves.
 LEFT_OUT = re.compile(r"^(?:<!--.*?-->|!\[[^\]]*\]\([^)]*\))\n", re.MULTILINE | re.DOTALL)
@@ -91,42 +89,11 @@ def composed(number: int) -> tuple[Cell, ...]:
     >>> kind, text.splitlines()[0]
     ('markdown', '# Lesson 1: Pre-sliding hysteresis')
     """
-    module: Any = lesson(number)
-    own = Path(module.__file__).with_suffix(".md")
-    before, found, after = own.read_text(encoding="utf-8").partition(f"{RUN}\n")
-    if not found:
-        raise ParameterError(f"the line {RUN} is missing", place=str(own))
-    text = inspect.cleandoc(module.__doc__).partition("\n\n")[2]  # without the first line, a title
-    replay = f'"lesson_{number}_replay.html"'
-    return (
-        ("markdown", f"# Lesson {number}: {module.TITLE}\n\n**{module.QUESTION}**"),
-        *cells_of(before),
-        ("markdown", f"## What happens\n\n{_escaped(text)}"),
-        (
-            "code",
-            "import textwrap\n\nfrom gms_fsm.app.lessons import lesson\n\n"
-            f"this = lesson({number})\nresult = this.run()\n"
-            'for line in result.lines():\n    print(textwrap.fill(line, 84), end="\\n\\n")',
-        ),
-        ("code", "this.figure(result)"),
-        *cells_of(after),
-        (
-            "markdown",
-            "## Step through the runs\n\nA page in which you can step and scrub the runs, with "
-            "every guard explained:",
-        ),
-        (
-            "code",
-            "from plots import write_replay\n\nruns = result.replayed\n"
-            f'print(write_replay({replay}, *runs.values(), title="Lesson {number}", '
-            "names=list(runs)))",
-        ),
-        (
-            "markdown",
-            f"## The code of the runs\n\nThis is `run()` of `{module.__name__}`:\n\n"
-            f"```python\n{inspect.getsource(module.run)}```",
-        ),
-    )
+    chosen = lesson(number)
+    words = dict(chosen.words) | {"explanation": _escaped(chosen.words["explanation"])}
+    source = inspect.getsource(chosen.measure)
+    page = TEMPLATE.substitute(words, module=chosen.module, source=source)
+    return tuple(cell for part in page.split(NEW) for cell in cells_of(part))
 
 
 def cells_of(text: str) -> tuple[Cell, ...]:

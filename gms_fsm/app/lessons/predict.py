@@ -84,20 +84,9 @@ def vary(
         )
         return
     ipywidgets: Any = import_module("ipywidgets")
-    numbers = (initial, least, most, step)
-    whole = all(isinstance(each, int) for each in numbers)
+    whole = all(isinstance(each, int) for each in (initial, least, most, step))
     kind = "FloatLogSlider" if log else "IntSlider" if whole else "FloatSlider"
-    slider = getattr(ipywidgets, kind)(
-        initial,
-        min=least,
-        max=most,
-        step=step,
-        description=label,
-        continuous_update=False,
-        **({} if whole else {"readout_format": ".4g"}),
-    )
-    ipywidgets.interact(draw, **{_argument(draw): slider})
-
-
-def _argument(draw: Callable[..., object]) -> str:
-    return next(iter(inspect.signature(draw).parameters))
+    options: dict[str, Any] = {"min": least, "max": most, "step": step, "description": label}
+    options |= {"continuous_update": False} | ({} if whole else {"readout_format": ".4g"})
+    argument = next(iter(inspect.signature(draw).parameters))
+    ipywidgets.interact(draw, **{argument: getattr(ipywidgets, kind)(initial, **options)})

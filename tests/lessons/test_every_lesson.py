@@ -1,0 +1,276 @@
+"""What holds for every lesson: its lines, its figure, its notebook, its questions and answers."""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import json
+import re
+import string
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from gms_fsm.app import lessons
+from gms_fsm.app.lessons import LESSONS, Result
+from gms_fsm.app.lessons._lesson import Lesson, grid
+from gms_fsm.app.lessons.notebooks import composed
+from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
+from tests.helpers import ROOT, matrix
+from tests.scenario_files import CommandLine
+
+FOLDER = ROOT / "docs" / "lessons"
+COUNTED = ("", "elements n", "switches found once per step", "elements in slip")  # without a unit
+FORMATTER = string.Formatter()
+Ran = Callable[[int], Result]
+SLOW = sorted({*LESSONS} - {1, 9})
+each_lesson = pytest.mark.parametrize(
+    "number", [1, 9, *(pytest.param(number, marks=pytest.mark.slow) for number in SLOW)]
+)
+
+
+def test_a_module_in_the_folder_is_a_lesson() -> None:
+    assert list(LESSONS) == list(range(1, len(LESSONS) + 1)) == list(range(1, 12))
+    for number, lesson in LESSONS.items():
+        assert lesson.heading == f"Lesson {number}: {lesson.question}"
+        assert lesson.module.startswith(f"gms_fsm.app.lessons.l{number}_")
+    assert len({lesson.question for lesson in LESSONS.values()}) == len(LESSONS)
+
+
+@each_lesson
+def test_the_five_lines_say_what_was_measured(ran: Ran, number: int) -> None:
+    question, run, first, second, moral = ran(number).lines()
+    assert question == f"Question: {LESSONS[number].question}"
+    assert run.startswith("Run: ")
+    assert "chosen by us" in run
+    assert re.search("signed law|published law", run)
+    assert moral.startswith("So: ")
+    assert not re.search(r"[{}\n]", "".join((run, first, second, moral)))
+    # In both lines of measured values, the numbers are those of the run.
+    templates = LESSONS[number].words["said"].split("\n\n")[1:3]
+    for template, line in zip(templates, (first, second), strict=True):
+        fields = [re.split(r"\W", name)[0] for _, name, *_ in FORMATTER.parse(template) if name]
+        assert {*fields} & {*ran(number).values}
+        assert line.startswith("Measured")
+
+
+@pytest.mark.slow
+@each_lesson
+def test_its_figure_has_units_and_nothing_overlaps(ran: Ran, number: int) -> None:
+    pytest.importorskip("matplotlib", reason="pictures need the extra 'plots'")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.text import Annotation
+
+    lesson = LESSONS[number]
+    figure = lesson.figure(ran(number))
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    texts: list[Any] = []
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            label = axis.label.get_text()
+            assert label in COUNTED or "[" in label, label
+        texts += [ax.title, ax._left_title, ax.xaxis.label, ax.yaxis.label]
+        texts += [text for text in ax.texts if isinstance(text, Annotation)]
+    said = [text.get_text() for text in texts]
+    letters = "".join(sorted(ax.title.get_text() for ax in figure.axes))
+    assert letters == "abcdef"[: len(lesson.panels)]
+    assert any(" law" in each for each in said), "no panel names the law it ran"
+    boxes = [(t.get_text(), t.get_window_extent()) for t in texts if t.get_text()]
+    width, height = canvas.get_width_height()
+    for text, box in boxes:
+        assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= -1, text
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
+        wide = min(a.x1, b.x1) - max(a.x0, b.x0)
+        high = min(a.y1, b.y1) - max(a.y0, b.y0)
+        assert wide <= 1 or high <= 1, (one, other)
+
+
+@each_lesson
+def test_readers_predict_before_the_run_and_compare_after_it(ran: Ran, number: int) -> None:
+    cells = composed(number)
+    (run,) = (i for i, (_, text) in enumerate(cells) if "this.run()" in text)
+    asked = "\n".join(text for kind, text in cells[:run] if kind == "code")
+    (answers,) = (text for kind, text in cells[run:] if kind == "code" and "reveal(" in text)
+    assert any("<details>" in text for kind, text in cells[run:] if kind == "markdown")
+    names: dict[str, Any] = {"result": ran(number)}
+    exec(asked, names)
+    predictions = [name for name, value in names.items() if value is None]
+    assert len(predictions) >= 2
+    assert re.findall(r"^reveal\((\w+), ", answers, re.MULTILINE) == predictions
+    exec(answers, names)  # every answer can be read from the run
+
+
+def test_a_page_without_its_parts_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = ModuleType("broken", "Lesson 12: Nothing.\n\nWhat?\n\nNo sections.")
+    monkeypatch.setitem(sys.modules, "broken", broken)
+    with pytest.raises(ValueError, match="broken: its docstring is not the page of a lesson"):
+        _ = Lesson("broken", dict, (), grid("a", (1.0, 1.0))).title
+    with pytest.raises(AttributeError, match="nothing named shoes was measured"):
+        _ = Result(LESSONS[1], {}).shoes
+
+
+@pytest.fixture(scope="module")
+def notebooks() -> ModuleType:
+    """The module that writes and executes notebooks, docs/notebooks.py."""
+    for module in ("ipykernel", "nbclient"):
+        pytest.importorskip(module, reason="running a notebook needs ipykernel and nbclient")
+    spec = importlib.util.spec_from_file_location("notebooks", ROOT / "docs" / "notebooks.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_notebooks_in_the_repository_are_in_step(notebooks: ModuleType) -> None:
+    """If this fails, run: python docs/notebooks.py."""
+    sources = notebooks.sources()
+    names = {path.stem for path in sources}
+    assert names == {*(f"lesson_{number}" for number in LESSONS), "desk_experiment"}
+    assert set(FOLDER.glob("*.ipynb")) == set(sources)
+    for path, text in sources.items():
+        assert path.read_text(encoding="utf-8") == text, path.name
+
+
+# With ipywidgets, and nothing else of the extra docs, the site runs all lessons
+# (tests/docs/test_docs_build.py). Without it, `vary` draws once; one lesson has no slider.
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", matrix(["lesson_1", "lesson_4", "desk_experiment"], ["lesson_1", "desk_experiment"])
+)
+def test_a_notebook_runs_from_top_to_bottom(
+    name: str, notebooks: ModuleType, tmp_path: Path
+) -> None:
+    for module in ("matplotlib", "llvmlite", "pygraphviz", "uplot"):
+        pytest.importorskip(module, reason="a lesson uses the extra 'all'")
+    text = (FOLDER / f"{name}.ipynb").read_text(encoding="utf-8")
+    hidden = 'import sys\nsys.modules["ipywidgets"] = None'
+    first = f"{notebooks.WITHOUT_DOCS}\n{hidden}\n{notebooks.STRICT}"
+    done = notebooks.executed(text, tmp_path, first)
+    outputs = [output for cell in done.cells for output in cell.get("outputs", ())]
+    said = "".join(each["text"] for each in outputs if each.get("name") == "stderr")
+    assert [line for line in said.splitlines() if not line.startswith("findfont: ")] == []  # fonts
+    pictures = [each for each in outputs if "image/png" in each.get("data", {})]
+    printed = "".join(each.get("text", "") for each in outputs)
+    lesson = name.startswith("lesson")
+    assert len(pictures) == 1 + text.count('"vary(')
+    assert printed.count("You predicted nothing. Measured: ") == text.count('"reveal(')
+    assert (tmp_path / f"{name}_replay.html").is_file() == lesson
+    assert lesson or "friction coefficient 0.30" in printed  # the record was made with 0.30
+
+
+def test_the_command_line_lists_lessons_and_writes_notebooks(gms_fsm: CommandLine) -> None:
+    done = gms_fsm("lesson")
+    assert done.code == 0, done.err
+    for line, (number, lesson) in zip(done.out.splitlines(), LESSONS.items(), strict=True):
+        assert line == f"{number}  {lesson.title}: {lesson.question}"
+    path = Path("mine", "lesson_1.ipynb")
+    assert gms_fsm("lesson", "1", "--notebook", "-o", "mine").out == f"{path}\n"
+    assert path.read_text(encoding="utf-8") == (FOLDER / path.name).read_text(encoding="utf-8")
+    assert len(gms_fsm("lesson", "--notebook", "-o", "all").out.splitlines()) == len(LESSONS)
+
+    content: Any = json.loads(path.read_text(encoding="utf-8"))
+    content["cells"][2]["source"] = ["first_slip = 6.25"]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    done = gms_fsm("lesson", "1", "--notebook", "-o", "mine")  # not over a reader's answers
+    assert done.code == 2
+    assert "lesson_1.ipynb" in done.err
+    assert "6.25" in path.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_command_line_writes_text_figure_and_page(gms_fsm: CommandLine) -> None:
+    for module in ("matplotlib", "uplot", "pygraphviz"):
+        pytest.importorskip(module, reason="figure and page need the extras")
+    done = gms_fsm("lesson", "7", "-o", "out")
+    assert done.code == 0, done.err
+    text = Path("out/lesson_7.txt").read_text(encoding="utf-8")
+    assert done.out.startswith(text)
+    assert len(text.splitlines()) == 5
+    assert Path("out/lesson_7.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in Path("out/lesson_7.svg").read_text(encoding="utf-8")
+    page = Path("out/lesson_7.html").read_text(encoding="utf-8")
+    assert "Lesson 7" in page
+    assert "10 rad/s: GMS" in page
+    for name in ("txt", "png", "svg", "html"):
+        assert f"lesson_7.{name}" in done.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["99"], "no lesson '99'"),
+        (["0"], "no lesson '0'"),
+        (["one"], "no lesson 'one'"),
+        (["7", "-o", "file/out"], "choose another folder"),
+    ],
+)
+def test_a_mistake_is_one_message_before_anything_runs(
+    arguments: list[str], said: str, gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Lesson, "run", lambda _: pytest.fail("it was run"))
+    Path("file").write_text("in the way")
+    done = gms_fsm("lesson", *arguments)
+    assert done.code == 2
+    assert said in done.err
+    assert "Traceback" not in done.err + done.out
+    assert list(Path().iterdir()) == [Path("file")]
+    with pytest.raises(ParameterError if len(arguments) == 1 else OutputError):
+        lessons.teach(99 if len(arguments) == 1 else 7, "file/out")
+
+
+def test_without_the_extras_there_is_the_text_and_a_note(
+    ran: Ran, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Lesson, "run", lambda _: ran(1))
+
+    def missing(*_: object) -> list[Path]:
+        raise MissingExtraError("needs an extra")
+
+    for step in ("_draw", "_replay"):
+        monkeypatch.setattr(lessons, step, missing)
+    with pytest.warns(UserWarning, match="was written: needs an extra") as noted:
+        taught = lessons.teach(1, tmp_path)
+    assert len(noted) == 2
+    assert [path.name for path in taught.files] == ["lesson_1.txt"]
+    assert taught.files[0].read_text(encoding="utf-8").splitlines() == list(taught.lines)
+
+
+@pytest.mark.parametrize(
+    ("predicted", "measured", "said"),
+    [
+        (6.26, 6.25, "your answer is right"),
+        (3.0, 6.0, "50 % too low"),
+        (9.0, 6.0, "50 % too high"),
+        (-1.0, 6.0, "far off"),
+        (1e9, 6.0, "far off"),
+        (0.0, 0.0, "You predicted 0 N. Measured: 0 N."),
+        ("lower", "higher", "You predicted lower. Measured: higher."),
+        (None, 6.0, "You predicted nothing. Measured: 6 N."),
+    ],
+)
+def test_a_prediction_is_compared(
+    predicted: Any, measured: Any, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    reveal(predicted, measured, "N")
+    assert said in capsys.readouterr().out
+
+
+def test_a_parameter_has_a_slider_where_ipywidgets_is_installed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    widgets = pytest.importorskip("ipywidgets", reason="a slider needs ipywidgets")
+    made: list[Any] = []
+    monkeypatch.setattr(widgets, "interact", lambda draw, **slider: made.append(slider))
+    vary(lambda n: n, 3, 1, 20, 1, "n")
+    vary(lambda w: w, 45.0, 0.0, 2.7, 0.05, "w", log=True)
+    vary(lambda v: v, 0.1, 0, 1, 0.1, "v")
+    kinds = [(name, type(slider).__name__) for each in made for name, slider in each.items()]
+    assert kinds == [("n", "IntSlider"), ("w", "FloatLogSlider"), ("v", "FloatSlider")]
+    assert made[0]["n"].value == 3
