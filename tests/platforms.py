@@ -43,8 +43,8 @@ from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
 from integrators.machine_code.values import Number
-from tests.helpers import ROOT
-from tests.random_systems import T_END, bits, trial
+from tests.helpers import ROOT, bits
+from tests.random_systems import T_END, trial
 
 SHAPES = 60
 ENGINE = "compiled" if find_spec("llvmlite") else "ifelse"
