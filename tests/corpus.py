@@ -416,7 +416,7 @@ def _flow(text: str) -> ChartModel:
     return ChartModel(chart, {"k": 1.0}, n=2, stribeck=CURVE)
 
 
-def _go(guard: str, **actions: str) -> ChartModel:
+def go(guard: str, **actions: str) -> ChartModel:
     return _broken(Transition("go", "stick", "slip", guard=guard, actions=actions))
 
 
@@ -461,11 +461,11 @@ FAILURES: dict[str, _Failure] = {
     "division by zero": (SimulationError, _on(SIGNED, Prescribed("0.1/(2 - t)"), 10.0)),
     "nothing at the start": (NotFiniteError, _on(SIGNED, Prescribed("sqrt(-1 - t)"), 10.0)),
     "a force without end": (SimulationError, _on(PULLED[0], Slider(1.0, "exp(300*t)"), 10.0)),
-    "a guard of NaN": (NotFiniteError, _on(_go("0 / (z - z) > 0"), Prescribed("0.1"), 1.0)),
-    "a root in a guard": (NotFiniteError, _on(_go("sqrt(-1 - z) > 0"), Prescribed("0.1"), 1.0)),
+    "a guard of NaN": (NotFiniteError, _on(go("0 / (z - z) > 0"), Prescribed("0.1"), 1.0)),
+    "a root in a guard": (NotFiniteError, _on(go("sqrt(-1 - z) > 0"), Prescribed("0.1"), 1.0)),
     "an action of NaN": (
         NotFiniteError,
-        _on(_go("z >= 0.05", z="1 / (z - z)"), Prescribed("0.1"), 1.0),
+        _on(go("z >= 0.05", z="1 / (z - z)"), Prescribed("0.1"), 1.0),
     ),
     "the record ends": (SignalEndError, _on(SIGNED, Prescribed(RECORD), 61.0)),
     "the record ends, rk4": (SignalEndError, _on(SIGNED, Prescribed(RECORD), 61.0, **_RK4)),

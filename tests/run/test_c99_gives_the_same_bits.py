@@ -19,7 +19,7 @@ from integrators.machine_code import objects
 from integrators.machine_code.c99 import c99_text
 from tests.helpers import open_loop, pulled_mass, same_bits, stick_slip
 from tests.physics.test_sliding_between_states import FALLING, relay
-from tests.systems_cases import CASES, same_system_bits
+from tests.systems_cases import CASES
 
 pytestmark = [
     pytest.mark.slow,
@@ -92,7 +92,7 @@ def test_the_bank(case: str, options: dict[str, Any], by_c: list[str]) -> None:
 
 @pytest.mark.parametrize("name", ["servo", "puck"])
 def test_systems(name: str, by_c: list[str]) -> None:
-    same_system_bits(CASES[name]().run("compiled"), CASES[name]().run("machines"))
+    same_bits(CASES[name]().run("compiled"), CASES[name]().run("machines"))
     assert by_c
 
 
