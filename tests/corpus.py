@@ -11,7 +11,7 @@ import functools
 import importlib.util
 import math
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,10 +19,12 @@ import numpy as np
 import pytest
 
 from gms_fsm import (
+    GMS,
     Body,
     Chart,
     ChartModel,
     Contact,
+    GMSParameters,
     LuGre,
     Prescribed,
     PulledSlider,
@@ -225,24 +227,109 @@ ORDER = Chart(
 )
 
 
-def relay() -> ChartModel:
-    """A variable pushed onto a surface from both sides, along which the run slides."""
+RISING = ("1 + 0.3 * t", "-1 + 0.3 * t")  # p' below and above q = 0
+FALLING = ("1 - 0.3 * t", "-1 - 0.3 * t")
+
+
+def relay(
+    flows: tuple[str, str] = RISING,
+    guards: tuple[str, str] = ("p > q", "p < q"),
+    more: Sequence[Transition] = (),
+    n: int = 1,
+) -> ChartModel:
+    """A variable p pushed towards q from both sides, along which the run slides."""
+    below, above = flows
     chart = Chart(
         "relay",
         inputs=("t",),
         variables=("p", "q"),
         parameters=("k",),
         states=(
-            State("below", flow={"p": "1 - 0.3 * t", "q": "0"}),
-            State("above", flow={"p": "-1 - 0.3 * t", "q": "0"}),
+            State("below", flow={"p": below, "q": "0"}),
+            State("above", flow={"p": above, "q": "0"}),
+            State("off", flow={"p": "0", "q": "0"}),
         ),
         transitions=(
-            Transition("rise", "below", "above", guard="p > q"),
-            Transition("fall", "above", "below", guard="p < q"),
+            Transition("rise", "below", "above", guard=guards[0]),
+            Transition("fall", "above", "below", guard=guards[1]),
+            *more,
         ),
         outputs={"F": "k * p"},
     )
-    return ChartModel(chart, {"k": 1.0})
+    return ChartModel(chart, {"k": 1.0}, n=n)
+
+
+def coulomb(outputs: str = "F_c * sgn(v)") -> ChartModel:
+    """Coulomb friction without stiction: a sign."""
+    chart = Chart(
+        "Coulomb friction",
+        inputs=("v", "x"),
+        variables=("z",),
+        parameters=("F_c",),
+        states=(State("on", flow={"z": "0"}),),
+        outputs={"F": outputs},
+    )
+    return ChartModel(chart, {"F_c": 1.0})
+
+
+def runs_down(C: Any) -> ChartModel:
+    """Elements that come to rest on z = 0, each in its time."""
+    chart = Chart(
+        "runs down",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("C",),
+        states=(State("on", flow={"z": "v - C * sgn(z)"}),),
+        outputs={"F": "z"},
+    )
+    return ChartModel(chart, {"C": C}, n=len(C))
+
+
+class Belt:
+    """A mass on a belt that moves."""
+
+    title = "mass on a moving belt"
+    acceleration = "(stiffness * (0 - x) - F - F_b * sgn(v - w)) / mass"
+
+    def __init__(self, w: str) -> None:
+        self.signals = {"w": as_signal(w)}
+        self.numbers = {"mass": 1.0, "stiffness": 4.0, "F_b": 1.0}
+
+
+# An element that slips holds v at 0 for a tenth of a millisecond.
+HELD = GMS(
+    GMSParameters(
+        [82e3, 146e3, 110e3],
+        [29, 2.6, 114],
+        [2.8e-3, 2.16e-3, 1.53e-3],
+        sigma_2=1.3,
+        stribeck=Stribeck(2.88, 3.155, 8.8e-3),
+        v_c=3.3e-6,
+        weights=[3.9e-6, 3e-6, 2.15e-6],
+    ),
+    law="signed",
+)
+PUSHED = Slider(1.4, "2.9*sin(4.7*t)")
+
+
+def _broken(*edges: Transition) -> ChartModel:
+    """The signed element with other edges."""
+    sound = gms_element("signed")
+    chart = Chart(
+        "broken",
+        sound.inputs,
+        sound.variables,
+        sound.parameters,
+        sound.states,
+        edges,
+        sound.outputs,
+    )
+    values = {"k": 1, "sigma": 0.1, "C": 0.1, "v_c": 0.2}
+    return ChartModel(chart, values, n=2, stribeck=Stribeck(1.0, 1.5, 1e-3), weights=[2, 1])
+
+
+def go(guard: str, **actions: str) -> ChartModel:
+    return _broken(Transition("go", "stick", "slip", guard=guard, actions=actions))
 
 
 OWN_RUNS: dict[str, Maker] = {
@@ -254,7 +341,18 @@ OWN_RUNS: dict[str, Maker] = {
         2.0,
         initial={"z": [2.0, 3.0], "w": [0.0, 0.0]},
     ),
-    "sliding": _on(relay(), Prescribed("0"), 5.0, initial={"p": [-0.1], "q": [0.0]}),
+    "sliding": _on(relay(FALLING), Prescribed("0"), 5.0, initial={"p": [-0.1], "q": [0.0]}),
+    "held at standstill": _on(HELD, PUSHED, 0.4),
+    "coulomb": _on(coulomb(), PulledSlider(1.0, 2.0, 0.1), 10.0),
+    "on a belt": _on(coulomb("0 * F_c"), Belt("0.1 * cos(t)"), 1.2, initial={"v": 0.1}),
+    "runs down": _on(
+        runs_down([1.0, 2.0, 2.0, 0.1]),
+        Slider(1e9, "0"),
+        2.0,
+        initial={"z": [1.0, 1.0, -1.0, 1.0]},
+    ),
+    "an infinite side": _on(go("exp(1e4 + z) > 0"), Prescribed("0.1"), 1.0),
+    "divided by zero": _on(go("1 / (z - z) > 0"), Prescribed("0.1"), 1.0),
     "fast switching": _on(banging(1e-2), Prescribed("1"), 2.0),
 }
 
@@ -392,32 +490,12 @@ SCENARIO_RUNS: dict[str, Maker] = {f"scenario {name}": _scenario(name) for name 
 
 
 # --------------------------------------------------------------------------- runs that stop
-def _broken(*edges: Transition) -> ChartModel:
-    """The signed element with other edges."""
-    sound = gms_element("signed")
-    chart = Chart(
-        "broken",
-        sound.inputs,
-        sound.variables,
-        sound.parameters,
-        sound.states,
-        edges,
-        sound.outputs,
-    )
-    values = {"k": 1, "sigma": 0.1, "C": 0.1, "v_c": 0.2}
-    return ChartModel(chart, values, n=2, stribeck=Stribeck(1.0, 1.5, 1e-3), weights=[2, 1])
-
-
-def _flow(text: str) -> ChartModel:
+def flow_of(text: str) -> ChartModel:
     """Two variables with one flow and no edges."""
     chart = Chart(
         "flow", ("v", "t"), ("z",), ("k",), (State("on", {"z": text}),), (), {"F": "k * z"}
     )
     return ChartModel(chart, {"k": 1.0}, n=2, stribeck=CURVE)
-
-
-def go(guard: str, **actions: str) -> ChartModel:
-    return _broken(Transition("go", "stick", "slip", guard=guard, actions=actions))
 
 
 BOTH_WAYS = _broken(
@@ -434,24 +512,24 @@ FAILURES: dict[str, _Failure] = {
     "livelock": (LivelockError, _on(BOTH_WAYS, Prescribed("0.15"), 20.0)),
     "self-loop": (LivelockError, _on(SELF_LOOP, Prescribed("0.5"), 5.0)),
     "chattering": (LivelockError, _on(banging(1e-8), Prescribed("1"), 10.0)),
-    "no slope": (LivelockError, _on(_flow("0"), FunctionBelt(), 5.0, initial={"v": 1.0})),
-    "blow-up": (StepSizeError, _on(_flow("z * z"), Prescribed("0"), 2.0, **_UP)),
+    "no slope": (LivelockError, _on(flow_of("0"), FunctionBelt(), 5.0, initial={"v": 1.0})),
+    "blow-up": (StepSizeError, _on(flow_of("z * z"), Prescribed("0"), 2.0, **_UP)),
     "blow-up, bs23": (
         StepSizeError,
-        _on(_flow("z * z"), Prescribed("0"), 2.0, method="bs23", rtol=1e-4, **_UP),
+        _on(flow_of("z * z"), Prescribed("0"), 2.0, method="bs23", rtol=1e-4, **_UP),
     ),
     "blow-up by step": (
         StepSizeError,
-        _on(_flow("z * z"), Prescribed("0"), 2.0, **_BY_STEP, **_UP),
+        _on(flow_of("z * z"), Prescribed("0"), 2.0, **_BY_STEP, **_UP),
     ),
-    "blow-up, rk4": (NotFiniteError, _on(_flow("z * z"), Prescribed("0"), 20.0, **_RK4, **_UP)),
+    "blow-up, rk4": (NotFiniteError, _on(flow_of("z * z"), Prescribed("0"), 20.0, **_RK4, **_UP)),
     "blow-up, rk4 by step": (
         NotFiniteError,
-        _on(_flow("z * z"), Prescribed("0"), 20.0, events="step", **_RK4, **_UP),
+        _on(flow_of("z * z"), Prescribed("0"), 20.0, events="step", **_RK4, **_UP),
     ),
-    "pole of t": (StepSizeError, _on(_flow("1 / (1 - t)**2"), Prescribed("0"), 2.0)),
-    "odd pole of t": (SimulationError, _on(_flow("1 / (t - 1)"), Prescribed("0"), 2.0)),
-    "infinite at once": (NotFiniteError, _on(_flow("1 / (k - 1)"), Prescribed("0"), 2.0)),
+    "pole of t": (StepSizeError, _on(flow_of("1 / (1 - t)**2"), Prescribed("0"), 2.0)),
+    "odd pole of t": (SimulationError, _on(flow_of("1 / (t - 1)"), Prescribed("0"), 2.0)),
+    "infinite at once": (NotFiniteError, _on(flow_of("1 / (k - 1)"), Prescribed("0"), 2.0)),
     "root of a negative": (NotFiniteError, _on(PUBLISHED, Prescribed("0.1*sqrt(3 - t)"), 10.0)),
     "root, fixed steps": (
         NotFiniteError,

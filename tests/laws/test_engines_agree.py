@@ -70,6 +70,11 @@ STILL = {  # the others switch
     "rate-state-slip",
     "seven-parameter",
     "prandtl-tomlinson",
+    "coulomb",
+    "on a belt",
+    "runs down",
+    "random system 1",
+    "random system 4",
 }
 
 

@@ -17,8 +17,8 @@ from gms_fsm.run import _compiled_run
 from integrators import compiled as machine
 from integrators.machine_code import objects
 from integrators.machine_code.c99 import c99_text
+from tests.corpus import FALLING, relay
 from tests.helpers import open_loop, pulled_mass, same_bits, stick_slip
-from tests.physics.test_sliding_between_states import FALLING, relay
 from tests.systems_cases import CASES
 
 pytestmark = [

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from gms_fsm import Chart, ChartModel, Prescribed, State, Trace, simulate
 from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.program import lower
-from tests.corpus import go
 from tests.helpers import CURVE, open_loop, other_parts, pulled_mass, stick_slip
 
 pytest.importorskip("llvmlite", reason="needs the extra fast")
@@ -123,19 +122,6 @@ def test_every_function_at_many_places(text: str) -> None:
     one, other = wanted[:, 1], found[:, 1]
     np.testing.assert_array_equal(np.isnan(one), np.isnan(other))  # whatever its payload
     assert one[~np.isnan(one)].tobytes() == other[~np.isnan(one)].tobytes()
-
-
-@pytest.mark.parametrize("guard", ["1 / (z - z) > 0", "exp(1e4 + z) > 0"])
-def test_an_infinite_side_of_a_guard(guard: str) -> None:
-    trace = agreed(go(guard), Prescribed("0.1"), 1.0)
-    assert set(trace.transitions.t.tolist()) == {0.0}
-
-
-def test_an_infinite_force_is_recorded_unchanged() -> None:
-    chart = Chart("loud", ("v",), ("z",), (), (State("on", {"z": "v"}),), (), {"F": "1 / (1 - z)"})
-    model = ChartModel(chart, {}, n=1, stribeck=CURVE)
-    trace = agreed(model, Prescribed("1"), 2.0, initial={"z": [1.0]})
-    assert np.isinf(trace.F[0])
 
 
 def test_scipy_solvers_are_not_compiled() -> None:
