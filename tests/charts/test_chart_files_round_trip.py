@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from gms_fsm import Chart, State, Transition
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import OutputError
-from tests.random_charts import charts
+from tests.strategies import charts
 
 
 @pytest.mark.slow
