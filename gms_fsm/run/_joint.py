@@ -18,7 +18,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.run._plausible import bounds_of
 from gms_fsm.run._steppable import start_of
-from gms_fsm.run._stepper import Machine, Plain, Stepper, fast, state_of
+from gms_fsm.run._stepper import Machine, Plain, Stepper, fast, put_state, state_of
 from gms_fsm.run.settings import MOST_STEPS
 from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems.models import Model
@@ -32,9 +32,8 @@ from gms_fsm.traces.failures import (
     StepSizeError,
 )
 from gms_fsm.traces.rows import Rows
-from integrators import advance, hybrid, loop
-from integrators.stepping import FULL_LOG, MEAN, RESUMED, SWITCHES
-from integrators.steps import T
+from integrators import advance, hybrid, loop, states
+from integrators.stepping import FULL_LOG
 
 __all__ = [
     "Alone",
@@ -118,7 +117,6 @@ class Part(NamedTuple):
     """A part of the state, and where it is in an array."""
 
     name: str
-    place: Any
     kind: np.dtype[Any]
     where: slice
 
@@ -164,10 +162,9 @@ class Joint:
                 place=f"contact {start.system.contacts[0].name!r}",
                 advice="give it another name",
             )
-        # Views: an item of a memoryview is written in half the time of one of an array.
-        sample = stepper.sample
-        self._end, self.force = _view(sample.end), _view(sample.force)
-        self._counts, self._v = _view(sample.counts), _view(sample.inputs[0])
+        self._sampled = stepper.sample
+        # A view: an item of a memoryview is written in half the time of one of an array.
+        self._v = _view(stepper.sample.inputs[0])
         # The entry of its default state sees the first velocity.
         self.enters = bool(self._chart.assignments["entry", self._chart.default_state.name])
 
@@ -178,23 +175,22 @@ class Joint:
             self._give(inputs)
         if self.enters:
             self.enter(Last(v0, v1, t, inputs))
-        v, counts = self._v, self._counts
-        self._end[0], v[0], v[1] = t, v0, v1
-        counts[RESUMED] = 0
+        v, sample = self._v, self._sampled
+        sample.end, v[0], v[1] = t, v0, v1
+        sample.resumed = False
         self.more = []
         if code := self.stepper.run():
             self.finish(code)
-        force: float = self.force[0]
-        return force
+        return sample.force
 
     def finish(self, code: int) -> None:
         """Complete a sample that ended early, or raise its error."""
-        counts = self._counts
+        sample = self._sampled
         while code:
             if code != FULL_LOG:
                 raise self._failure(code)
             self.more += self._logged()
-            counts[SWITCHES], counts[RESUMED] = 0, 1
+            sample.switches, sample.resumed = 0, True
             code = self.stepper.run()
 
     def commit(self, v0: float, v1: float, t: float, inputs: Mapping[str, Line]) -> float:
@@ -227,28 +223,28 @@ class Joint:
     def enter(self, sample: Last) -> None:
         """Enter the default states with the first inputs, if that has not been done yet."""
         b: Any = self.stepper.buffers
-        if b.memory.counts[loop.PHASE] == loop.START:
+        if b.memory.phase == loop.START:
             lines = {**sample.inputs, "v": (sample.v0, sample.v1)}
             # Of a sample without length only its end matters.
-            first = 0 if sample.t > b.now.clock[T] else 1
+            first = 0 if sample.t > b.now.t else 1
             values = {name: line[first] for name, line in lines.items()}
             start = start_of(self.given, *self.asked, values)
             b.now.y[:], b.memory.anchor[:] = start.y, start.y
 
     def _logged(self) -> list[Switch]:
         sample, edges = self.stepper.sample, self._chart.transitions
-        count = int(self._counts[SWITCHES])
+        count = sample.switches
         log = zip(sample.t[:count], sample.machine[:count], sample.edge[:count], strict=True)
         return [Switch(float(t), int(i), edges[int(edge)].name) for t, i, edge in log]
 
     def _failure(self, code: int) -> SimulationError:
         """Return the error for a sample that cannot be completed."""
         b, start = self.stepper.buffers, self.start
-        t, modes = float(b.now.clock[T]), hybrid.modes_of(b)
+        t, modes = b.now.t, hybrid.modes_of(b)
         where = np.array([t]), np.zeros(1, dtype=np.int64), np.array([b.now.y]), np.array([modes])
         row = Rows(*where)
         kind, reason = FAILURES[code]
-        element = f"element {int(b.memory.counts[loop.MACHINE]) + 1}"
+        element = f"element {b.memory.machine + 1}"
         error = kind(
             reason,
             start.trace(row, row, start.firings([])),
@@ -274,7 +270,7 @@ class Joint:
     @property
     def switches(self) -> tuple[Switch, ...]:
         """The edges taken in the last sample."""
-        return (*self.more, *self._logged()) if self._counts[SWITCHES] or self.more else ()
+        return (*self.more, *self._logged()) if self._sampled.switches or self.more else ()
 
     @property
     def mean_force(self) -> float:
@@ -305,12 +301,12 @@ class Joint:
         stepper, more = self.stepper, self.more
         now = stepper.copy()
         stepper.back()
-        length = t - float(stepper.buffers.now.clock[T])
+        length = t - stepper.buffers.now.t
         mean = mean and length > 0.0
-        self._counts[MEAN] = int(mean)
+        self._sampled.mean = mean
         try:
             force = self.run(v0, v1 + change, t, inputs)
-            impulse = float(self.force[1])
+            impulse = self._sampled.impulse
         finally:
             stepper.take(now)
             self.more = more
@@ -320,7 +316,7 @@ class Joint:
     def moved_to(self, t: float) -> None:
         """Forget the last sample: the stepper has been given another state."""
         self.t, self.last, self.more = t, None, []
-        self._counts[SWITCHES] = 0
+        self._sampled.switches = 0
 
     @property
     def engine(self) -> str:
@@ -338,9 +334,9 @@ class Joint:
 
     def to_array(self) -> FloatArray:
         """Return the present state as finite numbers."""
-        flat = np.empty(self.length)
+        flat, state = np.empty(self.length), state_of(self.stepper)
         for part in self._parts:
-            flat[part.where] = part.place
+            flat[part.where] = state[part.name]
         found: FloatArray = np.clip(flat, -MOST, MOST)
         return found
 
@@ -375,13 +371,11 @@ class Joint:
                 place="array",
                 advice="give what to_array returned, unchanged",
             )
-        for part in self._parts:
-            values = flat[part.where]
-            if isinstance(part.place, np.ndarray):
-                part.place[:] = values
-            else:
-                part.place[:] = values.astype(part.kind).tolist()
-        self.moved_to(float(self.stepper.buffers.now.clock[T]))
+        put_state(
+            self.stepper,
+            {part.name: flat[part.where].astype(part.kind).tolist() for part in self._parts},
+        )
+        self.moved_to(self.stepper.buffers.now.t)
 
     @functools.cached_property
     def _parts(self) -> list[Part]:
@@ -390,7 +384,7 @@ class Joint:
         for name, place in state_of(self.stepper).items():
             if name not in TEMPORARY and len(place) > 0:
                 where = slice(start, start + len(place))
-                parts.append(Part(name, place, np.asarray(place).dtype, where))
+                parts.append(Part(name, np.asarray(place).dtype, where))
                 start = where.stop
         return parts
 
@@ -398,7 +392,7 @@ class Joint:
     def _phase(self) -> int:
         """The place of the loop's phase in an array."""
         start: int = next(part.where.start for part in self._parts if part.name == "counts")
-        return start + loop.PHASE
+        return start + states.COUNTS.index("phase")
 
     @functools.cached_property
     def _limits(self) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
@@ -409,11 +403,12 @@ class Joint:
         for part in self._parts:
             whole[part.where] = part.kind.kind != "f"
             if part.name == "floor":  # tolerances only grow
-                least[part.where] = part.place
+                least[part.where] = self.stepper.buffers.now.floor
             if part.name in bounds:
                 least[part.where], most[part.where] = bounds[part.name]
             if part.name == "clock":  # it may be of a friction that began earlier
-                least[part.where.start + T], most[part.where.start + T] = -LATEST, LATEST
+                t = part.where.start + states.CLOCK.index("t")
+                least[t], most[t] = -LATEST, LATEST
         most[whole] = np.minimum(most[whole], 2.0**53)
         least[whole] = np.maximum(least[whole], -(2.0**53))
         return least, most, whole

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -16,8 +16,9 @@ from gms_fsm.run._ticks import EXACT, clocks_of, in_units
 from gms_fsm.run.machines import IfElse
 from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Corners
-from integrators import hybrid
+from integrators import hybrid, states
 from integrators.loop import Buffers, Machines
+from integrators.machine_code.records import numbers_in, numbers_of, put_numbers
 from integrators.sliding import Functions
 from integrators.stepping import Clocks, Sample, restart, step_to
 
@@ -32,10 +33,12 @@ __all__ = [
     "fast",
     "machine_code",
     "prepared",
+    "put_state",
     "state_of",
 ]
 
 MOST_SWITCHES = 64  # in the log of a sample; when it is full, it is emptied and the sample goes on
+SAMPLED, LOGGED = tuple(numbers_of(Sample)), ("t", "machine", "edge")
 
 
 class Stepper(Protocol):
@@ -70,7 +73,7 @@ def fast() -> bool:
 
 
 def state_of(stepper: Stepper) -> dict[str, Any]:
-    """Return the arrays (or lists) that make up a state, without copying them.
+    """Return what makes up a state: numbers, and the arrays (or lists) themselves.
 
     Parameters
     ----------
@@ -80,10 +83,18 @@ def state_of(stepper: Stepper) -> dict[str, Any]:
     Returns
     -------
     dict
-        As `integrators.hybrid.state_of`, and the values of the inputs.
+        As `integrators.states.state_of`, and the values of the inputs.
     """
     inputs = {f"input {k}": stepper.tables[2 * k + 1] for k in range(len(stepper.sample.inputs))}
-    return {**hybrid.state_of(stepper.buffers), **inputs}
+    return {**states.state_of(stepper.buffers), **inputs}
+
+
+def put_state(stepper: Stepper, state: Mapping[str, Sequence[Any]]) -> None:
+    """Return to a state, or to parts of it; see `integrators.states.put_state`."""
+    states.put_state(stepper.buffers, state)
+    for k in range(len(stepper.sample.inputs)):
+        if f"input {k}" in state:
+            stepper.tables[2 * k + 1][:] = state[f"input {k}"]
 
 
 # --------------------------------------------------------------------------- in Python
@@ -126,18 +137,16 @@ class Plain:
 
     def copy(self) -> dict[str, list[Any]]:
         """Return the present state."""
-        return {name: list(place) for name, place in self._all().items()}
+        log = {f"log {name}": getattr(self.sample, name) for name in LOGGED}
+        state = {**state_of(self), **log, "sample": numbers_in(self.sample, SAMPLED)}
+        return {name: list(place) for name, place in state.items()}
 
     def take(self, copy: Mapping[str, list[Any]]) -> None:
         """Return to what `copy` returned."""
-        for name, place in self._all().items():
-            place[:] = copy[name]
-
-    def _all(self) -> dict[str, Any]:
-        """Return all lists that a copy contains."""
-        found = ("end", "counts", "force", "t", "machine", "edge")
-        sample = {f"sample {name}": getattr(self.sample, name) for name in found}
-        return {**state_of(self), **sample}
+        put_state(self, copy)
+        put_numbers(self.sample, SAMPLED, copy["sample"])
+        for name in LOGGED:
+            getattr(self.sample, name)[:] = copy[f"log {name}"]
 
 
 def prepared(start: Start) -> tuple[Buffers, Sample]:
@@ -167,11 +176,15 @@ def prepared(start: Start) -> tuple[Buffers, Sample]:
     restart(b, clocks)
     lines = [each for each in start.system.signals.values() if isinstance(each, Corners)]
     sample = Sample(
-        end=[start.t_start],
+        end=start.t_start,
+        wanted=layout.observed.index(layout.banks[0].of("F")),
+        mean=False,
+        resumed=False,
+        switches=0,
+        code=0,
+        force=0.0,
+        impulse=0.0,
         inputs=[[0.0, 0.0] for _ in lines or (None,)],
-        counts=[0, 0, 0, 0],
-        wanted=[layout.observed.index(layout.banks[0].of("F"))],
-        force=[0.0, 0.0],
         seen=[0.0] * layout.observed.size,
         t=[0.0] * MOST_SWITCHES,
         machine=[0] * MOST_SWITCHES,
@@ -190,10 +203,11 @@ def _clocks(start: Start) -> Clocks:
     units = in_units(ticking)
     exact = units.largest < EXACT
     return Clocks(
-        per_second=[float(units.per_second) if exact else 1.0],
+        per_second=float(units.per_second) if exact else 1.0,
+        begin=0.0,
+        units=0.0,
         period=[*map(float, units.period)] if exact else [each.period for each in ticking],
         offset=[*map(float, units.first)] if exact else [each.offset for each in ticking],
-        begin=[0.0, 0.0],
         made=[0 for _ in ticking],
     )
 

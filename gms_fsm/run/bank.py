@@ -34,7 +34,6 @@ from gms_fsm.run.start import LATEST, Start
 from gms_fsm.run.stepping import Snapshot
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
-from integrators.stepping import CODE, RESUMED
 
 __all__ = ["FrictionBank"]
 
@@ -478,15 +477,11 @@ class _Together:
         self._floats = self._words.view(np.float64)
         first: Any = joints[0].stepper
         self._each, self._address = first.code.each, first.block.address
-        sample = first.sample
-
-        def place(array: Any) -> int:
-            return int(array.ctypes.data - first.block.address) // 8
-
-        self._end, self._force = place(sample.end), place(sample.force)
-        self._counts = place(sample.counts)
-        self._lines = [place(line) for line in sample.inputs]
+        place = first.code.layout.offset
+        self._end, self._force = place("sample.end"), place("sample.force")
+        self._resumed, self._code = place("sample.resumed"), place("sample.code")
         self._names = ("v", *joints[0].inputs)
+        self._lines = [place("sample.inputs") + 2 * k for k in range(len(self._names))]
         self._entering = joints[0].enters
         self._full: list[int] = []  # rows of those with switches that did not fit into the log
         self._more: list[tuple[int, list[Switch]]] = []  # theirs, of the kept state
@@ -499,16 +494,16 @@ class _Together:
             start, end = given[name]
             floats[:, line], floats[:, line + 1] = start[places], end[places]
         floats[:, self._end] = sample.t
-        words[:, self._counts + RESUMED] = 0
+        words[:, self._resumed] = 0
         if self._entering:
             for i, joint in zip(places, self.joints, strict=True):
                 joint.enter(sample.of(i, joint.inputs))
         self._forget()
         if self._each(self._address, len(places)):
-            for row in np.flatnonzero(words[:, self._counts + CODE]).tolist():
+            for row in np.flatnonzero(words[:, self._code]).tolist():
                 self.joints[row].t = sample.begin
                 try:
-                    self.joints[row].finish(int(words[row, self._counts + CODE]))
+                    self.joints[row].finish(int(words[row, self._code]))
                     self._full.append(row)
                 except GMSError as error:
                     raise error.inside(f"joint {places[row]}") from None

@@ -26,8 +26,6 @@ from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.monitors import Monitor, checked, watched
 from gms_fsm.traces.trace import Trace
 from integrators import Arc, HybridError, hybrid
-from integrators.advance import ROW, STEPS
-from integrators.steps import T
 
 __all__ = ["Moment", "Run", "mounted", "simulate"]
 
@@ -248,7 +246,7 @@ class Run:
     def restore(self, kept: dict[str, Any]) -> None:
         """Restore what `kept` returned; the buffers are already filled."""
         now = self.buffers.now
-        t, y = now.clock[T], list(now.y)
+        t, y = now.t, list(now.y)
         self.recorder.restore(kept, (t, y, hybrid.modes_of(self.buffers)))
         if self.engine is not None:
             self.engine.restore(t, list(y), now.mode)
@@ -277,7 +275,7 @@ class Run:
                 error.reason, recorder.trace(), place=error.place, advice=error.advice
             ) from None
         except KeyboardInterrupt:  # within a step; the previous rows may have taken an hour
-            if self.buffers.out.cursor[ROW]:
+            if self.buffers.out.row:
                 recorder.take(hybrid.take_rows(self.buffers))
             raise
         except Interference as error:
@@ -287,7 +285,7 @@ class Run:
             return False
         self.event = event
         recorder.take(event)
-        if isinstance(event, Arc) and self.buffers.out.cursor[STEPS] >= self.next_look:
-            self.next_look = LATER * self.buffers.out.cursor[STEPS]
+        if isinstance(event, Arc) and self.buffers.out.steps >= self.next_look:
+            self.next_look = LATER * self.buffers.out.steps
             check_pace(recorder, self.buffers)
         return True
