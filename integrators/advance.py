@@ -6,6 +6,7 @@ fires edges: the outer loop does so between two calls.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from integrators.crossings import (
@@ -28,16 +29,11 @@ from integrators.step_size import (
     root_of,
 )
 from integrators.steps import (
-    ERROR_BEFORE,
-    SEEN,
-    T_STOP,
     Coefficients,
     Dense,
-    H,
     Motion,
     Now,
     Scratch,
-    T,
     Vector,
     fit_dense,
     interpolate,
@@ -63,8 +59,6 @@ CALM = 2.0
 QUIET = 0.55  # what the controller remembers of a step with hardly an error
 # Significant difference of two times: four units in the last place, whatever the run's length.
 TICK = 4.0 * 2.0**-52
-# Indices into Output.cursor.
-ROW, NEXT_TIME, NEXT_KNOT, STEPS = 0, 1, 2, 3
 
 
 class Plan(NamedTuple):
@@ -86,29 +80,33 @@ class Plan(NamedTuple):
     leaps: bool  # whether velocities that are given may jump at a crossing
 
 
-class Output(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Output:
     """The destination of rows: every accepted step, or the requested times."""
 
-    times: Vector  # requested times, increasing
+    row: int  # rows written
+    next_time: int  # the next requested time
+    next_knot: int
+    steps: int  # tried
     every_step: bool
+    times: Vector  # requested times, increasing
     rows_t: Vector  # shape (capacity,)
     rows_y: list[Vector]  # shape (capacity, m)
-    cursor: list[int]  # [rows written, next requested time, next knot, steps tried]
 
 
 def put_row(out: Output, t: float, y: Vector) -> None:
     """Write one row."""
-    row = out.cursor[ROW]
+    row = out.row
     out.rows_t[row] = t
     place = out.rows_y[row]
     for j in range(len(y)):
         place[j] = y[j]
-    out.cursor[ROW] = row + 1
+    out.row = row + 1
 
 
 def is_full(out: Output) -> bool:
     """Return whether there is no room for the row of another step."""
-    return out.every_step and out.cursor[ROW] >= len(out.rows_t)
+    return out.every_step and out.row >= len(out.rows_t)
 
 
 def tick_at(t: float) -> float:
@@ -133,17 +131,17 @@ def next_on_grid(control: Control, t: float) -> float:
     return t_new
 
 
-def knot_after(plan: Plan, clock: Vector, cursor: list[int]) -> float:
+def knot_after(plan: Plan, now: Now, out: Output) -> float:
     """Return the next knot; infinity if there is none."""
-    knots, t = plan.knots, clock[T]
-    while cursor[NEXT_KNOT] < len(knots) and knots[cursor[NEXT_KNOT]] <= t:
-        cursor[NEXT_KNOT] += 1
-    return knots[cursor[NEXT_KNOT]] if cursor[NEXT_KNOT] < len(knots) else INFINITY
+    knots = plan.knots
+    while out.next_knot < len(knots) and knots[out.next_knot] <= now.t:
+        out.next_knot += 1
+    return knots[out.next_knot] if out.next_knot < len(knots) else INFINITY
 
 
-def limit_after(plan: Plan, clock: Vector, cursor: list[int]) -> float:
+def limit_after(plan: Plan, now: Now, out: Output) -> float:
     """Return the end of the next step at the latest: the next stop or knot."""
-    return min(clock[T_STOP], knot_after(plan, clock, cursor))
+    return min(now.t_stop, knot_after(plan, now, out))
 
 
 def calm_step(plan: Plan, mode: list[int]) -> float:
@@ -199,7 +197,7 @@ def advance(
     """
     y, f = now.y, now.f
     y_new, f_new = scratch.y_new, scratch.f_new
-    clock, cursor, times = now.clock, out.cursor, out.times
+    times = out.times
     adaptive = not plan.control.step > 0.0
     watching = len(w.active) > 0
     waiting = False
@@ -211,16 +209,16 @@ def advance(
     calm = calm_step(plan, now.mode) if adaptive and watching else INFINITY
     rejected = redone = False
     while True:
-        t = clock[T]
-        if t >= clock[T_STOP]:
+        t = now.t
+        if t >= now.t_stop:
             return REACHED
         if not (rejected or redone) and (most_steps <= 0 or is_full(out)):
             return FULL
-        t_new, seen, tick = _next_end(plan, clock, cursor)
+        t_new, seen, tick = _next_end(plan, now, out)
         if not t_new > t:
             return TOO_SMALL
         h = t_new - t
-        cursor[STEPS] += 1
+        out.steps += 1
         most_steps -= 1
         take_step(motion, plan.method, now, t_new, scratch)
         status = _assess_step(plan, now, h, tick, scratch, rejected)
@@ -230,17 +228,17 @@ def advance(
         if status != ACCEPTED:
             return status
 
-        wanted = cursor[NEXT_TIME] < len(times) and times[cursor[NEXT_TIME]] < t_new
+        wanted = out.next_time < len(times) and times[out.next_time] < t_new
         theta = NO_CHANGE
         near = watching and not is_quiet_step(motion, now, t_new, scratch, w)
-        wanders = calm < INFINITY and not redone and clock[ERROR_BEFORE] > QUIET
+        wanders = calm < INFINITY and not redone and now.error_before > QUIET
         if wanders and not near and _is_ahead(w, CALM_STEPS * calm / h):
             if h - calm > AT_ONCE * tick:
-                clock[H] = calm
+                now.h = calm
                 continue
-            clock[H] = min(clock[H], calm)
+            now.h = min(now.h, calm)
         if waiting and adaptive:
-            clock[H] = min(clock[H], longest_next(motion, now, t_new, scratch, w))
+            now.h = min(now.h, longest_next(motion, now, t_new, scratch, w))
         if near or wanted:
             fit_dense(plan.method, h, y, scratch)
         if near:
@@ -254,10 +252,10 @@ def advance(
                 if theta <= ROUGH:  # perhaps almost zero
                     theta = first_change(path, w, tick)
                 if wanders and theta < NO_CHANGE and theta * h - calm > AT_ONCE * tick:
-                    clock[H] = max(calm, theta * h - CALM_STEPS * calm)
+                    now.h = max(calm, theta * h - CALM_STEPS * calm)
                     continue
                 if theta < REDO and theta * h > AT_ONCE * tick:
-                    clock[H] = theta * h
+                    now.h = theta * h
                     redone = True
                     continue
             if theta != NO_CHANGE or not adaptive or redone:
@@ -276,7 +274,7 @@ def advance(
                 y[j] = y_new[j]
                 f[j] = f_new[j]
         motion.follow(min(t_new, seen), y, now.mode, now.held, motion.p)
-        clock[T] = t_new
+        now.t = t_new
         if scaleless:
             raise_floor(plan.control, now)
         if out.every_step:
@@ -285,28 +283,28 @@ def advance(
             return CROSSED
 
 
-def _next_end(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float, float]:
+def _next_end(plan: Plan, now: Now, out: Output) -> tuple[float, float, float]:
     """Return the end of the next step, when it is seen, and the significant difference of times.
 
     It follows the grid or the controller, but not past a stop, and avoids a sliver before one.
     """
-    t, control = clock[T], plan.control
+    t, control = now.t, plan.control
     if control.step > 0.0:
         t_new = next_on_grid(control, t)
     else:
-        t_new = t + min(clock[H], control.max_step)
-    limit = limit_after(plan, clock, cursor)
+        t_new = t + min(now.h, control.max_step)
+    limit = limit_after(plan, now, out)
     tick = TICK * max(abs(t), abs(t_new))
     if t_new + tick >= limit:
         t_new = limit
-    return t_new, min(t_new, clock[SEEN]), tick
+    return t_new, min(t_new, now.seen), tick
 
 
 def _assess_step(
     plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, rejected: bool
 ) -> int:
     """Return the outcome of the attempted step of length h, and choose the next step's length."""
-    control, method, clock = plan.control, plan.method, now.clock
+    control, method = plan.control, plan.method
     y_new, f_new = scratch.y_new, scratch.f_new
     if control.step > 0.0:
         total = 0.0
@@ -317,18 +315,18 @@ def _assess_step(
     weighted_sum(method.E, len(method.B), f_new, scratch.k, scratch.error)
     error = error_norm(scratch.error, h, now.y, y_new, control.rtol, now.floor)
     if not error <= 1.0:
-        clock[H] = h * retry_factor(error, order)
-        if clock[H] > tick:
+        now.h = h * retry_factor(error, order)
+        if now.h > tick:
             return REJECTED
         return TOO_SMALL if error < INFINITY else NOT_FINITE
     root = root_of(error, order)
-    factor = next_factor(root, clock[ERROR_BEFORE])
+    factor = next_factor(root, now.error_before)
     if rejected:
         factor = min(factor, 1.0)
     # A step cut short by a stop says little about the step after it.
-    cut_short = h < clock[H] and not rejected
-    clock[H] = max(clock[H], h * factor) if cut_short else h * factor
-    clock[ERROR_BEFORE] = memory_of(root)
+    cut_short = h < now.h and not rejected
+    now.h = max(now.h, h * factor) if cut_short else h * factor
+    now.error_before = memory_of(root)
     return ACCEPTED
 
 
@@ -340,12 +338,12 @@ def _put_wanted(
     They are right-continuous: a time that coincides with a stop is written after the stop, when the
     states have switched.
     """
-    cursor, t = out.cursor, now.clock[T]
-    while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
-        time = out.times[cursor[NEXT_TIME]]
-        row = cursor[ROW]
+    t = now.t
+    while out.next_time < len(out.times) and out.times[out.next_time] < t_new:
+        time = out.times[out.next_time]
+        row = out.row
         interpolate(dense, (time - t) / h, out.rows_y[row])
-        motion.follow(min(time, now.clock[SEEN]), out.rows_y[row], now.mode, now.held, motion.p)
+        motion.follow(min(time, now.seen), out.rows_y[row], now.mode, now.held, motion.p)
         out.rows_t[row] = time
-        cursor[ROW] = row + 1
-        cursor[NEXT_TIME] += 1
+        out.row = row + 1
+        out.next_time += 1

@@ -5,33 +5,27 @@ Everything is in arrays, so that the whole function can be machine code.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from integrators.advance import ROW, Output, put_row
+from integrators.advance import Output, put_row
 from integrators.loop import (
     ARC,
     DONE,
-    EDGE,
     FIRED,
     FIRING,
-    MACHINE,
-    MICROSTEP,
-    PHASE,
     ROWS,
     SLID,
     STOPPED,
-    TAKEN,
     Buffers,
     Machines,
+    Memory,
     run_to_event,
 )
 from integrators.sliding import Functions, Held, flow_on, follow_on, look, margins_on
-from integrators.steps import SEEN, Motion, Now, T, Vector
+from integrators.steps import Motion, Now, Vector
 
-__all__ = ["FIRINGS", "STOPS", "Log", "Recorded", "record"]
-
-# Indices in Log.counts.
-FIRINGS, STOPS = 0, 1
+__all__ = ["Log", "Recorded", "record"]
 
 
 class Recorded(NamedTuple):
@@ -41,10 +35,12 @@ class Recorded(NamedTuple):
     seen: list[list[int]]  # three places among what is observed; the third is read after, too
 
 
-class Log(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Log:
     """Columns that `record` fills: one entry per firing, and both sides of every stop."""
 
-    counts: list[int]  # [firings, stops]
+    firings: int
+    stops: int
     t: Vector
     machine: list[int]
     edge: list[int]
@@ -91,62 +87,62 @@ def record(
         `run_to_event`.
     """
     observe, now = machines.observe, b.now
-    counts, cursor = b.memory.counts, b.out.cursor
+    memory, out = b.memory, b.out
     seen_at = float("nan")  # the time at which log.seen was computed
     on = Held(functions, now.held, b.sliding)
     motion = Motion(flow_on, margins_on, on, follow_on)
     left = most_steps
     while True:
         left -= 1
-        if left < 0 or _is_full(b.out, log):
+        if left < 0 or _is_full(out, log):
             return ROWS
         event = run_to_event(functions, machines, motion, b, most_steps)
-        t = min(now.clock[T], now.clock[SEEN])
+        t = min(now.t, now.seen)
         if event == ROWS:
-            for row in range(counts[TAKEN], cursor[ROW]):
+            for row in range(memory.taken, out.row):
                 log.rows_microstep[row] = 0
                 _put_modes(now.mode, b.sliding.flags, log.rows_mode[row])
-            counts[TAKEN] = cursor[ROW]
-            if counts[PHASE] == ARC:
+            memory.taken = out.row
+            if memory.phase == ARC:
                 return ROWS
         elif event == FIRING:
             if seen_at != t:
                 look(observe, on, t, now.y, now.mode, log.seen)
-            _put_firing(now, counts, log, recorded)
+            _put_firing(now, memory, log, recorded)
             if pause:
                 return FIRING
         elif event == FIRED:
             look(observe, on, t, now.y, now.mode, log.seen)
             seen_at = t
-            log.numbers[log.counts[FIRINGS]][4] = log.seen[recorded.seen[counts[MACHINE]][2]]
-            log.counts[FIRINGS] += 1
+            log.numbers[log.firings][4] = log.seen[recorded.seen[memory.machine][2]]
+            log.firings += 1
         elif event == SLID:
             seen_at = float("nan")
         elif event not in (STOPPED, DONE):
             return event
         if event not in (ROWS, FIRING):
             switched = event in (FIRED, SLID)
-            _put_stop(now, counts, b.out, b.sliding.flags, log, switched)
+            _put_stop(now, memory, out, b.sliding.flags, log, switched)
         if event == DONE:
             return DONE
 
 
 def _is_full(out: Output, log: Log) -> bool:
     """Return whether a column has no room for the next event."""
-    if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
+    if out.every_step and out.row + 1 >= len(out.rows_t):
         return True
-    if log.counts[FIRINGS] >= len(log.t):
+    if log.firings >= len(log.t):
         return True
-    return 0 < len(log.stops_t) <= log.counts[STOPS]
+    return 0 < len(log.stops_t) <= log.stops
 
 
-def _put_firing(now: Now, counts: list[int], log: Log, recorded: Recorded) -> None:
+def _put_firing(now: Now, memory: Memory, log: Log, recorded: Recorded) -> None:
     """Write the values known before a firing."""
-    i, row = counts[MACHINE], log.counts[FIRINGS]
+    i, row = memory.machine, log.firings
     numbers = log.numbers[row]
-    log.t[row] = now.clock[T]
+    log.t[row] = now.t
     log.machine[row] = i
-    log.edge[row] = counts[EDGE]
+    log.edge[row] = memory.edge
     own, seen = recorded.own[i], recorded.seen[i]
     numbers[0] = now.y[own] if own >= 0 else float("nan")
     numbers[1] = log.seen[seen[0]]
@@ -155,24 +151,24 @@ def _put_firing(now: Now, counts: list[int], log: Log, recorded: Recorded) -> No
 
 
 def _put_stop(
-    now: Now, counts: list[int], out: Output, flags: list[int], log: Log, switched: bool
+    now: Now, memory: Memory, out: Output, flags: list[int], log: Log, switched: bool
 ) -> None:
     """Write the state and the modes from here on."""
-    t = now.clock[T] if switched else min(now.clock[T], now.clock[SEEN])
+    t = now.t if switched else min(now.t, now.seen)
     if out.every_step and switched:
-        row = out.cursor[ROW]
+        row = out.row
         put_row(out, t, now.y)
-        log.rows_microstep[row] = counts[MICROSTEP]
+        log.rows_microstep[row] = memory.microstep
         _put_modes(now.mode, flags, log.rows_mode[row])
-        counts[TAKEN] = out.cursor[ROW]
+        memory.taken = out.row
     if len(log.stops_t) > 0:
-        row = log.counts[STOPS]
+        row = log.stops
         log.stops_t[row] = t
-        log.stops_microstep[row] = counts[MICROSTEP] if switched else 0
+        log.stops_microstep[row] = memory.microstep if switched else 0
         for j in range(len(now.y)):
             log.stops_y[row][j] = now.y[j]
         _put_modes(now.mode, flags, log.stops_mode[row])
-        log.counts[STOPS] += 1
+        log.stops += 1
 
 
 def _put_modes(mode: list[int], flags: list[int], place: list[int]) -> None:

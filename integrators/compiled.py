@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import CodeType, FunctionType
 from typing import Any, NamedTuple, Protocol
 
@@ -42,6 +42,7 @@ from integrators.machine_code import (
     llvm,
     objects,
     passing,
+    records,
     sources,
     statements,
     translate,
@@ -190,7 +191,7 @@ def edition() -> str:
     16
     """
     front = (sources, work, bindings, passing, expressions, statements, translate)
-    tools = (*front, values, tree, layouts, llvm, objects)
+    tools = (*front, values, tree, records, layouts, llvm, objects)
     functions: list[Callable[..., Any]] = []
     constants: list[tuple[str, Any]] = []
     for module in (*LOOPS, *tools):
@@ -489,9 +490,10 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
     size = len(b.now.y)
     column: Any = Column
     plan = b.plan._replace(jumps=column(), before_jumps=column(), ticks=column("i"), knots=column())
-    out = b.out._replace(times=column(), rows_t=column(), rows_y=column("f", size))
+    out = replace(b.out, times=column(), rows_t=column(), rows_y=column("f", size))
     log = Log(
-        counts=[0, 0],
+        firings=0,
+        stops=0,
         t=column(),
         machine=column("i"),
         edge=column("i"),

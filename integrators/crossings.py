@@ -23,7 +23,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from integrators.step_size import INFINITY
-from integrators.steps import SEEN, Motion, Now, Scratch, T, Vector
+from integrators.steps import Motion, Now, Scratch, Vector
 
 __all__ = [
     "DEEPEST",
@@ -188,10 +188,10 @@ def is_quiet_step(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: W
         False if `first_change` must search.
     """
     margins, p, mode = motion.margins, motion.p, now.mode
-    t, y, f = now.clock[T], now.y, now.f
+    t, y, f = now.t, now.y, now.f
     y_new, f_new = scratch.y_new, scratch.f_new
     middle, probe = w.search.y_probe, w.search.probe
-    seen = now.clock[SEEN]
+    seen = now.seen
     margins(min(t_new, seen), y_new, mode, p, w.watch, w.end)
     if any_changed(w, w.end):
         return False
@@ -225,10 +225,10 @@ def longest_next(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Wa
         return longest
     y, f, y_new, f_new = now.y, now.f, scratch.y_new, scratch.f_new
     place, quarter, middle = w.search.y_probe, w.search.low, w.search.probe
-    h = t_new - now.clock[T]
+    h = t_new - now.t
     for j in range(len(y)):  # of the same cubic
         place[j] = 0.84375 * y[j] + 0.15625 * y_new[j] + h * (0.140625 * f[j] - 0.046875 * f_new[j])
-    motion.margins(now.clock[T] + 0.25 * h, place, now.mode, motion.p, w.watch, quarter)
+    motion.margins(now.t + 0.25 * h, place, now.mode, motion.p, w.watch, quarter)
     for r in w.active:
         if w.watch[r] & WAITING:
             a, q, m, b = w.start[r], quarter[r], middle[r], w.end[r]

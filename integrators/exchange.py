@@ -15,18 +15,14 @@ from dataclasses import dataclass
 from integrators.advance import CROSSED, REACHED
 from integrators.crossings import any_changed, listed
 from integrators.loop import (
-    ACTIVE,
     ADVANCE,
     AFTER,
     ARC,
     FIRED,
     FIRING,
-    JUMP,
-    PHASE,
     ROWS,
     SLID,
     START,
-    STATUS,
     STOPPED,
     Buffers,
     Machines,
@@ -35,7 +31,7 @@ from integrators.loop import (
 from integrators.sliding import Functions, Held, flow_on, follow_on, look, margins_on
 from integrators.step_size import INFINITY
 from integrators.stepping import Clocks, next_tick
-from integrators.steps import LATEST, Motion, T, Vector
+from integrators.steps import Motion, Vector
 
 __all__ = ["Exchange", "changed", "indicate", "observe", "settle", "slope"]
 
@@ -79,26 +75,25 @@ def settle(
     int
         0, or an error as in `run_to_event`.
     """
-    now, counts, plan = b.now, b.memory.counts, b.plan
-    clock = now.clock
+    now, memory, plan = b.now, b.memory, b.plan
     for j in range(len(now.y)):
         x.before[j] = now.y[j]
-    clock[LATEST] = abs(clock[T])
+    now.latest = abs(now.t)
     due = False
-    if counts[PHASE] == ARC:  # what crossed is counted, as after a step of ours
+    if memory.phase == ARC:  # what crossed is counted, as after a step of ours
         if len(plan.jumps) > 0:
-            tick = plan.jumps[counts[JUMP]]
-            due = tick - clock[T] <= SOON * abs(tick)
+            tick = plan.jumps[memory.jump]
+            due = tick - now.t <= SOON * abs(tick)
         if due:  # what crossed comes first
-            clock[T] = plan.before_jumps[counts[JUMP]]
-        counts[STATUS] = CROSSED
-        counts[PHASE] = AFTER
+            now.t = plan.before_jumps[memory.jump]
+        memory.status = CROSSED
+        memory.phase = AFTER
     error = _quiet(functions, machines, b, clocks, x)
     if due and error == 0:
-        counts[STATUS] = REACHED
-        counts[PHASE] = AFTER
+        memory.status = REACHED
+        memory.phase = AFTER
         error = _quiet(functions, machines, b, clocks, x)
-    x.next = plan.jumps[counts[JUMP]] if len(plan.jumps) > 0 else INFINITY
+    x.next = plan.jumps[memory.jump] if len(plan.jumps) > 0 else INFINITY
     x.moved = False
     for j in range(len(now.y)):
         if now.y[j] != x.before[j]:
@@ -110,14 +105,14 @@ def _quiet(
     functions: Functions, machines: Machines, b: Buffers, clocks: Clocks, x: Exchange
 ) -> int:
     """Run the loop until a solver would have to go on."""
-    counts, plan, clock = b.memory.counts, b.plan, b.now.clock
-    motion = Motion(flow_on, margins_on, Held(functions, b.now.held, b.sliding), follow_on)
+    now, memory, plan = b.now, b.memory, b.plan
+    motion = Motion(flow_on, margins_on, Held(functions, now.held, b.sliding), follow_on)
     event = ROWS
     while event != ADVANCE:
         event = run_to_event(functions, machines, motion, b, 1)
-        if len(plan.jumps) > 0 and plan.jumps[1] <= clock[T]:
+        if len(plan.jumps) > 0 and plan.jumps[1] <= now.t:
             next_tick(plan, clocks)
-            counts[JUMP] = 0
+            memory.jump = 0
         if event == FIRED:
             x.switches += 1
         elif event not in (FIRING, STOPPED, SLID, ROWS, ADVANCE):
@@ -138,9 +133,9 @@ def slope(functions: Functions, b: Buffers, x: Exchange) -> None:
         Its slope is filled.
     """
     now = b.now
-    if b.memory.counts[PHASE] == START:
-        functions.arm(now.clock[T], now.y, now.mode, functions.p, now.held, b.sliding.watch)
-    flow_on(now.clock[T], now.y, now.mode, now.held, Held(functions, now.held, b.sliding), x.slope)
+    if b.memory.phase == START:
+        functions.arm(now.t, now.y, now.mode, functions.p, now.held, b.sliding.watch)
+    flow_on(now.t, now.y, now.mode, now.held, Held(functions, now.held, b.sliding), x.slope)
 
 
 def indicate(functions: Functions, b: Buffers, x: Exchange) -> None:
@@ -159,7 +154,7 @@ def indicate(functions: Functions, b: Buffers, x: Exchange) -> None:
     for r in range(len(watch)):
         x.margins[r] = 0.0
     on = Held(functions, now.held, b.sliding)
-    margins_on(now.clock[T], now.y, now.mode, on, watch, x.margins)
+    margins_on(now.t, now.y, now.mode, on, watch, x.margins)
     for r in range(len(watch)):
         if watch[r] == 0:
             x.indicators[r] = 1.0
@@ -183,7 +178,7 @@ def changed(functions: Functions, b: Buffers, x: Exchange) -> int:
         Whether `settle` is due.
     """
     indicate(functions, b, x)
-    w = listed(b.relations, b.memory.counts[ACTIVE])
+    w = listed(b.relations, b.memory.active)
     return 1 if any_changed(w, x.margins) else 0
 
 
@@ -203,6 +198,6 @@ def observe(functions: Functions, machines: Machines, b: Buffers, x: Exchange) -
     for k in range(len(now.held)):
         x.signs[k] = now.held[k]
     on = Held(functions, now.held, b.sliding)
-    look(machines.observe, on, now.clock[T], now.y, now.mode, x.seen)
+    look(machines.observe, on, now.t, now.y, now.mode, x.seen)
     for k in range(len(now.held)):
         now.held[k] = x.signs[k]

@@ -8,7 +8,7 @@ from integrators import advance as kernel
 from integrators import loop
 from integrators.crossings import listed
 from integrators.loop import MOST_SWITCHES, Buffers
-from integrators.steps import T, Vector
+from integrators.steps import Vector
 
 __all__ = [
     "Entangled",
@@ -115,17 +115,16 @@ def failure(event: int, b: Buffers, relations: list[str]) -> HybridError:
         The error to raise.
     """
     memory = b.memory
-    counts = memory.counts
-    scene = b.now.clock[T], b.now.y, modes_of(b)
+    scene = b.now.t, b.now.y, modes_of(b)
     if event == kernel.TOO_SMALL:
         return StepTooSmall("step size below the clock's resolution", *scene)
     if event == loop.TOO_MANY_STEPS:
         return TooManySteps(f"the maximum of {b.plan.max_steps} steps was reached", *scene)
     if event == loop.REFUSED:
-        edge = counts[loop.EDGE]
-        return Refused(*scene, counts[loop.MACHINE], edge if edge >= 0 else None)
+        edge = memory.edge
+        return Refused(*scene, memory.machine, edge if edge >= 0 else None)
     if event == loop.MACHINE_LIVELOCK:
-        machine = counts[loop.MACHINE]
+        machine = memory.machine
         return Livelock(*scene, machine, memory.switches[machine], [])
     if event == loop.RELATION_LIVELOCK:
         # A relation in a guard may have changed once more than its machine has switched.
@@ -137,7 +136,7 @@ def failure(event: int, b: Buffers, relations: list[str]) -> HybridError:
         return Livelock(*scene, None, MOST_SWITCHES, often)
     if event == loop.ENTANGLED:
         return Entangled(*scene, sorted(k for k, on in enumerate(b.sliding.flags) if on))
-    w = listed(b.relations, counts[loop.ACTIVE])
+    w = listed(b.relations, memory.active)
     undefined = [
         name for r, name in enumerate(relations) if r in w.active and w.start[r] != w.start[r]
     ]

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from integrators import advance as kernel
 from integrators import loop
 from integrators.advance import Output, Plan
 from integrators.crossings import watched
@@ -40,16 +39,15 @@ from integrators.sliding import (
     margins_on,
     sliding_scratch,
 )
+from integrators.states import COUNTS, CURSOR, beginning
 from integrators.step_size import Control
 from integrators.steps import (
-    SEEN,
     Dense,
     Flow,
     Margins,
     Motion,
     Now,
     Scratch,
-    T,
     Vector,
     coefficients,
     stays,
@@ -83,7 +81,6 @@ __all__ = [
     "plan_of",
     "relaxation_times",
     "run",
-    "state_of",
     "take_rows",
 ]
 
@@ -305,7 +302,7 @@ def run(
 def events(equations: Equations, switch: Switch, b: Buffers, options: Options) -> Iterator[Event]:
     """Continue from the state in some buffers; see `run`.
 
-    Between two events the buffers contain the complete state of the run (`state_of`).
+    Between two events the buffers contain the complete state of the run (`integrators.states`).
 
     Parameters
     ----------
@@ -328,31 +325,31 @@ def events(equations: Equations, switch: Switch, b: Buffers, options: Options) -
         solver = SciPyStepper(on, b, options)
     plainly = Motion(functions.flow, functions.margins, functions.p, functions.follow)
     along = Motion(flow_on, margins_on, on, follow_on)
-    counts, cursor, y = b.memory.counts, b.out.cursor, b.now.y
+    now, memory, out = b.now, b.memory, b.out
     before: tuple[Vector, tuple[int, ...]] = [], ()
     while True:
-        motion = along if b.sliding.which[-1] else plainly
+        motion = along if b.sliding.count else plainly
         try:
             event = loop.run_to_event(functions, switch, motion, b, options.rows_at_once)
             if solver is not None and event == loop.ADVANCE:
-                left = b.plan.max_steps - cursor[kernel.STEPS]
+                left = b.plan.max_steps - out.steps
                 solver.advance(min(options.rows_at_once if options.located else 1, left))
         except Exception:
-            if cursor[kernel.ROW]:
+            if out.row:
                 yield take_rows(b)
             raise
-        t, mode = b.now.clock[T], modes_of(b)
-        seen = min(t, b.now.clock[SEEN])
+        t, y, mode = now.t, now.y, modes_of(b)
+        seen = min(t, now.seen)
         if event == loop.ROWS:
             yield take_rows(b)
         elif event == loop.FIRING:
             before = list(y), mode
         elif event == loop.FIRED:
-            machine, edge = counts[loop.MACHINE], counts[loop.EDGE]
+            machine, edge = memory.machine, memory.edge
             scenes = (*before, list(y), mode)
-            yield Firing(t, counts[loop.MICROSTEP], machine, edge, *scenes, seen=seen)
+            yield Firing(t, memory.microstep, machine, edge, *scenes, seen=seen)
         elif event == loop.SLID:
-            yield Slide(t, counts[loop.MICROSTEP], list(y), mode)
+            yield Slide(t, memory.microstep, list(y), mode)
         elif event in (loop.STOPPED, loop.DONE):
             yield Stop(seen, list(y), mode)
             if event == loop.DONE:
@@ -403,7 +400,7 @@ def buffers(
     return Buffers(
         plan=plan,
         now=Now(
-            clock=beginning(t, t_end),
+            **beginning(t, t_end),
             y=list(y),
             f=vector(),
             mode=list(mode),
@@ -411,7 +408,7 @@ def buffers(
             floor=list(options.floor or options.atol),
         ),
         memory=Memory(
-            counts=[0] * loop.PLACES,
+            **_zeros(COUNTS),
             edges=[-1] * n,
             switches=[0] * n,
             changes=[0] * len(strict),
@@ -425,11 +422,11 @@ def buffers(
             surfaces, size, equations.held, len(strict), equations.seen, machines=n
         ),
         out=Output(
-            times=[] if times is None else _as_list(times),
+            **_zeros(CURSOR),
             every_step=times is None,
+            times=[] if times is None else _as_list(times),
             rows_t=[0.0] * capacity,
             rows_y=[vector() for _ in range(capacity)],
-            cursor=[0, 0, 0, 0],
         ),
         scratch=Scratch(
             k=[vector() for _ in plan.method.B],
@@ -439,6 +436,10 @@ def buffers(
             dense=Dense(vector(), vector(), vector(), vector(), vector()),
         ),
     )
+
+
+def _zeros(names: Sequence[str]) -> dict[str, Any]:
+    return dict.fromkeys(names, 0)
 
 
 def _as_list(numbers: Sequence[float] | Any) -> list[Any]:
@@ -514,39 +515,6 @@ def relaxation_times(options: Options) -> Vector:
     return [time or math.inf for row in padded for time in row]
 
 
-def state_of(b: Buffers) -> dict[str, Any]:
-    """Return the lists (or arrays) that make up a run's state, without copying them.
-
-    Parameters
-    ----------
-    b : Buffers
-        The buffers of a run between two events.
-
-    Returns
-    -------
-    dict
-        By name; to resume bit for bit, copy them back into buffers created in the same way.
-    """
-    w, s = b.relations, b.sliding
-    return {
-        **b.now._asdict(),
-        **b.memory._asdict(),
-        "watch": w.watch,
-        "room": w.room,
-        "truth": w.truth,
-        "start": w.start,
-        "cursor": b.out.cursor,
-        "slid": s.flags,
-        "arrived": s.arrived,
-        "which": s.which,
-    }
-
-
-def beginning(t: float, t_end: float) -> Vector:
-    """Return `Now.clock` for a run that has not started."""
-    return [t, 0.0, 1.0, t_end, t, -math.inf, math.inf, abs(t_end), math.inf]
-
-
 def take_rows(b: Buffers) -> Arc:
     """Take the rows waiting in the buffers; only complete ones are counted there.
 
@@ -560,7 +528,7 @@ def take_rows(b: Buffers) -> Arc:
     Arc
         Possibly without rows.
     """
-    rows = b.out.cursor[kernel.ROW]
-    b.out.cursor[kernel.ROW] = 0
+    rows = b.out.row
+    b.out.row = 0
     states = [list(y) for y in b.out.rows_y[:rows]]
     return Arc(b.out.rows_t[:rows], states, modes_of(b))

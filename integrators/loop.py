@@ -8,16 +8,14 @@ each event to its caller, the compiled engine (`record`) writes it into columns.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from integrators.advance import (
     CROSSED,
     FULL,
-    NEXT_TIME,
     NOT_FINITE,
     REACHED,
-    ROW,
-    STEPS,
     TOO_SMALL,
     Output,
     Plan,
@@ -51,22 +49,7 @@ from integrators.seizing import (
 )
 from integrators.sliding import Functions, Held, Sliding, arm_on, margins_on, other_mode
 from integrators.step_size import INFINITY, error_norm, starting_step
-from integrators.steps import (
-    ANCHOR,
-    ERROR_BEFORE,
-    LATEST,
-    PAUSE,
-    SEEN,
-    SWITCHED,
-    T_STOP,
-    H,
-    Motion,
-    Now,
-    Scratch,
-    T,
-    Vector,
-    time_of,
-)
+from integrators.steps import Motion, Now, Scratch, Vector, time_of
 
 __all__ = [
     "MOST_SWITCHES",
@@ -92,21 +75,28 @@ MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS, PAUSED = 16, 17, 1
 REFUSED = 22  # an edge would take a velocity that has jumped, and there is no other
 ENTANGLED = 23  # machines slide on surfaces that bear on each other
 NOTHING = -1  # no event yet
-# Indices into Memory.counts.
-PLACES = 12
-PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, NEW_ARC, HOLD = (
-    range(PLACES)
-)
 # Phases.
 START, ASK, PICK, FIRE, SETTLED, BEGIN, ARC, AFTER, JUMPING, FINISH, END = range(11)
 
 
-class Memory(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Memory:
     """What the loop stores between two calls."""
 
-    counts: list[int]  # see the indices above
+    phase: int
+    microstep: int
+    machine: int  # whose edge is taken
+    edge: int
+    fired_one: bool  # since the machines were asked last
+    fresh: bool  # whether something has switched or jumped since the last arc began
+    status: int  # why the kernel returned
+    jump: int  # the next one in the plan
+    active: int  # how many relations are watched
+    taken: int  # rows that the caller has taken
+    new_arc: bool  # whether a foreign solver must begin anew
+    hold: int  # what ticks of the discrete machines that have been asked, as bits
     edges: list[int]  # the enabled edge of each machine, or -1
-    switches: list[int]  # firings of each machine since the time Now.clock[ANCHOR]
+    switches: list[int]  # firings of each machine since the time `Now.anchor`
     changes: list[int]  # changes of each relation since that time
     anchor: Vector  # the state at that time
     due: list[int]  # whether each discrete machine is to be asked
@@ -152,90 +142,89 @@ def run_to_event(
         ROWS (to be taken, all with the present mode; possibly none if the steps are used up),
         FIRING (before) and FIRED (after an edge), STOPPED (a crossing, either side of a jump),
         SLID (sliding started or ended), ADVANCE (a foreign solver must continue), PAUSED (settled
-        at the time ``clock[PAUSE]``), DONE; or the error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK,
+        at the time ``now.pause``), DONE; or the error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK,
         RELATION_LIVELOCK, TOO_MANY_STEPS, ENTANGLED.
     """
     plan, now, memory = b.plan, b.now, b.memory
     relations, sliding, scratch = b.relations, b.sliding, b.scratch
-    clock, counts, p = now.clock, memory.counts, functions.p
-    out, cursor = b.out, b.out.cursor
+    out, p = b.out, functions.p
     on = Held(functions, now.held, sliding)
     while True:
-        if cursor[ROW] > counts[TAKEN]:
+        if out.row > memory.taken:
             return ROWS
-        phase, event = counts[PHASE], NOTHING
+        phase, event = memory.phase, NOTHING
         if phase == ASK:
             left = _ask(switch, now, memory, sliding, p)
             if left >= 0:  # an edge of the other mode is enabled: go there first
                 leave(on, now, relations, left)
                 return SLID
             _only_due(plan, memory)
-            counts[MACHINE] = -1
-            counts[FIRED_ONE] = 0
-            counts[PHASE] = PICK
+            memory.machine = -1
+            memory.fired_one = False
+            memory.phase = PICK
             if len(memory.was) > 0:
                 refused = only_let_go(plan.located, memory.edges, memory.jolt)
                 if refused >= 0:
-                    _refuse(counts, refused, -2 - memory.edges[refused])
+                    _refuse(memory, refused, -2 - memory.edges[refused])
         elif phase == PICK:
             event = _pick(plan, memory)
         elif phase == FIRE:
             _act(switch, on, plan, now, memory, relations)
             event = _fired(plan, now, memory, scratch)
         elif phase == SETTLED:
-            if clock[T] >= clock[PAUSE]:
+            if now.t >= now.pause:
                 return PAUSED
-            if clock[SEEN] < clock[T]:  # what is before the jump has switched
-                counts[PHASE] = JUMPING
-            elif counts[HOLD] > 0:  # discrete machines have fired: what they give out is held now
-                switch.tick(counts[HOLD], clock[T], now.y, now.mode, p)
-                event = _held(now, counts, out)
+            if now.seen < now.t:  # what is before the jump has switched
+                memory.phase = JUMPING
+            elif memory.hold > 0:  # discrete machines have fired: what they give out is held now
+                switch.tick(memory.hold, now.t, now.y, now.mode, p)
+                event = _held(now, memory, out)
             else:
                 if plan.located:
                     forget(memory.jolt, 0)
-                _choose_stop(plan, clock, counts)
-            if event == NOTHING and plan.located and counts[PHASE] == BEGIN:
-                event = _rearm(plan, on, now, relations, counts)
+                _choose_stop(plan, now, memory)
+            if event == NOTHING and plan.located and memory.phase == BEGIN:
+                event = _rearm(plan, on, now, relations, memory)
         elif phase == BEGIN:
-            event = _begin_arc(motion, plan, now, cursor, scratch, counts)
+            event = _begin_arc(motion, plan, now, out, scratch, memory)
         elif phase == ARC:
-            steps = _steps_ahead(plan, cursor, most_steps)
+            steps = _steps_ahead(plan, out, most_steps)
             if steps > 0 and not plan.foreign:
-                w = listed(relations, counts[ACTIVE])
-                counts[STATUS] = advance(motion, plan, now, w, out, scratch, steps)
-            event = _flowed(plan, counts, steps)
+                w = listed(relations, memory.active)
+                memory.status = advance(motion, plan, now, w, out, scratch, steps)
+            event = _flowed(plan, memory, steps)
         elif phase == AFTER:
             often = False
-            if counts[STATUS] == CROSSED:
-                w = listed(relations, counts[ACTIVE])
+            if memory.status == CROSSED:
+                w = listed(relations, memory.active)
                 often = _often_changed(motion, plan, now, w, sliding, memory, scratch)
                 let_go_in_time(on, now, relations)
-            if len(memory.was) > 0 and (counts[STATUS] == CROSSED or counts[STATUS] == REACHED):
-                arrived(switch, plan, now, memory.was, memory.jolt, counts[STATUS] == CROSSED, p)
-            event = _end_arc(plan, clock, counts, often)
+            if len(memory.was) > 0 and (memory.status == CROSSED or memory.status == REACHED):
+                arrived(switch, plan, now, memory.was, memory.jolt, memory.status == CROSSED, p)
+            event = _end_arc(plan, now, memory, often)
         elif phase == JUMPING:
             look_back(on, now, relations)
-            clock[T] = plan.jumps[counts[JUMP]]
-            clock[SEEN] = INFINITY
-            if plan.ticks[counts[JUMP]] > 0:
-                switch.tick(plan.ticks[counts[JUMP]], clock[T], now.y, now.mode, p)
+            now.t = plan.jumps[memory.jump]
+            now.seen = INFINITY
+            if plan.ticks[memory.jump] > 0:
+                switch.tick(plan.ticks[memory.jump], now.t, now.y, now.mode, p)
                 _make_due(plan, memory)
             let_go(on, now, relations)
             if len(memory.was) > 0:
                 jolted(switch, now, memory.was, memory.jolt, p)
-            event = _jump(now, counts, out)
+            event = _jump(now, memory, out)
         elif phase == START:
-            if len(plan.jumps) > 0 and plan.jumps[0] <= clock[T]:
-                switch.tick(plan.ticks[0], clock[T], now.y, now.mode, p)
+            if len(plan.jumps) > 0 and plan.jumps[0] <= now.t:
+                switch.tick(plan.ticks[0], now.t, now.y, now.mode, p)
                 _make_due(plan, memory)
             if len(memory.was) > 0:
                 jolted(switch, now, memory.was, memory.jolt, p)
                 for i in range(len(memory.jolt)):
                     if memory.jolt[i] == LET_GO:  # a start in a lock has been checked
                         memory.jolt[i] = 0
-            _start(plan, now, counts, out)
+            _start(plan, now, memory, out)
         elif phase == FINISH:
-            _finish(now, counts, out)
+            _finish(now, memory, out)
         else:
             return DONE
         if event != NOTHING:
@@ -244,12 +233,12 @@ def run_to_event(
 
 # --------------------------------------------------------------------------- one helper per phase
 # They take only what they need, not all the buffers: every array is passed separately in a call.
-def _start(plan: Plan, now: Now, counts: list[int], out: Output) -> None:
-    counts[PHASE] = ASK
-    counts[FRESH] = 1
+def _start(plan: Plan, now: Now, memory: Memory, out: Output) -> None:
+    memory.phase = ASK
+    memory.fresh = True
     raise_floor(plan.control, now)
     if out.every_step:
-        put_row(out, now.clock[T], now.y)
+        put_row(out, now.t, now.y)
 
 
 def _ask(switch: Switch, now: Now, memory: Memory, sliding: Sliding, p: Any) -> int:
@@ -259,13 +248,13 @@ def _ask(switch: Switch, now: Now, memory: Memory, sliding: Sliding, p: Any) -> 
     for i in surfaces.machine:
         if i >= 0:
             edges[i] = -1
-    for c in range(which[-1]):
+    for c in range(sliding.count):
         i = surfaces.machine[which[c]]
         if i >= 0:
             edges[i] = own_edge(surfaces, which[c], mode[i])
     switch.ask(t, y, mode, p, memory.jolt, edges)
     left = -1
-    for c in range(which[-1]):
+    for c in range(sliding.count):
         k = which[c]
         i = surfaces.machine[k]
         if i >= 0 and edges[i] < 0:
@@ -281,20 +270,19 @@ def _ask(switch: Switch, now: Now, memory: Memory, sliding: Sliding, p: Any) -> 
     return left
 
 
-def _refuse(counts: list[int], machine: int, edge: int) -> None:
+def _refuse(memory: Memory, machine: int, edge: int) -> None:
     """End the run at an edge that is refused."""
-    counts[MACHINE] = machine
-    counts[EDGE] = edge
-    counts[PHASE] = AFTER
-    counts[STATUS] = REFUSED
+    memory.machine = machine
+    memory.edge = edge
+    memory.phase = AFTER
+    memory.status = REFUSED
 
 
 def _act(
     switch: Switch, on: Held, plan: Plan, now: Now, memory: Memory, relations: Watched
 ) -> None:
     """Take an edge; after some, the others are asked again."""
-    counts, p = memory.counts, on.functions.p
-    edge, machine = counts[EDGE], counts[MACHINE]
+    edge, machine, p = memory.edge, memory.machine, on.functions.p
     look_back(on, now, relations)
     switch.act(edge, machine, time_of(now), now.y, now.mode, p)
     let_go(on, now, relations)
@@ -308,81 +296,81 @@ def _act(
 
 def _pick(plan: Plan, memory: Memory) -> int:
     """Find the next machine with an enabled edge."""
-    counts, edges = memory.counts, memory.edges
-    i = counts[MACHINE] + 1
+    edges = memory.edges
+    i = memory.machine + 1
     while i < len(edges) and edges[i] < 0:
         i += 1
     if i < len(edges):
-        counts[MACHINE] = i
-        counts[EDGE] = edges[i]
-        counts[PHASE] = FIRE
+        memory.machine = i
+        memory.edge = edges[i]
+        memory.phase = FIRE
         return FIRING
     again = plan.located or moves_a_lock(memory.jolt)
-    counts[PHASE] = ASK if counts[FIRED_ONE] == 1 and again else SETTLED
+    memory.phase = ASK if memory.fired_one and again else SETTLED
     return NOTHING
 
 
 def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
     """Count the edge that was just taken."""
-    counts, i = memory.counts, memory.counts[MACHINE]
-    counts[MICROSTEP] += 1
-    counts[FIRED_ONE] = 1
-    counts[FRESH] = 1
-    counts[PHASE] = PICK
+    i = memory.machine
+    memory.microstep += 1
+    memory.fired_one = True
+    memory.fresh = True
+    memory.phase = PICK
     if memory.jolt[i] == LET_GO:
         memory.jolt[i] = JUMPED if plan.located else 0
     _reset_if_advanced(now, memory)
     memory.switches[i] += 1
     if memory.switches[i] >= MOST_SWITCHES and _no_progress(plan, now, memory, scratch):
-        counts[PHASE] = AFTER
-        counts[STATUS] = MACHINE_LIVELOCK
+        memory.phase = AFTER
+        memory.status = MACHINE_LIVELOCK
     return FIRED
 
 
-def _choose_stop(plan: Plan, clock: Vector, counts: list[int]) -> None:
+def _choose_stop(plan: Plan, now: Now, memory: Memory) -> None:
     """Choose the next stop once no edge is enabled: the next jump, or the end."""
-    t, jumps = clock[T], plan.jumps
+    t, jumps = now.t, plan.jumps
     if t >= plan.t_end:
-        counts[PHASE] = FINISH
+        memory.phase = FINISH
         return
-    while counts[JUMP] < len(jumps) and jumps[counts[JUMP]] <= t:
-        counts[JUMP] += 1
-    clock[T_STOP] = plan.t_end
-    if counts[JUMP] < len(jumps):
+    while memory.jump < len(jumps) and jumps[memory.jump] <= t:
+        memory.jump += 1
+    now.t_stop = plan.t_end
+    if memory.jump < len(jumps):
         # A step that ends on a jump would see the value after it: it is asked one clock tick before
         # its end. At a tick, or if steps are not ours, it ends there.
-        clock[SEEN] = plan.before_jumps[counts[JUMP]]
-        reached = plan.ticks[counts[JUMP]] == 0 and not plan.foreign
-        clock[T_STOP] = min(clock[T_STOP], jumps[counts[JUMP]] if reached else clock[SEEN])
-    counts[STATUS] = FULL
-    counts[PHASE] = BEGIN
+        now.seen = plan.before_jumps[memory.jump]
+        reached = plan.ticks[memory.jump] == 0 and not plan.foreign
+        now.t_stop = min(now.t_stop, jumps[memory.jump] if reached else now.seen)
+    memory.status = FULL
+    memory.phase = BEGIN
 
 
-def _rearm(plan: Plan, on: Held, now: Now, relations: Watched, counts: list[int]) -> int:
+def _rearm(plan: Plan, on: Held, now: Now, relations: Watched, memory: Memory) -> int:
     """Freeze signs, choose what to watch and to slide on, store the truth values watched."""
     functions, sliding = on.functions, on.sliding
     surfaces, watch, p = sliding.surfaces, relations.watch, functions.p
-    t, y = now.clock[T], now.y
+    t, y = now.t, now.y
     mode, held = now.mode, now.held
-    for a in range(counts[ACTIVE]):
+    for a in range(memory.active):
         watch[relations.room[a]] = 0
     arm_on(on, t, y, mode, watch)
     for k in range(len(surfaces.sign)):
         if surfaces.machine[k] >= 0 and (sliding.flags[k] == 1 or sliding.arrived[k] == 1):
             watch[surfaces.above[k]] |= FOR_A_SIGN
-    w = _list(relations, counts)
+    w = _list(relations, memory)
     functions.margins(t, y, mode, p, watch, w.start)
     slid = False
     if len(surfaces.sign) > 0:
-        begins = t == plan.control.origin and sliding.which[-1] == 0
+        begins = t == plan.control.origin and sliding.count == 0
         if begins and repels(on, now, w):
-            counts[PHASE], counts[STATUS] = AFTER, ENTANGLED
+            memory.phase, memory.status = AFTER, ENTANGLED
             return NOTHING
         slid = seize(on, now, w)
         functions.follow(t, y, mode, held, p)
-        count = sliding.which[-1]
+        count = sliding.count
         if count > 1 and entangled(on, t, y, mode):
-            counts[PHASE], counts[STATUS] = AFTER, ENTANGLED
+            memory.phase, memory.status = AFTER, ENTANGLED
             return NOTHING
         if count > 0:
             first = len(watch) - 2 * len(sliding.sigma)
@@ -390,7 +378,7 @@ def _rearm(plan: Plan, on: Held, now: Now, relations: Watched, counts: list[int]
                 k = sliding.which[c]
                 watch[surfaces.above[k]] = watch[surfaces.at_least[k]] = 0
                 watch[first + 2 * c] = watch[first + 2 * c + 1] = 1
-            w = _list(relations, counts)
+            w = _list(relations, memory)
             margins_on(t, y, mode, on, watch, w.start)
     for k in range(len(surfaces.sign)):
         if surfaces.machine[k] < 0:
@@ -409,22 +397,22 @@ def _rearm(plan: Plan, on: Held, now: Now, relations: Watched, counts: list[int]
                     if w.start[r] == 0.0:
                         w.above[r] = JUST_BELOW if sign > 0.0 else 0.0
     if _undefined(w):
-        counts[PHASE] = AFTER
-        counts[STATUS] = NOT_FINITE
+        memory.phase = AFTER
+        memory.status = NOT_FINITE
     elif slid:  # y is on the surface now: comparisons with it must be evaluated again
-        counts[PHASE] = ASK
+        memory.phase = ASK
         return SLID
     return NOTHING
 
 
-def _list(relations: Watched, counts: list[int]) -> Watched:
+def _list(relations: Watched, memory: Memory) -> Watched:
     """List the flagged relations."""
     active = 0
     for r in range(len(relations.watch)):
         if relations.watch[r]:
             relations.room[active] = r
             active += 1
-    counts[ACTIVE] = active
+    memory.active = active
     return listed(relations, active)
 
 
@@ -437,51 +425,51 @@ def _undefined(w: Watched) -> bool:
 
 
 def _begin_arc(
-    motion: Motion, plan: Plan, now: Now, cursor: list[int], scratch: Scratch, counts: list[int]
+    motion: Motion, plan: Plan, now: Now, out: Output, scratch: Scratch, memory: Memory
 ) -> int:
     """Compute the slope and choose the first step after a switch or a jump."""
-    control, clock = plan.control, now.clock
-    counts[PHASE] = ARC
-    if plan.located or counts[FRESH] == 1:
-        counts[NEW_ARC] = 1
-        counts[FRESH] = 0
+    control = plan.control
+    memory.phase = ARC
+    if plan.located or memory.fresh:
+        memory.new_arc = True
+        memory.fresh = False
         if not plan.foreign:
-            motion.flow(clock[T], now.y, now.mode, now.held, motion.p, now.f)
+            motion.flow(now.t, now.y, now.mode, now.held, motion.p, now.f)
             # Without location the solver knows nothing of switches: it keeps its step.
-            if control.step <= 0.0 and (plan.located or clock[H] <= 0.0):
-                clock[ERROR_BEFORE] = 1.0
-                knot = knot_after(plan, clock, cursor)
+            if control.step <= 0.0 and (plan.located or now.h <= 0.0):
+                now.error_before = 1.0
+                knot = knot_after(plan, now, out)
                 order = plan.method.error_order
                 first = starting_step(motion, order, control, now, knot, scratch)
-                clock[H] = max(first, tick_at(clock[T]))  # a knot may be a few ticks away
+                now.h = max(first, tick_at(now.t))  # a knot may be a few ticks away
     return ADVANCE if plan.foreign else NOTHING
 
 
-def _steps_ahead(plan: Plan, cursor: list[int], most_steps: int) -> int:
+def _steps_ahead(plan: Plan, out: Output, most_steps: int) -> int:
     """Return how many steps may be taken in one call."""
-    left = plan.max_steps - cursor[STEPS]
+    left = plan.max_steps - out.steps
     return min(most_steps, left) if plan.located else min(1, left)
 
 
-def _flowed(plan: Plan, counts: list[int], steps: int) -> int:
+def _flowed(plan: Plan, memory: Memory, steps: int) -> int:
     """Return whether the arc continues; a foreign solver has already taken its steps."""
-    counts[MICROSTEP] = 0
+    memory.microstep = 0
     if steps <= 0:
         return TOO_MANY_STEPS
-    if counts[STATUS] != FULL or not plan.located:
-        counts[PHASE] = AFTER
+    if memory.status != FULL or not plan.located:
+        memory.phase = AFTER
         return NOTHING
     return ADVANCE if plan.foreign else ROWS
 
 
-def _end_arc(plan: Plan, clock: Vector, counts: list[int], often: bool) -> int:
+def _end_arc(plan: Plan, now: Now, memory: Memory, often: bool) -> int:
     """Return the reason for the end of the arc."""
-    status = counts[STATUS]
+    status = memory.status
     if status in (TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, REFUSED, ENTANGLED):
         return status
-    counts[PHASE] = ASK
-    if status == REACHED and (clock[T] < plan.t_end or clock[SEEN] < clock[T]):
-        counts[PHASE] = JUMPING
+    memory.phase = ASK
+    if status == REACHED and (now.t < plan.t_end or now.seen < now.t):
+        memory.phase = JUMPING
         return STOPPED
     if status == FULL and not plan.located:
         return ROWS  # possibly none; yields control to the caller
@@ -502,51 +490,51 @@ def _only_due(plan: Plan, memory: Memory) -> None:
 
 def _make_due(plan: Plan, memory: Memory) -> None:
     """Let discrete machines be asked at the tick that has just come."""
-    bits = plan.ticks[memory.counts[JUMP]]
+    bits = plan.ticks[memory.jump]
     for i in range(len(memory.due)):
         if plan.discrete[i] & bits > 0:
             memory.due[i] = 1
-            memory.counts[HOLD] |= plan.discrete[i]
+            memory.hold |= plan.discrete[i]
 
 
-def _held(now: Now, counts: list[int], out: Output) -> int:
+def _held(now: Now, memory: Memory, out: Output) -> int:
     """Go on with what discrete machines give out from now on."""
-    counts[HOLD] = 0
-    counts[FRESH] = 1
-    counts[PHASE] = ASK
+    memory.hold = 0
+    memory.fresh = True
+    memory.phase = ASK
     if out.every_step:
-        put_row(out, now.clock[T], now.y)
+        put_row(out, now.t, now.y)
     return STOPPED
 
 
-def _jump(now: Now, counts: list[int], out: Output) -> int:
+def _jump(now: Now, memory: Memory, out: Output) -> int:
     """Pass a jump of the flow."""
-    counts[PHASE] = ASK
+    memory.phase = ASK
     if out.every_step:
-        put_row(out, now.clock[T], now.y)
+        put_row(out, now.t, now.y)
     return STOPPED
 
 
-def _finish(now: Now, counts: list[int], out: Output) -> None:
+def _finish(now: Now, memory: Memory, out: Output) -> None:
     """Write the rows requested for the end itself."""
-    counts[PHASE] = END
-    t, cursor = now.clock[T], out.cursor
-    while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] <= t:
-        put_row(out, out.times[cursor[NEXT_TIME]], now.y)
-        cursor[NEXT_TIME] += 1
+    memory.phase = END
+    t = now.t
+    while out.next_time < len(out.times) and out.times[out.next_time] <= t:
+        put_row(out, out.times[out.next_time], now.y)
+        out.next_time += 1
 
 
 # --------------------------------------------------------------------------- progress
 def _reset_if_advanced(now: Now, memory: Memory) -> None:
     """Restart the count of switches if time has advanced since the last one."""
-    t = now.clock[T]
-    if t - now.clock[SWITCHED] > max(CLOCK_CRAWLS * abs(t), END_STANDS * now.clock[LATEST]):
+    t = now.t
+    if t - now.switched > max(CLOCK_CRAWLS * abs(t), END_STANDS * now.latest):
         _reset_counts(now, memory)
-    now.clock[SWITCHED] = t
+    now.switched = t
 
 
 def _reset_counts(now: Now, memory: Memory) -> None:
-    now.clock[ANCHOR] = now.clock[T]
+    now.anchor = now.t
     for j in range(len(now.y)):
         memory.anchor[j] = now.y[j]
     for i in range(len(memory.switches)):
@@ -558,8 +546,8 @@ def _reset_counts(now: Now, memory: Memory) -> None:
 def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool:
     """Return whether the counted switches made no progress; otherwise restart the count here."""
     y, anchor, moved = now.y, memory.anchor, scratch.error
-    t, elapsed = now.clock[T], now.clock[T] - now.clock[ANCHOR]
-    stands = elapsed <= MOST_SWITCHES * max(CLOCK_STANDS * abs(t), END_STANDS * now.clock[LATEST])
+    t, elapsed = now.t, now.t - now.anchor
+    stands = elapsed <= MOST_SWITCHES * max(CLOCK_STANDS * abs(t), END_STANDS * now.latest)
     if not stands and elapsed <= MOST_SWITCHES * CLOCK_CRAWLS * abs(t):
         for j in range(len(y)):
             moved[j] = y[j] - anchor[j]

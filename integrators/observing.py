@@ -90,7 +90,7 @@ def observe_row(
             if mode[n + k] != 0:
                 sliding.which[slid] = k
                 slid += 1
-        sliding.which[len(sliding.sigma)] = slid
+        sliding.count = slid
         look(observe, on, t, y, mode, out)
     else:
         observe(t, y, mode, sliding.live, on.functions.p, out)

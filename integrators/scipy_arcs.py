@@ -16,12 +16,9 @@ from integrators.advance import (
     AT_ONCE,
     CROSSED,
     FULL,
-    NEXT_TIME,
     NOT_FINITE,
     REACHED,
     REDO,
-    ROW,
-    STEPS,
     TOO_SMALL,
     limit_after,
     next_on_grid,
@@ -29,9 +26,8 @@ from integrators.advance import (
     tick_at,
 )
 from integrators.crossings import NO_CHANGE, Path, copy_margins, first_change, listed
-from integrators.loop import ACTIVE, NEW_ARC, STATUS
 from integrators.sliding import Held, flow_on, follow_on, margins_on
-from integrators.steps import T_STOP, Motion, T
+from integrators.steps import Motion
 
 if TYPE_CHECKING:
     from integrators.hybrid import Buffers, Options
@@ -58,16 +54,16 @@ class SciPyStepper:
 
     def advance(self, most_steps: int) -> None:
         """Step until the next stop, a crossing, a full buffer or most_steps steps."""
-        counts = self.buffers.memory.counts
-        if counts[NEW_ARC]:  # after a stop the old solver's step and history are invalid
+        memory = self.buffers.memory
+        if memory.new_arc:  # after a stop the old solver's step and history are invalid
             self.solver = None
-            counts[NEW_ARC] = 0
-        counts[STATUS] = self._advance(most_steps)
+            memory.new_arc = False
+        memory.status = self._advance(most_steps)
 
     def _limit(self) -> float:
-        plan, clock = self.buffers.plan, self.buffers.now.clock
-        limit = limit_after(plan, clock, self.buffers.out.cursor)
-        return min(limit, next_on_grid(plan.control, clock[T])) if self.options.step else limit
+        plan, now = self.buffers.plan, self.buffers.now
+        limit = limit_after(plan, now, self.buffers.out)
+        return min(limit, next_on_grid(plan.control, now.t)) if self.options.step else limit
 
     def _solver_to(self, limit: float) -> Any:
         if self.solver is not None and self.solver.t_bound == limit:
@@ -85,7 +81,7 @@ class SciPyStepper:
         solver: Any = self.options.method
         return solver(
             slope,
-            now.clock[T],
+            now.t,
             np.array(now.y),
             limit,
             rtol=self.options.rtol,
@@ -95,17 +91,16 @@ class SciPyStepper:
 
     def _advance(self, most_steps: int) -> int:
         b, now, out = self.buffers, self.buffers.now, self.buffers.out
-        clock, y = now.clock, now.y
-        cursor, w = out.cursor, listed(b.relations, b.memory.counts[ACTIVE])
+        y, w = now.y, listed(b.relations, b.memory.active)
         motion = Motion(flow_on, margins_on, self.on, follow_on)
         redone, ahead = False, math.inf
         while True:
-            t = clock[T]
-            if t >= clock[T_STOP]:
+            t = now.t
+            if t >= now.t_stop:
                 return REACHED
-            if most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t)):
+            if most_steps <= 0 or (out.every_step and out.row >= len(out.rows_t)):
                 return FULL
-            cursor[STEPS] += 1
+            out.steps += 1
             try:
                 solver = self._solver_to(min(self._limit(), ahead))
                 # BDF computes with a row that it has not filled yet, and overwrites the result.
@@ -132,18 +127,18 @@ class SciPyStepper:
                 t_new = t + theta * (t_new - t)
             else:
                 copy_margins(w, w.end, w.start)
-            while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
-                time = out.times[cursor[NEXT_TIME]]
+            while out.next_time < len(out.times) and out.times[out.next_time] < t_new:
+                time = out.times[out.next_time]
                 row = dense(time).tolist()
                 motion.follow(time, row, now.mode, now.held, motion.p)
                 put_row(out, time, row)
-                cursor[NEXT_TIME] += 1
+                out.next_time += 1
             if theta < 1.0:
                 _interpolate(dense, theta, y)
             else:
                 y[:] = y_new
             motion.follow(t_new, y, now.mode, now.held, motion.p)
-            clock[T] = t_new
+            now.t = t_new
             most_steps -= 1
             if out.every_step:
                 put_row(out, t_new, y)

@@ -9,13 +9,6 @@ from integrators.advance import tick_at
 from integrators.crossings import FOR_A_SIGN, Watched
 from integrators.sliding import (
     BEYOND,
-    COLUMN,
-    GAINS,
-    LOWER,
-    NORMAL,
-    RATES,
-    SLOPE,
-    UPPER,
     Held,
     Sliding,
     Surfaces,
@@ -25,7 +18,7 @@ from integrators.sliding import (
     slope_on,
     to_neither,
 )
-from integrators.steps import LATEST, Now, T, Vector, time_of
+from integrators.steps import Now, Vector, time_of
 
 __all__ = [
     "crossed",
@@ -58,13 +51,13 @@ def own_edge(surfaces: Surfaces, k: int, mode: int) -> int:
 
 def drop(sliding: Sliding, k: int) -> None:
     """Stop sliding on a surface."""
-    which, count = sliding.which, sliding.which[-1]
+    which, count = sliding.which, sliding.count
     sliding.flags[k] = 0
     for c in range(count):
         if which[c] == k:
             which[c] = which[count - 1]
             which[count - 1] = k
-            which[-1] = count - 1
+            sliding.count = count - 1
 
 
 def release(on: Held, now: Now, w: Watched, k: int, side: float) -> None:
@@ -82,9 +75,8 @@ def release(on: Held, now: Now, w: Watched, k: int, side: float) -> None:
         Positive or negative.
     """
     t, y, mode = time_of(now), now.y, now.mode
-    surfaces, table, p = on.sliding.surfaces, on.sliding.table, on.functions.p
-    above, size, probe = surfaces.above[k], len(y), w.search.probe
-    g = table[3 * len(on.sliding.sigma) + UPPER]
+    g, p = on.sliding.upper, on.functions.p
+    above, size, probe = on.sliding.surfaces.above[k], len(y), w.search.probe
     on.functions.normal(k, t, y, mode, p, g)
     square, large = 0.0, 0.0
     for j in range(size):
@@ -121,8 +113,8 @@ def entangled(on: Held, t: float, y: Vector, mode: list[int]) -> bool:
     """
     which, machine = on.sliding.which, on.sliding.surfaces.machine
     found = False
-    for r in range(which[-1]):
-        for c in range(which[-1]):
+    for r in range(on.sliding.count):
+        for c in range(on.sliding.count):
             if r != c and (machine[which[r]] >= 0 or machine[which[c]] >= 0):
                 found = found or _bears(on, t, y, mode, r, c)
     return found
@@ -131,8 +123,7 @@ def entangled(on: Held, t: float, y: Vector, mode: list[int]) -> bool:
 def _bears(on: Held, t: float, y: Vector, mode: list[int], r: int, c: int) -> bool:
     """Return whether the sides of one surface slid on differ in the slope across another."""
     flow, surfaces, p, held = on.functions.flow, on.sliding.surfaces, on.functions.p, on.held
-    table, most = on.sliding.table, len(on.sliding.sigma)
-    upper, lower, g = table[3 * most + UPPER], table[3 * most + LOWER], table[NORMAL * most + r]
+    upper, lower, g = on.sliding.upper, on.sliding.lower, on.sliding.normals[r]
     here, other = on.sliding.which[r], on.sliding.which[c]
     to_neither(on.sliding, held)
     on.functions.normal(here, t, y, mode, p, g)
@@ -158,29 +149,24 @@ def repels(on: Held, now: Now, w: Watched) -> bool:
     If there is one, it is left as the only one slid on.
     """
     t, y, mode = time_of(now), now.y, now.mode
-    surfaces, which, table, most = (
-        on.sliding.surfaces,
-        on.sliding.which,
-        on.sliding.table,
-        len(on.sliding.sigma),
-    )
-    slope, column, g = table[3 * most + SLOPE], table[COLUMN * most], table[NORMAL * most]
+    sliding, surfaces = on.sliding, on.sliding.surfaces
+    slope, half, g = sliding.slope, sliding.halves[0], sliding.normals[0]
     found = False
     for k in range(len(surfaces.sign)):
         above = surfaces.above[k]
         if not found and surfaces.machine[k] < 0 and w.watch[above] and w.start[above] == 0.0:
             kept = on.held[surfaces.sign[k]]
-            which[0] = k
-            which[most] = 1
+            sliding.which[0] = k
+            sliding.count = 1
             slope_on(on, t, y, mode, slope)
             on.held[surfaces.sign[k]] = kept
             size = 0.0
             for j in range(len(y)):
-                size += abs(g[j]) * (abs(slope[j]) + abs(column[j]))
-            gain = table[3 * most + GAINS][0]
-            found = gain > CLEARLY * size and abs(on.sliding.sigma[0]) < 1.0 - CLEARLY
+                size += abs(g[j]) * (abs(slope[j]) + abs(half[j]))
+            gain = sliding.gains[0]
+            found = gain > CLEARLY * size and abs(sliding.sigma[0]) < 1.0 - CLEARLY
     if not found:
-        which[most] = 0
+        sliding.count = 0
     return found
 
 
@@ -207,9 +193,8 @@ def seize(on: Held, now: Now, w: Watched) -> bool:
     """
     t, y, mode = time_of(now), now.y, now.mode
     held, sliding, surfaces = on.held, on.sliding, on.sliding.surfaces
-    which, sigma, table = sliding.which, sliding.sigma, sliding.table
+    which, sigma, rates, gains = sliding.which, sliding.sigma, sliding.rates, sliding.gains
     most, size = len(sigma), len(y)
-    rates, gains = table[3 * most + RATES], table[3 * most + GAINS]
     for k in range(len(surfaces.sign)):
         if surfaces.machine[k] >= 0 and sliding.arrived[k] == 1 and _is_far(on, now, w, k):
             sliding.arrived[k] = 0
@@ -229,8 +214,8 @@ def seize(on: Held, now: Now, w: Watched) -> bool:
             count += 1
     candidates = count
     while count > 0:
-        which[most] = count
-        slope_on(on, t, y, mode, table[3 * most + SLOPE])
+        sliding.count = count
+        slope_on(on, t, y, mode, sliding.slope)
         worst, excess = -1, 0.0
         for c in range(count):
             beyond = abs(sigma[c]) - 1.0 if gains[c] < 0.0 else BEYOND
@@ -247,9 +232,9 @@ def seize(on: Held, now: Now, w: Watched) -> bool:
             release(on, now, w, k, pushed)
         count -= 1
         which[worst], which[count] = which[count], k
-    which[most] = count
+    sliding.count = count
     if candidates > count:
-        dy, g = table[3 * most + SLOPE], table[3 * most + RATES]
+        dy, g = sliding.slope, rates
         flow_on(t, y, mode, held, on, dy)
         for c in range(count, candidates):
             if surfaces.machine[which[c]] >= 0:
@@ -277,7 +262,7 @@ def seize(on: Held, now: Now, w: Watched) -> bool:
         changed = changed or slid != sliding.flags[k]
         sliding.flags[k] = slid
     for c in range(count):
-        u, g, square = w.start[surfaces.above[which[c]]], table[NORMAL * most + c], 0.0
+        u, g, square = w.start[surfaces.above[which[c]]], sliding.normals[c], 0.0
         for j in range(size):
             square += g[j] * g[j]
         if u != 0.0 and square > 0.0:
@@ -291,13 +276,13 @@ def _is_far(on: Held, now: Now, w: Watched, k: int) -> bool:
 
     Near are what it covers in the time to which crossings are located, and an absolute tolerance.
     """
-    which, table, most = on.sliding.which, on.sliding.table, len(on.sliding.sigma)
-    which[0] = k
-    which[most] = 1
-    slope_on(on, time_of(now), now.y, now.mode, table[3 * most + SLOPE])
-    fastest = abs(table[3 * most + RATES][0]) + abs(table[3 * most + GAINS][0])
-    located = BRACKET * (abs(now.clock[T]) + now.clock[LATEST])
-    u, g, square, far = w.start[on.sliding.surfaces.above[k]], table[NORMAL * most], 0.0, False
+    sliding = on.sliding
+    sliding.which[0] = k
+    sliding.count = 1
+    slope_on(on, time_of(now), now.y, now.mode, sliding.slope)
+    fastest = abs(sliding.rates[0]) + abs(sliding.gains[0])
+    located = BRACKET * (abs(now.t) + now.latest)
+    u, g, square, far = w.start[sliding.surfaces.above[k]], sliding.normals[0], 0.0, False
     for j in range(len(now.y)):
         square += g[j] * g[j]
     for j in range(len(now.y)):
@@ -313,7 +298,7 @@ def _sign(u: float) -> float:
 
 def look_back(on: Held, now: Now, w: Watched) -> None:
     """Keep where the surfaces slid on are before something may jump; see `let_go`."""
-    if on.sliding.which[-1] == 0:
+    if on.sliding.count == 0:
         return
     _values(on, now, w)
     for k in range(len(on.sliding.before)):
@@ -322,10 +307,10 @@ def look_back(on: Held, now: Now, w: Watched) -> None:
 
 def let_go(on: Held, now: Now, w: Watched) -> None:
     """Stop sliding on surfaces that have jumped away, or from which the state has."""
-    if on.sliding.which[-1] == 0:
+    if on.sliding.count == 0:
         return
     sliding, y = on.sliding, now.y
-    g = sliding.table[3 * len(sliding.sigma) + UPPER]
+    g = sliding.upper
     _values(on, now, w)
     for k in range(len(sliding.flags)):
         jump = w.search.probe[sliding.surfaces.above[k]] - sliding.before[k]
@@ -344,10 +329,10 @@ def let_go(on: Held, now: Now, w: Watched) -> None:
 def _values(on: Held, now: Now, w: Watched) -> None:
     """Evaluate the surfaces slid on, which are not watched meanwhile, into ``w.search.probe``."""
     which, above = on.sliding.which, on.sliding.surfaces.above
-    for c in range(which[-1]):
+    for c in range(on.sliding.count):
         w.watch[above[which[c]]] |= FOR_A_SURFACE
     on.functions.margins(time_of(now), now.y, now.mode, on.functions.p, w.watch, w.search.probe)
-    for c in range(which[-1]):
+    for c in range(on.sliding.count):
         w.watch[above[which[c]]] &= FOR_A_SURFACE - 1
 
 
@@ -361,10 +346,10 @@ def leave(on: Held, now: Now, relations: Watched, left: int) -> None:
 
 def let_go_in_time(on: Held, now: Now, relations: Watched) -> None:
     """Stop sliding on surfaces that have moved with the crossing just located: a sign of time."""
-    t = now.clock[T]
-    now.clock[T] = t - BRACKETS * tick_at(t)
+    t = now.t
+    now.t = t - BRACKETS * tick_at(t)
     look_back(on, now, relations)
-    now.clock[T] = t
+    now.t = t
     let_go(on, now, relations)
 
 

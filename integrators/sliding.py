@@ -20,6 +20,7 @@ steep ramp changes the solution and makes the system stiff.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from integrators.steps import Flow, Follow, Margins, Vector
@@ -48,11 +49,6 @@ __all__ = [
 MOST_SLIDING = 32  # surfaces at once
 LIVE = 2.0  # in place of a held sign: evaluate the sign live
 BEYOND = 2.0  # sigma is clipped here: above 1 only the fact matters
-# Rows of the scratch table after three per surface (its gradient over y and rate in t; half the
-# difference of both sides; its row of the linear system): du/dt with all their signs 0, the
-# response of du/dt to its own sign, flow and observed values on either side, a slope.
-RATES, GAINS, UPPER, LOWER, SEEN_UPPER, SEEN_LOWER, SLOPE = range(7)
-NORMAL, COLUMN, MATRIX = range(3)
 
 
 class Functions(NamedTuple):
@@ -81,19 +77,32 @@ class Surfaces(NamedTuple):
     fall: list[int]  # the edge back
 
 
-class Sliding(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Sliding:
     """The surfaces on which the motion slides, with scratch space."""
 
+    count: int  # of the surfaces slid on
     surfaces: Surfaces
-    which: list[int]  # the sliding surfaces; their number in the last entry, (MOST_SLIDING + 1,)
+    which: list[int]  # begins with the surfaces slid on, shape (MOST_SLIDING,)
     sigma: Vector  # replaces their signs, shape (MOST_SLIDING,)
-    table: list[Vector]  # scratch space, see the rows above
     flags: list[int]  # whether the motion slides on each, shape (S,)
     arrived: list[int]  # whether each has just been reached (-1: left), shape (S,)
-    before: Vector  # scratch space: u before something jumped, shape (S,)
-    edges: list[int]  # scratch space: enabled edges of the other modes, shape (n,)
     live: Vector  # signs, all set to LIVE
     watch: list[int]  # unused flags, shape (r,)
+    # Scratch space, of each surface slid on:
+    normals: list[Vector]  # its gradient over y, and its rate in t
+    halves: list[Vector]  # half the difference of the flows on both sides
+    matrix: list[Vector]  # its row of the linear system
+    rates: Vector  # du/dt with all their signs 0
+    gains: Vector  # the response of du/dt to its own sign
+    # ... and of all:
+    upper: Vector  # the flow on either side of one
+    lower: Vector
+    seen_upper: Vector  # observed values on either side
+    seen_lower: Vector
+    slope: Vector
+    before: Vector  # u before something jumped, shape (S,)
+    edges: list[int]  # enabled edges of the other modes, shape (n,)
 
 
 class Held(NamedTuple):
@@ -139,17 +148,34 @@ def sliding_scratch(
     most = min(number, MOST_SLIDING)
     on = [k for k, flag in enumerate(flags) if flag]
     width = max(size + 1, most + 1, seen) if most else 0
+
+    def row() -> Vector:
+        return [0.0] * width
+
+    def rows() -> list[Vector]:
+        return [row() for _ in range(max(most, 1))]
+
     return Sliding(
+        count=len(on),
         surfaces=surfaces,
-        which=on + [0] * (most - len(on)) + [len(on)],
+        which=on + [0] * (most - len(on)),
         sigma=[0.0] * most,
-        table=[[0.0] * width for _ in range(3 * most + 7)],
         flags=list(flags) or [0] * number,
         arrived=[0] * number,
-        before=[0.0] * number,
-        edges=[-1] * machines,
         live=[LIVE] * signs,
         watch=[0] * relations,
+        normals=rows(),
+        halves=rows(),
+        matrix=rows(),
+        rates=row(),
+        gains=row(),
+        upper=row(),
+        lower=row(),
+        seen_upper=row(),
+        seen_lower=row(),
+        slope=row(),
+        before=[0.0] * number,
+        edges=[-1] * machines,
     )
 
 
@@ -167,15 +193,10 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         Filled.
     """
     flow, normal, p = on.functions.flow, on.functions.normal, on.functions.p
-    held, surfaces = on.held, on.sliding.surfaces
-    which, sigma, table = on.sliding.which, on.sliding.sigma, on.sliding.table
-    most = len(sigma)
-    count = which[most]
-    size = len(y)
-    first = 3 * most
-    rates, gains = table[first + RATES], table[first + GAINS]
-    upper, lower = table[first + UPPER], table[first + LOWER]
-    to_neither(on.sliding, held)
+    held, sliding, surfaces = on.held, on.sliding, on.sliding.surfaces
+    which, sigma, count, size = sliding.which, sliding.sigma, sliding.count, len(y)
+    upper, lower, normals, halves = sliding.upper, sliding.lower, sliding.normals, sliding.halves
+    to_neither(sliding, held)
     # A mean that is exact for any sum of functions of one sign (or the modes of one machine) each.
     if count == 1:
         for j in range(size):
@@ -190,35 +211,35 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         go_to(surfaces, which[c], -1.0, held, mode)
         flow(t, y, mode, held, p, lower)
         go_back(surfaces, which[c], kept, held, mode)
-        column = table[COLUMN * most + c]
+        half = halves[c]
         for j in range(size):
             dy[j] += 0.5 * (upper[j] + lower[j])
-            column[j] = 0.5 * (upper[j] - lower[j])
+            half[j] = 0.5 * (upper[j] - lower[j])
     for r in range(count):
-        g, row = table[NORMAL * most + r], table[MATRIX * most + r]
+        g, row = normals[r], sliding.matrix[r]
         normal(which[r], t, y, mode, p, g)
         rate = g[size]
         for j in range(size):
             rate += g[j] * dy[j]
         row[count] = -rate
         for c in range(count):
-            column = table[COLUMN * most + c]
+            half = halves[c]
             gain = 0.0
             for j in range(size):
-                gain += g[j] * column[j]
+                gain += g[j] * half[j]
             row[c] = gain
-        rates[r], gains[r] = rate, row[r]
-    _solve(table, MATRIX * most, count, sigma)
+        sliding.rates[r], sliding.gains[r] = rate, row[r]
+    _solve(sliding.matrix, count, sigma)
     for c in range(count):
         if surfaces.machine[which[c]] < 0:
             held[surfaces.sign[which[c]]] = sigma[c]
-        column = table[COLUMN * most + c]
+        half = halves[c]
         for j in range(size):
-            dy[j] += sigma[c] * column[j]
+            dy[j] += sigma[c] * half[j]
     # Nothing normal to the surface, not even by rounding: v itself does not move. Nor where sigma
     # is clipped, past the end of the slide: a step may end there, and guards are read before it.
     for r in range(count):
-        g = table[NORMAL * most + r]
+        g = normals[r]
         rate, square = g[size], 0.0
         for j in range(size):
             rate += g[j] * dy[j]
@@ -231,7 +252,7 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
 def to_neither(sliding: Sliding, signs: Vector) -> None:
     """Set the signs of the surfaces slid on to 0; machines keep their modes."""
     which, surfaces = sliding.which, sliding.surfaces
-    for c in range(which[-1]):
+    for c in range(sliding.count):
         if surfaces.machine[which[c]] < 0:
             signs[surfaces.sign[which[c]]] = 0.0
 
@@ -257,27 +278,27 @@ def go_back(surfaces: Surfaces, k: int, kept: int, signs: Vector, mode: list[int
         mode[i] = kept
 
 
-def _solve(table: list[Vector], first: int, count: int, out: Vector) -> None:
+def _solve(matrix: list[Vector], count: int, out: Vector) -> None:
     """Solve a small linear system, right side in the last column; clip large values."""
     for c in range(count):
         best = c
         for r in range(c + 1, count):
-            if abs(table[first + r][c]) > abs(table[first + best][c]):
+            if abs(matrix[r][c]) > abs(matrix[best][c]):
                 best = r
         if best != c:
             for j in range(count + 1):
-                swapped = table[first + c][j]
-                table[first + c][j] = table[first + best][j]
-                table[first + best][j] = swapped
-        pivot = table[first + c][c]
+                swapped = matrix[c][j]
+                matrix[c][j] = matrix[best][j]
+                matrix[best][j] = swapped
+        pivot = matrix[c][c]
         if pivot != 0.0:
             for r in range(c + 1, count):
-                factor = table[first + r][c] / pivot
+                factor = matrix[r][c] / pivot
                 for j in range(c, count + 1):
-                    table[first + r][j] -= factor * table[first + c][j]
+                    matrix[r][j] -= factor * matrix[c][j]
     for back in range(count):
         r = count - 1 - back
-        row = table[first + r]
+        row = matrix[r]
         rest = row[count]
         for c in range(r + 1, count):
             rest -= row[c] * out[c]
@@ -297,7 +318,7 @@ def flow_on(t: float, y: Vector, mode: list[int], held: Vector, on: Held, dy: Ve
     on : Held
         The system, as the parameters.
     """
-    if on.sliding.which[-1] == 0:
+    if on.sliding.count == 0:
         on.functions.flow(t, y, mode, held, on.functions.p, dy)
     else:
         slope_on(on, t, y, mode, dy)
@@ -316,13 +337,12 @@ def margins_on(
         The system, as the parameters.
     """
     on.functions.margins(t, y, mode, on.functions.p, watch, out)
-    which, sigma, table = on.sliding.which, on.sliding.sigma, on.sliding.table
-    count, most = which[-1], len(sigma)
-    if count == 0:
+    sliding, sigma = on.sliding, on.sliding.sigma
+    if sliding.count == 0:
         return
-    slope_on(on, t, y, mode, table[3 * most + SLOPE])
-    first = len(watch) - 2 * most
-    for c in range(count):
+    slope_on(on, t, y, mode, sliding.slope)
+    first = len(watch) - 2 * len(sigma)
+    for c in range(sliding.count):
         out[first + 2 * c] = 1.0 - sigma[c]
         out[first + 2 * c + 1] = 1.0 + sigma[c]
 
@@ -352,7 +372,7 @@ def arm_on(on: Held, t: float, y: Vector, mode: list[int], watch: list[int]) -> 
     """
     arm, p, surfaces = on.functions.arm, on.functions.p, on.sliding.surfaces
     arm(t, y, mode, p, on.held, watch)
-    for c in range(on.sliding.which[-1]):
+    for c in range(on.sliding.count):
         k = on.sliding.which[c]
         i = surfaces.machine[k]
         if i >= 0:
@@ -386,15 +406,14 @@ def look(
     """
     p, sliding = on.functions.p, on.sliding
     live, surfaces, which = sliding.live, sliding.surfaces, sliding.which
-    slope, count = sliding.table[3 * len(sliding.sigma) + SLOPE], which[-1]
-    if count == 0:
+    if sliding.count == 0:
         observe(t, y, mode, live, p, out)
         return
     arm_on(on, t, y, mode, sliding.watch)
-    slope_on(on, t, y, mode, slope)
+    slope_on(on, t, y, mode, sliding.slope)
     to_neither(sliding, live)
     _combine(observe, on, t, y, mode, live, False, out)
-    for c in range(count):
+    for c in range(sliding.count):
         if surfaces.machine[which[c]] < 0:
             live[surfaces.sign[which[c]]] = LIVE
 
@@ -410,10 +429,10 @@ def look_held(
         As in `look`.
     """
     machines = False
-    for c in range(on.sliding.which[-1]):
+    for c in range(on.sliding.count):
         machines = machines or on.sliding.surfaces.machine[on.sliding.which[c]] >= 0
     if machines:
-        slope_on(on, t, y, mode, on.sliding.table[3 * len(on.sliding.sigma) + SLOPE])
+        slope_on(on, t, y, mode, on.sliding.slope)
         _combine(observe, on, t, y, mode, on.held, True, out)
     else:
         observe(t, y, mode, on.held, on.functions.p, out)
@@ -431,10 +450,10 @@ def _combine(
 ) -> None:
     """Observe both sides of the surfaces slid on, and combine them by the sigmas of the slope."""
     p, sliding, surfaces = on.functions.p, on.sliding, on.sliding.surfaces
-    which, sigma, table, most = sliding.which, sliding.sigma, sliding.table, len(sliding.sigma)
-    upper, lower = table[3 * most + SEEN_UPPER], table[3 * most + SEEN_LOWER]
+    which, sigma = sliding.which, sliding.sigma
+    upper, lower = sliding.seen_upper, sliding.seen_lower
     count = 0
-    for c in range(which[most]):
+    for c in range(sliding.count):
         if surfaces.machine[which[c]] >= 0 or not only_machines:
             count += 1
     if count == 1:
@@ -444,7 +463,7 @@ def _combine(
         observe(t, y, mode, signs, p, out)
         for j in range(len(out)):
             out[j] = (1.0 - count) * out[j]
-    for c in range(which[most]):
+    for c in range(sliding.count):
         if surfaces.machine[which[c]] >= 0 or not only_machines:
             share = min(max(sigma[c], -1.0), 1.0)
             kept = go_to(surfaces, which[c], 1.0, signs, mode)

@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from integrators.elementary import power
-from integrators.steps import SEEN, T_STOP, Motion, Now, Scratch, T, Vector
+from integrators.steps import Motion, Now, Scratch, Vector
 
 __all__ = [
     "Control",
@@ -231,12 +231,12 @@ def starting_step(
     float
         A step, > 0.
     """
-    t = now.clock[T]
+    t = now.t
     room = knot - t
     # If the system has a scale, the remaining time does not matter: the kernel cuts the step.
     time_scale = control.time_scale
     if not time_scale > 0.0:
-        time_scale = min(room, now.clock[T_STOP] - t)
+        time_scale = min(room, now.t_stop - t)
     y, f = now.y, now.f
     y_try, f_try = scratch.y_new, scratch.f_new
     longest = control.max_step
@@ -257,7 +257,7 @@ def starting_step(
     h = min(h, room)
     for j in range(len(y)):
         y_try[j] = y[j] + h * f[j]
-    motion.flow(min(t + h, now.clock[SEEN]), y_try, now.mode, now.held, motion.p, f_try)
+    motion.flow(min(t + h, now.seen), y_try, now.mode, now.held, motion.p, f_try)
     for j in range(len(y)):
         f_try[j] = (f_try[j] - f[j]) / h
     d2 = scaled_size(f_try, y, control, now.floor)

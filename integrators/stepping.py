@@ -7,19 +7,15 @@ restarted. So the results are those of a run over the same samples as a record, 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
 
-from integrators.advance import NEXT_KNOT, STEPS, Plan
+from integrators.advance import Plan
 from integrators.loop import (
     ARC,
     ASK,
-    EDGE,
     FIRED,
     FIRING,
-    JUMP,
-    MACHINE,
     PAUSED,
-    PHASE,
     ROWS,
     SETTLED,
     SLID,
@@ -40,49 +36,42 @@ from integrators.sliding import (
     margins_on,
 )
 from integrators.step_size import INFINITY
-from integrators.steps import LATEST, PAUSE, Motion, T, Vector
+from integrators.steps import Motion, Vector
 
-__all__ = [
-    "CODE",
-    "FULL_LOG",
-    "MEAN",
-    "RESUMED",
-    "SWITCHES",
-    "Clocks",
-    "Sample",
-    "next_tick",
-    "restart",
-    "step_to",
-]
+__all__ = ["FULL_LOG", "Clocks", "Sample", "next_tick", "restart", "step_to"]
 
 FULL_LOG = 21  # the log is full: empty it, and call again
-# Indices into Sample.counts: switches in the log; whether this call continues one that returned
-# FULL_LOG; whether the mean is wanted; what was returned.
-SWITCHES, RESUMED, MEAN, CODE = range(4)
 EXACT = 2.0**53  # up to here every whole number is a float
 
 
-class Clocks(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Clocks:
     """What ticks: samplers, then discrete machines, each with its bit.
 
     Periods and offsets are whole numbers of units, so that no sum of them is rounded.
     """
 
-    per_second: Vector  # [units in a second]
+    per_second: float  # units in a second
+    begin: float  # a time, s
+    units: float  # after that time: their sum is the start
     period: Vector
     offset: Vector  # of each its first tick, from the start
-    begin: Vector  # [time, units]: their sum is the start
     made: list[int]  # ticks in the plan, or past
 
 
-class Sample(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Sample:
     """What a call is given, and what it finds."""
 
-    end: Vector  # [time]
+    end: float  # its time
+    wanted: int  # place of the force among the observed values
+    mean: bool  # whether the mean is wanted
+    resumed: bool  # whether this call continues one that returned FULL_LOG
+    switches: int  # in the log
+    code: int  # what was returned
+    force: float  # at the end
+    impulse: float  # integral of the force over the sample, if the mean is wanted
     inputs: list[Vector]  # of each input its value at the start and at the end; never empty
-    counts: list[int]  # see the indices above
-    wanted: list[int]  # [place of the force among the observed values]
-    force: Vector  # [at the end, integral over the sample]
     seen: Vector  # observed values at the end
     t: Vector  # of each switch its time
     machine: list[int]
@@ -110,39 +99,37 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
     int
         0 at its end, FULL_LOG, or an error as in `run_to_event`.
     """
-    now, counts, observe = b.now, b.memory.counts, machines.observe
-    clock, done = now.clock, sample.counts
-    end = sample.end[0]
+    now, memory, observe, end = b.now, b.memory, machines.observe, sample.end
     on = Held(functions, now.held, b.sliding)
     motion = Motion(flow_on, margins_on, on, follow_on)
-    if done[RESUMED] == 0:
+    if not sample.resumed:
         _begin(functions, b, sample)
-    done[CODE] = 0
-    while clock[T] < end or not (counts[PHASE] == ARC or counts[PHASE] == SETTLED):
-        t = clock[T]
+    sample.code = 0
+    while now.t < end or not (memory.phase == ARC or memory.phase == SETTLED):
+        t = now.t
         for j in range(len(now.y)):
             sample.before[j] = now.y[j]
         event = run_to_event(functions, machines, motion, b, 1)
-        if len(b.plan.jumps) > 0 and b.plan.jumps[1] <= clock[T]:
+        if len(b.plan.jumps) > 0 and b.plan.jumps[1] <= now.t:
             next_tick(b.plan, sample.clocks)
-            counts[JUMP] = 0
-        if done[MEAN] > 0 and clock[T] > t:
+            memory.jump = 0
+        if sample.mean and now.t > t:
             impulse = _impulse(machines, motion, b, sample, t)
-            sample.force[1] += impulse
+            sample.impulse += impulse
         if event == FIRED:
-            row = done[SWITCHES]
-            sample.t[row] = clock[T]
-            sample.machine[row] = counts[MACHINE]
-            sample.edge[row] = counts[EDGE]
-            done[SWITCHES] = row + 1
+            row = sample.switches
+            sample.t[row] = now.t
+            sample.machine[row] = memory.machine
+            sample.edge[row] = memory.edge
+            sample.switches = row + 1
             if row + 1 == len(sample.t):
-                done[CODE] = FULL_LOG
+                sample.code = FULL_LOG
                 return FULL_LOG
         elif event not in (ROWS, FIRING, STOPPED, SLID, PAUSED):
-            done[CODE] = event
+            sample.code = event
             return event
-    look(observe, on, clock[T], now.y, now.mode, sample.seen)
-    sample.force[0] = sample.seen[sample.wanted[0]]
+    look(observe, on, now.t, now.y, now.mode, sample.seen)
+    sample.force = sample.seen[sample.wanted]
     return 0
 
 
@@ -175,8 +162,8 @@ def next_tick(plan: Plan, clocks: Clocks) -> None:
 
 def _due(clocks: Clocks, i: int) -> float:
     """Return the next tick of a clock."""
-    units = clocks.begin[1] + clocks.offset[i] + clocks.made[i] * clocks.period[i]
-    return clocks.begin[0] + units / clocks.per_second[0]
+    units = clocks.units + clocks.offset[i] + clocks.made[i] * clocks.period[i]
+    return clocks.begin + units / clocks.per_second
 
 
 def restart(b: Buffers, clocks: Clocks) -> None:
@@ -189,13 +176,13 @@ def restart(b: Buffers, clocks: Clocks) -> None:
     clocks : Clocks
         What ticks.
     """
-    t, plan = b.now.clock[T], b.plan
-    clocks.begin[0], clocks.begin[1] = t, 0.0
-    units = t * clocks.per_second[0]
+    t, plan = b.now.t, b.plan
+    clocks.begin, clocks.units = t, 0.0
+    units = t * clocks.per_second
     if abs(units) < EXACT:
         whole = int(units + 0.5) if units > 0.0 else int(units - 0.5)
-        if whole / clocks.per_second[0] == t:
-            clocks.begin[0], clocks.begin[1] = 0.0, float(whole)
+        if whole / clocks.per_second == t:
+            clocks.begin, clocks.units = 0.0, float(whole)
     for i in range(len(clocks.made)):
         clocks.made[i] = 0
     for _k in range(len(plan.jumps)):
@@ -204,31 +191,31 @@ def restart(b: Buffers, clocks: Clocks) -> None:
 
 def _begin(functions: Functions, b: Buffers, sample: Sample) -> None:
     """Write the straight lines; where an input jumps, guards are asked again."""
-    clock, counts, end = b.now.clock, b.memory.counts, sample.end[0]
+    now, memory, end = b.now, b.memory, sample.end
     _shared, _own, tables = functions.p
-    first = 1 if clock[T] >= end else 0  # of a sample without length only its end matters
-    on, jumps = Held(functions, b.now.held, b.sliding), False
+    first = 1 if now.t >= end else 0  # of a sample without length only its end matters
+    on, jumps = Held(functions, now.held, b.sliding), False
     for k in range(len(tables) // 2):
         jumps = jumps or tables[2 * k + 1][1] != sample.inputs[k][first]
-    jumps = jumps and counts[PHASE] != START
+    jumps = jumps and memory.phase != START
     if jumps:
-        look_back(on, b.now, b.relations)
+        look_back(on, now, b.relations)
     for k in range(len(tables) // 2):
         times, values, given = tables[2 * k], tables[2 * k + 1], sample.inputs[k]
-        times[0] = clock[T]
+        times[0] = now.t
         times[1] = end
         values[0] = given[0]
         values[1] = given[1]
     if jumps:
-        counts[PHASE] = ASK
-        let_go(on, b.now, b.relations)
-    clock[PAUSE] = end
-    clock[LATEST] = abs(end)
+        memory.phase = ASK
+        let_go(on, now, b.relations)
+    now.pause = end
+    now.latest = abs(end)
     b.plan.knots[0] = end
-    b.out.cursor[NEXT_KNOT] = 0
-    b.out.cursor[STEPS] = 0
-    sample.counts[SWITCHES] = 0
-    sample.force[1] = 0.0
+    b.out.next_knot = 0
+    b.out.steps = 0
+    sample.switches = 0
+    sample.impulse = 0.0
 
 
 def _impulse(machines: Machines, motion: Motion, b: Buffers, sample: Sample, t: float) -> float:
@@ -236,15 +223,15 @@ def _impulse(machines: Machines, motion: Motion, b: Buffers, sample: Sample, t: 
 
     The state in the middle is on the cubic through both ends.
     """
-    now, on, place = b.now, motion.p, sample.wanted[0]
+    now, on, place = b.now, motion.p, sample.wanted
     before, middle, slope, first = sample.before, sample.middle, sample.slope, b.scratch.k[0]
-    h = now.clock[T] - t
-    motion.flow(now.clock[T], now.y, now.mode, now.held, motion.p, slope)
+    h = now.t - t
+    motion.flow(now.t, now.y, now.mode, now.held, motion.p, slope)
     for j in range(len(now.y)):
         middle[j] = 0.5 * (before[j] + now.y[j]) + 0.125 * h * (first[j] - slope[j])
     look_held(machines.observe, on, t, before, now.mode, sample.seen)
     total = sample.seen[place]
     look_held(machines.observe, on, t + 0.5 * h, middle, now.mode, sample.seen)
     total += 4.0 * sample.seen[place]
-    look_held(machines.observe, on, now.clock[T], now.y, now.mode, sample.seen)
+    look_held(machines.observe, on, now.t, now.y, now.mode, sample.seen)
     return h * (total + sample.seen[place]) / 6.0

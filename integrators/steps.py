@@ -7,6 +7,7 @@ result to the last bit (sums are evaluated in order, nothing is reassociated).
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from integrators.tableaux import Row, Tableau
@@ -28,11 +29,6 @@ Vector = list[float]
 Flow = Callable[..., Any]  # flow(t, y, mode, held, p, dy) -> None, fills dy
 Follow = Callable[..., Any]  # follow(t, y, mode, held, p) -> None, sets what others determine
 Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
-# Indices into Now.clock: the time, the next step, the controller's memory, the next stop; the time
-# since which switches are counted, and the time of the last one; the time at which the loop returns
-# once the states are settled, and the latest time that the clock must resolve; the latest time at
-# which the system shows what is before the next jump. Beyond it, at the jump, it is asked there.
-T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED, PAUSE, LATEST, SEEN = range(9)
 
 
 class Coefficients(NamedTuple):
@@ -69,10 +65,21 @@ class Motion(NamedTuple):
     follow: Follow
 
 
-class Now(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Now:
     """The state of a run; changed in place."""
 
-    clock: Vector  # see the indices above
+    t: float  # the time
+    h: float  # the next step
+    error_before: float  # the controller's memory
+    t_stop: float  # the next stop
+    anchor: float  # the time since which switches are counted
+    switched: float  # the time of the last one
+    pause: float  # the time at which the loop returns once the states are settled
+    latest: float  # the latest time that the clock must resolve
+    # The latest time at which the system shows what is before the next jump. Beyond it, at the
+    # jump, it is asked there.
+    seen: float
     y: Vector  # state, shape (m,)
     f: Vector  # slope, shape (m,)
     mode: list[int]  # of each machine, shape (n,); frozen within a step
@@ -82,7 +89,7 @@ class Now(NamedTuple):
 
 def time_of(now: Now) -> float:
     """Return the time at which the system shows the state: one clock tick before a jump."""
-    return min(now.clock[T], now.clock[SEEN])
+    return min(now.t, now.seen)
 
 
 class Scratch(NamedTuple):
@@ -130,12 +137,12 @@ def take_step(
         Filled with the slopes of the stages, the state at t_new and its slope.
     """
     flow, p = motion.flow, motion.p
-    t, y = now.clock[T], now.y
+    t, y = now.t, now.y
     mode, held = now.mode, now.held
     k, y_new = scratch.k, scratch.y_new
     h = t_new - t
     size = len(y)
-    end = min(t_new, now.clock[SEEN])
+    end = min(t_new, now.seen)
     A = method.A
     B = method.B
     C = method.C

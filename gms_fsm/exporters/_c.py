@@ -28,7 +28,7 @@ from integrators.compiled import INLINE, is_known
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Block, Layout
 from integrators.machine_code.translate import Translator
-from integrators.stepping import FULL_LOG, RESUMED, SWITCHES, step_to
+from integrators.stepping import FULL_LOG, step_to
 
 __all__ = [
     "PLACES",
@@ -216,7 +216,6 @@ class _Text:
     def source(self) -> str:
         """Return the source."""
         name, made, place = self.name, self.made, self.layout.offset
-        counts = place("sample.counts")
         given = [
             f"    w[{place('sample.inputs') + 2 * k + j}].f = {each}{j};"
             for k, each in enumerate(made.inputs)
@@ -238,7 +237,7 @@ class _Text:
             title=safe(self.title),
             version=__version__,
             engine=self._translated(),
-            clock=place("buffers.now.clock"),
+            clock=place("buffers.now.t"),
             shown=self._shown(),
             image=image_of(self.layout, self.arguments),
             lines=made.lines,
@@ -249,8 +248,8 @@ class _Text:
             latest=repr(LATEST),
             end=place("sample.end"),
             given="\n".join(given),
-            resumed=counts + RESUMED,
-            switches=counts + SWITCHES,
+            resumed=place("sample.resumed"),
+            switches=place("sample.switches"),
             full_log=FULL_LOG,
             spans=" || ".join(spans),
             time_scale=place("buffers.plan.control.time_scale"),

@@ -161,7 +161,7 @@ class FmuModel:
             "STATES": len(self.nominals),
             "INDICATORS": len(self.arguments.exchange.indicators),
             "HAS_EXCHANGE": int(self.exchange),
-            "CLOCK": place("buffers.now.clock"),
+            "CLOCK": place("buffers.now.t"),
             "FOREIGN": place("buffers.plan.foreign"),
             "TABLES": place("functions.p.2"),
             "Y": place("buffers.now.y"),
@@ -175,8 +175,8 @@ class FmuModel:
             "NEXT": place("exchange.next"),
             "SAMPLE_END": place("sample.end"),
             "SAMPLE_INPUTS": place("sample.inputs"),
-            "SAMPLE_SWITCHES": place("sample.counts") + stepping.SWITCHES,
-            "SAMPLE_RESUMED": place("sample.counts") + stepping.RESUMED,
+            "SAMPLE_SWITCHES": place("sample.switches"),
+            "SAMPLE_RESUMED": place("sample.resumed"),
             "FULL_LOG": stepping.FULL_LOG,
         }
 

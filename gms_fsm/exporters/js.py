@@ -36,8 +36,6 @@ from gms_fsm.run._stepper import arguments_of
 from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems.signals import Function
 from integrators import columns, hybrid, loop
-from integrators.advance import ROW
-from integrators.columns import FIRINGS
 from integrators.compiled import INLINE, is_known
 from integrators.machine_code.javascript import javascript_text, script_number, tables_of
 from integrators.machine_code.layout import Block, Column, Layout
@@ -45,8 +43,7 @@ from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
 from integrators.machine_code.values import Number
 from integrators.observing import observe_rows
-from integrators.stepping import FULL_LOG, RESUMED, SWITCHES, step_to
-from integrators.steps import T
+from integrators.stepping import FULL_LOG, step_to
 
 __all__ = ["js"]
 
@@ -337,7 +334,6 @@ class _Run(_Module):
     def holes(self) -> dict[str, object]:
         """Return codes, sizes, and places in the block."""
         start, place, layout = self.start, self.layout.offset, self.start.program.layout
-        counts = place("buffers.memory.counts")
         names = [
             f"element {i + 1}" + (f" of {bank.name}" if len(layout.banks) > 1 else "")
             for bank in layout.banks
@@ -350,11 +346,11 @@ class _Run(_Module):
             "modes": layout.modes,
             "size": layout.y.size,
             "observed": layout.observed.size,
-            "clock": place("buffers.now.clock") + T,
-            "machine": counts + loop.MACHINE,
+            "clock": place("buffers.now.t"),
+            "machine": place("buffers.memory.machine"),
             "livelock": loop.MACHINE_LIVELOCK,
-            "row": place("buffers.out.cursor") + ROW,
-            "firings": place("log.counts") + FIRINGS,
+            "row": place("buffers.out.row"),
+            "firings": place("log.firings"),
             "t_start": repr(start.t_start),
             "t_end": repr(start.t_end),
             "times": "undefined" if start.options.times is None else len(start.options.times),
@@ -412,11 +408,11 @@ class _Friction(_Module):
             "t_start": repr(self.start.t_start),
             "latest": repr(LATEST),
             "full_log": FULL_LOG,
-            "clock": place("buffers.now.clock") + T,
+            "clock": place("buffers.now.t"),
             "end": place("sample.end"),
             "given": place("sample.inputs"),
-            "resumed": place("sample.counts") + RESUMED,
-            "switches": place("sample.counts") + SWITCHES,
+            "resumed": place("sample.resumed"),
+            "switches": place("sample.switches"),
             "log_t": place("sample.t"),
             "log_element": place("sample.machine"),
             "log_edge": place("sample.edge"),

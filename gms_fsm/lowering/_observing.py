@@ -64,7 +64,7 @@ def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> l
     if any(mode[program.layout.slides]):
         on = _on(program, mode)._replace(held=armed(program, t, y, mode))
         slope_on(on, t, y, list(mode), [0.0] * program.layout.y.size)
-        for c in range(on.sliding.which[-1]):
+        for c in range(on.sliding.count):
             found[on.sliding.which[c]] = min(max(on.sliding.sigma[c], -1.0), 1.0)
     return found
 

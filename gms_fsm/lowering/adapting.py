@@ -24,8 +24,8 @@ from gms_fsm.lowering._scale_text import HELPERS, scale_text
 from gms_fsm.systems._assembly import CURVE_LOAD, Bank, of
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import LEAST_LOAD
-from integrators.loop import PHASE, START, Buffers
-from integrators.steps import T, Vector
+from integrators.loop import START, Buffers
+from integrators.steps import Vector
 
 __all__ = ["FUNCTIONS", "SHARE", "Adapting", "Adaptive", "adapt", "adaptive", "bind"]
 
@@ -277,11 +277,11 @@ def adapt(functions: Any, b: Buffers, seen: Vector, live: Vector, a: Adapting) -
         control.atol[j] = a.chosen[j]
         if a.chosen[j] == 0.0:
             control.atol[j] = SHARE * control.rtol * a.sizes[j]
-    if b.memory.counts[PHASE] == START:
+    if b.memory.phase == START:
         for j in range(len(a.y)):
             if a.given[j] == 0:
                 now.y[j] = a.y[j]
-        a.enter(now.clock[T], now.y, now.mode, p, a.given)
+        a.enter(now.t, now.y, now.mode, p, a.given)
         for j in range(len(a.y)):
             b.memory.anchor[j] = now.y[j]
         signs = now.held[0] if len(now.held) > 0 else 0.0  # all are equal before the first step

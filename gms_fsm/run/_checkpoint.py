@@ -25,8 +25,7 @@ from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import Contact
 from gms_fsm.traces._archives import member
-from integrators import hybrid, loop
-from integrators.advance import ROW
+from integrators import hybrid, states
 
 __all__ = ["Checkpointer"]
 
@@ -100,7 +99,7 @@ class Checkpointer:
 
     def save(self) -> None:
         """Write a checkpoint atomically."""
-        state = {f"loop_{name}": u for name, u in hybrid.state_of(self.run.buffers).items()}
+        state = {f"loop_{name}": u for name, u in states.state_of(self.run.buffers).items()}
         kept = {f"kept_{name}": u for name, u in self.run.kept().items()}
         head: dict[str, Any] = {"format": _FORMAT, "program": _program(), "identity": self.identity}
         write_whole(self.path, lambda file: np.savez(file, **head, **state, **kept))
@@ -110,7 +109,7 @@ class Checkpointer:
         self.path.unlink(missing_ok=True)
 
     def _restore(self) -> None:
-        places, columns = hybrid.state_of(self.run.buffers), self.run.kept()
+        places, columns = states.state_of(self.run.buffers), self.run.kept()
         ours = [_FORMAT, _program(), self.identity]
         try:
             most = self.path.stat().st_size  # nothing in it is compressed
@@ -145,8 +144,7 @@ class Checkpointer:
                 place=str(self.path),
                 advice="remove it, or use a separate file for this run",
             )
-        for name, place in places.items():
-            place[:] = state[name] if isinstance(place, np.ndarray) else state[name].tolist()
+        states.put_state(self.run.buffers, {name: u.tolist() for name, u in state.items()})
         self.run.restore(kept)
 
 
@@ -185,17 +183,18 @@ def _identity(start: Start) -> str:
 def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) -> None:
     """Raise a ValueError unless a run like this one can have reached such values."""
     start, b, layout = run.start, run.buffers, run.start.program.layout
-    for name, place in hybrid.state_of(b).items():
+    for name, place in states.state_of(b).items():
         _expect(name, state[name], np.asarray(place), rows=False)
     for name, column in run.kept().items():
         _expect(name, kept[name], np.asarray(column), rows=name not in ("counts", "seen"))
     check_state(start, b, state, start.t_end)
     counts, cursor, last = state["counts"], state["cursor"], last_states(start)
+    row = cursor[states.CURSOR.index("row")]
     # Compiled rows are in the saved columns, others in the buffer.
     capacity = max(len(kept["rows_t"]), len(b.out.rows_t))
     within = {
-        "row": (cursor[ROW], 0, capacity),
-        "rows taken": (counts[loop.TAKEN], 0, cursor[ROW]),
+        "row": (row, 0, capacity),
+        "rows taken": (counts[states.COUNTS.index("taken")], 0, row),
         "rows' mode": (kept["rows_mode"][:, layout.elements], 0, last),
         "stops' mode": (kept["stops_mode"][:, layout.elements], 0, last),
         "rows slid": (kept["rows_mode"][:, layout.slides], 0, 1),

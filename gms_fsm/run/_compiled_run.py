@@ -22,11 +22,12 @@ from gms_fsm.traces._firings import Firings
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
-from integrators import hybrid, loop
-from integrators.advance import ROW, STEPS
-from integrators.columns import FIRINGS, STOPS, Log, Recorded
-from integrators.sliding import Functions
-from integrators.steps import T
+from integrators import hybrid, loop, states
+from integrators.columns import Log, Recorded
+from integrators.loop import Memory
+from integrators.machine_code.records import arrays_of, put_numbers
+from integrators.sliding import Functions, Sliding
+from integrators.steps import Now
 
 if TYPE_CHECKING:
     from integrators.compiled import Run
@@ -72,14 +73,13 @@ class CompiledRun:
     def restore(self, kept: dict[str, Any]) -> None:
         """Restore what `kept` returned; the buffers are already filled."""
         self.columns.restore(kept)
-        counts: Any = self.buffers.memory.counts
+        memory = self.buffers.memory
         t, y, mode = self.columns.latest
         if self.engine is not None:
             self.engine.restore(t, y, mode[self.start.program.layout.elements])
-            if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop has yet to fire
-                machine = int(counts[loop.MACHINE])
-                _, edge = self.start.edge(machine, int(counts[loop.EDGE]))
-                self.engine.set_state(machine, edge.target)
+            if memory.phase == loop.FIRE:  # its callbacks have run, the loop has yet to fire
+                _, edge = self.start.edge(memory.machine, memory.edge)
+                self.engine.set_state(memory.machine, edge.target)
 
     def reset(self, what: Mounted) -> None:
         """Start over with different numbers; signals and initial values stay.
@@ -122,7 +122,7 @@ class CompiledRun:
             check_end(columns)
             return False
         if event == loop.ROWS:
-            steps = int(b.out.cursor[STEPS])
+            steps = b.out.steps
             if steps >= self.next_look and start.options.max_steps - steps >= WORTH_A_LOOK:
                 self.next_look = LATER * steps
                 check_pace(columns, columns.as_lists())
@@ -138,11 +138,11 @@ class CompiledRun:
         assert engine is not None
         memory, (t, y, mode) = self.columns.buffers.memory, self.columns.latest
         start = self.columns.start
-        if memory.counts[loop.FIRED_ONE] == 0:  # the values when the guards were evaluated
+        if not memory.fired_one:  # the values when the guards were evaluated
             jolt: Any = memory.jolt
             engine.show(t, y, list(mode[start.program.layout.elements]), jolt.tolist())
         try:
-            engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
+            engine.trigger(memory.edge, memory.machine, t)
         except Interference as error:
             raise interference_error(error, self.columns) from error.__cause__
 
@@ -179,32 +179,25 @@ class Columns:
         plan = hybrid.plan_of(
             equations(start.program), start.t_start, start.last, start.options, len(start.mode)
         )
-        out = b.out._replace(
-            times=np.asarray(() if start.options.times is None else start.options.times, float),
-            every_step=start.options.times is None,
-            rows_t=rows_t,
-            rows_y=rows_y,
-        )
-        self.buffers: hybrid.Buffers = b._replace(plan=_as_arrays(plan, b.plan), out=out)
-        self.log: Log = self.run_of.log._replace(
-            t=floats(256),
-            machine=ints(256),
-            edge=ints(256),
-            numbers=floats((256, len(LOG_NUMBERS))),
-            rows_microstep=rows_microstep,
-            rows_mode=rows_mode,
-            stops_t=stops_t,
-            stops_microstep=stops_microstep,
-            stops_y=stops_y,
-            stops_mode=stops_mode,
-        )
+        self.buffers: hybrid.Buffers = b._replace(plan=_as_arrays(plan, b.plan))
+        out: Any = b.out  # arrays
+        out.every_step = start.options.times is None
+        out.times = np.asarray(() if out.every_step else start.options.times, float)
+        out.rows_t, out.rows_y = rows_t, rows_y
+        log: Any = self.run_of.log
+        self.log: Log = log
+        log.t, log.machine, log.edge = floats(256), ints(256), ints(256)
+        log.numbers = floats((256, len(LOG_NUMBERS)))
+        log.rows_microstep, log.rows_mode = rows_microstep, rows_mode
+        log.stops_t, log.stops_microstep = stops_t, stops_microstep
+        log.stops_y, log.stops_mode = stops_y, stops_mode
         self.handed_out = False  # whether a trace has the columns of rows, and not a copy
         self._begin()
         if stops:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
             self.log.stops_microstep[0] = 0
-            self.log.counts[STOPS] = 1
+            self.log.stops = 1
 
     def __del__(self) -> None:
         if hasattr(self, "block"):
@@ -220,7 +213,6 @@ class Columns:
             self.run_of._replace(
                 functions=functions._replace(p=(*places[:2], tables)),
                 buffers=self.buffers,
-                log=self.log,
             )
         )
         return self.engine(self.block, most_steps, pause)
@@ -235,7 +227,8 @@ class Columns:
         """Write the start into the buffers, which are otherwise as they were at the beginning."""
         start = self.start
         b: Any = self.buffers  # arrays
-        b.now.clock[:] = hybrid.beginning(start.t_start, start.last)
+        begun = states.beginning(start.t_start, start.last)
+        put_numbers(b.now, begun.keys(), begun.values())
         b.now.y[:], b.now.mode[:], b.memory.anchor[:] = start.y, start.mode, start.y
         b.now.floor[:] = start.options.floor or start.options.atol
 
@@ -246,14 +239,15 @@ class Columns:
         start, log = self.start, self.log
         b: Any = self.buffers  # arrays
         memory, sliding = b.memory, b.sliding
+        for record, names in ((memory, states.COUNTS), (b.out, states.CURSOR)):
+            put_numbers(record, names, [0] * len(names))
+        sliding.count = 0
         for counts in (
-            memory.counts,
             memory.switches,
             memory.changes,
             memory.was,
             memory.jolt,
             b.relations.watch,
-            b.out.cursor,
             sliding.which,
             sliding.flags,
             sliding.arrived,
@@ -265,58 +259,51 @@ class Columns:
         b.plan.relaxing[:] = hybrid.relaxation_times(start.options)
         control = b.plan.control._replace(time_scale=start.options.time_scale)
         self.buffers = b._replace(plan=b.plan._replace(control=control))
-        log.counts[:] = [0, min(1, len(log.stops_t))]
+        log.firings, log.stops = 0, min(1, len(log.stops_t))
 
     def _replace_rows(self) -> None:
         """Leave the columns of rows to the trace that has them."""
         out: Any = self.buffers.out
         layout = self.start.program.layout
         t, microstep, y, mode = _empty_rows(len(out.rows_t), layout.y.size, layout.modes)
-        self.buffers = self.buffers._replace(out=out._replace(rows_t=t, rows_y=y))
-        self.log = self.log._replace(rows_microstep=microstep, rows_mode=mode)
+        out.rows_t, out.rows_y = t, y
+        self.log.rows_microstep, self.log.rows_mode = microstep, mode
         self.handed_out = False
 
     def state(self) -> dict[str, Any]:
         """Return the contents as arrays, for a checkpoint; 0 where nothing has been written."""
-        out = self.buffers.out
-        found: dict[str, Any] = {**self.log._asdict(), "rows_t": out.rows_t, "rows_y": out.rows_y}
-        taken = self.buffers.memory.counts[loop.TAKEN]  # the modes of further rows come later
+        out, log = self.buffers.out, self.log
+        found: dict[str, Any] = {name: getattr(log, name) for name in arrays_of(Log)}
+        found |= {"rows_t": out.rows_t, "rows_y": out.rows_y}
+        taken = self.buffers.memory.taken  # the modes of further rows come later
         filled = dict.fromkeys(("rows_mode", "rows_microstep"), taken)
-        filled |= dict.fromkeys(("rows_t", "rows_y"), out.cursor[ROW])
-        filled |= {name: self.log.counts[STOPS] for name in found if name.startswith("stops")}
+        filled |= dict.fromkeys(("rows_t", "rows_y"), out.row)
+        filled |= {name: log.stops for name in found if name.startswith("stops")}
         for name, count in filled.items():
             found[name][count:] = 0
-        return found
+        return {"counts": [log.firings, log.stops], **found}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Restore what `state` returned."""
-        for name in ("counts", "seen"):  # places in the block
-            getattr(self.log, name)[...] = state[name]
-        columns = {n: state[n] for n in self.log._fields if n not in ("counts", "seen")}
-        self.log = self.log._replace(**columns)
-        out = self.buffers.out._replace(rows_t=state["rows_t"], rows_y=state["rows_y"])
-        self.buffers = self.buffers._replace(out=out)
+        out: Any = self.buffers.out
+        log: Any = self.log
+        log.firings, log.stops = map(int, state["counts"])
+        log.seen[...] = state["seen"]  # a place in the block
+        for name in arrays_of(Log):
+            if name != "seen":
+                setattr(log, name, state[name])
+        out.rows_t, out.rows_y = state["rows_t"], state["rows_y"]
 
     def make_room(self) -> None:
         """Double the columns that are full."""
         out, log = self.buffers.out, self.log
-        if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
-            out = out._replace(rows_t=_doubled(out.rows_t), rows_y=_doubled(out.rows_y))
-            self.buffers = self.buffers._replace(out=out)
-            log = log._replace(
-                rows_microstep=_doubled(log.rows_microstep), rows_mode=_doubled(log.rows_mode)
-            )
-        if log.counts[FIRINGS] >= len(log.t):
-            log = log._replace(
-                **{
-                    name: _doubled(getattr(log, name))
-                    for name in ("t", "machine", "edge", "numbers")
-                }
-            )
-        if 0 < len(log.stops_t) <= log.counts[STOPS]:
-            names = ("stops_t", "stops_microstep", "stops_y", "stops_mode")
-            log = log._replace(**{name: _doubled(getattr(log, name)) for name in names})
-        self.log = log
+        if out.every_step and out.row + 1 >= len(out.rows_t):
+            _double(out, "rows_t", "rows_y")
+            _double(log, "rows_microstep", "rows_mode")
+        if log.firings >= len(log.t):
+            _double(log, "t", "machine", "edge", "numbers")
+        if 0 < len(log.stops_t) <= log.stops:
+            _double(log, "stops_t", "stops_microstep", "stops_y", "stops_mode")
 
     def interrupted(self, before: tuple[float, list[float], tuple[int, ...]]) -> None:
         """Recover from machine code that was interrupted by an error in a user's function.
@@ -325,24 +312,24 @@ class Columns:
         """
         b: Any = self.buffers
         log: Any = self.log
-        fresh = slice(int(b.memory.counts[loop.TAKEN]), int(b.out.cursor[ROW]))
+        fresh = slice(int(b.memory.taken), int(b.out.row))
         t, y, mode = before
         modes = [*b.now.mode.tolist(), *b.sliding.flags.tolist()]
         log.rows_microstep[fresh], log.rows_mode[fresh] = 0, modes
-        b.now.clock[T], b.now.y[:], b.now.mode[:] = t, y, mode[: len(b.now.mode)]
+        b.now.t, b.now.y[:], b.now.mode[:] = t, y, mode[: len(b.now.mode)]
 
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
         """Time, state and modes reached."""
         b: Any = self.buffers
         modes = (*b.now.mode.tolist(), *b.sliding.flags.tolist())
-        return float(b.now.clock[T]), b.now.y.tolist(), modes
+        return b.now.t, b.now.y.tolist(), modes
 
     def around(self, t: float) -> tuple[Place, Place | None]:
         """Return the last row at or before a time, and the next one."""
         out, log, start = self.buffers.out, self.log, self.start
         rows: Any = out  # arrays
-        count = int(out.cursor[ROW])
+        count = out.row
         row = int(np.searchsorted(rows.rows_t[:count], t, "right")) - 1
         modes: Any = log.rows_mode
         places = [
@@ -361,15 +348,16 @@ class Columns:
 
     def as_lists(self) -> hybrid.Buffers:
         """Return the buffers with time, state and modes as Python numbers, for messages."""
-        b: Any = self.buffers
-        lists = {name: getattr(b.now, name).tolist() for name in ("clock", "y", "mode")}
-        memory = b.memory._replace(counts=b.memory.counts.tolist())
-        sliding = b.sliding._replace(flags=b.sliding.flags.tolist())
-        return self.buffers._replace(now=b.now._replace(**lists), memory=memory, sliding=sliding)
+        b = self.buffers
+        return b._replace(
+            now=_with_lists(Now, b.now),
+            memory=_with_lists(Memory, b.memory),
+            sliding=_with_lists(Sliding, b.sliding),
+        )
 
     def fired(self) -> Firings:
         """Return the firings so far."""
-        start, count = self.start, int(self.log.counts[FIRINGS])
+        start, count = self.start, self.log.firings
         names = ("t", "machine", "edge", "numbers")
         columns = {name: getattr(self.log, name)[:count] for name in names}
         return Firings.copied(columns, start.program.layout, of_system=start.what.named)
@@ -377,7 +365,7 @@ class Columns:
     def trace(self) -> Trace:
         """Return the trace of all recorded data."""
         start, log, out = self.start, self.log, self.buffers.out
-        count = int(out.cursor[ROW])
+        count = out.row
         if start.output == "end":
             t, y, mode = self.latest
             rows = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
@@ -388,7 +376,7 @@ class Columns:
         stops = rows
         if start.output == "t_eval":
             stops = _rows(
-                int(log.counts[STOPS]),
+                log.stops,
                 log.stops_t,
                 log.stops_microstep,
                 log.stops_y,
@@ -484,8 +472,16 @@ def _empty_rows(rows: int, size: int, modes: int) -> tuple[Any, Any, Any, Any]:
     return numbers[:rows], whole[rows:start], y, mode
 
 
-def _doubled(column: Any) -> Any:
-    return np.concatenate([column, np.zeros_like(column)])
+def _with_lists(kind: Any, record: Any) -> Any:
+    """Return a copy of a record in a block, with lists instead of arrays."""
+    parts = (getattr(record, name) for name in kind.__match_args__)
+    return kind(*(part.tolist() if isinstance(part, np.ndarray) else part for part in parts))
+
+
+def _double(record: Any, *names: str) -> None:
+    for name in names:
+        column = getattr(record, name)
+        setattr(record, name, np.concatenate([column, np.zeros_like(column)]))
 
 
 def _rows(count: int, *columns: Any) -> Rows:

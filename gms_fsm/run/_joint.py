@@ -30,9 +30,8 @@ from gms_fsm.traces.failures import (
     StepSizeError,
 )
 from gms_fsm.traces.rows import Rows
-from integrators import advance, hybrid, loop
-from integrators.stepping import CODE, FULL_LOG, RESUMED, SWITCHES
-from integrators.steps import T
+from integrators import advance, hybrid, loop, states
+from integrators.stepping import FULL_LOG
 
 __all__ = ["FAILURES", "Asked", "ElementSwitch", "Joint", "Line"]
 
@@ -71,7 +70,6 @@ class StatePart(NamedTuple):
     """A part of the state, and where it is in an array."""
 
     name: str
-    place: Any
     kind: np.dtype[Any]
     where: slice
 
@@ -106,9 +104,9 @@ class Joint:
     def enter(self, t: float, lines: Mapping[str, Line]) -> None:
         """Enter the default states with the first inputs, if that has not been done yet."""
         b: Any = self.memory.buffers
-        if b.memory.counts[loop.PHASE] == loop.START:
+        if b.memory.phase == loop.START:
             # Of a sample without length only its end matters.
-            first = 0 if t > b.now.clock[T] else 1
+            first = 0 if t > b.now.t else 1
             values = {name: line[first] for name, line in lines.items()}
             try:
                 start = start_of(self.given, *self.asked, values)
@@ -118,12 +116,12 @@ class Joint:
 
     def finish(self, now: float) -> list[ElementSwitch]:
         """Complete a sample that ended early, and return what its log lost; or raise its error."""
-        counts, lost = self.memory.sample.counts, list[ElementSwitch]()
-        while code := int(counts[CODE]):
+        sample, lost = self.memory.sample, list[ElementSwitch]()
+        while code := sample.code:
             if code != FULL_LOG:
                 raise self._within(self._failure(code, now))
             lost += self.logged
-            counts[SWITCHES], counts[RESUMED] = 0, 1
+            sample.switches, sample.resumed = 0, True
             self.memory.run()
         return lost
 
@@ -134,11 +132,11 @@ class Joint:
     def _failure(self, code: int, now: float) -> SimulationError:
         """Return the error for a sample that cannot be completed."""
         b, start = self.memory.buffers, self.start
-        t, modes = float(b.now.clock[T]), hybrid.modes_of(b)
+        t, modes = b.now.t, hybrid.modes_of(b)
         where = np.array([t]), np.zeros(1, dtype=np.int64), np.array([b.now.y]), np.array([modes])
         row = Rows(*where)
         kind, reason = FAILURES[code]
-        element = f"element {int(b.memory.counts[loop.MACHINE]) + 1}"
+        element = f"element {b.memory.machine + 1}"
         error = kind(
             reason,
             start.trace(row, row, start.firings([])),
@@ -165,13 +163,13 @@ class Joint:
     def logged(self) -> list[ElementSwitch]:
         """The switches in the log of the sample."""
         sample, edges = self.memory.sample, self._chart.transitions
-        count = int(sample.counts[SWITCHES])
+        count = sample.switches
         log = zip(sample.t[:count], sample.machine[:count], sample.edge[:count], strict=True)
         return [ElementSwitch(float(t), int(i), edges[int(edge)].name) for t, i, edge in log]
 
     def forget(self) -> None:
         """Empty the log."""
-        self.memory.sample.counts[SWITCHES] = 0
+        self.memory.sample.switches = 0
 
     @property
     def speed(self) -> float:
@@ -192,7 +190,8 @@ class Joint:
     @property
     def numbers(self) -> FloatArray:
         """The present state as finite numbers."""
-        flat = np.concatenate([np.asarray(part.place, dtype=np.float64) for part in self._parts])
+        state = self.memory.state()
+        flat = np.concatenate([np.asarray(state[part.name], float) for part in self._parts])
         found: FloatArray = np.clip(flat, -MOST, MOST)
         return found
 
@@ -228,16 +227,12 @@ class Joint:
                 advice="give what to_array returned, unchanged",
             )
         clock = next(part.where.start for part in self._parts if part.name == "clock")
-        return float(flat[clock + T]), flat
+        return float(flat[clock + states.CLOCK.index("t")]), flat
 
     def write(self, flat: FloatArray) -> None:
         """Return to a state that is checked."""
-        for part in self._parts:
-            values = flat[part.where]
-            if isinstance(part.place, np.ndarray):
-                part.place[:] = values
-            else:
-                part.place[:] = values.astype(part.kind).tolist()
+        parts = self._parts
+        self.memory.put({each.name: flat[each.where].astype(each.kind).tolist() for each in parts})
 
     @functools.cached_property
     def _parts(self) -> list[StatePart]:
@@ -246,7 +241,7 @@ class Joint:
         for name, place in self.memory.state().items():
             if name not in TEMPORARY and len(place) > 0:
                 where = slice(start, start + len(place))
-                parts.append(StatePart(name, place, np.asarray(place).dtype, where))
+                parts.append(StatePart(name, np.asarray(place).dtype, where))
                 start = where.stop
         return parts
 
@@ -254,7 +249,7 @@ class Joint:
     def _phase(self) -> int:
         """The place of the loop's phase in an array."""
         start: int = next(part.where.start for part in self._parts if part.name == "counts")
-        return start + loop.PHASE
+        return start + states.COUNTS.index("phase")
 
     @functools.cached_property
     def _limits(self) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
@@ -265,11 +260,12 @@ class Joint:
         for part in self._parts:
             whole[part.where] = part.kind.kind != "f"
             if part.name == "floor":  # tolerances only grow
-                least[part.where] = part.place
+                least[part.where] = self.memory.buffers.now.floor
             if part.name in bounds:
                 least[part.where], most[part.where] = bounds[part.name]
             if part.name == "clock":  # it may be of a friction that began earlier
-                least[part.where.start + T], most[part.where.start + T] = -LATEST, LATEST
+                t = part.where.start + states.CLOCK.index("t")
+                least[t], most[t] = -LATEST, LATEST
         most[whole] = np.minimum(most[whole], 2.0**53)
         least[whole] = np.maximum(least[whole], -(2.0**53))
         return least, most, whole

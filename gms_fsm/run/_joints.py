@@ -20,7 +20,6 @@ from gms_fsm.run._stepper import BlockMemory, ListMemory, StepMemory, fast, mach
 from gms_fsm.run.start import LATEST
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
-from integrators.stepping import MEAN, RESUMED
 
 __all__ = ["Joints", "Snapshot", "content_of", "input_lines", "made_again"]
 
@@ -78,9 +77,8 @@ class JointGroup:
     def __init__(self, joints: Sequence[Joint], memory: StepMemory, places: Any) -> None:
         self.joints, self.places = joints, places
         self.copy, self.take = memory.copy, memory.take
-        self._run, sample = memory.run, memory.sample
-        self._end, self._force, self._counts = sample.end, sample.force, sample.counts
-        self._v, *others = sample.inputs
+        self._run, self._sample = memory.run, memory.sample
+        self._v, *others = memory.lines
         self._others = [*zip(joints[0].inputs, others, strict=False)]
         self._entering = joints[0].enters
 
@@ -100,16 +98,16 @@ class JointGroup:
             line[0], line[1] = inputs[name]
         if self._entering:
             self._enter(t, {**inputs, "v": (v0, v1)})
-        v, counts = self._v, self._counts
-        self._end[0], v[0], v[1] = t, v0, v1
-        counts[RESUMED] = 0
+        v, sample = self._v, self._sample
+        sample.end, v[0], v[1] = t, v0, v1
+        sample.resumed = False
         if mean:
-            counts[MEAN] = 1
+            sample.mean = True
         if self._run():
             for joint in self.joints:
                 if more := joint.finish(now):
                     lost[joint] = more
-        return self._force[1 if mean else 0]
+        return sample.impulse if mean else sample.force
 
     def _enter(self, t: float, lines: Mapping[str, Line]) -> None:
         for row, joint in enumerate(self.joints):

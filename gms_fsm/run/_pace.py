@@ -21,9 +21,6 @@ from gms_fsm.run.machines import IfElse
 from gms_fsm.run.start import Start
 from gms_fsm.traces.failures import StepLimitError
 from integrators import Arc, HybridError, hybrid
-from integrators.advance import STEPS
-from integrators.loop import JUMP
-from integrators.steps import H, T
 
 __all__ = ["LATER", "PATIENCE", "check_pace"]
 
@@ -53,13 +50,13 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
         With the advice to use an implicit method.
     """
     start, now, plan = recording.start, buffers.now, buffers.plan
-    t = now.clock[T]
+    t = now.t
     place = t, list(now.y), hybrid.modes_of(buffers)
-    options, step = start.options, now.clock[H]
-    left = options.max_steps - buffers.out.cursor[STEPS]
+    options, step = start.options, now.h
+    left = options.max_steps - buffers.out.steps
     if options.step or not isinstance(options.method, integrators.Tableau):
         return
-    if start.last - t <= step * left or len(plan.jumps) - buffers.memory.counts[JUMP] > MOST_AHEAD:
+    if start.last - t <= step * left or len(plan.jumps) - buffers.memory.jump > MOST_AHEAD:
         return
     floor = np.array(now.floor)
     fastest = _fastest(start, place, floor)

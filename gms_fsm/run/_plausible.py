@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.run.start import Start
-from integrators import FOR_A_GUARD, FOR_A_SIGN, LET_GO, WAITING, hybrid, loop
-from integrators.advance import NEXT_KNOT, NEXT_TIME
-from integrators.steps import T
+from integrators import FOR_A_GUARD, FOR_A_SIGN, LET_GO, WAITING, hybrid, loop, states
 
 __all__ = ["bounds_of", "check_ranges", "check_state", "last_edges", "last_states"]
 
@@ -51,29 +49,14 @@ def bounds_of(start: Start, b: hybrid.Buffers, t_end: float = np.inf) -> dict[st
     Returns
     -------
     dict
-        By name, as `integrators.hybrid.state_of`; without what may have any value.
+        By name, as `integrators.states.state_of`; without what may have any value.
     """
     _, last_edge = last_edges(start)
     n, relations = len(b.now.mode), len(b.relations.watch)
-    clock = np.full((2, len(b.now.clock)), [[-np.inf], [np.inf]])
-    clock[:, T] = start.t_start, t_end
-    counts = np.full((2, loop.PLACES), [[-np.inf], [np.inf]])
-    for place, least, most in (
-        (loop.HOLD, 0, sum({*start.program.discrete})),
-        (loop.PHASE, loop.START, loop.END),
-        (loop.MACHINE, -1, n - 1),
-        (loop.EDGE, 0, max(0, last_edge.max())),
-        (loop.JUMP, 0, len(b.plan.jumps)),
-        (loop.ACTIVE, 0, relations),
-    ):
-        counts[:, place] = least, most
-    cursor = np.full((2, len(b.out.cursor)), [[-np.inf], [np.inf]])
-    cursor[:, NEXT_TIME] = 0, len(b.out.times)
-    cursor[:, NEXT_KNOT] = 0, len(b.plan.knots)
-    most_surfaces = np.full(len(b.sliding.which), max(0, start.program.layout.surfaces - 1))
-    most_surfaces[-1] = len(b.sliding.sigma)
+    slid = len(b.sliding.sigma)
+    most_surfaces = [max(0, start.program.layout.surfaces - 1)] * slid
     return {
-        "clock": (clock[0], clock[1]),
+        "clock": _bounds(states.CLOCK, t=(start.t_start, t_end)),
         "mode": (0, last_states(start)),
         "edges": (-1, last_edge),
         "room": (0, relations - 1),
@@ -81,12 +64,28 @@ def bounds_of(start: Start, b: hybrid.Buffers, t_end: float = np.inf) -> dict[st
         "truth": (0, 1),
         "due": (0, 1),
         "jolt": (0, LET_GO),
-        "counts": (counts[0], counts[1]),
-        "cursor": (cursor[0], cursor[1]),
-        "which": (0, most_surfaces),
+        "counts": _bounds(
+            states.COUNTS,
+            hold=(0, sum({*start.program.discrete})),
+            phase=(loop.START, loop.END),
+            machine=(-1, n - 1),
+            edge=(0, max(0, last_edge.max())),
+            jump=(0, len(b.plan.jumps)),
+            active=(0, relations),
+        ),
+        "cursor": _bounds(
+            states.CURSOR, next_time=(0, len(b.out.times)), next_knot=(0, len(b.plan.knots))
+        ),
+        "which": (0, np.array([*most_surfaces, slid])),
         "slid": (0, 1),
         "arrived": (-1, 1),
     }
+
+
+def _bounds(names: Sequence[str], **bounds: Bounds) -> Bounds:
+    """Return the bounds of numbers with names; most may have any value."""
+    found = np.array([bounds.get(name, (-np.inf, np.inf)) for name in names])
+    return found[:, 0], found[:, 1]
 
 
 def check_state(start: Start, b: hybrid.Buffers, state: Mapping[str, Any], t_end: float) -> None:
@@ -97,7 +96,7 @@ def check_state(start: Start, b: hybrid.Buffers, state: Mapping[str, Any], t_end
     start, b, t_end
         As for `bounds_of`.
     state : mapping of str to ndarray
-        As `integrators.hybrid.state_of`.
+        As `integrators.states.state_of`.
 
     Raises
     ------
@@ -106,14 +105,15 @@ def check_state(start: Start, b: hybrid.Buffers, state: Mapping[str, Any], t_end
     """
     check_ranges({name: (state[name], *u) for name, u in bounds_of(start, b, t_end).items()})
     first_edge, last_edge = last_edges(start)
-    counts, enabled = state["counts"], np.asarray(state["edges"]) >= 0
+    counts = dict(zip(states.COUNTS, state["counts"], strict=True))
+    enabled = np.asarray(state["edges"]) >= 0
     edges = state["edges"][enabled], first_edge[enabled], last_edge[enabled]
     more: dict[str, tuple[Any, Any, Any]] = {"enabled edges": edges}
-    if counts[loop.PHASE] == loop.FIRE:
-        machine = counts[loop.MACHINE]
+    if counts["phase"] == loop.FIRE:
+        machine = counts["machine"]
         more["machine"] = machine, 0, len(b.now.mode) - 1
         if machine >= 0:
-            more["edge"] = counts[loop.EDGE], first_edge[machine], last_edge[machine]
+            more["edge"] = counts["edge"], first_edge[machine], last_edge[machine]
     check_ranges(more)
 
 

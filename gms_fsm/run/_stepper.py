@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 import importlib.util
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.program import equations
@@ -16,8 +17,9 @@ from gms_fsm.run._ticks import EXACT, clocks_of, in_units
 from gms_fsm.run.machines import IfElse
 from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Corners
-from integrators import hybrid
+from integrators import hybrid, states
 from integrators.loop import Buffers, Machines
+from integrators.machine_code.records import numbers_in, numbers_of, put_numbers
 from integrators.sliding import Functions
 from integrators.stepping import Clocks, Sample, restart, step_to
 
@@ -36,6 +38,7 @@ __all__ = [
 ]
 
 MOST_SWITCHES = 64  # in the log of a sample; when it is full, it is emptied and the sample goes on
+SAMPLED, LOGGED = tuple(numbers_of(Sample)), ("t", "machine", "edge")
 
 
 class JointMemory(NamedTuple):
@@ -47,9 +50,18 @@ class JointMemory(NamedTuple):
     run: Callable[[], int]
 
     def state(self) -> dict[str, Any]:
-        """Return the arrays (or lists) that make up its state, without copying them."""
-        inputs = {f"input {k}": self.tables[2 * k + 1] for k in range(len(self.sample.inputs))}
-        return {**hybrid.state_of(self.buffers), **inputs}
+        """Return what makes up its state: numbers, and the arrays (or lists) themselves."""
+        return {**states.state_of(self.buffers), **self._inputs()}
+
+    def put(self, state: Mapping[str, Sequence[Any]]) -> None:
+        """Return to a state, or to parts of it; see `integrators.states.put_state`."""
+        states.put_state(self.buffers, state)
+        for name, place in self._inputs().items():
+            if name in state:
+                place[:] = state[name]
+
+    def _inputs(self) -> dict[str, Any]:
+        return {f"input {k}": self.tables[2 * k + 1] for k in range(len(self.sample.inputs))}
 
 
 class StepMemory(Protocol):
@@ -61,7 +73,11 @@ class StepMemory(Protocol):
 
     @property
     def sample(self) -> Any:
-        """An item in it is a number if there is one joint, else one number per joint."""
+        """The numbers of `Sample`; of several joints each is an array, assigned as a whole."""
+
+    @property
+    def lines(self) -> Sequence[Any]:
+        """Of each input its value at the start and at the end; of several joints, arrays."""
 
     @property
     def run(self) -> Callable[[], int]:
@@ -92,19 +108,21 @@ class ListMemory:
         buffers, self.sample = prepared(start)
         self.run = functools.partial(step_to, functions, machines, buffers, self.sample)
         self.each = (JointMemory(buffers, functions.p[2], self.sample, self.run),)
-        found = (
-            getattr(self.sample, n) for n in ("end", "counts", "force", "t", "machine", "edge")
-        )
-        self._lists = [*self.each[0].state().values(), *found]
+        self.lines = self.sample.inputs
 
-    def copy(self, _into: Any = None, /) -> list[list[Any]]:
+    def copy(self, _into: Any = None, /) -> dict[str, list[Any]]:
         """Return the present state."""
-        return [list(place) for place in self._lists]
+        log = {f"log {name}": getattr(self.sample, name) for name in LOGGED}
+        numbers = {"sample": numbers_in(self.sample, SAMPLED)}
+        state = {**self.each[0].state(), **log, **numbers}
+        return {name: list(place) for name, place in state.items()}
 
-    def take(self, copy: list[list[Any]]) -> None:
+    def take(self, copy: dict[str, list[Any]]) -> None:
         """Return to what `copy` returned."""
-        for place, values in zip(self._lists, copy, strict=True):
-            place[:] = values
+        self.each[0].put(copy)
+        put_numbers(self.sample, SAMPLED, copy["sample"])
+        for name in LOGGED:
+            getattr(self.sample, name)[:] = copy[f"log {name}"]
 
 
 def prepared(start: Start) -> tuple[Buffers, Sample]:
@@ -134,11 +152,15 @@ def prepared(start: Start) -> tuple[Buffers, Sample]:
     restart(b, clocks)
     lines = [each for each in start.system.signals.values() if isinstance(each, Corners)]
     sample = Sample(
-        end=[start.t_start],
+        end=start.t_start,
+        wanted=layout.observed.index(layout.banks[0].of("F")),
+        mean=False,
+        resumed=False,
+        switches=0,
+        code=0,
+        force=0.0,
+        impulse=0.0,
         inputs=[[0.0, 0.0] for _ in lines or (None,)],
-        counts=[0, 0, 0, 0],
-        wanted=[layout.observed.index(layout.banks[0].of("F"))],
-        force=[0.0, 0.0],
         seen=[0.0] * layout.observed.size,
         t=[0.0] * MOST_SWITCHES,
         machine=[0] * MOST_SWITCHES,
@@ -157,10 +179,11 @@ def _clocks(start: Start) -> Clocks:
     units = in_units(ticking)
     exact = units.largest < EXACT
     return Clocks(
-        per_second=[float(units.per_second) if exact else 1.0],
+        per_second=float(units.per_second) if exact else 1.0,
+        begin=0.0,
+        units=0.0,
         period=[*map(float, units.period)] if exact else [each.period for each in ticking],
         offset=[*map(float, units.first)] if exact else [each.offset for each in ticking],
-        begin=[0.0, 0.0],
         made=[0 for _ in ticking],
     )
 
@@ -185,10 +208,9 @@ class BlockMemory:
         # Items of a memoryview are written in half the time of those of an array.
         view: Any = memoryview if count == 1 else functools.partial(_across, self._words, count)
         first = each[0].sample
-        self.sample = first._replace(
-            end=view(first.end), inputs=[*map(view, first.inputs)], counts=view(first.counts),
-            force=view(first.force),
-        )  # fmt: skip
+        self.lines = [*map(view, first.inputs)]
+        blocks = self._words.reshape(count, -1)
+        self.sample: Any = first if count == 1 else SamplesAcross(blocks, code.layout.offset)
         address = self._words.ctypes.data
         self.run = each[0].run if count == 1 else functools.partial(code.each, address, count)
 
@@ -202,6 +224,21 @@ class BlockMemory:
     def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
         self._words[:] = copy
+
+
+class SamplesAcross:
+    """The numbers of samples in blocks one after the other: arrays, assigned as a whole."""
+
+    def __init__(self, blocks: NDArray[np.int64], offset: Callable[[str], int]) -> None:
+        words = {"f": blocks.view(np.float64), "i": blocks}
+        kinds = numbers_of(Sample).items()
+        vars(self)["columns"] = {name: words[k][:, offset(f"sample.{name}")] for name, k in kinds}
+
+    def __getattr__(self, name: str) -> Any:
+        return vars(self)["columns"][name]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        vars(self)["columns"][name][...] = value
 
 
 def _across(words: Any, count: int, array: Any) -> Any:

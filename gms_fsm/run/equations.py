@@ -24,8 +24,8 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 from integrators import hybrid
 from integrators.crossings import watched
-from integrators.loop import EDGE, FIRED, FIRING, MACHINE, PAUSED, run_to_event
-from integrators.steps import PAUSE, Motion
+from integrators.loop import FIRED, FIRING, PAUSED, run_to_event
+from integrators.steps import Motion
 
 __all__ = ["FrictionEquations"]
 
@@ -250,13 +250,13 @@ class FrictionEquations:
         b = hybrid.buffers(
             made, t, driven.full(own, (v,)), self._mode, t, driven.start.options, capacity=1
         )
-        b.now.clock[PAUSE] = t
+        b.now.pause = t
         functions, switch = made.functions(located=True), IfElse(program)
         taken: list[ElementSwitch] = []
         motion = Motion(functions.flow, functions.margins, functions.p, functions.follow)
         while (event := run_to_event(functions, switch, motion, b, 1)) != PAUSED:
             if event == FIRED:
-                machine, edge = b.memory.counts[MACHINE], b.memory.counts[EDGE]
+                machine, edge = b.memory.machine, b.memory.edge
                 taken.append(ElementSwitch(t, machine, driven.edge(edge)))
             elif event != FIRING:
                 last = taken[-1]

@@ -27,8 +27,6 @@ from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.monitors import Monitor, checked, watched
 from gms_fsm.traces.trace import Trace
 from integrators import Arc, HybridError, hybrid
-from integrators.advance import ROW, STEPS
-from integrators.steps import T
 
 __all__ = ["Moment", "Run", "simulate"]
 
@@ -202,7 +200,7 @@ class Run:
     @property
     def rows_wait(self) -> bool:
         """Whether the next event brings rows that are in the buffers only: the one of a tick."""
-        return self.buffers.out.cursor[ROW] > 0
+        return self.buffers.out.row > 0
 
     def kept(self) -> dict[str, Any]:
         """Return the recorder's contents for a checkpoint."""
@@ -211,7 +209,7 @@ class Run:
     def restore(self, kept: dict[str, Any]) -> None:
         """Restore what `kept` returned; the buffers are already filled."""
         now = self.buffers.now
-        t, y = now.clock[T], list(now.y)
+        t, y = now.t, list(now.y)
         self.recorder.restore(kept, (t, y, hybrid.modes_of(self.buffers)))
         if self.engine is not None:
             self.engine.restore(t, list(y), now.mode)
@@ -240,7 +238,7 @@ class Run:
                 error.reason, recorder.trace(), place=error.place, advice=error.advice
             ) from None
         except KeyboardInterrupt:  # within a step; the previous rows may have taken an hour
-            if self.buffers.out.cursor[ROW]:
+            if self.buffers.out.row:
                 recorder.take(hybrid.take_rows(self.buffers))
             raise
         except Interference as error:
@@ -250,7 +248,7 @@ class Run:
             return False
         self.event = event
         recorder.take(event)
-        if isinstance(event, Arc) and self.buffers.out.cursor[STEPS] >= self.next_look:
-            self.next_look = LATER * self.buffers.out.cursor[STEPS]
+        if isinstance(event, Arc) and self.buffers.out.steps >= self.next_look:
+            self.next_look = LATER * self.buffers.out.steps
             check_pace(recorder, self.buffers)
         return True

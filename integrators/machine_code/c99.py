@@ -42,7 +42,7 @@ from integrators.machine_code.tree import (
     parts_of,
 )
 
-__all__ = ["Names", "Writer", "c99_text", "calls", "number_text"]
+__all__ = ["Fields", "Names", "Writer", "c99_text", "calls", "number_text"]
 
 _TYPES = {"f": "double", "i": "int64_t", "b": "bool", "p": "char *"}
 HEAD = """\
@@ -118,8 +118,11 @@ def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False)
     known = {*RESERVED.split(), *taken, *(table.name for table in module.tables)}
     functions = Names(known - {f.name for f in module.functions if f.entry})
     known |= {functions(f.name) for f in module.functions}
-    writers = [Writer(f, results, functions, Names(known)) for f in module.functions]
+    fields = Fields(known)
+    writers = [Writer(f, results, functions, Names(known), fields) for f in module.functions]
     parts += [each.text(static=hidden or not each.function.entry) for each in writers]
+    if fields.offsets:
+        parts.insert(0, fields.text())
     text = "\n".join(parts)
     used = [each for name, each in HELPERS.items() if re.search(rf"\b{name}\b", text)]
     return "\n".join([HEAD, *used, text])
@@ -187,6 +190,27 @@ class Names:
         return self._found[name]
 
 
+class Fields:
+    """Constants for where the numbers of records are, in bytes from the beginning of a block."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._taken = {*taken}
+        self.offsets: dict[str, int] = {}
+
+    def __call__(self, address: Address) -> str:
+        """Return the offset of a place, by its name if that is free."""
+        name = re.sub(r"\W", "_", address.name).upper()
+        if name in ("", *self._taken) or self.offsets.get(name, address.offset) != address.offset:
+            return str(address.offset)
+        self.offsets[name] = address.offset
+        return name
+
+    def text(self) -> str:
+        """Return their definitions."""
+        lines = ",\n".join(f"    {name} = {offset}" for name, offset in self.offsets.items())
+        return f"enum {{\n{lines}\n}};\n"
+
+
 RESERVED = """
     INFINITY NAN NULL alignas alignof asm auto bool break callbacks case char const continue
     default do double else enum extern false float for goto if inline int long register restrict
@@ -216,10 +240,15 @@ class Writer:
     """Writes one function."""
 
     def __init__(
-        self, function: Function, results: dict[str, str], functions: Names, locals_: Names
+        self,
+        function: Function,
+        results: dict[str, str],
+        functions: Names,
+        locals_: Names,
+        fields: Fields,
     ) -> None:
         self.function, self.results = function, results
-        self.functions, self.name = functions, locals_
+        self.functions, self.name, self.field = functions, locals_, fields
         self.counter = 0  # of results with several parts
         self.read = set[str]()
         self.unread = self._unread()
@@ -387,8 +416,8 @@ class Writer:
         """Write a place in memory."""
         type_ = _TYPES[kind] if kind != "p" else "char *"
         base = self.value(address.base, 8)
-        if address.offset:
-            base = f"({base} + {address.offset})"
+        if address.offset or address.name:
+            base = f"({base} + {self.field(address)})"
         index = "0" if address.index is None else self.value(address.index)
         return f"(({type_} *){base})[{index}]".replace("* *", "**")
 

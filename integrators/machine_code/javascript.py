@@ -12,7 +12,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 
-from integrators.machine_code.c99 import Names, Writer, calls
+from integrators.machine_code.c99 import Fields, Names, Writer, calls
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import (
     Address,
@@ -159,7 +159,7 @@ class _Script(Writer):
         tables: Mapping[str, int],
     ) -> None:
         self.tables = tables
-        super().__init__(function, results, functions, locals_)
+        super().__init__(function, results, functions, locals_, Fields(()))
 
     def text(self, *, static: bool) -> str:
         """Return its text."""
@@ -263,7 +263,7 @@ class _Script(Writer):
         elif address.index is not None:
             parts.append(self.value(address.index, 9))
         if offset or not parts:
-            parts.append(str(offset))
+            parts.append(f"{offset} /* {address.name} */" if address.name else str(offset))
         return " + ".join(parts)
 
     def place(self, kind: str, address: Address) -> str:

@@ -22,16 +22,13 @@ from typing import Any
 
 import numpy as np
 
+from integrators.machine_code.records import FIELDS, numbers_of
 from integrators.machine_code.tree import Address, Const, Expr, Load, Local
 from integrators.machine_code.values import Array, Fixed, Number, Record, Value
 
 __all__ = ["Block", "Column", "Layout", "parts_of"]
 
 _KINDS = {float: "f", int: "i", bool: "b"}
-# Of fields of named tuples; truth values that are not in lists take a word, as integers do.
-_FIELDS: dict[Any, str] = {
-    float: "f", int: "i", bool: "i", list[int]: "i", list[list[int]]: "i", list[bool]: "b",
-}  # fmt: skip
 _DTYPES = {"f": np.dtype(np.float64), "i": np.dtype(np.int64), "b": np.dtype(np.bool_)}
 _WORDS: dict[str, Any] = {"f": ctypes.c_double, "i": ctypes.c_int64}
 
@@ -190,10 +187,10 @@ class Layout:
             found[place.offset : place.offset + words] = [place.kind] * words
         return found
 
-    def _value(self, example: Any, way: tuple[int, ...], block: Expr) -> Record:
+    def _value(self, example: Any, way: tuple[int, ...], block: Expr, owner: str = "") -> Record:
         record: Any = type(example)
         names, hints = _names(example), _kinds(record)
-        words = _words(record) if dataclasses.is_dataclass(example) else {}
+        words = numbers_of(record) if dataclasses.is_dataclass(example) else {}
         fields: dict[str, Value] = {}
         for k, (name, part) in enumerate(zip(names, _parts(example), strict=True)):
             here = (*way, k)
@@ -201,14 +198,15 @@ class Layout:
                 fields[name] = _constant(part)
             elif name in words:
                 self.arrays.append(_Place(here, self.words, words[name], ()))
-                fields[name] = Array(words[name], (), block, 8 * self.words)
+                path = f"{owner}.{name}" if owner else name
+                fields[name] = Array(words[name], (), block, 8 * self.words, name=path)
                 self.words += 1
             elif isinstance(part, list | np.ndarray):
                 fields[name] = self._array(part, here, block, hints.get(name))
             elif isinstance(part, Column):
                 fields[name] = self._column(part, here, block)
             elif _is_record(part):
-                fields[name] = self._value(part, here, block)
+                fields[name] = self._value(part, here, block, name)
             else:
                 kind = hints.get(name) or ("f" if isinstance(part, float) else "i")
                 place = Address(block, 8 * self.words)
@@ -345,7 +343,7 @@ class Block:
         if isinstance(example, tuple):
             return getattr(type(example), "_make", type(example))(parts)
         record: Any = type(example)
-        kind, words = _view(record), _words(record)
+        kind, words = _view(record), numbers_of(record)
         view = kind.from_buffer(self._words, made[(*way, 0)].ctypes.data - self.address)
         for name, part in list(zip(_names(example), parts, strict=True))[len(words) :]:
             setattr(view, name, part)
@@ -501,18 +499,9 @@ def parts_of(record: Any, known: Callable[[Any], bool]) -> list[Any]:
 
 
 @functools.cache
-def _words(record: Any) -> dict[str, str]:
-    """Return the kinds of the numbers of a dataclass."""
-    hints = typing.get_type_hints(record)
-    kinds = {name: _FIELDS[hint] for name, hint in hints.items() if hint in (float, int, bool)}
-    assert [*kinds] == [*hints][: len(kinds)], f"numbers come first in {record.__name__}"
-    return kinds
-
-
-@functools.cache
 def _view(record: Any) -> Any:
     """Return a class like a dataclass whose numbers are words in memory."""
-    fields = [(name, _WORDS[kind]) for name, kind in _words(record).items()]
+    fields = [(name, _WORDS[kind]) for name, kind in numbers_of(record).items()]
     members = {"_fields_": fields, "__match_args__": record.__match_args__}
     return type(record.__name__, (ctypes.Structure,), members)
 
@@ -530,7 +519,7 @@ def _constant(part: Any) -> Value:
 def _kinds(record: Any) -> dict[str, str]:
     """Return the kinds of the fields of a record, where its hints say them."""
     hints = typing.get_type_hints(record)
-    return {name: _FIELDS[hint] for name, hint in hints.items() if hint in _FIELDS}
+    return {name: FIELDS[hint] for name, hint in hints.items() if hint in FIELDS}
 
 
 def _shape(part: list[Any]) -> tuple[int, ...]:

@@ -95,7 +95,7 @@ def take(work: Work, arguments: Sequence[Value]) -> None:
     def own(expr: Expr, name: str) -> Expr:
         for each in locals_in(expr):
             if each not in known:
-                known[each] = parameter(name, each.kind)
+                known[each] = parameter(each.name.partition(".")[0] or name, each.kind)
         return substituted(expr, known)  # type: ignore[no-any-return]
 
     def bound(value: Value, name: str, direct: bool) -> Value:

@@ -118,12 +118,16 @@ class Choose:
 
 @dataclass(frozen=True)
 class Address:
-    """A place in memory: base + offset bytes + index times the size of an entry."""
+    """A place in memory: base + offset bytes + index times the size of an entry.
+
+    That of a number of a record has a name, for readers of what is printed.
+    """
 
     base: Expr
     offset: int = 0
     index: Expr | None = None
     size: int = 8
+    name: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)

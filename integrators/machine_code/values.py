@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from integrators.machine_code.tree import (
@@ -44,6 +44,8 @@ class Array:
         Bytes from there.
     index : Expr, optional
         Further entries from there.
+    name : str
+        Of a number of a record.
     """
 
     kind: str
@@ -51,11 +53,12 @@ class Array:
     base: Expr
     offset: int = 0
     index: Expr | None = None
+    name: str = field(default="", compare=False)
 
     @property
     def address(self) -> Address:
         """Where it begins."""
-        return Address(self.base, self.offset, self.index, SIZES[self.kind])
+        return Address(self.base, self.offset, self.index, SIZES[self.kind], self.name)
 
     def at(self, place: Expr) -> Array | Number:
         """Return an entry, or a row of a table."""

@@ -21,7 +21,6 @@ from gms_fsm.exporters import Subject
 from gms_fsm.exporters._fmu_model import FmuArguments, both_of
 from gms_fsm.systems.models import ChartModel
 from integrators import exchange, stepping
-from integrators.steps import T
 
 PAPER = GMS(GMSParameters.paper("stick-slip"), law="signed")
 KARNOPP_VALUES = {"F_c": 1.0, "F_s": 1.5, "sigma_2": 0.4, "D": 1e-4}
@@ -61,7 +60,7 @@ class Importer:
 
     def go_to(self, t: float, y: list[float]) -> None:
         """Set time and state."""
-        self.b.now.clock[T] = t
+        self.b.now.t = t
         self.b.now.y[:] = y
 
     def settle(self) -> None:
@@ -93,7 +92,7 @@ class Importer:
 
     def run(self, end: float, h: float) -> None:
         """Integrate."""
-        t = self.b.now.clock[T]
+        t = self.b.now.t
         self.settle()
         while t < end:
             y = np.array(self.b.now.y)
@@ -162,4 +161,4 @@ def test_another_start_moves_the_ticks() -> None:
     stepping.restart(importer.b, importer.clocks)
     importer.settle()
     assert importer.x.next == 3.0 + 1e-3
-    assert math.isclose(importer.b.now.clock[T], 3.0)
+    assert math.isclose(importer.b.now.t, 3.0)

@@ -12,7 +12,7 @@ from integrators import advance as kernel
 from integrators.hybrid import Buffers, Equations, Options, buffers
 from integrators.sliding import Surfaces
 from integrators.step_size import LEAST_ROOT, memory_of, next_factor, root_of
-from integrators.steps import ERROR_BEFORE, T_STOP, H, Motion, T
+from integrators.steps import Motion
 from integrators.tableaux import DP45, RK4
 
 
@@ -64,7 +64,7 @@ class _Run:
         options = Options(method, step, tolerance, [tolerance], max_step, 0.0, 10**6, True, times)
         self.b: Buffers = buffers(equations, origin, [1.0], [], 100.0, options, capacity)
         self.motion, self.y = Motion(flow, margins, None, nothing_follows), self.b.now.y
-        self.b.now.clock[T], self.b.now.f[0] = t, slope(t, 1.0)
+        self.b.now.t, self.b.now.f[0] = t, slope(t, 1.0)
         if margin is not None:
             w = self.b.relations
             w.watch[0] = 1
@@ -75,14 +75,14 @@ class _Run:
     def to(
         self, t_stop: float, *, h: float = 0.1, before: float = 1.0, steps: int = 1000
     ) -> tuple[int, float, float, float]:
-        b, clock = self.b, self.b.now.clock
-        clock[T_STOP], clock[H], clock[ERROR_BEFORE] = t_stop, h, before
+        b, now = self.b, self.b.now
+        now.t_stop, now.h, now.error_before = t_stop, h, before
         status = kernel.advance(self.motion, b.plan, b.now, b.relations, b.out, b.scratch, steps)
-        return status, clock[T], clock[H], clock[ERROR_BEFORE]
+        return status, now.t, now.h, now.error_before
 
     @property
     def rows(self) -> list[float]:
-        return self.b.out.rows_t[: self.b.out.cursor[0]]
+        return self.b.out.rows_t[: self.b.out.row]
 
 
 def test_fixed_steps_end_on_the_grid_wherever_they_begin() -> None:
@@ -290,13 +290,13 @@ def test_a_step_does_not_end_a_tick_before_a_stop(ticks: float) -> None:
     start, stop = 2.0**20, 2.0**20 + 1.0
     run = _Run(t=start)
     run.to(stop, h=1.0 - ticks * kernel.tick_at(stop))
-    assert run.b.out.cursor[kernel.STEPS] == (1 if ticks < 1.0 else 2)
+    assert run.b.out.steps == (1 if ticks < 1.0 else 2)
 
 
 def test_every_attempted_step_is_counted_once() -> None:
     run = _Run(lambda t, y: math.cos(50.0 * t), tolerance=1e-9)
     run.to(1.0, h=0.5)
-    tried, kept = run.b.out.cursor[kernel.STEPS], len(run.rows)
+    tried, kept = run.b.out.steps, len(run.rows)
     flows = len(run.asked) // 6
     assert tried > kept
     assert flows in (tried, tried + 1)

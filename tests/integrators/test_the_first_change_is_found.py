@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 
 from integrators.crossings import NO_CHANGE, Path, first_change, is_quiet_step, watched
-from integrators.hybrid import beginning
+from integrators.states import beginning
 from integrators.steps import Dense, Motion, Now, Scratch
 
 Margin = Callable[[float], float]
@@ -138,7 +138,7 @@ def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
         out[0] = y[0] - 100.0
 
     w.start[0] = 1.0 - 100.0
-    now = Now(beginning(1.0, 9.0), y=[1.0], f=[3.0], mode=[], held=[], floor=[])
+    now = Now(**beginning(1.0, 9.0), y=[1.0], f=[3.0], mode=[], held=[], floor=[])
     scratch = Scratch([], y_new=[27.0], f_new=[27.0], error=[], dense=Dense([], [], [], [], []))
     assert is_quiet_step(Motion(fill, fill, None, None), now, 3.0, scratch, w)
     assert seen == [(3.0, 27.0), (2.0, 8.0)]

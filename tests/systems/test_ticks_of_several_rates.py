@@ -20,7 +20,6 @@ from gms_fsm.run.start import Start
 from gms_fsm.systems.system import Body, Contact, Sampled, System
 from integrators.loop import Buffers
 from integrators.stepping import Clocks, next_tick, restart
-from integrators.steps import T
 from tests.helpers import stick_slip
 
 Clocking = tuple[tuple[float, float], ...]  # of each its period and offset
@@ -142,7 +141,7 @@ def stepped(b: Buffers, clocks: Clocks, count: int) -> list[tuple[float, int]]:
 def test_an_fmu_ticks_when_a_run_does(name: str, t_start: float) -> None:
     system = counting(SEVERAL[name], tuple(range(len(SEVERAL[name]))))
     both = both_of(Subject.of(system, "fmu2"))
-    both.buffers.now.clock[T] = t_start
+    both.buffers.now.t = t_start
     restart(both.buffers, both.sample.clocks)
     found = stepped(both.buffers, both.sample.clocks, 200)
     ticks = ticks_of(clocks_of(system), t_start, t_start, found[-1][0] + 1e-9)
