@@ -13,8 +13,6 @@ import re
 import tokenize
 from pathlib import Path
 
-import pytest
-
 from tests.helpers import ROOT
 
 PACKAGES = ("gms_fsm", "integrators", "plots")
@@ -70,15 +68,13 @@ def long_functions(text: str) -> dict[str, int]:
     return found
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(ROOT)))
-def test_a_module_is_not_too_long(path: Path) -> None:
-    size = len(path.read_text(encoding="utf-8").splitlines())
-    assert size <= LONGEST_MODULE
-
-
-@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(ROOT)))
-def test_a_function_is_not_too_long(path: Path) -> None:
-    assert long_functions(path.read_text(encoding="utf-8")) == {}
+def test_no_module_and_no_function_is_too_long() -> None:
+    found: dict[str, object] = {}
+    for path in modules():
+        text, name = path.read_text(encoding="utf-8"), str(path.relative_to(ROOT))
+        size, functions = len(text.splitlines()), long_functions(text)
+        found |= {name: functions or size} if functions or size > LONGEST_MODULE else {}
+    assert found == {}
 
 
 def test_lines_of_code_are_counted() -> None:
