@@ -49,6 +49,12 @@ def made() -> Sweep:
     return sweep(stick_slip("signed"), Prescribed("0.2"), 1.0, {"v_s": [0.1]}, engine="machines")
 
 
+def replayed() -> str:
+    from plots.replay import replay_html
+
+    return replay_html(simulate(stick_slip("signed"), Prescribed("0.2"), 0.1))
+
+
 @pytest.mark.parametrize(
     ("module", "extra", "call"),
     [
@@ -61,6 +67,7 @@ def made() -> Sweep:
         ("xarray", "sweep", lambda _: made().to_xarray()),
         ("pandas", "sweep", lambda folder: made().save(folder / "a.parquet")),
         ("z3", "check", lambda _: prove(stick_slip("signed").chart)),
+        ("uplot", "replay", lambda _: replayed()),
     ],
 )
 def test_a_function_names_the_module_and_the_extra(
@@ -71,7 +78,7 @@ def test_a_function_names_the_module_and_the_extra(
     tmp_path: Path,
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
-    words = rf"need\w* {module}, which is not installed: pip install \"gms-fsm\[{extra}\]\""
+    words = rf"need\w* (?i:{module}), which is not installed: pip install \"gms-fsm\[{extra}\]\""
     with pytest.raises(MissingExtraError, match=words):
         call(tmp_path)
 
