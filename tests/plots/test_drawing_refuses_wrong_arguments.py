@@ -174,6 +174,8 @@ LATE = np.array([20.0, 30.0])
         (lambda: replay_html(run(), run(), names=["one"]), r"2 run\(s\) but names = \['one'\]"),
         (lambda: plots.handout(stick_slip("signed"), "a.pdf", velocity="0.1"),
          "velocity and t_end belong together"),
+        (lambda: shifted(sliders={"q": (0.0, 1.0)}), "there is no number 'q'"),
+        (lambda: shifted(sliders={"F_s": (1.0, math.inf)}), r"sliders\['F_s'\] is inf; it must be"),
         (lambda: plots.animate(run(), "a.gif", seconds=3.0, frames=60), "give only one of them"),
         (lambda: plots.animate(run(), "a.gif", t_end=46.0), r"t_end is 46\.0 s; .* 0 to 10 s"),
         (lambda: plots.animate(run(), "a.gif", t_start=5.0, t_end=5.0), r"t_start is 5\.0 s and"),
