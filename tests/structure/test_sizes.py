@@ -47,10 +47,14 @@ def code_lines(text: str) -> set[int]:
 
 def long_functions(text: str) -> dict[str, int]:
     """Return the functions of a module that are too long without a reason, with their sizes."""
-    lines, code, found = text.splitlines(), code_lines(text), {}
+    lines, code, found = text.splitlines(), set[int](), {}
     for node in ast.walk(ast.parse(text)):
-        if not isinstance(node, Function):
+        if (
+            not isinstance(node, Function)
+            or (node.end_lineno or 0) - node.lineno < LONGEST_FUNCTION
+        ):
             continue
+        code = code or code_lines(text)
         inner = {
             line
             for other in ast.walk(node)
