@@ -102,7 +102,7 @@ core: .venv-core/stamp
 # transitions; typer and pydantic; llvmlite; scipy; pandas, pyarrow, xarray, distributed; z3; the drawing libraries
 LOWEST_TESTS := callbacks_* command_line* overrides_* scenarios_run machine_code_* compiled_* engines_agree scipy_* \
     trace_files_* sweep_* check_command full_screen_* prove_* rendering_* statechart* block_diagram_* panels_* figures_* \
-    animation_* films_can_* replay_stores_* lessons_taught
+    films_can_* replay_stores_* lessons_taught
 
 lowest: .venv-lowest/stamp
 	.venv-lowest/bin/uv pip freeze --python .venv-lowest/bin/python

@@ -9,9 +9,10 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from dark import dark_picture, dark_svg, webp
@@ -36,6 +37,8 @@ REPLAYED = (0.0, 30.0)  # s, on the first page
 SHARE = (0.4, 0.3, 0.2, 0.1)
 WIDEST = 2e-3  # m, the largest break-away distance of the bank that has more and more elements
 STROKE = 1.5e-3  # m
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -172,11 +175,11 @@ def bank(n: int) -> Trace:
     return simulate(GMS(parameters, law="signed"), motion, 1.25, engine="ifelse")
 
 
-def loops() -> Iterator[Frame]:
-    """Draw the hysteresis of 1 to 16 elements over that of infinitely many."""
+def loops(counts: Sequence[int]) -> Iterator[Frame]:
+    """Draw the hysteresis of several elements over that of infinitely many."""
     way = np.linspace(0.0, STROKE, 200)
     back = smooth(way[-1:]) - 2 * smooth(way)
-    for n in range(1, 17):
+    for n in counts:
         trace = bank(n)
         first = trace.t <= 0.25
         error = float(np.abs(trace.F - smooth(trace.x))[first].max())
@@ -197,7 +200,7 @@ def loops() -> Iterator[Frame]:
 
 
 # --------------------------------------------------------------------------- time
-def moments() -> Slider:
+def moments(_: int) -> Slider:
     """Draw one element's chart at the rows of one cycle, and the force beside it."""
     trace = pulled()
     chart = LiveChart(trace, [0], values=True)
@@ -244,23 +247,37 @@ def png(figure: Figure) -> bytes:
     return out.getvalue()
 
 
-def peaks() -> Slider:
+def peaks(every: int) -> Slider:
     """Change F_s from F_c to 2.5 F_c."""
-    runs = {f"{F_s:.1f} N": pulled(F_s=F_s) for F_s in np.arange(10, 26) / 10}
-    return Slider("F_s", list(runs).index("1.5 N"), tuple(cycles(runs)))
+    start, values = spaced([each / 10 for each in range(10, 26)], 1.5, every)
+    runs = {f"{F_s:.1f} N": pulled(F_s=F_s) for F_s in values}
+    return Slider("F_s", start, tuple(cycles(runs)))
 
 
-def velocities() -> Slider:
+def velocities(every: int) -> Slider:
     """Change v_s over more than two decades."""
-    values = (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2)
+    tried = (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2)
+    start, values = spaced(tried, 0.05, every)
     runs = {f"{v_s:g} m/s": pulled(v_s=v_s) for v_s in values}
-    return Slider("v_s", values.index(0.05), tuple(cycles(runs)))
+    return Slider("v_s", start, tuple(cycles(runs)))
 
 
-SLIDERS: dict[str, Callable[[], Slider]] = {
+def numbers(every: int) -> Slider:
+    """Change the number of elements."""
+    start, values = spaced(range(1, 17), 4, every)
+    return Slider("n", start, tuple(loops(values)))
+
+
+def spaced(values: Sequence[T], first: T, every: int) -> tuple[int, Sequence[T]]:
+    """Return every so many of some values, and where the first position is among them."""
+    kept = values[values.index(first) % every :: every]
+    return kept.index(first), kept
+
+
+SLIDERS: dict[str, Callable[[int], Slider]] = {
     "peak": peaks,
     "velocity": velocities,
-    "elements": lambda: Slider("n", 3, tuple(loops())),
+    "elements": numbers,
     "time": moments,
 }
 
@@ -310,22 +327,24 @@ def write_replay(folder: Path) -> None:
         (folder / f"replay{ending}").write_bytes(content)
 
 
-def write_all(folder: Path) -> None:
+def write_all(folder: Path, every: int = 1) -> None:
     """Write all frames, unless those in the folder are of the same sources.
 
     Parameters
     ----------
     folder : Path
         Destination; it contains nothing else.
+    every : int, optional
+        Every how many positions of a slider are drawn.
     """
     own = b"".join(Path(__file__).with_name(name).read_bytes() for name in ("frames.py", "dark.py"))
-    now, stamp = hashlib.sha256(common_sources() + own).hexdigest(), folder / "stamp"
+    now, stamp = hashlib.sha256(common_sources() + own).hexdigest() + f" {every}", folder / "stamp"
     if stamp.exists() and stamp.read_text() == now:
         return
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.iterdir():
         old.unlink()
     for name, make in SLIDERS.items():
-        write(folder, name, make())
+        write(folder, name, make(every))
     write_replay(folder)
     stamp.write_text(now)

@@ -13,7 +13,7 @@ import hashlib
 import logging
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from queue import Empty
 from typing import Any
@@ -204,13 +204,15 @@ def common_sources() -> bytes:
     )
 
 
-def write_all(folder: Path) -> None:
+def write_all(folder: Path, run: Collection[int] = LESSONS) -> None:
     """Write every lesson that has changed: page, pictures, replay page.
 
     Parameters
     ----------
     folder : Path
         Destination.
+    run : collection of int, optional
+        Those whose notebooks are executed; the pages of the others have no outputs.
     """
     folder.mkdir(parents=True, exist_ok=True)
     stamps = folder / ".stamps"
@@ -224,13 +226,15 @@ def write_all(folder: Path) -> None:
             continue
         for old in folder.glob(f"{name}_*.png"):
             old.unlink()
-        markdown, pictures = page(
-            executed(text, folder, f"{WITHOUT_DOCS}\n{STRICT}"), name, LESSONS[number].title
-        )
+        if number in run:
+            book = executed(text, folder, f"{WITHOUT_DOCS}\n{STRICT}")
+        else:
+            book = nbformat.reads(text, as_version=4)
+        markdown, pictures = page(book, name, LESSONS[number].title)
         for file, data in pictures.items():
             (folder / file).write_bytes(data)
         (folder / f"{name}.md").write_text(markdown, encoding="utf-8")
-        stamp.write_text(now)
+        stamp.write_text(now if number in run else "")
 
 
 if __name__ == "__main__":

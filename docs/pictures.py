@@ -250,9 +250,9 @@ class Replay(Directive):
         return [nodes.raw("", text, format="html")]
 
 
-def make_frames(_: Sphinx) -> None:
-    """Make the frames whose sources have changed."""
-    frames.write_all(MADE)
+def make_frames(app: Sphinx) -> None:
+    """Make the frames whose sources have changed; a draft has few."""
+    frames.write_all(MADE, every=4 if app.tags.has("draft") else 1)
 
 
 def copy_frames(app: Sphinx, error: Exception | None) -> None:

@@ -51,7 +51,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
             assert time.monotonic() < end, f"the site was not built in {PATIENCE} s"
             time.sleep(0.5)
     else:
-        command = ["-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going"]
+        command = ["-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going", "-t", "draft"]
         done = subprocess.run(
             [sys.executable, *command, "-d", str(folder / "doctrees"), "docs", str(site)],
             cwd=ROOT,

@@ -55,15 +55,11 @@ def test_links(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_named_files_exist(path: Path) -> None:
+def test_named_files_and_modules_exist(path: Path) -> None:
     names = r"`((?:benchmarks|docs|gms_fsm|integrators|plots|scenarios|tests)/[\w./-]+\.\w+)`"
     for name in re.findall(names, prose(path)):
         if not re.search(r"lN_name|lesson_N", name):
             assert (ROOT / name).is_file(), name
-
-
-@pytest.mark.parametrize("path", TEXTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_named_modules_exist(path: Path) -> None:
     for name in re.findall(r"`((?:gms_fsm|integrators|plots)(?:\.\w+)+)`", prose(path)):
         place = ROOT.joinpath(*name.split("."))
         last = name.rpartition(".")[2]

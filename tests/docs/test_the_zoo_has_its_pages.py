@@ -1,4 +1,4 @@
-"""The pages in docs/zoo are what ``docs/make_zoo.py`` makes, one for each chart that is a model."""
+"""The pages in docs/zoo and the table of phenomena are what the scripts make from the charts."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import runpy
 
 import pytest
 
+from gms_fsm import measure_phenomena
 from gms_fsm.charts import CHARTS
 from tests.helpers import ROOT
 
@@ -20,19 +21,13 @@ def test_each_chart_has_a_page_and_pictures() -> None:
     assert pictures == {*CHARTS} | {f"{name}_run" for name in CHARTS}
 
 
-@pytest.mark.parametrize("name", CHARTS)
-def test_a_page_says_what_the_model_shows_and_where_it_is_published(name: str) -> None:
-    text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
-    parts = re.findall(r"^## (.+)\n\n(.+)", text, re.MULTILINE)
-    assert [head for head, _ in parts] == [
-        "What it shows",
-        "Equations",
-        "Parameters",
-        "Run it",
-        "Proofs",
-        "References",
-    ]
-    assert dict(parts)["References"].startswith("- ")
+def test_a_page_says_what_the_model_shows_and_where_it_is_published() -> None:
+    heads = ["What it shows", "Equations", "Parameters", "Run it", "Proofs", "References"]
+    for name in CHARTS:
+        text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
+        parts = re.findall(r"^## (.+)\n\n(.+)", text, re.MULTILINE)
+        assert [head for head, _ in parts] == heads, name
+        assert dict(parts)["References"].startswith("- "), name
 
 
 @pytest.mark.slow
@@ -58,3 +53,21 @@ def test_less_than_a_tenth_of_all_findings_is_undecided() -> None:
         reasons = text.count("- **undecided**")
         assert reasons == int(counts[4]), f"{name}: each undecided finding gives its reason"
     assert undecided < 0.1 * total
+
+
+# --------------------------------------------------------------------------- phenomena
+TABLE = (ROOT / "docs" / "howto" / "phenomena_table.txt").read_text(encoding="utf-8")
+AGAIN = "run docs/make_phenomena.py (make gallery)"
+
+
+def test_every_chart_is_in_it() -> None:
+    missing = [
+        name for name in CHARTS if f"| {name} |" not in TABLE and f"- {name} does not" not in TABLE
+    ]
+    assert missing == [], AGAIN
+
+
+@pytest.mark.slow
+def test_three_models_measured_again() -> None:
+    fresh = measure_phenomena(["lugre", "gms-signed", "stiction"]).markdown().splitlines()
+    assert [line for line in fresh if line not in TABLE.splitlines()] == [], AGAIN

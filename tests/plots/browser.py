@@ -7,16 +7,25 @@ caused it.
 from __future__ import annotations
 
 import importlib.util
+import math
 import shutil
 from collections.abc import Callable, Iterator
-from functools import cache
+from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from gms_fsm import Prescribed, Trace, simulate
-from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
+from gms_fsm import Body, Chart, Contact, Prescribed, State, Stribeck, System, Trace, simulate
+from gms_fsm.charts.registry import entry
+from gms_fsm.systems.models import ChartModel, demonstration
+from tests.helpers import FIG4_SINE, SINE, bank, open_loop, pulled_mass, stick_slip, wear
+from tests.plots.systems_to_draw import BALL, BLOCKS, PULLED, SERVO, SHARED, TIMED
+from tests.plots.systems_to_draw import run as system_run
+from tests.systems_cases import puck
+from tests.zoo.zoo_cases import CASES
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 MISSING = [
@@ -35,29 +44,9 @@ if MISSING:
     pytest.skip(f"needs {', '.join(MISSING)}", allow_module_level=True)
 
 from axe_playwright_python.sync_playwright import Axe  # noqa: E402  # after the skip
-from playwright.sync_api import Browser, Page, expect, sync_playwright  # noqa: E402
+from playwright.sync_api import Browser, Page, expect, sync_playwright  # noqa: E402, F401
 
 from plots.replay import write_replay  # noqa: E402
-
-__all__ = [
-    "SIZES",
-    "Axe",
-    "Open",
-    "browser",
-    "events",
-    "expect",
-    "fig4",
-    "frame",
-    "in_view",
-    "last",
-    "mass",
-    "open_page",
-    "open_tab",
-    "pages",
-    "said",
-    "wait",
-    "window",
-]
 
 ARGUMENTS = [
     "--no-sandbox",
@@ -73,56 +62,165 @@ SIZES = {"laptop": (1366, 657), "desk": (1400, 900), "tablet": (800, 1000), "pho
 Open = Callable[..., Page]
 
 
-@cache
-def fig4(law: str) -> Trace:
-    return simulate(stick_slip(law), Prescribed(FIG4_SINE), 100.0)
+LINEAR = Chart(
+    "spring",
+    inputs=("v",),
+    variables=("z",),
+    parameters=("k",),
+    states=(State("only", flow={"z": "v"}),),
+    outputs={"F": "k * z"},
+)
+
+
+def pushed(contact: Contact, force: str = "4 * sin(3 * t)", t_end: float = 6.0) -> Trace:
+    """Return a run of a mass that is pushed to and fro over a contact."""
+    mass = Body("mass", inertia=1.0, force=force)
+    return simulate(System("pushed", bodies=(mass,), contacts=(contact,)), t_end)
+
+
+def shown(name: str) -> Trace:
+    """Return a run of a chart of the zoo that is moved to and fro."""
+    return simulate(demonstration(entry(name)), Prescribed("1e-3 * sin(6 * t)"), 3.0)
+
+
+def in_units(scale: float) -> Trace:
+    rig = Prescribed(f"{1e-3 / scale!r} * sin(t / {scale!r})")
+    return simulate(ChartModel(LINEAR, {"k": 1.0}), rig, scale)
+
+
+def named(name: str) -> Trace:
+    chart = replace(LINEAR, name=name)
+    model = ChartModel(chart, {"k": 1.0}, n=2, stribeck=Stribeck(1, 1.5, 0.1))
+    return simulate(model, Prescribed("0.1"), 1.0)
+
+
+def without_numbers() -> Trace:
+    """Return a run with values that are not numbers."""
+    trace = run("signed")
+    stored = {name: np.array(values) for name, values in trace.seen.items()}
+    stored["friction.F"][:3] = math.nan, math.inf, -math.inf
+    stored["friction.v"][0] = math.nan
+    stored["friction.F"][20:40] = math.inf
+    stored["friction.v"][50:60] = math.nan
+    return replace(trace, stored=stored)
+
+
+EVIL = "</script><script>document.title='owned'</script><img src=x onerror=alert(1)>"
+# What the pages show, each simulated once.
+RUNS: dict[str, Callable[[], Trace]] = {
+    "published": lambda: simulate(stick_slip("published"), Prescribed(FIG4_SINE), 100.0),
+    "signed": lambda: simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 100.0),
+    "short": lambda: simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 30.0),
+    "late": lambda: simulate(
+        stick_slip("signed"), Prescribed(FIG4_SINE), 60.0, t_eval=[50.0, 55.0]
+    ),
+    "mass": lambda: simulate(*pulled_mass(), 60.0),
+    "ramp": lambda: simulate(stick_slip("signed"), Prescribed("0.2*min(t, 5)"), 6.0),
+    "cascade": lambda: simulate(stick_slip("signed"), open_loop(), 20.0),
+    "still": lambda: simulate(stick_slip("signed"), Prescribed("1e-3*sin(t)"), 2.0),
+    "many": lambda: simulate(bank(20), Prescribed(SINE), 20.0),
+    "wear": lambda: simulate(wear(), Prescribed("0.2 * sin(t)"), 20.0),
+    "pulled": lambda: system_run(PULLED),
+    "ball": lambda: system_run(BALL),
+    "blocks": lambda: system_run(BLOCKS),
+    "pad1": lambda: system_run(BLOCKS).contact("pad1"),
+    "pad2": lambda: system_run(BLOCKS).contact("pad2"),
+    "servo": lambda: simulate(replace(SERVO, numbers={**SERVO.numbers, "k_p": 8.0}), 1.0),
+    "timed": lambda: pushed(Contact("pad", TIMED, {"T_d": 0.3, "F_c": 1.0, "F_s": 1.5})),
+    "shared": lambda: pushed(Contact("pad", SHARED, {"k": 10.0, "F_c": 1.0, "b": 0.2})),
+    "puck": lambda: puck().run(),
+    **{name: partial(shown, name) for name in ("backlash", "dahl", "rate-state-ageing")},
+    "karnopp": lambda: CASES["karnopp"](1.0).run(),
+    "elasto-plastic": lambda: CASES["elasto-plastic"](1.0).run(),
+    "microseconds": lambda: in_units(1e-6),
+    "megaseconds": lambda: in_units(1e6),
+    "evil": lambda: named(EVIL),
+    "no numbers": without_numbers,
+}
+# Pages that compare two runs; every other page has the run of its name.
+PAIRS = {"two": ("published", "signed"), "ended": ("signed", "short"), "same": ("signed",) * 2}
+TITLES = {"evil": EVIL}
+_PAGES: dict[str, Path] = {}
 
 
 @cache
-def mass() -> Trace:
-    return simulate(*pulled_mass(), 60.0)
+def run(name: str) -> Trace:
+    return RUNS[name]()
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
+    """Chromium; not longer than a module, because its event loop is in the way of others'."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         yield browser
         browser.close()
 
 
-@pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("replay")
-    one, two = fig4("published"), fig4("signed")
-    return {
-        "one": write_replay(folder / "one.html", one, title="Fig. 4"),
-        "two": write_replay(folder / "two.html", one, two),
-        "mass": write_replay(folder / "mass.html", mass()),
-    }
-
-
 @pytest.fixture
-def open_page(browser: Browser, pages: dict[str, Path]) -> Iterator[Open]:
+def open_page(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Open]:
     """Open a page; at the end there must be no requests and no console messages."""
     contexts, wrong = [], []
 
-    def opened(page: str | Path = "one", size: str = "desk", **options: Any) -> Page:
-        path = pages[page] if isinstance(page, str) else page
+    def opened(page: str | Path, size: str = "desk", tab: str = "", **options: Any) -> Page:
+        if isinstance(page, str) and page not in _PAGES:  # each is written once
+            runs = [run(name) for name in PAIRS.get(page, (page,))]
+            folder = tmp_path_factory.mktemp("replay")
+            _PAGES[page] = write_replay(folder / "page.html", *runs, title=TITLES.get(page, page))
+        path = _PAGES[page] if isinstance(page, str) else page
         width, height = SIZES[size]
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
         contexts.append(context)
-        tab = context.new_page()
-        tab.on("console", lambda message: wrong.append(message.text))
-        tab.on("pageerror", lambda error: wrong.append(str(error)))
-        tab.on("request", lambda r: r.url == path.as_uri() or wrong.append(f"asked for {r.url}"))
-        tab.goto(path.as_uri())
-        return tab
+        shown = context.new_page()
+        shown.on("console", lambda message: wrong.append(message.text))
+        shown.on("pageerror", lambda error: wrong.append(str(error)))
+        shown.on("request", lambda r: r.url == path.as_uri() or wrong.append(f"asked for {r.url}"))
+        shown.goto(path.as_uri())
+        if tab:
+            open_tab(shown, tab)
+        return shown
 
     yield opened
     for context in contexts:
         context.close()
     assert wrong == []
+
+
+def box_of(page: Page, selector: str) -> dict[str, float]:
+    """Return the box of the first such node that is seen."""
+    found = page.locator(selector).first.bounding_box()
+    assert found is not None, selector
+    return dict(found)
+
+
+def press(page: Page, *keys: str) -> None:
+    for key in keys:
+        page.keyboard.press(key)
+
+
+def own_rows(page: Page) -> list[tuple[int, int]]:
+    """Return the rows of the page that are rows of the run, with their numbers there."""
+    numbers, between = page.evaluate("[[...runs[0].number], [...runs[0].between]]")
+    return [(row, number) for row, number in enumerate(numbers) if not between[row]]
+
+
+def some_rows(page: Page, count: int, seed: int = 18) -> list[tuple[int, int]]:
+    """Return random ones of them."""
+    own = own_rows(page)
+    chosen = np.random.default_rng(seed).choice(len(own), min(count, len(own)), replace=False)
+    return [own[k] for k in chosen]
+
+
+def faults(page: Page, **options: Any) -> list[Any]:
+    """Return what axe finds: the rules that are broken, and where."""
+    found = Axe().run(page, **options).response["violations"]
+    return [(each["id"], [node["target"] for node in each["nodes"]][:3]) for each in found]
+
+
+def until(page: Page, text: str) -> None:
+    """Search for the row where a condition becomes true."""
+    page.fill("#until", text)
+    page.press("#until", "Enter")
 
 
 def frame(page: Page) -> int:

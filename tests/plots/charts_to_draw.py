@@ -65,3 +65,72 @@ def any_chart(seed: int) -> Chart:
 MANY_EDGES = random_chart(1, 12, 40)
 THREE_LOOPS = random_chart(2, 3, 4, loops=3)
 LONG_GUARDS = random_chart(3, 3, 5, longest=150, least=120)
+
+THREE_STATES = Chart(
+    name="three states, a self loop, entry, exit and actions",
+    inputs=("v", "s"),
+    variables=("z",),
+    parameters=("k", "v_c", "v_hi"),
+    states=(
+        State("stick", flow={"z": "v"}, entry={"z": "0"}),
+        State("creep", flow={"z": "v - k * abs(v) * z / s"}),
+        State("slip", flow={"z": "0"}, exit={"z": "z / 2"}),
+    ),
+    transitions=(
+        Transition("go", "stick", "creep", guard="abs(z) > 0.5 * s"),
+        Transition(
+            "tear", "creep", "slip", guard="abs(z) >= s and v > v_c", actions={"z": "s * sgn(v)"}
+        ),
+        Transition("back", "creep", "stick", guard="not v > v_c"),
+        Transition(
+            "arrest", "slip", "stick", guard="abs(v) <= v_c and (z > 0 or v > 0) and z < 2 * s"
+        ),
+        Transition("again", "slip", "slip", guard="v > v_hi and z < s", actions={"z": "s"}),
+        Transition("jump", "stick", "slip", guard="v_hi < v < 2 * v_hi"),
+    ),
+    outputs={"F": "k * z"},
+)
+
+FIVE_STATES = Chart(
+    name="five states, two variables",
+    inputs=("v", "s"),
+    variables=("z", "w"),
+    parameters=("k", "v_c", "v_hi"),
+    states=(
+        State("rest", flow={"z": "v", "w": "0"}),
+        State("creep_forward", flow={"z": "v - k * abs(v) * z / s", "w": "v"}),
+        State("creep_backward", flow={"z": "v - k * abs(v) * z / s", "w": "-v"}),
+        State("slip_forward", flow={"z": "0", "w": "v - w"}, entry={"z": "s", "w": "0"}),
+        State("slip_backward", flow={"z": "0", "w": "-v - w"}),
+    ),
+    transitions=(
+        Transition("up", "rest", "creep_forward", guard="z > 0.5 * s and v > v_c"),
+        Transition("down", "rest", "creep_backward", guard="z < -0.5 * s and v < -v_c"),
+        Transition("tear_up", "creep_forward", "slip_forward", guard="z >= s and v > v_c"),
+        Transition("tear_down", "creep_backward", "slip_backward", guard="z <= -s and v < -v_c"),
+        Transition("stop_up", "slip_forward", "rest", guard="z < s and v <= v_c or v < -v_hi"),
+        Transition("stop_down", "slip_backward", "rest", guard="abs(v) <= v_c"),
+        Transition("calm_up", "creep_forward", "rest", guard="v < 0"),
+        Transition("calm_down", "creep_backward", "rest", guard="v > 0"),
+        Transition("turn_down", "slip_forward", "slip_backward", guard="v < -v_hi"),
+        Transition("turn_up", "slip_backward", "slip_forward", guard="v > v_hi"),
+    ),
+    outputs={"F": "k * z"},
+)
+
+LONG_CLAUSE = " + ".join(f"k * abs(z - {i}) ** 2" for i in range(10)) + " >= s"
+HOSTILE = Chart(
+    name="größe & <b>]]></b> \"x\" 'y' \\N ; # ]",
+    inputs=("v", "s"),
+    variables=("z", "Δζ"),
+    parameters=("k", "σ_2", "sigma_0", "v_ç"),
+    states=(
+        State("état", flow={"z": "v", "Δζ": "sigma_0 * v"}, entry={"z": "-1e-6"}),
+        State("слип", flow={"z": "0", "Δζ": "min(v, 0) / 2e20"}),
+    ),
+    transitions=(
+        Transition("länge", "état", "слип", guard=LONG_CLAUSE + " and v < v_ç and z > -Δζ"),
+        Transition("zurück", "слип", "état", guard="v < 0 or z > s or not (z <= -s and v > 0)"),
+    ),
+    outputs={"F": "k * z + σ_2 * v"},
+)

@@ -2,4 +2,4 @@
 
 # They skip where there is no browser. Collected as modules of doctests, they would stay imported in
 # part, and the tests that import them would fail instead of being skipped.
-collect_ignore = ["browser.py", "landscape_cases.py", "printed.py", "widget_host.py"]
+collect_ignore = ["browser.py", "printed.py", "widget_host.py"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm import Body, Contact, MissingExtraError, ParameterError, Prescribed, System
+from gms_fsm import Body, Contact, MissingExtraError, Prescribed, System
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import CHARTS
 from tests.helpers import FIG4_SINE, stick_slip
@@ -118,22 +118,6 @@ def test_a_system() -> None:
     ask(widget, do="poke", contact="pad", what="", element=0, value="forward", t=3.0, microstep=0)
     assert widget.panel["laws"] == []
     assert widget.panel["pokes"]["others"] == ["x_m", "v_m"]
-
-
-@pytest.mark.parametrize(
-    ("sliders", "match"),
-    [
-        ({"q": (0.0, 1.0)}, "no number 'q'"),
-        ({"F_s": (2.0, 3.0)}, "range around 1.5"),
-        ({"F_s": (3.0, 1.0)}, "range around 1.5"),
-        ({"F_s": 2.0}, "lowest and its highest"),
-        ({"F_s": (1.0, float("inf"))}, "F_s"),
-        (["F_s"], "ranges by name"),
-    ],
-)
-def test_sliders_are_checked(sliders: object, match: str) -> None:
-    with pytest.raises(ParameterError, match=match):
-        plots.explore(stick_slip("signed"), Prescribed("0.2"), 3.0, sliders=sliders)  # type: ignore[arg-type]
 
 
 def test_logarithmic_over_two_decades(widget: Explorer) -> None:

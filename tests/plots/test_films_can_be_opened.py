@@ -1,53 +1,56 @@
-"""A film's file has the frames, the size and the length of the film, in every format."""
+"""A film's file has the frames, the size and the length of the film, in every format.
+
+Each frame has the chart and the cursor of its row. The chart is laid out once, whatever the number
+of frames. A failure leaves the old file.
+"""
 
 from __future__ import annotations
 
-import shutil
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 pytest.importorskip("matplotlib", reason="films need the extra 'plots'")
 
+from matplotlib.colors import to_rgb
 from PIL import Image
 
-import plots
+import plots.live_chart
 from gms_fsm import Trace, simulate
-from gms_fsm.errors import MissingExtraError
+from gms_fsm.errors import MissingExtraError, OutputError
+from plots._graphviz import available
+from plots.animation import animate
 from plots.formats import endings
 from plots.style import CHART_THEMES
-from tests.helpers import open_loop, stick_slip
+from tests.helpers import one_element, open_loop, stick_slip
 from tests.plots.films import count, frames_of, with_movie
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not available(), reason="no Graphviz")]
 VIDEOS = [ending for ending in endings("animation") if ending != ".gif"]
-FRAMES, FPS = 30, 10.0
+FRAMES, FPS = 20, 10.0
 WINDOW = {"t_start": 3.3, "t_end": 5.0, "frames": FRAMES, "fps": FPS}  # four micro-steps at 3.8 s
-
-
-@pytest.fixture(autouse=True)
-def _graphviz() -> None:
-    if shutil.which("dot") is None:
-        pytest.importorskip("pygraphviz", reason="drawing needs Graphviz, program or package")
 
 
 @cache
 def bank() -> Trace:
-    return simulate(stick_slip("published"), open_loop(), 8.0)
+    return simulate(stick_slip("published"), open_loop(), 45.0)
 
 
-def drawn(folder: Path) -> list[Image.Image]:
-    found: list[Image.Image] = with_movie(
-        bank(), folder, lambda movie: list(movie.pictures()), **WINDOW
-    )
-    return found
+@pytest.fixture(scope="module")
+def wanted(tmp_path_factory: pytest.TempPathFactory) -> list[Image.Image]:
+    """The frames before they are written."""
+    folder = tmp_path_factory.mktemp("frames")
+    return list(with_movie(bank(), folder, lambda movie: list(movie.pictures()), **WINDOW))
 
 
-def test_a_gif_shows_the_frames_for_the_right_time(tmp_path: Path) -> None:
-    path = plots.animate(bank(), tmp_path / "film.gif", **WINDOW)
-    wanted, stored = drawn(tmp_path), frames_of(path)
+def test_a_gif_shows_the_frames_for_the_right_time(
+    wanted: list[Image.Image], tmp_path: Path
+) -> None:
+    path = animate(bank(), tmp_path / "film.gif", **WINDOW)
+    stored = frames_of(path)
     with Image.open(path) as film:
         lasts = []
         for k in range(film.n_frames):  # type: ignore[attr-defined]
@@ -88,11 +91,12 @@ def test_a_gif_of_constant_frames_is_one_frame(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", VIDEOS)
-def test_a_video_shows_the_frames_for_the_right_time(ending: str, tmp_path: Path) -> None:
+def test_a_video_shows_the_frames_for_the_right_time(
+    ending: str, wanted: list[Image.Image], tmp_path: Path
+) -> None:
     av = pytest.importorskip("av", reason="videos need the extra 'film'")
-    path = plots.animate(bank(), tmp_path / f"film{ending}", **WINDOW)
+    path = animate(bank(), tmp_path / f"film{ending}", **WINDOW)
     assert list(tmp_path.iterdir()) == [path]
-    wanted = drawn(tmp_path)
     with av.open(str(path)) as file:
         (stream,) = file.streams
         context = stream.codec_context
@@ -113,5 +117,84 @@ def test_a_video_shows_the_frames_for_the_right_time(ending: str, tmp_path: Path
 def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "av", None)
     with pytest.raises(MissingExtraError, match=r"videos need av.*gms-fsm\[film\].*as a \.gif"):
-        plots.animate(bank(), tmp_path / "film.mp4", **WINDOW)
+        animate(bank(), tmp_path / "film.mp4", **WINDOW)
     assert not list(tmp_path.iterdir())
+
+
+@cache
+def one() -> Trace:
+    return simulate(one_element("signed"), open_loop(), 45.0)
+
+
+def test_frames_have_the_theme_the_active_states_and_the_cursor(tmp_path: Path) -> None:
+    theme = "dark"
+    path = animate(bank(), tmp_path / "run.gif", frames=6, fps=10, theme=theme, notation="math")
+    assert list(tmp_path.iterdir()) == [path]
+    with Image.open(path) as film:
+        assert film.format == "GIF"
+        assert film.n_frames == 6  # type: ignore[attr-defined]
+        assert film.info["duration"] == 100
+        assert film.info["loop"] == 0
+    pictures = frames_of(path)
+    assert {picture.size for picture in pictures} == {pictures[0].size}
+    assert min(pictures[0].size) > 300
+    assert len({picture.tobytes() for picture in pictures}) == 6
+    colours = CHART_THEMES[theme]
+    assert pictures[0].getpixel((3, 3)) == tuple(round(255 * c) for c in to_rgb(colours.paper))
+    for picture in pictures:
+        assert count(picture, colours.active) > 500
+        assert count(picture, colours.fired) > 50  # the cursor
+
+
+def test_the_active_state_moves_with_the_run(tmp_path: Path) -> None:
+    trace, colours = one(), CHART_THEMES["light"]
+    first = float(trace.transitions.t[0])
+    path = animate(trace, tmp_path / "one.gif", frames=2, t_start=first - 0.5, t_end=first + 0.5)
+    before, after = frames_of(path)
+
+    def centre(picture: Image.Image) -> float:
+        """Return the height of the border of the active state."""
+        wanted = tuple(round(255 * part) for part in to_rgb(colours.active))
+        width, height = picture.size
+        rows = [
+            y
+            for y in range(height)
+            for x in range(0, width, 2)
+            if picture.getpixel((x, y)) == wanted
+        ]
+        return sum(rows) / len(rows)
+
+    assert centre(after) > centre(before) + 50  # slip is below stick
+    assert count(after, colours.fired) > count(before, colours.fired) + 40  # the edge
+
+
+def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[Any] = []
+    real = plots.live_chart.picture
+
+    def counted(*arguments: Any) -> bytes:
+        calls.append(arguments)
+        return real(*arguments)
+
+    monkeypatch.setattr(plots.live_chart, "picture", counted)
+    told: list[tuple[int, int]] = []
+    more = {"elements": [1], "frames": 6, "progress": lambda *each: told.append(each)}
+    animate(bank(), tmp_path / "run.gif", **more)
+    assert len(calls) == 1
+    assert told == [(k, 6) for k in range(1, 7)]
+
+
+def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "run.gif"
+    path.write_bytes(b"the film of yesterday")
+
+    def stop(done: int, _: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        animate(one(), path, frames=5, progress=stop)
+    assert path.read_bytes() == b"the film of yesterday"
+    assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(OutputError, match="nowhere"):
+        animate(one(), tmp_path / "nowhere" / "run.gif", frames=2)

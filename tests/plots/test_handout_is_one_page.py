@@ -16,7 +16,6 @@ from matplotlib import rc_context
 
 import plots
 from gms_fsm.charts.registry import registered
-from gms_fsm.errors import ParameterError
 from gms_fsm.systems.models import Model, demonstration
 from plots._excitation import excited
 from plots._handout import PAGE, SMALLEST, handout_figure
@@ -56,7 +55,7 @@ def checked(model: Model) -> set[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "law"), matrix(ZOO, ZOO[::3]))
+@pytest.mark.parametrize(("name", "law"), matrix(ZOO, ZOO[::4]))
 def test_charts_of_the_zoo(name: str, law: str) -> None:
     chart = registered()[name].chart(law)
     texts = checked(demonstration(registered()[name], law))
@@ -64,7 +63,7 @@ def test_charts_of_the_zoo(name: str, law: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [1, 2, 7, 12])
+@pytest.mark.parametrize("n", [1, 12])
 def test_banks(n: int) -> None:
     texts = checked(bank(n))
     assert {"N/m", "F_s", "v_s", "sigma_2"} <= texts
@@ -123,5 +122,3 @@ def test_a_motion_of_ones_own() -> None:
     model = stick_slip("signed")
     figure = handout_figure(model, velocity="0.1*cos(t)", t_end=7.0)
     assert "v(t) = 0.1*cos(t) m/s" in [text.get_text() for text, _ in drawn_texts(figure)]
-    with pytest.raises(ParameterError, match="velocity and t_end belong together"):
-        handout_figure(model, velocity="0.1")

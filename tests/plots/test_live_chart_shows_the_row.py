@@ -7,26 +7,30 @@ layout serves all frames.
 
 from __future__ import annotations
 
-import math
 import shutil
 import sys
 from functools import cache
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import plots.live_chart
 from gms_fsm import LuGre, Prescribed, Stribeck, Trace, simulate
-from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.errors import MissingExtraError, OutputError
 from gms_fsm.inspection.explain import explain, explain_state, values_at
 from gms_fsm.systems.models import ChartModel
 from plots.live_chart import LiveChart, live_statechart
+from plots.statechart import statechart
 from plots.style import CHART_THEMES
 from tests.helpers import one_element, open_loop, stick_slip
-from tests.plots.test_statechart_shows_the_whole_chart import FIVE_STATES, THREE_STATES
+from tests.plots.charts_to_draw import FIVE_STATES, THREE_STATES
+from tests.plots.systems_to_draw import BALL, BLOCKS, END_STOP, PULLED
+from tests.plots.systems_to_draw import run as system_run
 
 CURVE = Stribeck(1.0, 1.5, 0.05)
-NAMES = ("bank", "one", "lugre", "three states", "five states", "wanted times")
+NAMES = ("bank", "lugre", "three states", "five states", "wanted times")
 
 Group = ElementTree.Element
 
@@ -179,7 +183,9 @@ def test_a_frame_depends_on_its_row_only() -> None:
 
 
 @pytest.mark.slow
-def test_one_layout_serves_all_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_layout_serves_all_frames_and_texts_do_not_move(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     calls = []
     real = plots.live_chart.picture
 
@@ -188,25 +194,18 @@ def test_one_layout_serves_all_frames(monkeypatch: pytest.MonkeyPatch) -> None:
         return real(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(plots.live_chart, "picture", counted)
-    chart = LiveChart(run("bank"))
-    for row in range(len(run("bank"))):
-        chart.frame(row)
-    assert len(calls) == 1
+    chart, trace = LiveChart(run("three states")), run("three states")
+    places = {
+        tuple((t.get("x"), t.get("y")) for t in groups(chart.frame(row))["graph0"].iter("text"))
+        for row in range(0, len(trace), 5)
+    }
+    assert len(calls) == len(places) == 1
 
 
-def test_texts_do_not_move_between_frames() -> None:
-    chart, trace = live("three states"), run("three states")
-
-    def places(row: int) -> list[tuple[str | None, str | None]]:
-        return [(t.get("x"), t.get("y")) for t in groups(chart.frame(row))["graph0"].iter("text")]
-
-    first = places(0)
-    assert all(places(row) == first for row in range(0, len(trace), 10))
-
-
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("notation", ["stateflow", "math"])
-@pytest.mark.parametrize("direction", ["TB", "LR"])
+@pytest.mark.parametrize(
+    ("theme", "notation", "direction"),
+    [("light", "stateflow", "LR"), ("dark", "math", "LR"), ("light", "math", "TB")],
+)
 def test_options(theme: str, notation: str, direction: str) -> None:
     svg = live_statechart(
         run("bank"), row=-1, elements=[2, 0], notation=notation, theme=theme, direction=direction
@@ -249,31 +248,6 @@ def test_at_is_the_last_row_at_or_before_a_time() -> None:
     assert LiveChart(mixed).at(25.0) == 2
 
 
-@pytest.mark.parametrize("t", [-0.1, 45.1, math.nan, math.inf])
-def test_a_time_outside_is_rejected(t: float) -> None:
-    with pytest.raises(ParameterError, match=r"t is .* within the run, 0 to 45 s"):
-        live("bank").at(t)
-
-
-def test_wrong_options_are_rejected() -> None:
-    trace = run("bank")
-    with pytest.raises(ParameterError, match=r"elements is \[4\].*the run has 4, counted from 0"):
-        LiveChart(trace, [4])
-    with pytest.raises(ParameterError, match="elements is 5"):
-        LiveChart(trace, 5)
-    with pytest.raises(ParameterError, match=r"'latex'.*'stateflow' or 'math'"):
-        LiveChart(trace, notation="latex")
-    with pytest.raises(ParameterError, match=r"'grey'.*'light' or 'dark'"):
-        LiveChart(trace, theme="grey")
-    with pytest.raises(ParameterError, match="row is None and t is None; give exactly one"):
-        live_statechart(trace)
-    with pytest.raises(ParameterError, match="give exactly one"):
-        live_statechart(trace, row=0, t=0.0)
-    for row in (len(trace), -len(trace) - 1):
-        with pytest.raises(IndexError, match=f"row {row}: the trace has"):
-            live("bank").look(row)
-
-
 def test_without_graphviz_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules["plots._graphviz"], "drawn", lambda *_: None)
     with pytest.raises(
@@ -293,26 +267,11 @@ def test_a_graphviz_with_unexpected_output_is_rejected(monkeypatch: pytest.Monke
         LiveChart(run("one"))
 
 
-def test_program_and_package_give_the_same_look(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("pygraphviz", reason="pygraphviz is the optional extra 'render'")
-    by_program = groups(LiveChart(run("bank"), values=True).frame(40))
-    monkeypatch.setenv("PATH", "")
-    by_package = groups(LiveChart(run("bank"), values=True).frame(40))
-    for name, group in by_program.items():
-        assert classes(group) == classes(by_package[name])
-        assert [t.text for t in group.findall("text")] == [
-            t.text for t in by_package[name].findall("text")
-        ]
-
-
 def test_a_guard_that_cannot_be_computed_is_marked() -> None:
-    from gms_fsm.charts.chart import Chart, State, Transition
-
     chart = Chart(
         "division",
         inputs=("v",),
         variables=("z",),
-        parameters=(),
         states=(State("a", flow={"z": "1"}), State("b", flow={"z": "0"})),
         transitions=(Transition("ab", "a", "b", guard="z > 9 and 1 / v > 2"),),
         outputs={"F": "z"},
@@ -323,3 +282,39 @@ def test_a_guard_that_cannot_be_computed_is_marked() -> None:
     trace.__dict__["seen"] = {**trace.seen, "friction.v": 0.0 * trace.v}  # a cached property
     assert shown.look(0)[0].marks == {"ab": (False, None)}
     assert marks(groups(shown.frame(0))["element1-guard-ab"]) == ["✗", "?"]
+
+
+# --------------------------------------------------------------------------- contacts of systems
+def test_the_picture_of_a_run_counts_bounces() -> None:
+    trace = system_run(BALL)
+    bounces = int((trace.transitions.edge == "bounce").sum())
+    assert bounces > 3
+    assert f"taken {bounces} times" in statechart(END_STOP, counts=trace).source
+
+
+def test_a_live_chart_marks_guards_that_read_the_force() -> None:
+    """At the release F is above F_s; just before it, and while the mass moves, it is not."""
+    trace = system_run(PULLED)
+    shown, (first, *_) = LiveChart(trace), np.flatnonzero(trace.microstep > 0)
+    (look,) = shown.look(int(first))
+    assert (look.fired, look.source, look.marks["release_forward"]) == (
+        "release_forward",
+        "stuck",
+        (True,),
+    )
+    (before,) = shown.look(int(first) - 2)
+    assert before.marks == {"release_forward": (False,), "release_backward": (False,)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("contact", ["pad1", "pad2"])
+def test_a_firing_belongs_to_its_own_contact(contact: str) -> None:
+    """A row made by another contact's firing is not taken for one of this contact."""
+    trace = system_run(BLOCKS).contact(contact)
+    made = [
+        row
+        for row in np.flatnonzero(trace.microstep > 0).tolist()
+        if any(edge.past for edge in explain(trace, row, 0))
+    ]
+    assert len(made) == len(trace.transitions) < (trace.microstep > 0).sum()
+    assert [LiveChart(trace).look(row)[0].fired for row in made] == trace.transitions.edge.tolist()

@@ -22,8 +22,7 @@ from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.language import MATLAB_LIKE, spell
 from plots.mermaid import mermaid
-from tests.plots.test_statechart_options import HOSTILE
-from tests.plots.test_statechart_shows_the_whole_chart import FIVE_STATES, THREE_STATES
+from tests.plots.charts_to_draw import FIVE_STATES, HOSTILE, THREE_STATES
 
 WORDS = Chart(
     name="---\nwords of Mermaid: %% {} <br/>",

@@ -5,8 +5,12 @@ from __future__ import annotations
 import html
 import io
 import pickle
+import re
 import subprocess
 import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,8 +21,110 @@ from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, simul
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.errors import OutputError
 from plots import drawings, notebook
+from plots._graphviz import available
 from tests.helpers import ROOT, one_element, stick_slip
 from tests.plots.systems_to_draw import BLOCKS, SERVO, run
+
+SVG, PNG, HTML, TEXT = "image/svg+xml", "image/png", "text/html", "text/plain"
+
+BEGIN = """
+import sys
+from gms_fsm import (GMS, ChartModel, GMSParameters, LuGre, Prescribed, Record, Session, Slider,
+                     Stribeck, fit, prove, simulate)
+from gms_fsm.charts import GMS_ELEMENT
+from gms_fsm.systems.system import system_of
+chart = GMS_ELEMENT["signed"]
+model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+rig = Prescribed("0.15*sin(2*pi*t/25)")
+trace = simulate(model, rig, 100.0, monitors=["coverage"])
+session = Session(model, rig, 20.0)
+here = session.next_transition()
+report = prove(GMS_ELEMENT["published"])
+rows = trace.sample([0.1 * i for i in range(300)])
+record = Record.from_arrays(time=rows.t, velocity=rows.v, force=rows.F)
+found = fit(record, model, free=["k"], search="local", progress=False)
+assert "plots" not in sys.modules and "matplotlib" not in sys.modules
+"""
+FIGURE = (
+    "from matplotlib.figure import Figure; f = Figure(figsize=(4, 3)); f.subplots().plot([1]); f"
+)
+SHOWN = {
+    "chart": SVG,
+    "model": SVG,
+    "LuGre(sigma_0=1e3, sigma_1=30.0, sigma_2=0.4, stribeck=Stribeck(1.0, 1.5, 1e-3))": SVG,
+    "system_of(model, rig)": SVG,
+    "system_of(model, rig).contacts[0]": SVG,
+    "model.parameters": HTML,
+    "trace": PNG,
+    "trace.transitions": HTML,
+    "trace.transitions[:2]": HTML,
+    "trace.monitors['coverage']": HTML,
+    "session": HTML,
+    "here": HTML,
+    "session.why(0)": HTML,
+    "session.why(0)[0]": HTML,
+    "report": HTML,
+    "found": HTML,
+    "report.refuted[0]": HTML,
+    FIGURE: PNG,
+    "import plots; plots.LiveChart(trace, 1)": SVG,
+    "plots.live_statechart(trace, row=40)": SVG,
+    "plots.statechart(chart, 4)": SVG,
+    "plots.block_diagram(2)": SVG,
+    "plots.block_diagram(system_of(model, rig))": SVG,
+    "plots.overview(trace)": PNG,
+    "plots.mermaid(chart)": "text/markdown",
+    "plots.replay(trace)": HTML,
+    "rig": TEXT,
+    "Prescribed(lambda t: 0.1 * t)": TEXT,
+    "Slider(1.0, [(i, 0.1) for i in range(10000)])": TEXT,
+    "GMSParameters(*[[1.0] * 1000] * 3, sigma_2=0, stribeck=Stribeck(1, 1, 1), v_c=1)": HTML,
+    "trace.rows": TEXT,
+    "trace.settings": TEXT,
+    "session.branches": TEXT,
+    "chart.transitions": TEXT,
+}
+
+
+def executed(begin: str, shown: Iterable[str], folder: Path) -> dict[str, Any]:
+    """Run each text as the last line of a cell, and return its output by mime type."""
+    nbclient = pytest.importorskip("nbclient", reason="running a notebook needs nbclient")
+    pytest.importorskip("ipykernel", reason="running a notebook needs ipykernel")
+    for module in ("matplotlib", "uplot", "z3"):
+        pytest.importorskip(module, reason="one of each needs the extra 'all'")
+    import nbformat
+
+    cells = [nbformat.v4.new_code_cell(text) for text in (begin, *shown)]
+    book = nbformat.v4.new_notebook(cells=cells)
+    place = {"metadata": {"path": str(folder)}}
+    nbclient.NotebookClient(book, timeout=300, kernel_name="python3", resources=place).execute()
+    first, *others = book.cells
+    assert first.outputs == []
+    for cell in others:
+        assert [each.output_type for each in cell.outputs] == ["execute_result"], cell.outputs
+    return {cell.source: cell.outputs[0].data for cell in others}
+
+
+@pytest.mark.slow
+def test_one_of_each_shows_itself_as_the_last_line_of_a_cell(tmp_path: Path) -> None:
+    """Its text is short; `plots` is not imported before, nor ``%matplotlib inline`` run."""
+    if not available():
+        pytest.skip("no Graphviz: neither the program dot nor pygraphviz")
+    for shown, data in executed(BEGIN, SHOWN, tmp_path).items():
+        form = SHOWN[shown]
+        assert set(data) == {form, TEXT} | ({HTML} if form == SVG else set()), shown
+        assert " at 0x" not in data[TEXT], shown
+        assert len(data[TEXT]) < 2000, shown
+        if form == SVG:
+            assert ElementTree.fromstring(data[SVG]).tag.endswith("svg"), shown
+            assert len(data[SVG]) < 100_000, shown
+            assert data[HTML].startswith('<img style="max-width:100%" alt="'), shown
+        if form == HTML:
+            assert re.search(r"<(table|pre|p|iframe)\b", data[HTML]), shown
+            assert " at 0x" not in data[HTML], shown
+            most = 300_000 if "base64" in data[HTML] else 100_000
+            assert len(data[HTML]) < (1_000_000 if "replay" in shown else most), shown
+
 
 CURVE = Stribeck(1.0, 1.5, 1e-3)
 
@@ -64,6 +170,7 @@ def test_without_graphviz_a_notebook_falls_back_to_text(monkeypatch: pytest.Monk
     for shown in (GMS_ELEMENT["signed"], stick_slip("signed"), SERVO.contact("bearing")):
         assert shown._repr_svg_() is None  # type: ignore[attr-defined]
         assert " -> " in html.unescape(shown._repr_html_())  # type: ignore[attr-defined]
+    assert "1 -> slip [z" in html.unescape(stick_slip("signed")._repr_html_())  # type: ignore[attr-defined]
     assert "J_m*dw_m/dt" in SERVO._repr_html_().replace(" ", "")  # type: ignore[attr-defined]
 
 
@@ -154,3 +261,9 @@ def test_charts_of_one_name_and_size_are_not_mixed_up() -> None:
         for chart in charts
     ]
     assert ends == pytest.approx([0.2, 0.4])
+
+
+@pytest.mark.slow
+def test_of_several_contacts_one_is_a_picture() -> None:
+    assert run(BLOCKS)._repr_png_() is None  # type: ignore[attr-defined]
+    assert run(BLOCKS).contact("pad1")._repr_png_() is not None  # type: ignore[attr-defined]

@@ -1,4 +1,8 @@
-"""Every panel draws the numbers of the run with units, and respects window, elements and log."""
+"""Every panel draws the numbers of the run with units, and respects window, elements and log.
+
+State ribbons equal the transition log, span by span. The cascade shows every step of F with its two
+one-sided values. Arrows of a phase portrait point along increasing time.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +14,26 @@ from gms_fsm import Trace, simulate
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Annotation, Text
 
 from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, Transition
 from plots import figures, panels
+from plots.panels._cascades import RESOLVED
 from plots.panels._shown import MOST_ROWS
-from tests.helpers import FIG4_SINE, non_drifting, open_loop, pulled_mass, stick_slip
+from tests.helpers import (
+    FASTEST,
+    FIG4_SINE,
+    non_drifting,
+    open_loop,
+    pulled_mass,
+    stick_slip,
+)
+from tests.plots.systems_to_draw import BALL, BLOCKS, PULLED
+from tests.plots.systems_to_draw import run as system_run
 
 
 @pytest.fixture(scope="module")
@@ -241,3 +258,292 @@ def test_rows_of_a_requested_grid_include_the_switches() -> None:
     assert len(part) > 2000
     assert np.isin(run.transitions.t, part.t).all()
     assert np.isin(run.transitions.F_before, part.F).all()
+
+
+# --------------------------------------------------------------------------- ribbons
+RIBBONS = {
+    "sine": lambda: simulate(stick_slip("published"), open_loop(), 60.0),
+    "pulled mass": lambda: simulate(*pulled_mass(), 60.0),
+    "wanted rows": lambda: simulate(*pulled_mass(), 60.0, t_eval=np.linspace(0.0, 60.0, 7)),
+}
+
+
+def by_hand(run: Trace, i: int, t0: float, t1: float) -> list[tuple[str, float, float]]:
+    """Return the states of element i over time, read from the log in the simplest way."""
+    spans, name, since = [], "stick", 0.0
+    for record in run.transitions:
+        if record.element == i:
+            spans.append((name, since, float(record.t)))
+            name, since = str(record.target), float(record.t)
+    spans.append((name, since, float(run.t[-1])))
+    cut = [(name, max(a, t0), min(b, t1)) for name, a, b in spans]
+    return [span for span in cut if span[2] > span[1]]
+
+
+def spans_of(artists: list[object]) -> list[list[tuple[float, float]]]:
+    collections = [a for a in artists if isinstance(a, PolyCollection)]
+    return [
+        [(p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in c.get_paths()]
+        for c in collections
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "window", "elements"),
+    [
+        ("sine", None, None),
+        ("sine", (14.0, 31.0), [2, 0]),
+        ("pulled mass", (14.0, 31.0), None),
+        ("wanted rows", None, [2, 0]),
+    ],
+)
+def test_ribbons_equal_the_log(
+    name: str, window: tuple[float, float] | None, elements: list[int] | None, ax: Axes
+) -> None:
+    run = RIBBONS[name]()
+    drawn = spans_of(panels.ribbons(ax, run, window=window, elements=elements))
+    limits = window or (0.0, 60.0)
+    chosen = range(4) if elements is None else elements
+    expected = [
+        [(a, b) for name, a, b in by_hand(run, i, *limits) if name == state]
+        for i in chosen
+        for state in ("stick", "slip")
+    ]
+    assert [len(spans) for spans in drawn] == [len(spans) for spans in expected]
+    for mine, wanted in zip(drawn, expected, strict=True):
+        np.testing.assert_allclose(mine, wanted, rtol=0, atol=1e-12)
+    assert [label.get_text() for label in ax.get_yticklabels()] == [f"E{i + 1}" for i in chosen]
+    assert ax.get_xlabel() == "t [s]"
+    still = simulate(stick_slip("signed"), open_loop(), 0.5)  # one span per element
+    assert spans_of(panels.ribbons(Figure().subplots(), still)) == [[(0.0, 0.5)], []] * 4
+
+
+def test_slip_is_hatched_and_stick_is_not(run: Trace) -> None:
+    stick, slip = panels.ribbons(Figure().subplots(), run)[:2]
+    assert (stick.get_hatch() or "") == ""
+    assert slip.get_hatch()
+
+
+def test_names_are_drawn_only_where_they_fit(run: Trace) -> None:
+    def shown_names(axes: Axes) -> list[str]:
+        canvas.draw()
+        renderer = canvas.get_renderer()
+        names = [a for a in axes.texts if a.get_text() in ("stick", "slip")]
+        for name in names:
+            if name.fits(renderer):  # type: ignore[attr-defined]
+                a, b = axes.transData.transform([(t, 0) for t in name.span])[:, 0]  # type: ignore[attr-defined]
+                box = Text.get_window_extent(name, renderer)
+                assert a <= box.x0
+                assert box.x1 <= b
+        return [a.get_text() for a in names if a.fits(renderer)]  # type: ignore[attr-defined]
+
+    wide, narrow = Figure(figsize=(16, 3)), Figure(figsize=(1.2, 3))
+    counts = []
+    for figure in (wide, narrow):
+        canvas = FigureCanvasAgg(figure)
+        ax = figure.subplots()
+        panels.ribbons(ax, run)
+        counts.append(len(shown_names(ax)))
+    assert counts[0] > 16
+    assert counts[1] < counts[0]
+
+
+# --------------------------------------------------------------------------- cascades
+def in_window(run: Trace, window: tuple[float, float]) -> np.recarray:
+    log = run.transitions
+    return log[(log.t >= window[0]) & (log.t <= window[1])]
+
+
+def labels(artists: list[object]) -> list[str]:
+    return [a.get_text() for a in artists if isinstance(a, Annotation)]
+
+
+def test_the_first_resolvable_cascade_is_found(run: Trace) -> None:
+    window = panels.cascade_window(run)
+    assert window is not None
+    log = in_window(run, window)
+    assert log.element.tolist() == [3, 2, 1, 0]
+    assert window[0] == pytest.approx(15.83, abs=0.02)
+    assert np.ptp(log.t) > RESOLVED
+
+
+def test_dots_are_the_one_sided_values(run: Trace) -> None:
+    drawn = panels.cascade(Figure().subplots(), run)
+    line, before, after = drawn[:3]
+    window = panels.cascade_window(run)
+    assert window is not None
+    log = in_window(run, window)
+    for dots, values in ((before, log.F_before), (after, log.F_after)):
+        assert isinstance(dots, Line2D)
+        np.testing.assert_array_equal(dots.get_xdata(), log.t)
+        np.testing.assert_array_equal(dots.get_ydata(), values)
+    curve = set(zip(line.get_xdata(), line.get_ydata(), strict=True))  # type: ignore[attr-defined]
+    for values in (log.F_before, log.F_after):
+        assert set(zip(log.t.tolist(), values.tolist(), strict=True)) <= curve
+    lines = [a for a in drawn[3:] if isinstance(a, Line2D)]
+    assert [a.get_xdata()[0] for a in lines] == log.t.tolist()
+    assert labels(drawn) == ["E4", "E3", "E2", "E1"]
+
+
+def test_a_subset_marks_its_own_steps_only(run: Trace) -> None:
+    assert labels(panels.cascade(Figure().subplots(), run, elements=[0, 2])) == ["E3", "E1"]
+
+
+def test_break_aways_at_one_instant_share_a_label(run: Trace) -> None:
+    first = float(run.transitions.t[0])
+    drawn = panels.cascade(Figure().subplots(), run, around=first)
+    assert labels(drawn) == ["E1 E2 E3 E4"]
+    np.testing.assert_array_equal(drawn[1].get_ydata(), run.transitions.F_before[:4])  # type: ignore[attr-defined]
+
+
+def test_within_makes_slow_break_aways_one_cascade() -> None:
+    model, rig = pulled_mass()
+    run = simulate(model, rig, 60.0)
+    single = panels.cascade_window(run)
+    assert single == pytest.approx((run.transitions.t[0] - 0.01, run.transitions.t[0] + 0.01))
+    wide = panels.cascade_window(run, within=4.0)
+    assert wide is not None
+    assert in_window(run, wide).element.tolist() == [0, 1, 2, 3]
+
+
+def test_margins_meet_zero_where_the_element_breaks_away(run: Trace) -> None:
+    ax = Figure().subplots()
+    drawn = panels.margins(ax, run)
+    assert "10$^3$" in ax.get_ylabel()
+    window = panels.cascade_window(run)
+    assert window is not None
+    part = panels.shown(run, window)
+    for i, line in enumerate(drawn[:4]):
+        np.testing.assert_array_equal(line.get_xdata(), part.t)  # type: ignore[attr-defined]
+        np.testing.assert_allclose(
+            line.get_ydata(),
+            1e3 * (1 - np.abs(part.z / part.s)[:, i]),  # type: ignore[attr-defined]
+        )
+    for i, dots in enumerate(drawn[5:9]):
+        mine = in_window(run, window)
+        assert dots.get_xdata() == mine.t[mine.element == i]  # type: ignore[attr-defined]
+        assert dots.get_ydata() == pytest.approx(0.0, abs=1e-9)  # type: ignore[attr-defined]
+
+
+def test_a_run_without_break_aways_has_no_cascade() -> None:
+    run = simulate(stick_slip("signed"), open_loop(), 0.5)
+    assert panels.cascade_window(run) is None
+    ax = Figure().subplots()
+    _, before, after = panels.cascade(ax, run)
+    assert before.get_xdata().size == after.get_xdata().size == 0  # type: ignore[attr-defined]
+    assert ax.get_xlim() == (0.0, 0.5)
+
+
+def test_a_nanosecond_reads_as_one(run: Trace) -> None:
+    t = float(run.transitions.t[0])
+    ax = Figure().subplots()
+    panels.cascade(ax, run, window=(t - 1e-9, t + 1e-9))
+    assert ax.get_xlabel().endswith("s [ns]")
+    assert all(len(label.get_text()) <= 5 for label in ax.get_xticklabels())
+
+
+# --------------------------------------------------------------------------- phase portraits
+def arrows_of(ax: Axes) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return tails and tips of the arrows, in pixels."""
+    found = [each for each in ax.texts if isinstance(each, Annotation) and each.arrow_patch]
+    return [(ax.transData.transform(each.xyann), ax.transData.transform(each.xy)) for each in found]
+
+
+def times_of(ax: Axes, t: np.ndarray, path: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Return the times at which a path passes within a pixel of a point."""
+    return np.asarray(t[np.hypot(*(ax.transData.transform(path) - point).T) < 1.0])
+
+
+@pytest.fixture(scope="module")
+def once() -> Trace:
+    """Half a cycle: no point of the path is passed twice."""
+    return simulate(stick_slip("signed"), open_loop(), 14.0)
+
+
+@pytest.mark.parametrize("panel", [0, 1], ids=["x", "v"])
+def test_tips_are_later_than_tails(once: Trace, panel: int) -> None:
+    figure = figures.phase(once)
+    ax = figure.axes[panel]
+    fine = once.refined(20_000)
+    path = np.column_stack([(fine.x - fine.x[0], fine.v)[panel], fine.F])
+    found = arrows_of(ax)
+    assert len(found) >= 5
+    checked = 0
+    for tail, tip in found:
+        before, after = (times_of(ax, fine.t, path, point) for point in (tail, tip))
+        if before.size and after.size and max(np.ptp(before), np.ptp(after)) < 1.0:
+            assert after.mean() > before.mean()
+            checked += 1
+    assert checked >= 4
+
+
+def test_arrows_are_evenly_spaced(once: Trace) -> None:
+    ax = figures.phase(once).axes[0]
+    tips = np.array([tip for _, tip in arrows_of(ax)]) / ax.figure.dpi  # type: ignore[operator]
+    away = np.hypot(*np.diff(tips, axis=0).T)
+    assert (away < 1.11).all()  # a chord is shorter than the path
+    assert np.median(away) > 0.8
+
+
+def test_a_path_that_repeats_itself_does_not_pile_up_arrows() -> None:
+    run = simulate(*pulled_mass(), 60.0, engine=FASTEST)
+    for ax in figures.phase(run).axes[:2]:
+        tips = np.array([tip for _, tip in arrows_of(ax)]) / ax.figure.dpi  # type: ignore[operator]
+        apart = np.hypot(*(tips[:, None] - tips).transpose(2, 0, 1)) + 9 * np.eye(len(tips))
+        assert apart.min() > 0.2
+        assert 10 < len(tips) < 60
+
+
+def test_the_dot_is_at_the_row(once: Trace) -> None:
+    for row in (40, -1, None):
+        figure = figures.phase(once, row=row)
+        place = -1 if row is None else row
+        for ax, values in zip(figure.axes, (once.x - once.x[0], once.v), strict=False):
+            (dot,) = (line for line in ax.lines if line.get_marker() == "o")
+            assert dot.get_xydata()[0] == pytest.approx([values[place], once.F[place]])
+        assert f"t = {once.t[place]:.9g} s" in figure.get_suptitle()
+
+
+def test_the_default_row_is_in_the_window(once: Trace) -> None:
+    figure = figures.phase(once, window=(2.0, 6.0))
+    row = int(np.flatnonzero(once.t <= 6.0)[-1])
+    assert f"dot at t = {once.t[row]:.9g} s" in figure.get_suptitle()
+
+
+def test_both_panels_have_one_colour_bar(once: Trace) -> None:
+    figure = figures.phase(once, elements=[0, 1])
+    assert len(figure.axes) == 3
+    assert figure.axes[2].get_ylabel() == "elements in slip"
+    for ax in figure.axes[:2]:
+        assert set(ax.collections[0].get_array()) == {0, 1, 2}
+
+
+def test_a_path_without_length_has_no_arrows() -> None:
+    run = simulate(stick_slip("signed"), open_loop(), 1.0, t_eval=[1.0])
+    ax = figures.phase(run).axes[0]
+    assert arrows_of(ax) == []
+    assert panels.portrait(ax, run, bar=False)
+
+
+# --------------------------------------------------------------------------- contacts of systems
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("system", "contact"), [(PULLED, "pad"), (BALL, "floor"), (BLOCKS, "pad2")]
+)
+def test_every_figure_takes_a_contact(system: object, contact: str) -> None:
+    trace = system_run(system).contact(contact)  # type: ignore[arg-type]
+    t = trace.transitions.t
+    for figure in (
+        *(make(trace) for make in (figures.overview, figures.ribbons_figure, figures.phase)),
+        figures.cascade_figure(trace),
+        figures.landscape(trace, 0, row=len(trace) // 2),
+        figures.unfold(trace, float(t[0]), float(t[min(4, t.size - 1)])),
+    ):
+        assert figure.get_suptitle().startswith(f"{contact}: ")
+
+
+@pytest.mark.parametrize("name", ["deflections", "ratio"])
+def test_a_chart_without_variables_has_no_deflection(name: str, ax: Axes) -> None:
+    (note,) = getattr(panels, name)(ax, system_run(PULLED))
+    assert note.get_text() == "no deflection:\nthis chart has no variables"

@@ -17,8 +17,8 @@ from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ParameterError
 from plots.plantuml import plantuml
 from plots.tikz import CODES, tikz
+from tests.plots.charts_to_draw import HOSTILE
 from tests.plots.test_mermaid_reads_back import WORDS
-from tests.plots.test_statechart_options import HOSTILE
 
 ALL = {**CHARTS, "words": WORDS, "hostile": HOSTILE}
 

@@ -1,7 +1,8 @@
 """A picture is written with any available Graphviz, or as DOT text if there is none.
 
-The chain is: program ``dot`` on PATH, package pygraphviz, DOT text with a warning. Every
-failure is an error of this package, and no incomplete file is left behind.
+The chain is: program ``dot`` on PATH, package pygraphviz, DOT text with a warning. Both draw the
+same texts at the same places and sizes. Every failure is an error of this package, and no
+incomplete file is left behind.
 """
 
 from __future__ import annotations
@@ -12,98 +13,105 @@ import sys
 import time
 import warnings
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import graphviz
 import pytest
 
-from gms_fsm.charts import GMS_ELEMENT, LUGRE
+from gms_fsm.charts import CHARTS, GMS_ELEMENT
 from gms_fsm.errors import OutputError, ParameterError
 from plots.block_diagram import block_diagram
 from plots.render import render
 from plots.statechart import statechart
+from tests.plots.charts_to_draw import LONG_GUARDS, MANY_EDGES, THREE_LOOPS
+from tests.plots.pictures import SVG, root_of, size_of
+from tests.plots.systems_to_draw import BLOCKS, SERVO
 
 BEGINS = {".svg": b"<?xml", ".png": b"\x89PNG\r\n", ".pdf": b"%PDF-"}
-GRAPHS = {"chart": statechart(GMS_ELEMENT["signed"], 2), "blocks": block_diagram(3)}
+SIGNED = GMS_ELEMENT["signed"]
+GRAPHS = {"chart": statechart(SIGNED, 2), "blocks": block_diagram(3)}
+ALIKE = {
+    "bank": statechart(SIGNED, 4, notation="math", direction="TB"),
+    "twelve": statechart(SIGNED, 12, notation="math", direction="LR"),
+    "40 edges": statechart(MANY_EDGES, direction="LR"),
+    "loops": statechart(THREE_LOOPS, notation="math", direction="TB"),
+    "long": statechart(LONG_GUARDS, direction="LR"),
+    "planar": statechart(CHARTS["planar-coulomb"], direction="TB"),
+    **{f"blocks {n}": block_diagram(n) for n in (1, 4, 12)},
+    "servo": block_diagram(SERVO),
+    "two blocks": block_diagram(BLOCKS),
+}
 
 needs_dot = pytest.mark.skipif(shutil.which("dot") is None, reason="needs the program dot on PATH")
 
 
-@pytest.fixture
-def no_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hide every program."""
-    monkeypatch.setenv("PATH", "")
+def hide(patch: pytest.MonkeyPatch, *what: str) -> None:
+    """Hide the program, the package, or both."""
+    if "program" in what:
+        patch.setenv("PATH", "")
+    if "package" in what:
+        patch.setitem(sys.modules, "pygraphviz", None)
 
 
-@pytest.fixture
-def no_graphviz(no_program: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hide the package too."""
-    monkeypatch.setitem(sys.modules, "pygraphviz", None)
-
-
-@pytest.fixture
-def no_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hide the package only."""
-    monkeypatch.setitem(sys.modules, "pygraphviz", None)
-
-
-def texts(svg: Path) -> list[str]:
-    texts = ElementTree.parse(svg).iter("{http://www.w3.org/2000/svg}text")
-    return sorted((text.text or "").replace("\xa0", " ").strip() for text in texts)
-
-
-@needs_dot
-@pytest.mark.parametrize("graph", GRAPHS.values(), ids=GRAPHS)
 @pytest.mark.parametrize("suffix", BEGINS)
-def test_program(graph: graphviz.Digraph, suffix: str, tmp_path: Path, no_package: None) -> None:
-    path = tmp_path / f"picture{suffix}"
-    assert render(graph, str(path)) == path
-    assert path.read_bytes().startswith(BEGINS[suffix])
-    assert list(tmp_path.iterdir()) == [path]
-
-
-@pytest.mark.parametrize("graph", GRAPHS.values(), ids=GRAPHS)
-@pytest.mark.parametrize("suffix", BEGINS)
-def test_package(graph: graphviz.Digraph, suffix: str, tmp_path: Path, no_program: None) -> None:
-    pytest.importorskip("pygraphviz", reason="pygraphviz is the optional extra 'render'")
-    path = tmp_path / f"picture{suffix}"
-    assert render(graph, path) == path
-    assert path.read_bytes().startswith(BEGINS[suffix])
-    assert list(tmp_path.iterdir()) == [path]
-
-
-@needs_dot
-@pytest.mark.parametrize("graph", GRAPHS.values(), ids=GRAPHS)
-def test_program_and_package_show_the_same(
-    graph: graphviz.Digraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "hidden", [pytest.param("package", marks=needs_dot), "program"], ids=["dot", "pygraphviz"]
+)
+@pytest.mark.parametrize("name", GRAPHS)
+def test_each_graphviz_writes_every_format(
+    name: str, suffix: str, hidden: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if hidden == "program":
+        pytest.importorskip("pygraphviz", reason="pygraphviz is the optional extra 'render'")
+    hide(monkeypatch, hidden)
+    path = tmp_path / f"picture{suffix}"
+    assert render(GRAPHS[name], str(path)) == path
+    assert path.read_bytes().startswith(BEGINS[suffix])
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def found_in(graph: Any) -> tuple[tuple[float, float], list[tuple[str, float, float]]]:
+    root = root_of(graph)
+    texts = [
+        (each.text or "", float(each.get("x", "")), float(each.get("y", "")))
+        for each in root.iter(SVG + "text")
+    ]
+    return size_of(root), texts
+
+
+@pytest.mark.slow
+@needs_dot
+@pytest.mark.parametrize("name", ALIKE)
+def test_program_and_package_draw_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pygraphviz", reason="pygraphviz is the optional extra 'render'")
-    by_program = render(graph, tmp_path / "program.svg")
-    monkeypatch.setenv("PATH", "")
-    by_package = render(graph, tmp_path / "package.svg")
-    assert texts(by_program) == texts(by_package)
+    size, texts = found_in(ALIKE[name])
+    hide(monkeypatch, "program")
+    other_size, other_texts = found_in(ALIKE[name])
+    assert other_size == pytest.approx(size, rel=0.02)
+    assert [text for text, *_ in other_texts] == [text for text, *_ in texts]
+    for (_, x, y), (_, other_x, other_y) in zip(texts, other_texts, strict=True):
+        assert other_x == pytest.approx(x, abs=1.0 if "element1" in ALIKE[name].source else 2.5)
+        assert other_y == pytest.approx(y, abs=2.5)
 
 
 @pytest.mark.parametrize("graph", GRAPHS.values(), ids=GRAPHS)
 def test_neither_gives_the_text_and_a_warning(
-    graph: graphviz.Digraph, tmp_path: Path, no_graphviz: None
+    graph: graphviz.Digraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    hide(monkeypatch, "program", "package")
     with pytest.warns(UserWarning, match=r'DOT text: .* Graphviz, .*"gms-fsm\[render\]"') as caught:
         written = render(graph, tmp_path / "picture.svg")
-    assert len(caught) == 1
-    assert caught[0].filename == __file__
+    assert [each.filename for each in caught] == [__file__]
     assert written == tmp_path / "picture.dot"
     assert written.read_text(encoding="utf-8") == graph.source
     assert list(tmp_path.iterdir()) == [written]
-
-
-@pytest.mark.parametrize("name", ["chart.dot", "chart.gv", "CHART.DOT"])
-def test_text_needs_no_graphviz(name: str, tmp_path: Path, no_graphviz: None) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        path = render(GRAPHS["chart"], tmp_path / name)
-    assert path == tmp_path / name
-    assert path.read_text(encoding="utf-8") == GRAPHS["chart"].source
+    for name in ("chart.gv", "CHART.DOT"):  # who asks for the text needs no Graphviz
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            path = render(graph, tmp_path / name)
+        assert path == tmp_path / name
+        assert path.read_text(encoding="utf-8") == graph.source
 
 
 @needs_dot
@@ -122,63 +130,49 @@ def test_same_graph_same_file(suffix: str, tmp_path: Path) -> None:
     first = render(GRAPHS["chart"], tmp_path / f"first{suffix}").read_bytes()
     time.sleep(1.1 if suffix == ".pdf" else 0.0)  # a PDF carries a date, in seconds
     assert render(GRAPHS["chart"], tmp_path / f"second{suffix}").read_bytes() == first
+    if suffix == ".png":  # it has two pixels per point
+        svg = ElementTree.parse(render(GRAPHS["chart"], tmp_path / "chart.svg")).getroot()
+        (width,) = struct.unpack(">I", first[16:20])
+        assert width == pytest.approx(2 * size_of(svg)[0], abs=4)
 
 
-@needs_dot
-def test_png_has_two_pixels_per_point(tmp_path: Path) -> None:
-    png = render(GRAPHS["chart"], tmp_path / "chart.png").read_bytes()
-    svg = ElementTree.parse(render(GRAPHS["chart"], tmp_path / "chart.svg")).getroot()
-    (width,) = struct.unpack(">I", png[16:20])
-    assert width == pytest.approx(2 * float(svg.get("width", "").removesuffix("pt")), abs=4)
-
-
-@pytest.mark.parametrize("name", ["chart.jpg", "chart", "chart.svgz", ".svg", "chart.svg.bak"])
-def test_another_suffix_is_rejected(name: str, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"\.svg, \.png, \.pdf .* \.dot, \.gv"):
-        render(GRAPHS["chart"], tmp_path / name)
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("name", ["chart.dot", pytest.param("chart.svg", marks=needs_dot)])
-def test_unwritable_folder_is_named(name: str, tmp_path: Path) -> None:
-    blocked = tmp_path / "a-file"
+def test_what_cannot_be_written_is_refused_and_leaves_no_trace(tmp_path: Path) -> None:
+    blocked, folder = tmp_path / "a-file", tmp_path / "chart.dot"
     blocked.write_text("not a folder")
-    with pytest.raises(OutputError, match=r"a-file.*choose another folder"):
-        render(GRAPHS["chart"], blocked / name)
-    with pytest.raises(OutputError, match="nowhere"):
-        render(GRAPHS["chart"], tmp_path / "nowhere" / name)
-    assert list(tmp_path.iterdir()) == [blocked]
-
-
-def test_failed_write_leaves_no_trace(tmp_path: Path) -> None:
-    folder = tmp_path / "chart.dot"
     folder.mkdir()
-    with pytest.raises(OutputError, match=r"chart\.dot"):
-        render(GRAPHS["chart"], folder)
-    assert list(tmp_path.iterdir()) == [folder]
+    for path, kind in (
+        *(
+            (tmp_path / name, ParameterError)
+            for name in ("chart.jpg", "chart", ".svg", "c.svg.bak")
+        ),
+        (blocked / "chart.dot", OutputError),
+        (tmp_path / "nowhere" / "chart.dot", OutputError),
+        (folder, OutputError),
+    ):
+        with pytest.raises(kind) as error:
+            render(GRAPHS["chart"], path)
+        assert str(path.name) in str(error.value) or str(path.parent) in str(error.value)
+    with pytest.raises(ParameterError, match="first the graph"):
+        render("chart.svg", GRAPHS["chart"])  # type: ignore[arg-type]
+    assert sorted(tmp_path.iterdir()) == [blocked, folder]
 
 
-@needs_dot
-def test_program_failing_is_an_error_with_its_message(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("hidden", "text", "said"),
+    [
+        pytest.param("package", "a [label=<<B>x</I>>]", "mismatched tag", marks=needs_dot),
+        ("program", "a -> -> b", "pygraphviz"),
+    ],
+)
+def test_a_graph_that_cannot_be_drawn_is_an_error_and_the_old_picture_is_kept(
+    hidden: str, text: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if hidden == "program":
+        pytest.importorskip("pygraphviz", reason="pygraphviz is the optional extra 'render'")
+    hide(monkeypatch, hidden)
     old = tmp_path / "chart.svg"
     old.write_text("the picture of yesterday")
-    broken = graphviz.Digraph(body=["a [label=<<B>x</I>>]"])
-    with pytest.raises(OutputError, match="mismatched tag"):
-        render(broken, old)
+    with pytest.raises(OutputError, match=said):
+        render(graphviz.Digraph(body=[text]), old)
     assert old.read_text() == "the picture of yesterday"
-
-
-def test_package_failing_is_an_error(tmp_path: Path, no_program: None) -> None:
-    pytest.importorskip("pygraphviz", reason="pygraphviz is the optional extra 'render'")
-    with pytest.raises(OutputError, match="pygraphviz"):
-        render(graphviz.Digraph(body=["a -> -> b"]), tmp_path / "chart.svg")
-    assert not list(tmp_path.iterdir())
-
-
-def test_wrong_objects_and_missing_folders_are_reported(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="first the graph"):
-        render("chart.svg", statechart(LUGRE))  # type: ignore[arg-type]
-    with pytest.raises(ParameterError, match=r"of a model its \.chart"):
-        statechart("gms")  # type: ignore[arg-type]
-    with pytest.raises(OutputError, match="create its folder first, or choose another"):
-        render(statechart(LUGRE), tmp_path / "none" / "chart.dot")
+    assert list(tmp_path.iterdir()) == [old]

@@ -1,7 +1,7 @@
 """The data of a replay page are the rows, values, states and log of the run, and only data.
 
 No browser is needed here; what the page computes from them is the claim of
-`test_replay_page_explains.py`.
+`test_replay_page_explains_and_compares.py`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.stribeck import Stribeck
-from gms_fsm.errors import MissingExtraError, OutputError, ParameterError, TraceFileError
+from gms_fsm.errors import OutputError, ParameterError, TraceFileError
 from gms_fsm.inspection.prove import prove
 from gms_fsm.systems.models import ChartModel, LuGre
 from gms_fsm.traces.failures import SimulationError
@@ -28,10 +29,13 @@ from plots.page import _chart, _rows
 from plots.replay import replay, replay_html, write_replay
 from tests.helpers import FASTEST, FIG4_SINE, bank, pulled_mass, stick_slip
 from tests.plots.stored import column, data_of, integers, log, modes, same
+from tests.plots.systems_to_draw import BLOCKS, PULLED, STICTION
+from tests.plots.systems_to_draw import run as system_run
 
-uplot = pytest.mark.skipif(
-    importlib.util.find_spec("uplot") is None, reason="needs the package uplot-python"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(importlib.util.find_spec("uplot") is None, reason="needs uplot-python"),
+]
 
 
 @cache
@@ -39,12 +43,16 @@ def fig4(law: str) -> Trace:
     return simulate(stick_slip(law), Prescribed(FIG4_SINE), 100.0)
 
 
-@pytest.mark.slow
-@uplot
+def run_of(trace: Trace, **options: Any) -> dict[str, Any]:
+    """Return the data of the only run of a page."""
+    (only,) = data_of(replay_html(trace, **options))["runs"]
+    return dict(only)
+
+
 @pytest.mark.parametrize("law", ["published", "signed"])
 def test_rows_have_the_numbers_the_bits_and_the_states_of_the_trace(law: str) -> None:
     trace = fig4(law)
-    (run,) = data_of(replay_html(trace))["runs"]
+    run = run_of(trace)
     (contact,) = run["contacts"]
     own = integers(run["between"]) == 0
     number = integers(run["number"])[own]
@@ -62,11 +70,9 @@ def test_rows_have_the_numbers_the_bits_and_the_states_of_the_trace(law: str) ->
     assert (modes(contact, run["rows"])[own] == trace.modes[number]).all()
 
 
-@pytest.mark.slow
-@uplot
 def test_the_log_is_complete_and_points_at_the_rows_that_firings_made() -> None:
     trace = fig4("signed")
-    (run,) = data_of(replay_html(trace))["runs"]
+    run = run_of(trace)
     (contact,) = run["contacts"]
     rows, elements, edges, made = log(contact)
     assert len(rows) == len(trace.transitions) == 64
@@ -80,8 +86,6 @@ def test_the_log_is_complete_and_points_at_the_rows_that_firings_made() -> None:
         assert names[states[row - 1, element]] == record.source
 
 
-@pytest.mark.slow
-@uplot
 def test_the_page_of_fig_4_is_small_and_complete() -> None:
     page = replay_html(fig4("published"), title="Fig. 4")
     assert len(page.encode()) < 500_000
@@ -91,8 +95,6 @@ def test_the_page_of_fig_4_is_small_and_complete() -> None:
     assert "{{" not in re.sub(r"<script>.*?</script>", "", page, flags=re.S)
 
 
-@pytest.mark.slow
-@uplot
 def test_800_000_rows_with_30_000_transitions_fit_into_5_megabytes() -> None:
     trace = simulate(*pulled_mass(), 23_000.0, engine=FASTEST)
     assert len(trace) > 800_000
@@ -111,32 +113,23 @@ def test_800_000_rows_with_30_000_transitions_fit_into_5_megabytes() -> None:
         assert v[shown].min() <= 0.99 * trace.v[inside].min()
 
 
-@pytest.mark.slow
-@uplot
 def test_20_elements_with_400_instants_fit_into_2_megabytes() -> None:
     trace = simulate(bank(20), Prescribed("0.15*sin(2*pi*t/5)"), 100.0)
     assert np.unique(trace.transitions.t).size >= 320
     assert len(replay_html(trace).encode()) < 2_000_000
 
 
-@pytest.mark.slow
-@uplot
 def test_a_window_shows_that_part_of_the_run() -> None:
     trace = fig4("signed")
-    (run,) = data_of(replay_html(trace, window=(20.0, 40.0)))["runs"]
+    run = run_of(trace, window=(20.0, 40.0))
     t = column(run, run["t"])
     assert (t.min() >= 20.0) & (t.max() <= 40.0)
     inside = trace.transitions[(trace.transitions.t >= 20.0) & (trace.transitions.t <= 40.0)]
     assert len(log(run["contacts"][0])[0]) == len(inside) > 0
     own = integers(run["between"]) == 0
     assert same(t[own], trace.t[integers(run["number"])[own]])
-    for window in ((40.0, 20.0), (0.0, 101.0), (1.0,), "all"):
-        with pytest.raises(ParameterError, match="window is"):
-            replay_html(trace, window=window)  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
-@uplot
 def test_more_transitions_than_a_page_holds_ask_for_a_window(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -146,12 +139,10 @@ def test_more_transitions_than_a_page_holds_ask_for_a_window(
     assert replay_html(fig4("signed"), window=(0.0, 10.0))
 
 
-@pytest.mark.slow
-@uplot
 def test_long_runs_at_requested_times_keep_all_transitions() -> None:
     trace = simulate(*pulled_mass(), 60.0, t_eval=np.linspace(0.0, 60.0, 20_001))
     assert (trace.microstep == 0).all()
-    (run,) = data_of(replay_html(trace))["runs"]
+    run = run_of(trace)
     rows, _, _, made = log(run["contacts"][0])
     assert len(rows) == len(trace.transitions) == 72
     assert made.all()
@@ -160,8 +151,6 @@ def test_long_runs_at_requested_times_keep_all_transitions() -> None:
     assert same(column(run, run["t"])[own], trace.t[integers(run["number"])[own]])
 
 
-@pytest.mark.slow
-@uplot
 def test_requested_times_of_a_loaded_trace_are_not_duplicated(tmp_path: Path) -> None:
     model, rig = stick_slip("signed"), Prescribed(FIG4_SINE)
     trace = simulate(model, rig, 100.0, t_eval=np.linspace(0.0, 100.0, 201))
@@ -176,19 +165,17 @@ def test_requested_times_of_a_loaded_trace_are_not_duplicated(tmp_path: Path) ->
         assert sum(steps) == sum(fig4("signed").microstep)
 
 
-@uplot
 def test_a_signal_that_is_not_in_the_file_leaves_the_rows_as_they_are(tmp_path: Path) -> None:
     trace = simulate(stick_slip("signed"), Prescribed(lambda t: 0.2), 3.0)
-    (run,) = data_of(replay_html(Trace.load(trace.save(tmp_path / "run.npz"))))["runs"]
+    run = run_of(Trace.load(trace.save(tmp_path / "run.npz")))
     assert run["rows"] == len(trace)
     assert not integers(run["between"]).any()
 
 
-@uplot
 def test_counterexamples_are_pinned_where_they_have_a_place() -> None:
     pytest.importorskip("z3")
     report = prove(GMS_ELEMENT["published"])
-    (run,) = data_of(replay_html(fig4("published"), checks=report))["runs"]
+    run = run_of(fig4("published"), checks=report)
     pins = run["contacts"][0]["plane"]["pins"]
     wanted = [f for f in report.findings if {"v", "z"} <= f.counterexample.keys()]
     assert [pin["text"] for pin in pins] == [f.text for f in wanted]
@@ -200,7 +187,6 @@ def test_counterexamples_are_pinned_where_they_have_a_place() -> None:
         replay_html(fig4("signed"), checks=report)
 
 
-@uplot
 def test_a_hostile_name_stays_a_text() -> None:
     evil = "</script><script>document.title='owned'</script><!-- \u2028"
     chart = Chart(
@@ -220,43 +206,29 @@ def test_a_hostile_name_stays_a_text() -> None:
     assert data_of(page)["title"] == evil
 
 
-@pytest.mark.slow
-@uplot
 def test_nan_and_infinities_are_stored() -> None:
     trace = fig4("signed")
     stored = {name: np.array(values) for name, values in trace.seen.items()}
     stored["friction.F"][:3] = np.nan, np.inf, -np.inf
     stored["friction.v"][5] = np.nan
-    (run,) = data_of(replay_html(replace(trace, stored=stored)))["runs"]
+    run = run_of(replace(trace, stored=stored))
     values = run["contacts"][0]["values"]
     assert same(column(run, values["F"]["all"])[:3], np.array([np.nan, np.inf, -np.inf]))
     assert np.isnan(column(run, values["v"]["all"])[5])
 
 
-@pytest.mark.slow
-@uplot
 def test_a_failed_run_has_a_page() -> None:
     with pytest.raises(SimulationError) as stopped:
         simulate(stick_slip("signed"), Prescribed("0.1*sqrt(2 - t)"), 5.0)
-    (run,) = data_of(replay_html(stopped.value.trace))["runs"]
+    run = run_of(stopped.value.trace)
     assert run["rows"] >= len(stopped.value.trace)
 
 
-def test_without_uplot_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(MissingExtraError, match=r"gms-fsm\[replay\]"):
-        replay_html(fig4("signed"))
-
-
-@pytest.mark.slow
-@uplot
 def test_a_page_in_a_missing_folder_is_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot write"):
         write_replay(tmp_path / "none" / "page.html", fig4("signed"))
 
 
-@pytest.mark.slow
-@uplot
 def test_two_runs_of_one_model_are_distinguished_by_their_names() -> None:
     coarse, fine = fig4("signed"), fig4("signed")
     runs = data_of(replay_html(coarse, fine, names=["coarse", "fine"]))["runs"]
@@ -264,12 +236,8 @@ def test_two_runs_of_one_model_are_distinguished_by_their_names() -> None:
     assert [run["title"].partition(": ")[2] for run in runs] == [
         run["title"] for run in data_of(replay_html(coarse, fine))["runs"]
     ]
-    with pytest.raises(ParameterError, match=r"2 run\(s\) but names = \['one'\]"):
-        replay_html(coarse, fine, names=["one"])
 
 
-@pytest.mark.slow
-@uplot
 def test_a_log_with_an_edge_of_another_chart_is_rejected() -> None:
     trace = fig4("signed")
     layout = trace.program.layout
@@ -278,12 +246,10 @@ def test_a_log_with_an_edge_of_another_chart_is_rejected() -> None:
         replay_html(replace(trace, firings=replace(trace.firings, layout=other)))
 
 
-@pytest.mark.slow
-@uplot
 def test_a_chart_without_edges_and_a_model_of_many_elements_have_pages() -> None:
     rig = Prescribed(FIG4_SINE)
     lugre = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=0.4, stribeck=Stribeck(1, 1.5, 0.05))
-    (run,) = data_of(replay_html(simulate(lugre, rig, 10.0)))["runs"]
+    run = run_of(simulate(lugre, rig, 10.0))
     (contact,) = run["contacts"]
     assert contact["edges"] == []
     assert len(log(contact)[0]) == 0
@@ -295,15 +261,11 @@ def test_a_chart_without_edges_and_a_model_of_many_elements_have_pages() -> None
     assert data_of(page)["runs"][0]["contacts"][0]["n"] == 9
 
 
-@pytest.mark.slow
-@uplot
 def test_without_graphviz_the_page_has_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_chart, "drawn", lambda graph, form: None)
     assert "No chart: Graphviz" in replay_html(fig4("signed"))
 
 
-@pytest.mark.slow
-@uplot
 def test_a_notebook_shows_it_in_a_sandbox(tmp_path: Path) -> None:
     shown = replay(fig4("signed"))
     frame = shown._repr_html_()
@@ -314,3 +276,24 @@ def test_a_notebook_shows_it_in_a_sandbox(tmp_path: Path) -> None:
     assert html.unescape(inside[1]) == shown.html
     path = write_replay(tmp_path / "page.html", fig4("signed"))
     assert path.read_text(encoding="utf-8") == shown.html  # the same run gives the same page
+
+
+# --------------------------------------------------------------------------- contacts of systems
+@pytest.mark.parametrize("contact", ["pad1", "pad2"])
+def test_a_firing_belongs_to_its_own_contact(contact: str) -> None:
+    trace = system_run(BLOCKS).contact(contact)
+    page = run_of(trace)
+    rows, _, _, made = log(page["contacts"][0])
+    assert made.all()
+    assert column(page, page["t"])[rows].tolist() == trace.transitions.t.tolist()
+
+
+def test_a_page_shows_the_force_that_guards_read_bit_for_bit() -> None:
+    trace = system_run(PULLED)
+    page = run_of(trace)
+    (contact,) = page["contacts"]
+    own = integers(page["between"]) == 0
+    F = column(page, contact["values"]["F"]["all"])[own]
+    assert same(F, trace.F[integers(page["number"])[own]])
+    assert contact["variables"] == []  # and has no plot of elements
+    assert {edge["name"] for edge in contact["edges"]} == {e.name for e in STICTION.transitions}

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import html
 import re
-import shutil
 from itertools import combinations
-from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 
 from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider
 from gms_fsm.systems.system import Body, Contact, System, system_of
 from plots.block_diagram import block_diagram
-from plots.render import render
+from tests.plots.pictures import SVG, Box, Picture
 from tests.plots.systems_to_draw import BLOCKS, DRY, SERVO, STICTION, systems
 
-SVG = "{http://www.w3.org/2000/svg}"
 MODEL = GMS(GMSParameters.paper("stick-slip"), law="signed")
 
 
 KINDS = {"signal", "sampled", "flow", "body", "spring", "contact"}
-Span = tuple[float, float, float, float]  # left, bottom, right, top
 
 
 def nodes(system: System) -> dict[str, dict[str, str]]:
@@ -184,93 +179,58 @@ def test_a_model_on_a_rig_is_the_picture_of_its_system() -> None:
 
 
 # --------------------------------------------------------------------------- places
-def span(look: dict[str, str]) -> Span:
+def span(look: dict[str, str]) -> Box:
     """Return what a node covers."""
     x, y = (float(part) for part in look["pos"].rstrip("!").split(","))
-    half = [36 * float(look[side]) for side in ("width", "height")]
-    return x - half[0], y - half[1], x + half[0], y + half[1]
-
-
-def meet(a: Span, b: Span, room: float = 0.0) -> bool:
-    return a[0] < b[2] + room and b[0] < a[2] + room and a[1] < b[3] + room and b[1] < a[3] + room
+    wide, high = (36 * float(look[side]) for side in ("width", "height"))
+    return Box(x - wide, y - high, x + wide, y + high)
 
 
 @pytest.mark.parametrize("name", sorted(systems()))
-def test_blocks_wires_and_texts_keep_apart(name: str) -> None:
+def test_blocks_wires_and_texts_keep_apart_on_two_pages(name: str) -> None:
     system = systems()[name]
     found = nodes(system)
     spans = {each: span(look) for each, look in found.items()}
+    wide = max(each.right for each in spans.values()) - min(each.left for each in spans.values())
+    assert wide <= 2 * 8.27 * 72
     blocks = {each: spans[each] for each, look in found.items() if look.get("class") in KINDS}
     texts = {each: spans[each] for each in found if each.endswith("-name") or each == "title"}
     for (a, one), (b, other) in combinations((blocks | texts).items(), 2):
-        assert not meet(one, other), (a, b)
+        assert not one.meets(other), (a, b)
     runs = []
     for wire, wired in pieces(system).items():
         for tail, head, _ in wired:
             (x0, y0), (x1, y1) = (
-                (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
+                (0.5 * (box.left + box.right), 0.5 * (box.top + box.bottom))
                 for box in (spans[tail], spans[head])
             )
             assert x0 == x1 or y0 == y1, wire
-            runs.append((wire, (min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))))
+            runs.append((wire, Box.around([(x0, y0), (x1, y1)])))
     for wire, run in runs:
-        inside = {each: (s[0] + 1, s[1] + 1, s[2] - 1, s[3] - 1) for each, s in blocks.items()}
-        assert not [each for each, box in (inside | texts).items() if meet(run, box, -0.5)], wire
+        met = [each for each, box in blocks.items() if run.meets(box, -1.5)]
+        assert not [*met, *(each for each, box in texts.items() if run.meets(box, -0.5))], wire
     for (a, one), (b, other) in combinations(runs, 2):
         if a == b:
             continue
-        for along, across in ((0, 1), (1, 0)):
-            level = one[across] == one[across + 2] and other[across] == other[across + 2]
-            if level and abs(one[across] - other[across]) < 4.0:
-                shared = min(one[along + 2], other[along + 2]) - max(one[along], other[along])
-                assert shared <= 0, (a, b)
-
-
-@pytest.mark.parametrize("name", sorted(systems()))
-def test_no_diagram_is_wider_than_two_pages(name: str) -> None:
-    spans = [span(look) for look in nodes(systems()[name]).values() if "pos" in look]
-    assert max(each[2] for each in spans) - min(each[0] for each in spans) <= 2 * 8.27 * 72
-
-
-def test_program_and_package_agree(monkeypatch: pytest.MonkeyPatch) -> None:
-    if shutil.which("dot") is None:
-        pytest.skip("needs the program dot")
-    pytest.importorskip("pygraphviz", reason="needs the package pygraphviz")
-    from plots._graphviz import drawn as picture_of
-
-    def drawn(graph: object) -> tuple[list[str], list[float]]:
-        picture = picture_of(graph, "svg")  # type: ignore[arg-type]
-        assert picture is not None
-        root = ElementTree.fromstring(picture)
-        texts = sorted(text.text or "" for text in root.iter(SVG + "text"))
-        return texts, [float(root.get(side, "")[:-2]) for side in ("width", "height")]
-
-    for system in (SERVO, BLOCKS):
-        texts, size = drawn(block_diagram(system))
-        with monkeypatch.context() as patch:
-            patch.setattr(shutil, "which", lambda _: None)
-            other_texts, other_size = drawn(block_diagram(system))
-        assert other_texts == texts
-        assert other_size == pytest.approx(size, rel=0.02)
+        near = Box(other.left, other.top - 4, other.right, other.bottom + 4)
+        if one.top == one.bottom and other.top == other.bottom:  # level
+            assert not (one.meets(near) and min(one.right, other.right) > max(one.left, other.left))
+        near = Box(other.left - 4, other.top, other.right + 4, other.bottom)
+        if one.left == one.right and other.left == other.right:  # upright
+            assert not (one.meets(near) and min(one.bottom, other.bottom) > max(one.top, other.top))
 
 
 @pytest.mark.parametrize("name", ["two-mass servo", "ball_screw_table", "a train of four"])
-def test_texts_fit_into_their_blocks(name: str, tmp_path: Path) -> None:
+def test_texts_fit_into_their_blocks(name: str) -> None:
     """The widths of characters that blocks are made for are not less than those drawn."""
-    if shutil.which("dot") is None:
-        pytest.importorskip("pygraphviz", reason="drawing needs Graphviz, program or package")
-    svg = render(block_diagram(systems()[name]), tmp_path / "system.svg")
-    for group in ElementTree.parse(svg).iter(SVG + "g"):
-        if not set(group.get("class", "").split()) & KINDS:
+    for group in Picture(block_diagram(systems()[name])).groups.values():
+        if not group.classes & KINDS:
             continue
-        shape = next(each for each in group.iter() if each.get("d") or each.get("points"))
-        numbers = re.findall(r"-?\d+(?:\.\d+)?", shape.get("d") or shape.get("points") or "")
-        left, right = (f(map(float, numbers[::2])) for f in (min, max))
-        for text in group.iter(SVG + "text"):
+        for text in group.element.iter(SVG + "text"):
             start, size = float(text.get("x", "")), float(text.get("font-size", ""))
             wide = 0.602 if "Mono" in text.get("font-family", "") else 0.5
-            assert left <= start, text.text
-            assert start + wide * size * len(text.text or "") <= right + 1, text.text
+            assert group.box.left <= start, text.text
+            assert start + wide * size * len(text.text or "") <= group.box.right + 1, text.text
 
 
 def test_the_force_on_each_body_has_its_share() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,18 +42,18 @@ def one_time() -> tuple[Trace, float, float]:
     return run, t, t
 
 
+def alike(n: int, v: str, **numbers: Any) -> Trace:
+    """Elements that break away at one time."""
+    given = {"k": 1.0, "sigma": 0.0, "C": 0.1} | numbers
+    lists = {name: np.broadcast_to(value, n) for name, value in given.items()}
+    curve = Stribeck(1.0, 1.5, 0.05)
+    parameters = GMSParameters(sigma_2=0.4, stribeck=curve, v_c=1e-6, **lists)
+    return simulate(GMS(parameters, law="signed"), Prescribed(v), 2.0)
+
+
 def twenty() -> tuple[Trace, float, float]:
-    """Twenty elements at one time."""
-    parameters = GMSParameters(
-        np.linspace(10, 40, 20),
-        [0.1] * 20,
-        [0.02] * 20,
-        sigma_2=0.4,
-        stribeck=Stribeck(1.0, 1.5, 0.05),
-        v_c=1e-6,
-        weights=[0.01] * 20,
-    )
-    return simulate(GMS(parameters, law="signed"), Prescribed("0.2"), 1.0), 0.0, 1.0
+    numbers = {"k": np.linspace(10, 40, 20), "sigma": 0.1, "C": 0.02, "weights": 0.01}
+    return alike(20, "0.2", **numbers), 0.0, 2.0
 
 
 def contact() -> tuple[Trace, float, float]:
@@ -75,7 +76,7 @@ Make = Callable[[], tuple[Trace, float, float]]
 
 
 @CASES
-def test_stairs_are_the_forces_of_the_log(
+def test_stairs_are_the_forces_of_the_log_and_columns_have_its_order(
     make: Make, instants: int | None, firings: int | None
 ) -> None:
     trace, t0, t1 = make()
@@ -96,15 +97,6 @@ def test_stairs_are_the_forces_of_the_log(
         np.testing.assert_allclose(levels[:-1], mine.F_before, rtol=1e-15)
         k += mine.size
     assert k == log.size
-
-
-@CASES
-def test_columns_are_in_the_order_of_the_log(
-    make: Make, instants: int | None, firings: int | None
-) -> None:
-    trace, t0, t1 = make()
-    log = trace.transitions[(trace.transitions.t >= t0) & (trace.transitions.t <= t1)]
-    part = panels.unfolded(trace, t0, t1)
     fired = [each for each in part.columns if each.edge]
     assert [(each.element, each.edge) for each in fired] == list(
         zip(log.element.tolist(), log.edge.tolist(), strict=True)
@@ -176,29 +168,10 @@ def test_too_many_columns_name_a_window_that_works() -> None:
 
 
 def test_too_many_at_one_time_say_to_choose_elements() -> None:
-    parameters = GMSParameters(
-        [1.0] * 30, [0.0] * 30, [0.1] * 30, sigma_2=0, stribeck=Stribeck(1, 1.5, 0.1), v_c=1e-6
-    )
-    trace = simulate(GMS(parameters, law="signed"), Prescribed("1"), 2.0)
+    trace = alike(30, "1")
     with pytest.raises(ParameterError, match="31 columns are at t = "):
         figures.unfold(trace, 0.0, 2.0)
     assert len(panels.unfolded(trace, 0.0, 2.0, elements=[0, 1, 2]).columns) == 4
-
-
-@pytest.mark.parametrize(
-    ("window", "said"),
-    [
-        ((0.1, 1.0), r"no transition from 0.1 to 1 s; the nearest one is at t = 2"),
-        ((2.0, 1.0), r"window is \(2.0, 1.0\); it must be two times"),
-        ((1.0, 9.0), r"inside the run, 0 to 3 s"),
-        (("a", 2.0), r"window is "),
-        ((9.0, 9.0), r"window is "),
-    ],
-)
-def test_wrong_windows(window: tuple[float, float], said: str) -> None:
-    trace, *_ = one_time()
-    with pytest.raises(ParameterError, match=said):
-        figures.unfold(trace, *window)
 
 
 def test_a_run_without_transitions() -> None:

@@ -19,25 +19,27 @@ from pathlib import Path
 import numpy as np
 from cases import PROBLEMS
 from compare import c_loop, ours
-one, (engine, name) = PROBLEMS[sys.argv[2]], (sys.argv[1], sys.argv[2])
-times = np.linspace(0.0, one.t_end, 101)
-with tempfile.TemporaryDirectory() as folder:
-    loop = c_loop(one, Path(folder))
-    rows, end = loop(times), loop(np.empty(0))
-exact = ours(one, t_eval=times, engine=engine, rtol=1e-12, atol=1e-15)
-coarse = ours(one, t_eval=times, engine=engine)
-def taken(outcome, i):
-    mine = outcome.element == i
-    return [outcome.edge[k] for k in np.flatnonzero(mine)], outcome.t[mine]
-late, same = 0.0, True
-for i in np.unique(exact.element):
-    (edges, t), (true, t_true) = taken(rows, i), taken(exact, i)
-    same = same and edges == true
-    late = max(late, float(np.abs(t - t_true).max())) if edges == true else late
-def far(outcome, rows=slice(None)):
-    return float(np.abs(outcome.z - exact.z[rows]).max())
-print(json.dumps([len(exact.t), one.transitions, same, late / one.t_end, far(rows), far(coarse),
-                  far(end, slice(-1, None))]))
+engine = sys.argv[1]
+for name in sys.argv[2:]:
+    one = PROBLEMS[name]
+    times = np.linspace(0.0, one.t_end, 101)
+    with tempfile.TemporaryDirectory() as folder:
+        loop = c_loop(one, Path(folder))
+        rows, end = loop(times), loop(np.empty(0))
+    exact = ours(one, t_eval=times, engine=engine, rtol=1e-12, atol=1e-15)
+    coarse = ours(one, t_eval=times, engine=engine)
+    def taken(outcome, i):
+        mine = outcome.element == i
+        return [outcome.edge[k] for k in np.flatnonzero(mine)], outcome.t[mine]
+    late, same = 0.0, True
+    for i in np.unique(exact.element):
+        (edges, t), (true, t_true) = taken(rows, i), taken(exact, i)
+        same = same and edges == true
+        late = max(late, float(np.abs(t - t_true).max())) if edges == true else late
+    def far(outcome, rows=slice(None)):
+        return float(np.abs(outcome.z - exact.z[rows]).max())
+    print(json.dumps([len(exact.t), one.transitions, same, late / one.t_end, far(rows), far(coarse),
+                      far(end, slice(-1, None))]))
 """
 
 
@@ -45,21 +47,22 @@ print(json.dumps([len(exact.t), one.transitions, same, late / one.t_end, far(row
 @pytest.mark.skipif(
     sys.platform != "linux" or shutil.which("cc") is None, reason="needs a C compiler on Linux"
 )
-@pytest.mark.parametrize("name", ["pulled", "open", "servo", "stiction"])
-def test_the_c_loop_agrees(name: str) -> None:
+def test_the_c_loops_agree() -> None:
+    names = ["pulled", "open", "servo", "stiction"]
     done = subprocess.run(
-        [sys.executable, "-c", AGREE, FASTEST, name],
+        [sys.executable, "-c", AGREE, FASTEST, *names],
         cwd=FOLDER,
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    count, told, same, late, error, ours, at_end = json.loads(done.stdout.splitlines()[-1])
-    assert count == told
-    assert same  # for each element the same edges in the same order
-    assert late < 1e-6
-    assert max(error, at_end) < 3 * ours  # of gms-fsm at the same rtol
+    for name, line in zip(names, done.stdout.splitlines(), strict=True):
+        count, told, same, late, error, ours, at_end = json.loads(line)
+        assert count == told, name
+        assert same, name  # for each element the same edges in the same order
+        assert late < 1e-6, name
+        assert max(error, at_end) < 3 * ours, name  # of gms-fsm at the same rtol
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/numerics.md"])

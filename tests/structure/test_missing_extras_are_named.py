@@ -49,6 +49,12 @@ def made() -> Sweep:
     return sweep(stick_slip("signed"), Prescribed("0.2"), 1.0, {"v_s": [0.1]}, engine="machines")
 
 
+def replayed() -> str:
+    from plots.replay import replay_html
+
+    return replay_html(simulate(stick_slip("signed"), Prescribed("0.2"), 0.1))
+
+
 @pytest.mark.parametrize(
     ("module", "extra", "call"),
     [
@@ -61,6 +67,7 @@ def made() -> Sweep:
         ("xarray", "sweep", lambda _: made().to_xarray()),
         ("pandas", "sweep", lambda folder: made().save(folder / "a.parquet")),
         ("z3", "check", lambda _: prove(stick_slip("signed").chart)),
+        ("uplot", "replay", lambda _: replayed()),
     ],
 )
 def test_a_function_names_the_module_and_the_extra(
@@ -71,28 +78,37 @@ def test_a_function_names_the_module_and_the_extra(
     tmp_path: Path,
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
-    words = rf"need\w* {module}, which is not installed: pip install \"gms-fsm\[{extra}\]\""
+    words = rf"need\w* (?i:{module}), which is not installed: pip install \"gms-fsm\[{extra}\]\""
     with pytest.raises(MissingExtraError, match=words):
         call(tmp_path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("absent", ["matplotlib", "PIL"])
-@pytest.mark.parametrize("module", ["figures", "panels", "_elements", "animation"])
-def test_a_module_names_the_module_and_the_extra(absent: str, module: str) -> None:
-    if absent == "PIL":  # which only matplotlib needs
-        pytest.importorskip("matplotlib", reason="needs the extra plots")
-    code = (
-        f"import sys; sys.modules[{absent!r}] = None\n"
-        "from gms_fsm.errors import MissingExtraError\n"
-        f"try:\n    import plots.{module}\n"
-        "except MissingExtraError as error:\n    print(error)"
-    )
+def test_a_module_names_the_module_and_the_extra() -> None:
+    """PIL is needed by matplotlib only."""
+    pytest.importorskip("matplotlib", reason="needs the extra plots")
+    code = """
+import importlib, sys
+for absent in ("matplotlib", "PIL"):
+    sys.modules[absent] = None
+    from gms_fsm.errors import MissingExtraError
+    for module in ("figures", "panels", "_elements", "animation"):
+        try:
+            importlib.import_module("plots." + module)
+        except MissingExtraError as error:
+            print(error)
+    for name in [each for each in sys.modules if each.startswith(("plots", absent))]:
+        del sys.modules[name]
+"""
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    said = f'need {absent}, which is not installed: pip install "gms-fsm[plots]"'
-    assert said in done.stdout
+    said = 'need {}, which is not installed: pip install "gms-fsm[plots]"'
+    lines = done.stdout.splitlines()
+    assert [
+        said.format(absent) in line
+        for absent, line in zip(["matplotlib"] * 4 + ["PIL"] * 4, lines, strict=True)
+    ] == [True] * 8
 
 
 def test_a_broken_module_is_not_reported_as_missing(

@@ -177,7 +177,7 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         | options
         | {"parameters": {"v_c": [1.0]}, "executor": None, "progress": False},
         "LiveChart": {"trace": _trace()} | view,
-        "animate": {"trace": _trace(), "path": tmp / "a.gif"},
+        "animate": {"trace": _trace(), "path": tmp / "a.gif", "frames": 2},
         "block_diagram": {"elements": 1},
         "explore": run | options | {"sliders": {"v_c": (1e-9, 2.0)}, "height": 500},
         "handout": {"model": MODEL, "path": tmp / "a.pdf", "velocity": "0.1", "t_end": 1.0},

@@ -26,16 +26,17 @@ def _python(code: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", gms_fsm.__all__)
-def test_a_fresh_process_has_the_name_before_and_after_its_module(name: str) -> None:
-    home = gms_fsm._HOME[name]
+@pytest.mark.parametrize("first", ["name", "module"])
+def test_a_fresh_process_has_every_name_before_and_after_its_module(first: str) -> None:
     code = f"""
-import sys, types
-from gms_fsm import {name} as first
-import gms_fsm, gms_fsm.{home}
-from gms_fsm import {name} as again
-assert first is again is gms_fsm.{name} is gms_fsm.{home}.{name}
-assert not isinstance(first, types.ModuleType)
+import importlib, types, gms_fsm
+homes = gms_fsm._HOME
+for name in gms_fsm.__all__ if {first == "name"} else gms_fsm.__all__[::-1]:
+    early = getattr(gms_fsm, name) if {first == "name"} else None
+    home = importlib.import_module("gms_fsm." + homes[name])
+    late = getattr(gms_fsm, name)
+    assert late is getattr(home, name) and (early is late or early is None), name
+    assert not isinstance(late, types.ModuleType), name
 """
     done = _python(code)
     assert done.returncode == 0, done.stderr
@@ -87,25 +88,33 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         exec("from gms_fsm import simulatte")
 
 
-@pytest.mark.parametrize(
-    "hiding", ["plots.py", "integrators.py", "plots/", "integrators/__init__.py"]
-)
-def test_a_file_that_shadows_a_package_is_named(hiding: str, tmp_path: Path) -> None:
-    place = tmp_path / hiding
-    if hiding.endswith("/"):
-        place.mkdir()
-    else:
-        place.parent.mkdir(exist_ok=True)
-        place.write_text("")
-    name = hiding.partition("/")[0].partition(".")[0]
-    code = f"import sys; sys.path[:0] = [{str(tmp_path)!r}, {str(ROOT)!r}]; import gms_fsm"
+def test_a_file_that_shadows_a_package_is_named(tmp_path: Path) -> None:
+    """Python prefers any package to a folder without __init__.py."""
+    hiding = {"a": "plots.py", "b": "integrators.py", "c": "plots", "d": "integrators/__init__.py"}
+    for folder, file in hiding.items():
+        place = tmp_path / folder / file
+        (place if folder == "c" else place.parent).mkdir(parents=True)
+        if folder != "c":
+            place.write_text("")
+    code = f"""
+import sys
+for folder in "abcd":
+    sys.path[:0] = [{str(tmp_path)!r} + "/" + folder, {str(ROOT)!r}]
+    try:
+        import gms_fsm
+    except ImportError as error:
+        print(error)
+    del sys.path[:2]
+    for name in [each for each in sys.modules if each.startswith(("gms_fsm", "plots", "integ"))]:
+        del sys.modules[name]
+"""
     done = _python(code, tmp_path)
-    if hiding == "plots/":  # Python prefers any package to a folder without __init__.py
-        assert done.returncode == 0, done.stderr
-        return
-    assert done.returncode == 1
-    last = done.stderr.strip().splitlines()[-1]
-    assert last == (
-        f"ImportError: {place} hides the package {name!r} of gms-fsm; rename that file or "
+    assert done.stdout.splitlines() == [
+        f"{tmp_path / folder / file} hides the package {name!r} of gms-fsm; rename that file or "
         "folder, or run Python from another folder"
-    )
+        for (folder, file), name in zip(
+            [each for each in hiding.items() if each[0] != "c"],
+            ["plots", "integrators", "integrators"],
+            strict=True,
+        )
+    ]

@@ -1,0 +1,434 @@
+"""Texts of a chart: flows, forces, locks, guards, in both notations; counts of a run; options.
+
+An edge that leaves several states is drawn, painted, counted and replayed once per source. A chart
+with many edges is a matrix of sources and targets, with numbered guards.
+"""
+
+from __future__ import annotations
+
+import html
+import random
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import Prescribed, SimulationError, Stribeck, Trace, simulate
+from gms_fsm.app.report import dwell_times
+from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.language import MATLAB_LIKE, parse_condition, parse_value, spell
+from gms_fsm.systems.models import ChartModel
+from gms_fsm.systems.system import Body, Contact, System
+from plots import LiveChart, mermaid
+from plots._labels import LONGEST_LINE, Tally, edge_id, wrapped
+from plots._notation import Writer
+from plots.page._chart import chart_svg
+from plots.page._rows import page_rows
+from plots.page._run import stored_run
+from plots.statechart import MOST_EDGES, Sheet, statechart
+from plots.style import CHART_THEMES
+from tests.helpers import one_element, open_loop, stick_slip
+from tests.plots.charts_to_draw import (
+    FIVE_STATES,
+    LONG_GUARDS,
+    MANY_EDGES,
+    THREE_STATES,
+    guard,
+    random_chart,
+)
+from tests.plots.pictures import SVG, chart_picture, squeezed
+from tests.plots.stored import integers
+from tests.plots.systems_to_draw import BACKLASH, END_STOP, PLANAR, SHARED, STICTION, TIMED
+
+SIGNED = GMS_ELEMENT["signed"]
+
+
+# --------------------------------------------------------------------------- notation
+@pytest.mark.parametrize(
+    ("text", "formula"),
+    [
+        ("z >= s and v > v_c", "z ≥ s(v) ∧ v > v_c"),
+        ("z <= -s or v < -v_c", "z ≤ −s(v) ∨ v < −v_c"),
+        ("not abs(z) < s", "¬(|z| < s(v))"),
+        ("v ** 2 - (v / v_c) ** 10 > -1e-6", "v² − (v / v_c)¹⁰ > −10⁻⁶"),
+        ("v ** 0.5 < 2.5e-7", "v^0.5 < 2.5·10⁻⁷"),
+        ("sigma_0 * z <= pi", "σ₀ · z ≤ π"),
+        ("sqrt(z) - (z - v) > 1e20", "√(z) − (z − v) > 10²⁰"),
+        ("v ** -2 > max(z, s)", "v^(−2) > max(z, s(v))"),
+        ("omega > 3", "ω > 3"),
+    ],
+)
+def test_formulas(text: str, formula: str) -> None:
+    names = ("v", "s", "z", "v_c", "sigma_0", "omega")
+    chart = Chart("names", inputs=("v", "s"), variables=("z",), parameters=names[3:],
+                  states=(State("a", flow={"z": "0"}),), outputs={"F": "z"})  # fmt: skip
+    assert Writer(chart, "math").text(parse_condition(text, names)) == formula
+
+
+def test_rates_and_assignments() -> None:
+    write, value = Writer(LUGRE, "math"), parse_value("v", ["v"])
+    assert write.flow("z", value) == "ż = v"
+    assert write.flow("Δζ", value) == "dΔζ/dt = v"
+    assert write.assignment("z", value) == "z := v"
+    assert write.actions({"z": value, "Δζ": value}) == "/ z := v, Δζ := v"
+    assert Writer(LUGRE, "stateflow").actions({"z": value}) == "{z = v;}"
+
+
+# --------------------------------------------------------------------------- lines
+@pytest.mark.parametrize("limit", [24, 34, LONGEST_LINE])
+def test_long_texts_are_broken_at_operators_and_nothing_is_lost(limit: int) -> None:
+    for seed in range(30):
+        rng = random.Random(seed)
+        tree = parse_condition(
+            guard(rng, rng.randint(1, 200)), ("z", "w", "v", "s", "k", "v_c", "v_hi")
+        )
+        text = spell(tree, MATLAB_LIKE)
+        lines = wrapped(text, limit)
+        assert " ".join(line.strip() for line in lines) == text, f"seed {seed}"
+        assert max(map(len, lines)) <= limit
+        assert all(line.startswith("  ") for line in lines[1:])
+    long = "x" * 60
+    assert wrapped(long) == [long]
+    assert wrapped(f"{long} > 1 && v > 2", 20) == [long, "  > 1 && v > 2"]
+    assert wrapped("") == []
+    text = "k * abs(z - 1) ** 2 + 1.5e-06 * v_hi >= sqrt(w) && not (v > -v_c)"
+    for limit in range(10, 60):  # words are never broken
+        assert " ".join(wrapped(text, limit)).split() == text.split()
+
+
+@pytest.mark.parametrize(
+    ("text", "limit", "lines"),
+    [
+        ("a > 1 && b > 2 && c > 3", 17, ["a > 1 && b > 2 &&", "  c > 3"]),
+        ("alpha > 1 && beta > 2", 14, ["alpha > 1 &&", "  beta > 2"]),
+        ("alpha > 1 || beta > 2 && c", 22, ["alpha > 1 ||", "  beta > 2 && c"]),
+        ("alpha + beta >= gamma", 15, ["alpha + beta", "  >= gamma"]),
+        ("alpha * (beta + gamma) + d", 24, ["alpha * (beta + gamma)", "  + d"]),
+        ("|alpha - beta| > |gamma|", 18, ["|alpha - beta|", "  > |gamma|"]),
+        ("max(alpha, beta) > 3", 18, ["max(alpha, beta)", "  > 3"]),
+    ],
+)
+def test_where_lines_end(text: str, limit: int, lines: list[str]) -> None:
+    assert wrapped(text, limit) == lines
+
+
+# --------------------------------------------------------------------------- forces and locks
+def plain(rows: Any) -> list[str]:
+    return ["".join(piece.text for piece in row) for row in rows]
+
+
+def lines_of(chart: Chart, state: str) -> list[str]:
+    """Return the lines in the box of a state, without the title."""
+    (found,) = (each for each in chart.states if each.name == state)
+    return plain(Sheet(chart).state_rows(found, 0)[1:])
+
+
+def guards(chart: Chart, notation: str = "stateflow") -> list[tuple[str, str]]:
+    """Return the source and the text of every edge."""
+    sheet = Sheet(chart, notation)
+    return [
+        (edge.source, " ".join(plain(sheet.guard_rows(edge, n, 0))))
+        for state in chart.states
+        for n, (_, edge) in enumerate(chart.leaving(state.name), start=1)
+    ]
+
+
+DAMPER = Chart("damper", parameters=("b",), states=(State("on"),), outputs={"F": "b * v"})
+
+
+@pytest.mark.parametrize(
+    ("chart", "state", "texts"),
+    [
+        (STICTION, "stuck", ["locked: v = 0, F holds it"]),
+        (STICTION, "forward", ["force: F = F_c + b * v;"]),
+        (BACKLASH, "left", ["force: F = k * (x + gap) + d * v;"]),
+        (END_STOP, "free", ["force: F = 0;"]),
+        (PLANAR, "start", ["force: F = F_c * h;", "       F_w = F_c * g;"]),
+        (PLANAR, "stuck", ["locked: v = 0, w = 0, F and F_w hold them",
+                           "exit: h = F / sqrt(F^2 + F_w^2);",
+                           "      g = F_w / sqrt(F^2 + F_w^2);"]),
+        (SHARED, "stick", ["during: dz = v;", "force: F = k * z;"]),
+        (SHARED, "slip", ["during: dz = 0;", "force: F = k * z;"]),
+        (DAMPER, "on", ["force: F = b * v;"]),
+        (CHARTS["elasto-plastic"], "elastic", ["during: dz = v;"]),
+    ],
+    ids=lambda given: given if isinstance(given, str) else "",
+)  # fmt: skip
+def test_the_force_of_a_state(chart: Chart, state: str, texts: list[str]) -> None:
+    assert lines_of(chart, state) == texts
+
+
+def test_timers_impulses_and_guards_that_always_hold() -> None:
+    assert ("stuck", "2[F > F_s &&   after(T_d)]") in guards(TIMED)
+    assert not [line for s in TIMED.states for line in lines_of(TIMED, s.name) if "age" in line]
+    assert ("rest", "1[true]") in guards(TIMED)
+    assert ("rest", "1[⊤]") in guards(TIMED, "math")
+    assert any(text.endswith("{v = -e * v;}") for _, text in guards(END_STOP))
+
+
+def test_named_expressions_and_common_forces_are_below() -> None:
+    assert plain(Sheet(SHARED).definitions()) == [
+        "let: limit = F_c / k;",
+        "     far = |z| / limit;",
+        "force of the contact: F = sum(F) + b * v;",
+    ]
+    below = plain(Sheet(SHARED, "math").definitions())
+    assert below[-1] == "force of the contact: F = ΣF + b · v"
+    below = plain(Sheet(CHARTS["elasto-plastic"]).definitions())
+    assert below[-1] == "force in all states: F = sigma_0 * z + sigma_1 * dz;"
+    for chart in (*GMS_ELEMENT.values(), LUGRE):  # of two states it stands in each
+        assert Sheet(chart).definitions() == []
+        for state in chart.states:
+            found = [each for each in lines_of(chart, state.name) if "force: F = " in each]
+            assert len(found) == 1
+    one, other = (lines_of(CHARTS[name], "bristle") for name in ("lugre", "lugre-sigma1"))
+    assert one[:-1] == other[:-1]
+    assert one[-1] == "force: F = sigma_0 * z + sigma_1 * dz;"
+    assert other[-1].startswith("force: F = sigma_0 * z + sigma_1 * exp(")
+
+
+def test_every_chart_says_every_force() -> None:
+    for name, chart in CHARTS.items():
+        below = " ".join(plain(Sheet(chart).definitions()))
+        for state in chart.states:
+            own = " ".join(lines_of(chart, state.name))
+            for force in chart.force_names:
+                assert re.search(rf"\b{force}\b", own + below), (name, state.name, force)
+
+
+def test_mermaid_says_the_same() -> None:
+    text = html.unescape(re.sub(r"#(\d+);", r"&#\1;", mermaid(STICTION) + mermaid(SHARED)))
+    for line in (
+        "s1_stuck : locked: v = 0, F holds it",
+        "s2_forward : force: F = F_c + b * v;",
+        "note right of s1_stick",
+        "s1_stick : force: F = k * z;",
+        "let: limit = F_c / k;",
+        "force of the contact: F = sum(F) + b * v;",
+    ):
+        assert line in text
+
+
+# --------------------------------------------------------------------------- options
+@pytest.mark.parametrize("theme", CHART_THEMES)
+def test_a_theme_has_its_colours(theme: str) -> None:
+    colours, text = CHART_THEMES[theme], statechart(SIGNED, 2, theme=theme).source
+    assert colours.ink in text
+    others = set(vars(CHART_THEMES["dark" if theme == "light" else "light"]).values())
+    assert not [colour for colour in others - set(vars(colours).values()) if colour in text]
+
+
+@pytest.mark.parametrize(("direction", "across"), [("TB", False), ("LR", True)])
+def test_direction_turns_the_layout(direction: str, across: bool) -> None:
+    shown = chart_picture(SIGNED, direction=direction)
+    stick, slip = (shown[f"element1-state-{name}"].box for name in ("stick", "slip"))
+    assert (stick.right < slip.left) == across
+    assert (stick.bottom < slip.top) == (not across)
+
+
+def test_names_of_edges_are_shown_on_request() -> None:
+    texts = [
+        ["".join(box.texts) for box in chart_picture(SIGNED, names=names).groups.values()]
+        for names in (False, True)
+    ]
+    for edge in SIGNED.transitions:
+        assert not any(edge.name in text for text in texts[0])
+        assert any(edge.name in text and "[" in text for text in texts[1])
+
+
+# --------------------------------------------------------------------------- counts
+CURVE = Stribeck(1.0, 1.5, 0.05)
+NUMBERS = {"k": 0.5, "v_c": 1e-3, "v_hi": 0.25}
+COUNTED = {
+    "bank": (stick_slip("signed"), open_loop(), 45.0),
+    "bank, one way": (stick_slip("signed"), Prescribed("0.2"), 9.0),
+    "one": (one_element("published"), open_loop(), 45.0),
+    "three states": (
+        ChartModel(THREE_STATES, NUMBERS, n=3, stribeck=CURVE),
+        Prescribed("0.3*sin(2*pi*t/17)"),
+        40.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_counts_are_those_of_the_run(name: str) -> None:
+    trace = simulate(*COUNTED[name])
+    chart, dwell, log = trace.model.chart, dwell_times(trace), trace.transitions
+    some = trace.sample([trace.t[-1] / 2, trace.t[-1] / 3])  # the log is complete all the same
+    for each in (trace, some):
+        np.testing.assert_allclose(Tally(each).dwell, dwell, rtol=1e-12, atol=1e-12)
+    for numbers in (trace.n, [trace.n - 1]):
+        shown = chart_picture(chart, numbers, counts=trace)
+        for i in range(trace.n) if numbers == trace.n else [trace.n - 1]:
+            for column, state in enumerate(chart.states):
+                text = shown[f"element{i + 1}-state-{state.name}"].texts[-1]
+                found = re.fullmatch(r"active (\S+) s \((\d+) %\)", text)
+                assert found
+                assert float(found[1]) == pytest.approx(dwell[i, column], rel=1e-3)
+                share = 100 * dwell[i, column] / dwell[i].sum()
+                assert float(found[2]) == pytest.approx(share, abs=1)
+            for edge in chart.transitions:
+                count = int(((log.element == i) & (log.edge == edge.name)).sum())
+                text = shown[f"element{i + 1}-guard-{edge.name}"].texts[-1]
+                said = {0: "never taken", 1: "taken once"}.get(count, f"taken {count} times")
+                assert text == said
+                for half in (1, 2):
+                    group = shown[f"element{i + 1}-edge-{edge.name}-{half}"].element
+                    (line,) = group.findall(SVG + "path")
+                    assert (line.get("stroke-dasharray") is not None) == (count == 0)
+    # One of several elements is named, and a single one is not.
+    one = chart_picture(chart, 1, counts=trace)
+    assert ("element1" in one.groups) == (trace.n > 1)
+    assert "taken" not in statechart(chart, 2).source
+    assert "active" not in statechart(chart, 2).source
+
+
+# --------------------------------------------------------------------------- several sources
+RESET = Chart(
+    "reset",
+    inputs=("v", "t"),
+    states=tuple(State(name, outputs={"F": "0"}) for name in ("low", "high", "off")),
+    transitions=(
+        Transition("up", "low", "high", guard="t >= 1"),
+        Transition("stop", ("low", "high"), "off", guard="t >= 2"),
+    ),
+)
+
+
+def test_an_edge_with_several_sources_is_one_line_for_each() -> None:
+    source = statechart(RESET).source
+    for state, priority in (("low", 2), ("high", 1)):
+        name = f'"element1-guard-stop-from-{state}"'
+        assert f'"element1-state-{state}" -> {name}' in source
+        assert f'{name} -> "element1-state-off"' in source
+        (drawn,) = (line for line in source.splitlines() if line.strip().startswith(f"{name} ["))
+        assert f"<B>{priority}</B>" in drawn
+    assert "element1-guard-up-from" not in source
+    assert [line.split(" : ")[0].strip() for line in mermaid(RESET).splitlines()[-3:]] == [
+        "s1_low --> s2_high",
+        "s1_low --> s3_off",
+        "s2_high --> s3_off",
+    ]
+    # In a run low is left by the edge up, and high by the edge stop: that line is painted,
+    # counted and replayed.
+    bodies, contacts = (Body("mass", inertia=1.0),), (Contact("pad", RESET),)
+    trace = simulate(System("reset", bodies=bodies, contacts=contacts), 3.0)
+    svg = LiveChart(trace).frame(-1)
+    fired = [line.split('"')[1] for line in svg.split("<g ") if "fired" in line]
+    assert sorted(fired) == [
+        "element1-edge-stop-from-high-1",
+        "element1-edge-stop-from-high-2",
+        "element1-guard-stop-from-high",
+    ]
+    source = statechart(RESET, counts=trace).source
+    assert source.count("taken once") == 2
+    assert source.count("never taken") == 1
+    (contact,) = stored_run(page_rows(trace), [0], [])["contacts"]
+    names = [(edge["name"], contact["states"][edge["source"]]) for edge in contact["edges"]]
+    edges = integers(contact["log"][2])
+    assert [names[edge] for edge in edges] == [("up", "low"), ("stop", "high")]
+
+
+# --------------------------------------------------------------------------- matrices
+@pytest.mark.parametrize(
+    ("chart", "form", "matrix"),
+    [
+        (random_chart(1, 5, MOST_EDGES), "auto", False),
+        (random_chart(1, 5, MOST_EDGES + 1), "auto", True),
+        (MANY_EDGES, "graph", False),
+        (FIVE_STATES, "matrix", True),
+    ],
+)
+def test_a_chart_with_many_edges_or_on_demand_is_a_matrix(
+    chart: Chart, form: str, matrix: bool
+) -> None:
+    assert (Sheet(chart, form=form).fitted().form == "matrix") == matrix
+    source = statechart(chart, form=form).source
+    assert ("element1-target-1" in source) == matrix
+    assert ("element1-default" in source) == (not matrix)
+
+
+def test_a_wide_graph_becomes_a_matrix() -> None:
+    """A ring of twelve states would be wider than two pages from left to right."""
+    names = [f"state_{i}" for i in range(12)]
+    chart = Chart(
+        "ring",
+        inputs=("v",),
+        states=tuple(State(name) for name in names),
+        transitions=tuple(
+            Transition(f"next_{i}", name, names[i - 11], guard="v > 0.1 and v < 0.2")
+            for i, name in enumerate(names)
+        ),
+        outputs={"F": "v"},
+    )
+    assert Sheet(chart, direction="TB").fitted().form == "graph"
+    assert Sheet(chart, direction="LR").fitted().form == "matrix"
+    assert Sheet(chart, direction="LR", form="graph").fitted().form == "graph"
+
+
+@pytest.mark.slow
+def test_every_edge_is_in_the_cell_of_its_source_and_target() -> None:
+    """Elements of a matrix are drawn once; edges with the same guard share a number."""
+    chart, found = MANY_EDGES, chart_picture(MANY_EDGES, 3)
+    assert found.of_class("region") == {"element1"}
+    assert found["element1"].texts[:2] == ["Elements 1 to 3", "× 3"]
+    rules = [found[name].line for name in found.groups if "-rule" in name]
+    xs = sorted({line[0][0] for line in rules if line[0][0] == line[-1][0]})
+    ys = sorted({line[0][1] for line in rules if line[0][1] == line[-1][1]})
+    names = [state.name for state in chart.states]
+    assert (len(xs), len(ys)) == (len(names) + 2, len(names) + 2)
+    for state in chart.states:
+        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
+            shown = found[edge_id(chart, "element1", "guard", edge)]
+            number = re.fullmatch(rf"{priority}\[(g\d+)\]", squeezed(*shown.texts))
+            assert number
+            assert squeezed(f"{number[1]} = {chart.guard_text(edge.name)}") in found.legend()
+            row, column = names.index(edge.source) + 1, names.index(edge.target) + 1
+            assert xs[column] <= shown.box.left
+            assert shown.box.right <= xs[column + 1]
+            assert ys[row] <= shown.box.top
+            assert shown.box.bottom <= ys[row + 1]
+    assert len(found.of_class("guard")) == len(chart.transitions)
+    assert list(Sheet(SIGNED, form="matrix").fitted().numbered.values()) == [1, 2, 3]
+    many = Sheet(MANY_EDGES).fitted()
+    texts = {many.legend_text(edge) for edge in MANY_EDGES.transitions}
+    assert len(set(many.numbered.values())) == len(texts) < len(MANY_EDGES.transitions)
+
+
+def test_states_of_a_matrix_show_their_actions_and_which_is_the_default() -> None:
+    found = chart_picture(FIVE_STATES, form="matrix")
+    titles = [found[f"element1-state-{state.name}"].texts[0] for state in FIVE_STATES.states]
+    assert titles[0] == "1  rest ●"
+    assert not [title for title in titles[1:] if "●" in title]
+    for state in FIVE_STATES.states:
+        assert "during:" in found[f"element1-state-{state.name}"].texts
+
+
+@pytest.mark.parametrize("direction", ["TB", "LR"])
+def test_a_long_guard_is_numbered_and_the_others_are_not(direction: str) -> None:
+    """Guards of 120 characters stand on the edges if they have at most six lines."""
+    found = chart_picture(LONG_GUARDS, direction=direction)
+    numbered = set(re.findall(r"g\d+(?==)", found.legend()))
+    for edge in LONG_GUARDS.transitions:
+        texts = found[edge_id(LONG_GUARDS, "element1", "guard", edge)].texts
+        number = re.search(r"\[(g\d+)\]", squeezed(*texts))
+        assert not number or number[1] in numbered
+        assert max(map(len, texts)) <= 36
+
+
+@pytest.mark.slow
+def test_a_live_chart_and_a_page_are_always_graphs() -> None:
+    """The marks of the clauses of a numbered guard follow its number."""
+    model = ChartModel(MANY_EDGES, NUMBERS, n=1, stribeck=CURVE)
+    with pytest.raises(SimulationError) as failed:  # random guards: the chart switches for ever
+        simulate(model, Prescribed("0.01"), 1e-3)
+    trace: Trace = failed.value.trace
+    shown = LiveChart(trace)
+    (look,), svg = shown.look(0), shown.frame(0)
+    assert look.leaving
+    assert f'id="element1-edge-{look.leaving[0]}-2"' in svg
+    assert svg.count('class="mark ') == sum(map(len, look.marks.values()))
+    assert 'data-edge="39"' in chart_svg(MANY_EDGES, 1)
