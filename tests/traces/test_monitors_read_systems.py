@@ -173,8 +173,3 @@ def test_a_wrong_monitor_is_refused_before_the_run(
 ) -> None:
     with pytest.raises(error, match=said):
         checked([monitor], mixed())
-
-
-def test_a_model_on_a_rig_has_no_contact_names() -> None:
-    with pytest.raises(ParameterError, match="a model on a rig has one contact, so leave"):
-        checked("pad: passivity", stick_slip("signed"))
