@@ -40,18 +40,7 @@ def loaded(*arguments: str) -> tuple[str, set[str]]:
 
 def test_help_lists_every_verb_and_imports_nothing_heavy() -> None:
     said, names = loaded("--help")
-    for verb in [
-        "paper",
-        "run",
-        "phenomena",
-        "chart",
-        "check",
-        "animate",
-        "replay",
-        "debug",
-        "lesson",
-        "code",
-    ]:
+    for verb in ("paper", "run", "phenomena", "chart", "check", "animate", "replay", "debug"):
         assert f" {verb} " in said
     assert names & HEAVY == set()
 

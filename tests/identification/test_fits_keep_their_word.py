@@ -138,7 +138,7 @@ def test_terms_of_the_measurement_have_its_unit(tmp_path: Path) -> None:
 
 def test_many_predictions_keep_few_runs() -> None:
     found = fit(_record(), TRUTH, free=["k"], **LOCAL)
-    for _ in range(40):
+    for _ in range(34):
         found.predict(_record())
     assert len(found.task.fine.driver._runs) <= 32
 
