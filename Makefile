@@ -100,7 +100,7 @@ core: .venv-core/stamp
 	.venv-core/bin/python -m pytest -n auto -m "not slow and not matrix" tests gms_fsm integrators
 
 # transitions; typer and pydantic; llvmlite; scipy; pandas, pyarrow, xarray, distributed; z3; the drawing libraries
-LOWEST_TESTS := callbacks_* command_line* overrides_* scenarios_run machine_code_* compiled_* engines_agree_* scipy_* \
+LOWEST_TESTS := callbacks_* command_line* overrides_* scenarios_run machine_code_* compiled_* engines_agree scipy_* \
     trace_files_* sweep_* check_command full_screen_* prove_* rendering_* statechart* block_diagram_* panels_* figures_* \
     animation_* films_can_* replay_stores_* lessons_taught
 

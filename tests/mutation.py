@@ -51,7 +51,7 @@ NEAR = {  # module: its tests, those that detect most first
         "run/test_callbacks_run_once_per_firing",
         "run/test_callbacks_only_look",
         "run/test_callbacks_in_systems",
-        "systems/test_engines_agree_on_systems",
+        "laws/test_engines_agree",
         "traces/test_traces_of_systems_round_trip",
         "charts/test_gms_chart_is_the_papers",
     ],

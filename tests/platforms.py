@@ -43,13 +43,13 @@ from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
 from integrators.machine_code.values import Number
-from tests.helpers import ROOT
-from tests.random_systems import T_END, bits, trial
+from tests.helpers import ROOT, bits
+from tests.random_systems import T_END, trial
 
 SHAPES = 60
 ENGINE = "compiled" if find_spec("llvmlite") else "ifelse"
 COMPILERS = [each for each in ("gcc", "clang") if shutil.which(each)]
-FLAGS = ("-std=c99", "-ffp-contract=off", "-shared", "-fPIC", "-w")
+FLAGS = ("-std=c99", "-ffp-contract=off", "-shared", "-fPIC")
 COMBINATIONS = [(each, level) for each in COMPILERS for level in ("-O0", "-O1", "-O2", "-O3")]
 
 
@@ -143,10 +143,10 @@ class CLibrary:
 
 
 @contextmanager
-def in_c(compiler: str, level: str) -> Iterator[None]:
-    """Let what is compiled be compiled by a C compiler, from the text of the C99 printer."""
+def in_c(compiler: str, level: str, warnings: Sequence[str] = ("-w",)) -> Iterator[list[str]]:
+    """Let what is compiled be compiled by a C compiler; yield the texts of the C99 printer."""
     with tempfile.TemporaryDirectory() as folder:
-        numbers = itertools.count()
+        texts: list[str] = []
 
         def library(
             text: str, function: Any, arguments: Any, layout: Any, extra: Sequence[str], *_: Any
@@ -154,12 +154,12 @@ def in_c(compiler: str, level: str) -> Iterator[None]:
             translator = Translator(compiled.INLINE)
             more = [Number(Local("i", each)) for each in extra]
             translator.entry("entry", function, [*layout.value.fields.values(), *more])
-            source = Path(folder) / f"{function.__name__}{next(numbers)}.c"
-            source.write_text(c99_text(translator.module), encoding="utf-8")
+            texts.append(c99_text(translator.module))
+            source = Path(folder) / f"{function.__name__}{len(texts)}.c"
+            source.write_text(texts[-1], encoding="utf-8")
             made = source.with_suffix(".so")
-            subprocess.run(
-                [compiler, *FLAGS, level, str(source), "-o", str(made), "-lm"], check=True
-            )
+            command = [compiler, *FLAGS, *warnings, level, str(source), "-o", str(made), "-lm"]
+            subprocess.run(command, check=True)
             return CLibrary(made)
 
         with (
@@ -167,7 +167,7 @@ def in_c(compiler: str, level: str) -> Iterator[None]:
             mock.patch.object(_compiled_run, "_known", {}),
             mock.patch.object(_compiled, "_observers", {}),
         ):
-            yield
+            yield texts
 
 
 # --------------------------------------------------------------------------- JavaScript

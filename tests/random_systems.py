@@ -42,6 +42,7 @@ from gms_fsm import (
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import GMSError
 from gms_fsm.traces.failures import SimulationError
+from tests.helpers import other_parts
 
 SHAPES = 60
 MOST_STEPS = 3000  # of a run; some of these systems chatter
@@ -328,37 +329,15 @@ def run(trial: Trial, engine: str) -> tuple[Trace | None, str]:
         return None, f"{type(error).__name__}: {error}"
 
 
-def bits(trace: Trace | None) -> dict[str, tuple[Any, ...]]:
-    """Return everything in a trace, as bytes with shapes and kinds."""
-    if trace is None:
-        return {}
-    arrays = {f"columns {name}": each for name, each in trace.columns().items()}
-    for kind in ("rows", "stops"):
-        table = getattr(trace, kind)
-        arrays |= {f"{kind} {name}": getattr(table, name) for name in ("t", "y", "mode")}
-        arrays[f"{kind} microstep"] = table.microstep
-    arrays |= {f"log {name}": trace.transitions[name] for name in trace.transitions.dtype.names}
-    arrays |= {f"sliding {name}": trace.sliding[name] for name in trace.sliding.dtype.names}
-    found = {}
-    for name, each in arrays.items():
-        array = np.ascontiguousarray(each)
-        text = array.dtype.kind in "UO"
-        content = tuple(array.ravel().tolist()) if text else array.tobytes()
-        found[name] = ("text" if text else array.dtype.str, array.shape, content)
-    return found
-
-
 def differences(trial: Trial, engines: tuple[str, ...] = ENGINES) -> tuple[list[str], Trace | None]:
     """Return what differs from the first engine, and its trace."""
     trace, end = run(trial, engines[0])
-    mine, found = bits(trace), []
+    found = []
     for engine in engines[1:]:
         other, its_end = run(trial, engine)
         if its_end != end:
             found.append(f"{engine}: {its_end!r} and not {end!r}")
-        theirs = bits(other)
-        parts = [name for name in mine | theirs if mine.get(name) != theirs.get(name)]
-        if parts:
+        if parts := other_parts(trace, other):
             found.append(f"{engine}: {', '.join(parts[:6])}")
     return found, trace
 

@@ -21,39 +21,14 @@ from gms_fsm import (
     Slider,
     Stribeck,
     Trace,
-    simulate,
 )
-from gms_fsm.app.scenario import Loaded
 from gms_fsm.language import Binary, Call, Name, Negative, Number, Value, spell
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula, Signal
+from tests.corpus import Run
 
 AXES = ("length", "force", "time")
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """A model on a rig, and the further arguments of `simulate`, ``t_end`` included."""
-
-    model: Model
-    rig: Rig
-    arguments: Mapping[str, Any]
-
-    @classmethod
-    def of(cls, loaded: Loaded) -> Case:
-        """Return a scenario's case; an absolute tolerance only where the file gives one."""
-        given = loaded.scenario.run.model_fields_set
-        arguments = {
-            name: value
-            for name, value in loaded.arguments.items()
-            if name not in ("atol", "rtol") or name in given
-        }
-        return cls(loaded.model, loaded.rig, arguments)
-
-    def run(self, engine: str) -> Trace:
-        """Run it."""
-        return simulate(self.model, self.rig, **{**self.arguments, "engine": engine})
 
 
 def factors(axis: str, exponent: int) -> dict[str, float]:
@@ -66,24 +41,25 @@ def factors(axis: str, exponent: int) -> dict[str, float]:
     return {axis: 2.0**exponent}
 
 
-def scaled(case: Case, *, length: float = 1.0, force: float = 1.0, time: float = 1.0) -> Case:
-    """Return a case with all its lengths [m], forces [N] and times [s] multiplied.
+def scaled(run: Run, *, length: float = 1.0, force: float = 1.0, time: float = 1.0) -> Run:
+    """Return a run with all its lengths [m], forces [N] and times [s] multiplied.
 
     Parameters
     ----------
-    case : Case
+    run : Run
         Of a GMS or LuGre model on a shipped rig. ``atol`` must not be given: it has no unit.
     length, force, time : float
         Powers of two, so that nothing is rounded.
 
     Returns
     -------
-    Case
+    Run
         The same run in other units.
     """
-    assert "atol" not in case.arguments, "one number cannot be scaled as m and as m/s"
-    units = _Units(length, force, time)
-    return Case(_model(case.model, units), _rig(case.rig, units), _arguments(case.arguments, units))
+    assert "atol" not in run.how, "one number cannot be scaled as m and as m/s"
+    units, (model, rig) = _Units(length, force, time), run.subject
+    subject = _model(model, units), _rig(rig, units)
+    return Run(subject, time * run.t_end, _arguments(run.how, units))
 
 
 @dataclass(frozen=True)
@@ -172,7 +148,7 @@ def _slower(tree: Value, time: float) -> Value:
 
 
 def _arguments(given: Mapping[str, Any], u: _Units) -> dict[str, Any]:
-    times = ("t_start", "t_end", "t_eval", "step", "max_step")
+    times = ("t_start", "t_eval", "step", "max_step")
     initial = {"x": u.length, "z": u.length, "v": u.speed}
     changed = {name: u.time * given[name] for name in times if given.get(name) is not None}
     if "initial" in given:
@@ -184,12 +160,6 @@ def _arguments(given: Mapping[str, Any], u: _Units) -> dict[str, Any]:
 
 
 # --------------------------------------------------------------------------- comparing
-def sequence(trace: Trace) -> list[tuple[int, str]]:
-    """Return which element took which edge, in order."""
-    log = trace.transitions
-    return list(zip(log.element.tolist(), log.edge.tolist(), strict=True))
-
-
 def other_bits(
     trace: Trace, base: Trace, *, length: float = 1.0, force: float = 1.0, time: float = 1.0
 ) -> list[str]:

@@ -195,96 +195,22 @@ def million(transitions: int) -> bool:
     return good
 
 
-def random_runs(seed: int, examples: int) -> bool:
-    """Draw new random runs; hypothesis prints the one that fails, shrunk."""
+def child(part: str, *command: str, ends: str = "") -> bool:
+    """Run a part in a process of its own, which prints what it finds; see also `main`."""
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:  # for machine code that is not needed again
-        surroundings = {"GMS_FSM_EXAMPLES": str(examples), "GMS_FSM_CACHE": folder}
         done = subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "pytest",
-                "-q",
-                "tests/physics/test_hard_random_runs.py",
-                f"--hypothesis-seed={seed}",
-            ],
-            cwd=ROOT,
-            env={**os.environ, **surroundings},
-            stdout=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
-    print(
-        f"random runs: {examples} of each kind in {time.monotonic() - began:.0f} s, seed {seed}: "
-        + done.stdout.strip().splitlines()[-1],
-        flush=True,
-    )
-    if done.returncode:
-        print("FINDING", done.stdout)
-    return done.returncode == 0
-
-
-def trials(seed: int, count: int) -> bool:
-    """Judge new random runs with the defaults by the reference; the child prints wrong ones."""
-    from tests.trials import FAMILIES
-
-    began = time.monotonic()
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "tests.trials",
-            "--count",
-            str(-(-count // len(FAMILIES))),
-            "--seed",
-            str(seed),
-        ],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
-    print(f"{count} trials in {time.monotonic() - began:.0f} s\n{done.stdout}", end="", flush=True)
-    return done.returncode == 0
-
-
-def stepping(seed: int, count: int) -> bool:
-    """Compare stepping with `simulate` on new random records; the child prints what differs."""
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.run.test_stepping_equals_simulate", str(seed), str(count)],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
-    good = done.returncode == 0 and f"0 of {count} differ" in done.stdout
-    print(f"{'' if good else 'FINDING '}stepping: {done.stdout}", end="", flush=True)
-    return good
-
-
-def systems(module: str, seed: int, count: int) -> bool:
-    """Compare new random systems, in all engines or with a reference; the child prints findings."""
-    with tempfile.TemporaryDirectory() as folder:  # for machine code that is not needed again
-        done = subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                f"tests.{module}",
-                "--count",
-                str(count),
-                "--seed",
-                str(seed),
-            ],
+            [sys.executable, "-m", *command],
             cwd=ROOT,
             env={**os.environ, "GMS_FSM_CACHE": folder},
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
             text=True,
             check=False,
         )
-    print(f"{module}: {done.stdout}", end="", flush=True)
-    return done.returncode == 0
+    good = done.returncode == 0 and ends in done.stdout
+    print(f"{'' if good else 'FINDING '}{part}, {time.monotonic() - began:.0f} s: {done.stdout}",
+          end="", flush=True)  # fmt: skip
+    return good
 
 
 # --------------------------------------------------------------------------- all parts
@@ -319,18 +245,24 @@ def main() -> None:
         print("accepted" if fuzz.BODIES[given.only[0]](data) else "refused")
         return
     print(f"seed {given.seed}", flush=True)
+    os.environ["GMS_FSM_EXAMPLES"] = str(given.examples)  # of each kind of random run
+    seed, hard = str(given.seed), "tests/physics/test_hard_random_runs.py"
+    of_each = str(-(-given.trials // 5))  # there are five families
     work: dict[str, Callable[[], bool]] = {
         "expression": lambda: fuzzing("expression", given.seed, given.minutes),
         "scenario": lambda: fuzzing("scenario", given.seed, given.minutes),
         "trace": lambda: fuzzing("trace", given.seed, given.minutes),
         "kill": lambda: killing(given.seed, given.kills),
         "million": lambda: million(given.transitions),
-        "runs": lambda: random_runs(given.seed, given.examples),
-        "trials": lambda: trials(given.seed, given.trials),
-        "stepping": lambda: stepping(given.seed, given.records),
-        "systems": lambda: systems("random_systems", given.seed, given.systems),
-        "exact": lambda: systems("exact_systems", given.seed, given.exact),
-    }
+        "runs": lambda: child("random runs", "pytest", "-q", hard, f"--hypothesis-seed={seed}"),
+        "trials": lambda: child("trials", "tests.trials", "--count", of_each, "--seed", seed),
+        "stepping": lambda: child("stepping", "tests.run.test_stepping_equals_simulate", seed,
+                                  str(given.records), ends=f"0 of {given.records} differ"),
+        "systems": lambda: child("systems", "tests.random_systems", "--count",
+                                 str(given.systems), "--seed", seed),
+        "exact": lambda: child("exact systems", "tests.exact_systems", "--count",
+                               str(given.exact), "--seed", seed),
+    }  # fmt: skip
     good = [work[part]() for part in given.only or parts]
     print("nothing found" if all(good) else "see FINDING above")
     sys.exit(0 if all(good) else 1)

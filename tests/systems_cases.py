@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from gms_fsm import Body, Contact, System, Trace, simulate
 from gms_fsm.charts import CHARTS
 from tests.helpers import FASTEST
@@ -228,11 +226,3 @@ CASES = {
         clutched_bearings,
     )
 }
-
-
-def same_system_bits(one: Trace, other: Trace) -> None:
-    """Assert that two runs of a system are equal to the last bit."""
-    for name in ("t", "y", "mode"):
-        np.testing.assert_array_equal(getattr(one.rows, name), getattr(other.rows, name), name)
-    for name in one.transitions.dtype.names:
-        np.testing.assert_array_equal(one.transitions[name], other.transitions[name], name)

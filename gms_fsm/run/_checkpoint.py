@@ -42,6 +42,10 @@ class Resumable(Protocol):
     def buffers(self) -> hybrid.Buffers:
         """The buffers in which the loop keeps its state."""
 
+    @property
+    def rows_wait(self) -> bool:
+        """Whether the buffers have rows that `kept` does not have yet."""
+
     def kept(self) -> dict[str, Any]:
         """Return the recorder's contents as arrays."""
 
@@ -87,7 +91,9 @@ class Checkpointer:
         self.saved_at = time.monotonic()
 
     def look(self) -> None:
-        """Write a checkpoint if one is due."""
+        """Write a checkpoint if one is due; not while rows wait that it would not have."""
+        if self.run.rows_wait:
+            return
         if time.monotonic() - self.saved_at >= self.every:
             self.save()
             self.saved_at = time.monotonic()

@@ -61,6 +61,11 @@ class CompiledRun:
         """The buffers in which the loop keeps its state."""
         return self.columns.buffers
 
+    @property
+    def rows_wait(self) -> bool:
+        """The columns have all rows."""
+        return False
+
     def kept(self) -> dict[str, Any]:
         """Return the columns for a checkpoint."""
         return self.columns.state()

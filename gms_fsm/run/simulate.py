@@ -241,6 +241,11 @@ class Run:
         self.buffers = hybrid.buffers(made, start.t_start, start.y, start.mode, start.last, options)
         self.events = hybrid.events(made, switch, self.buffers, options)
 
+    @property
+    def rows_wait(self) -> bool:
+        """Whether the next event brings rows that are in the buffers only: the one of a tick."""
+        return self.buffers.out.cursor[ROW] > 0
+
     def kept(self) -> dict[str, Any]:
         """Return the recorder's contents for a checkpoint."""
         return self.recorder.state()

@@ -17,7 +17,7 @@ from gms_fsm import Chart, State, Transition, export
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ChartError, ExpressionError, ParameterError
 from tests.exporters.charts_to_export import MODELS, model
-from tests.random_charts import charts
+from tests.strategies import charts
 
 WRITTEN = [name for name in MODELS if name != "backlash"]  # its guards read F
 

@@ -20,7 +20,7 @@ from gms_fsm import Chart, export
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ChartError, ExpressionError
 from tests.exporters.charts_to_export import MODELS, imported, rebuilt
-from tests.random_charts import charts
+from tests.strategies import charts
 
 
 @pytest.mark.parametrize("name", MODELS)

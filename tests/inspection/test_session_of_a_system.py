@@ -11,8 +11,8 @@ import pytest
 from gms_fsm import Body, Chart, Contact, Sampled, State, System, Transition, simulate
 from gms_fsm.errors import ExpressionError, ParameterError, SessionError
 from gms_fsm.inspection.session import Session
-from tests.helpers import stick_slip
-from tests.systems_cases import CASES, DRY, STICTION, same_system_bits
+from tests.helpers import same_bits, stick_slip
+from tests.systems_cases import CASES, DRY, STICTION
 
 SAMPLED = Sampled("pid", period=0.05, updates={"u": "4 * (0.5 - q1)", "count": "count + 1"})
 
@@ -54,7 +54,7 @@ def test_a_walk_has_the_bits_of_a_run(system: System, options: dict[str, Any]) -
     session.back(5)
     session.next_transition()
     session.branch.complete()
-    same_system_bits(session.branch.trace(), simulate(system, 1.0, **options))
+    same_bits(session.branch.trace(), simulate(system, 1.0, **options))
 
 
 def test_a_row_has_bodies_contacts_and_values() -> None:

@@ -8,7 +8,6 @@ examples, drawn at random, as tests/soak.py does.
 
 from __future__ import annotations
 
-import importlib.util
 import itertools
 import math
 import os
@@ -21,27 +20,23 @@ from hypothesis import strategies as st
 
 from gms_fsm import (
     GMS,
-    Chart,
     ChartModel,
-    GMSParameters,
     Prescribed,
     PulledSlider,
     Slider,
-    State,
-    Stribeck,
     Trace,
-    Transition,
     simulate,
 )
 from gms_fsm.errors import GMSError
 from gms_fsm.inspection.explain import Explanation, explain, explain_state, values_at
 from gms_fsm.traces.failures import SimulationError
-from tests.helpers import same_bits
+from tests.corpus import ENGINES
+from tests.helpers import FASTEST, other_parts
+from tests.strategies import banks, chart_models, options, ramps, rigs, rounded
 
 pytestmark = pytest.mark.slow
 
 EXAMPLES = int(os.environ.get("GMS_FSM_EXAMPLES", "0"))
-HAS_FAST = bool(importlib.util.find_spec("llvmlite"))
 
 
 def hard(examples: int, most: int = 10**9) -> Any:
@@ -54,182 +49,6 @@ def hard(examples: int, most: int = 10**9) -> Any:
         deadline=None,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
     )
-
-
-def rounded(low: float, high: float) -> st.SearchStrategy[float]:
-    """Numbers with three digits, evenly spread; they occasionally fall on boundaries."""
-    return st.integers(0, 1000).map(lambda i: float(f"{low + (high - low) * i / 1000:.3g}"))
-
-
-# --------------------------------------------------------------------------- strategies
-FLOWS = [
-    "v",
-    "0",
-    "-z",
-    "0.5 * (sgn(v) - z / s)",
-    "0.2 * v * cos(z)",
-    "tanh(v) - z",
-    "v - abs(v) * z / s",
-    "min(v, 0.2) - 0.5 * z",
-    "max(-0.3, v) * exp(-abs(z))",
-    "0.1 * sin(3 * t) - 0.2 * z",
-]
-CLAUSES = [
-    "z >= {a}",
-    "z <= -{a}",
-    "abs(z) < {a}",
-    "abs(z) >= s",
-    "z >= s",
-    "z <= -s",
-    "abs(v) <= {b}",
-    "v > {b}",
-    "v < -{b}",
-    "v >= {b}",
-    "z * v > 0",
-    "t > {a}",
-    "sin(4 * t) > {b}",
-    "z + v < {a}",
-    "not (z < {a})",
-]
-ACTIONS = [{}, {}, {}, {"z": "0.5 * z"}, {"z": "0"}, {"z": "z + 0.01"}]
-
-
-@st.composite
-def guards(draw: st.DrawFn) -> str:
-    """One to three comparisons, joined."""
-    parts = [
-        text.format(a=draw(rounded(0.01, 0.3)), b=draw(rounded(0.0, 0.2)))
-        for text in draw(st.lists(st.sampled_from(CLAUSES), min_size=1, max_size=3))
-    ]
-    return draw(st.sampled_from([" and ", " or "])).join(parts)
-
-
-@st.composite
-def charts(draw: st.DrawFn) -> Chart:
-    """Two or three states, and edges between them."""
-    names = ["rest", "go", "turn"][: draw(st.integers(2, 3))]
-    states = [
-        State(name, {"z": draw(st.sampled_from(FLOWS))}, entry=draw(st.sampled_from(ACTIONS)))
-        for name in names
-    ]
-    pairs = [(a, b) for a in names for b in names if a != b]
-    edges = [
-        Transition(f"e{i}", *pair, draw(guards()), actions=draw(st.sampled_from(ACTIONS)))
-        for i, pair in enumerate(draw(st.lists(st.sampled_from(pairs), min_size=1, max_size=5)))
-    ]
-    return Chart(
-        "random", ("v", "s", "t"), ("z",), ("k",), states, edges, {"F": "k * z + 0.1 * dz"}
-    )
-
-
-@st.composite
-def chart_models(draw: st.DrawFn) -> ChartModel:
-    """A bank of one to three elements of a random chart."""
-    n = draw(st.integers(1, 3))
-    F_c = draw(rounded(0.2, 0.8))
-    return ChartModel(
-        draw(charts()),
-        {"k": np.array(draw(st.lists(rounded(0.1, 9), min_size=n, max_size=n)))},
-        n=n,
-        stribeck=Stribeck(F_c, F_c * draw(rounded(1, 2)), draw(rounded(0.01, 0.3))),
-        sigma_2=draw(rounded(0, 1)),
-        weights=np.array(draw(st.lists(rounded(0.05, 0.5), min_size=n, max_size=n))),
-    )
-
-
-@st.composite
-def banks(draw: st.DrawFn, law: str | None = None) -> GMS:
-    """A GMS bank of one to four elements."""
-    n = draw(st.integers(1, 4))
-
-    def numbers(low: float, high: float) -> list[float]:
-        return draw(st.lists(rounded(low, high), min_size=n, max_size=n))
-
-    F_c = draw(rounded(0.1, 1))
-    parameters = GMSParameters(
-        numbers(0.5, 50),
-        numbers(0, 1),
-        numbers(0.01, 1),
-        sigma_2=draw(rounded(0, 1)),
-        stribeck=Stribeck(F_c, F_c * draw(rounded(1.01, 3)), draw(rounded(1e-3, 0.1))),
-        v_c=draw(st.sampled_from([1e-6, 1e-4, 1e-3])),
-        weights=numbers(0.03, 0.4),
-    )
-    law = law or draw(st.sampled_from(["signed", "published"]))
-    return GMS(parameters, law=law)  # type: ignore[arg-type]
-
-
-@st.composite
-def ramps(draw: st.DrawFn, jumps: bool = False) -> list[tuple[float, float]]:
-    """Corners of a velocity or a force; with `jumps`, some segments are vertical."""
-    waits = draw(st.lists(rounded(0.05, 2), min_size=2, max_size=6))
-    times = np.concatenate([[0.0], np.cumsum(waits)]).tolist()
-    corners = [(t, draw(rounded(-0.6, 0.6))) for t in times]
-    if jumps and draw(st.booleans()):
-        place = draw(st.integers(1, len(corners) - 1))
-        corners.insert(place, (corners[place][0], draw(rounded(-0.6, 0.6))))
-    return corners
-
-
-@st.composite
-def signals(draw: st.DrawFn) -> Any:
-    """A formula, ramps, a record or a constant."""
-    kind = draw(st.sampled_from([0, 0, 0, 1, 1, 2, 3]))
-    if kind == 0:
-        a, w, p = draw(rounded(0.1, 0.6)), draw(rounded(0.5, 5)), draw(rounded(0, 6))
-        text = draw(
-            st.sampled_from(
-                [
-                    "{a}*sin({w}*t + {p})",
-                    "{a}*sgn(sin({w}*t))*min(1, 9*abs(sin({w}*t)))",
-                    "{a}*cos({w}*t)*exp(-t/{w})",
-                    "{a}*tanh({w}*(t - 1))",
-                    "{a}*(t - 1)**3",
-                    "max(0, {a}*sin({w}*t + {p}))",
-                ]
-            )
-        )
-        return text.format(a=a, w=w, p=p)
-    if kind == 1:
-        return draw(ramps(jumps=True))
-    if kind == 2:
-        times = np.linspace(0.0, 6.0, draw(st.integers(9, 60)))
-        a, w = draw(rounded(0.1, 0.6)), draw(rounded(0.5, 5))
-        return times, (a * np.sin(w * times)).round(draw(st.integers(1, 6)))
-    return draw(st.sampled_from([0.0, 0.2, -0.2, 1e-6, 1e-3]) | rounded(-0.6, 0.6))
-
-
-@st.composite
-def rigs(draw: st.DrawFn) -> Any:
-    """Mostly open loop."""
-    kind = draw(st.sampled_from([0, 0, 0, 1, 2]))
-    mass = draw(rounded(0.2, 3))
-    if kind == 1:
-        return Slider(
-            mass, draw(st.sampled_from(["3*sin(2*t)", "2*t - 3", "9*cos(t)"]) | signals())
-        )
-    if kind == 2:
-        return PulledSlider(mass, draw(rounded(0.5, 9)), draw(rounded(-0.5, 0.5)))
-    return Prescribed(draw(signals()))
-
-
-@st.composite
-def options(draw: st.DrawFn) -> dict[str, Any]:
-    """Adaptive and fixed steps, located events and those at step ends."""
-    kind = draw(st.integers(0, 5))
-    if kind <= 2:
-        found: dict[str, Any] = {
-            "method": draw(st.sampled_from(["dp45", "bs23"])),
-            "rtol": draw(st.sampled_from([1e-3, 1e-5, 1e-6, 1e-8])),
-        }
-        if draw(st.booleans()):
-            found["max_step"] = draw(rounded(0.01, 1))
-    else:
-        methods = st.sampled_from(["rk4", "heun", "euler", "dp45"])
-        found = {"method": draw(methods), "step": draw(rounded(0.003, 0.1))}
-    if kind == 5:
-        found["events"] = "step"
-    return found
 
 
 # --------------------------------------------------------------------------- invariants of any run
@@ -364,43 +183,37 @@ def test_requested_times_change_nothing(
 
 
 # --------------------------------------------------------------------------- engines
-@hard(25)
-@given(chart_models(), rigs(), options())
-def test_machines_and_ifelse_agree_on_random_charts(
-    model: ChartModel, rig: Any, given: dict[str, Any]
-) -> None:
+def engines_agree(model: Any, rig: Any, given: dict[str, Any], engines: tuple[str, ...]) -> None:
     one, end = attempt(model, rig, 3.0, **given)
-    other, end_too = attempt(model, rig, 3.0, **given, engine="ifelse")
-    assert end == end_too
-    same_bits(one, other)
+    for engine in engines:
+        other, end_too = attempt(model, rig, 3.0, **given, engine=engine)
+        assert end == end_too
+        assert other_parts(one, other) == []
     fired(one)
 
 
-@pytest.mark.skipif(not HAS_FAST, reason="needs the extra fast")
-@hard(20)  # most are compiled
+@hard(25)
+@given(chart_models(), rigs(), options())
+def test_engines_agree_on_random_charts(model: ChartModel, rig: Any, given: dict[str, Any]) -> None:
+    engines_agree(model, rig, given, ("ifelse",))
+
+
+@hard(20)
 @given(banks(), ramps(jumps=True), options(), st.booleans())
-def test_compiled_agrees_on_random_banks(
+def test_engines_agree_on_random_banks(
     model: GMS, corners: Any, given: dict[str, Any], pushed: bool
 ) -> None:
     """Ramps and parameters are arguments of the machine code: compiled only twice per law."""
     rig = Slider(1.0, corners) if pushed else Prescribed(corners)
-    one, end = attempt(model, rig, 3.0, **given)
-    other, end_too = attempt(model, rig, 3.0, **given, engine="compiled")
-    assert end == end_too
-    same_bits(one, other)
-    fired(one)
+    engines_agree(model, rig, given, ENGINES)
 
 
-@pytest.mark.skipif(not HAS_FAST, reason="needs the extra fast")
 @hard(4, most=20)  # each is compiled, which takes seconds
 @given(chart_models(), ramps(), options())
-def test_compiled_agrees_on_random_charts(
+def test_machine_code_agrees_on_random_charts(
     model: ChartModel, corners: Any, given: dict[str, Any]
 ) -> None:
-    one, end = attempt(model, Prescribed(corners), 2.0, **given)
-    other, end_too = attempt(model, Prescribed(corners), 2.0, **given, engine="compiled")
-    assert end == end_too
-    same_bits(one, other)
+    engines_agree(model, Prescribed(corners), given, (FASTEST,))
 
 
 # --------------------------------------------------------------------------- symmetry

@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider, Stribeck, simulate
+from gms_fsm import Prescribed, PulledSlider, Slider, simulate
 from tests.helpers import FIG4_SINE, SINE, pulled_mass, stick_slip
 
 MIRRORED = {
@@ -63,40 +61,3 @@ def test_slider():
     trace = simulate(model, Slider(1.0, force), 20.0)
     assert set(trace.transitions.edge) == set(MIRRORED)
     assert_mirrored(trace, simulate(model, Slider(1.0, f"-({force})"), 20.0))
-
-
-@st.composite
-def cases(draw):
-    """A bank of one to three elements, and ramps."""
-    n = draw(st.integers(1, 3))
-
-    def numbers(low, high):
-        return draw(st.lists(st.floats(low, high), min_size=n, max_size=n))
-
-    F_c = draw(st.floats(0.1, 1.0))
-    parameters = GMSParameters(
-        numbers(0.5, 5),
-        numbers(0, 1),
-        numbers(0.01, 1),
-        sigma_2=draw(st.floats(0, 1)),
-        stribeck=Stribeck(F_c, F_c * draw(st.floats(1.0, 3.0)), draw(st.floats(1e-3, 0.1))),
-        v_c=1e-6,
-        weights=numbers(0.1, 1),
-    )
-    waits = draw(st.lists(st.floats(0.2, 3), min_size=2, max_size=7))
-    speeds = draw(st.lists(st.floats(-0.5, 0.5), min_size=len(waits) + 1, max_size=len(waits) + 1))
-    times = np.concatenate([[0.0], np.cumsum(waits)])
-    return GMS(parameters, law="signed"), times, np.array(speeds)
-
-
-@pytest.mark.slow
-@settings(max_examples=60, deadline=None, derandomize=True)
-@given(cases())
-def test_random_ramps_and_parameters(case):
-    """Any parameters, any ramps, including dwells and values on a boundary."""
-    model, times, speeds = case
-    runs = [
-        simulate(model, Prescribed(list(zip(times, sign * speeds, strict=True))), times[-1])
-        for sign in (1.0, -1.0)
-    ]
-    assert_mirrored(*runs)

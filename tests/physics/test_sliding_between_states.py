@@ -6,7 +6,6 @@ without end, and the run ended in a livelock error; written with sgn(p - q) it w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -29,48 +28,10 @@ from gms_fsm import (
 from gms_fsm.charts.end_stop import END_STOP
 from gms_fsm.inspection.explain import explain
 from gms_fsm.traces.failures import LivelockError, NotUniqueError
-from tests.helpers import same_bits
+from tests.corpus import FALLING, relay
+from tests.helpers import FASTEST
 
-COMPILED = pytest.param("compiled", marks=pytest.mark.slow)
-ENGINES = ["machines", "ifelse", COMPILED]
-RISING = ("1 + 0.3 * t", "-1 + 0.3 * t")  # p' below and above q = 0
-FALLING = ("1 - 0.3 * t", "-1 - 0.3 * t")
 LEAVES = 1.0 / 0.3  # where one of the two no longer leads to q
-
-
-def needs(engine: str) -> str:
-    """Skip without the extra."""
-    if engine == "compiled":
-        pytest.importorskip("llvmlite", reason="needs the extra fast")
-    return engine
-
-
-def relay(
-    flows: tuple[str, str] = RISING,
-    guards: tuple[str, str] = ("p > q", "p < q"),
-    more: Sequence[Transition] = (),
-    n: int = 1,
-) -> ChartModel:
-    """Return p pushed towards q from both sides."""
-    below, above = flows
-    chart = Chart(
-        "relay",
-        inputs=("t",),
-        variables=("p", "q"),
-        parameters=("k",),
-        states=(
-            State("below", flow={"p": below, "q": "0"}),
-            State("above", flow={"p": above, "q": "0"}),
-            State("off", flow={"p": "0", "q": "0"}),
-        ),
-        transitions=(
-            Transition("rise", "below", "above", guard=guards[0]),
-            Transition("fall", "above", "below", guard=guards[1]),
-            *more,
-        ),
-        outputs={"F": "k * p"},
-    )
-    return ChartModel(chart, {"k": 1.0}, n=n)
 
 
 def run(model: ChartModel, p: float | list[float] = -0.1, **options: Any) -> Trace:
@@ -101,10 +62,9 @@ def dry(switching: bool) -> Chart:
 
 
 # --------------------------------------------------------------------------- on the surface
-@pytest.mark.parametrize("engine", ENGINES)
-def test_it_stays_on_the_surface_until_the_drift_exceeds_the_push(engine: str) -> None:
+def test_it_stays_on_the_surface_until_the_drift_exceeds_the_push() -> None:
     """Then p = 0.15 (t - t_1)^2; in between sigma is the drift, and nothing is switched."""
-    trace = run(relay(), engine=needs(engine))
+    trace = run(relay())
     (slide,) = trace.sliding
     assert slide.surface == "p - q (below, above) of element 1"
     start = (np.sqrt(1.0 + 0.6 * 0.1) - 1.0) / 0.3  # t + 0.15 t^2 = 0.1
@@ -119,12 +79,10 @@ def test_it_stays_on_the_surface_until_the_drift_exceeds_the_push(engine: str) -
     exact = 0.15 * (trace.t[after] - LEAVES) ** 2
     assert np.abs(trace.z[after, 0] - exact).max() < 1e-12
     assert {row[0] for row in trace.states[trace.t > start + 1e-9]} == {"above"}
-    same_bits(trace, run(relay(), engine="ifelse"))
 
 
-@pytest.mark.parametrize("engine", ["machines", "ifelse"])
-def test_it_leaves_by_its_edge_where_the_other_state_was_entered_last(engine: str) -> None:
-    trace = run(relay(FALLING), engine=engine)
+def test_it_leaves_by_its_edge_where_the_other_state_was_entered_last() -> None:
+    trace = run(relay(FALLING))
     log = trace.transitions
     assert log.edge.tolist() == ["rise", "fall"]
     assert log.t[1] == trace.sliding[0].t_end == pytest.approx(LEAVES, abs=1e-12)
@@ -132,11 +90,10 @@ def test_it_leaves_by_its_edge_where_the_other_state_was_entered_last(engine: st
 
 
 @pytest.mark.parametrize("source", ["above", "below"])
-@pytest.mark.parametrize("engine", ["machines", "ifelse"])
-def test_edges_of_both_states_leave_it(source: str, engine: str) -> None:
+def test_edges_of_both_states_leave_it(source: str) -> None:
     """From the state that was not entered last, its edge there is taken first."""
     off = Transition("switch_off", source, "off", guard="t > 2")
-    trace = run(relay(more=[off]), engine=engine)
+    trace = run(relay(more=[off]))
     there = [] if source == "above" else ["fall"]
     assert trace.transitions.edge.tolist() == ["rise", *there, "switch_off"]
     assert trace.sliding[0].t_end == pytest.approx(2.0, abs=1e-12)
@@ -165,11 +122,10 @@ def test_a_curved_surface_that_moves_is_followed() -> None:
     assert trace.z[on, 0] == pytest.approx(np.sqrt(1.0 + 0.1 * trace.t[on]), abs=1e-6)
 
 
-@pytest.mark.parametrize("engine", ["machines", "ifelse"])
-def test_it_is_the_motion_with_a_sign(engine: str) -> None:
+def test_it_is_the_motion_with_a_sign() -> None:
     rig = PulledSlider(1.0, 2.0, 0.1)
     two, one = (  # with one tolerance: the default follows from the forces at the start
-        simulate(ChartModel(dry(kind), {"F_c": 1.0}), rig, 20.0, engine=engine, atol=1e-9)
+        simulate(ChartModel(dry(kind), {"F_c": 1.0}), rig, 20.0, atol=1e-9)
         for kind in (True, False)
     )
     assert two.sliding[0].t_end == pytest.approx(one.sliding[0].t_end, abs=1e-12)
@@ -195,8 +151,7 @@ def test_elements_that_do_not_bear_on_each_other_slide_at_once() -> None:
     assert trace.z[-1] == pytest.approx(-0.15 * (5.0 - LEAVES) ** 2, abs=1e-12)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_surfaces_that_bear_on_each_other_are_refused(engine: str) -> None:
+def test_surfaces_that_bear_on_each_other_are_refused() -> None:
     """A block on a block: once both rest, either pad could hold the upper one."""
     system = System(
         "blocks",
@@ -210,7 +165,7 @@ def test_surfaces_that_bear_on_each_other_are_refused(engine: str) -> None:
         ),
     )
     with pytest.raises(NotUniqueError) as caught:
-        simulate(system, 8.0, initial={"va": 1.0, "vb": 1.0}, engine=needs(engine))
+        simulate(system, 8.0, initial={"va": 1.0, "vb": 1.0})
     error = caught.value
     assert error.t == error.trace.t[-1] == pytest.approx(5.0, abs=1e-9)  # both at -0.2 m/s^2
     assert "va (bwd, fwd) of element 1 of floor = 0 and " in error.reason
@@ -269,12 +224,12 @@ def follower() -> ChartModel:
     return ChartModel(chart, {"c": 1.0})
 
 
-@pytest.mark.parametrize("engine", ["ifelse", COMPILED])
+@pytest.mark.parametrize("engine", sorted({"ifelse", FASTEST}))
 def test_stepping_gives_the_same_bits_and_the_mean_force(engine: str) -> None:
     t = np.linspace(0.0, 6.0, 121)
     v = 1.5 * np.sin(t) + 0.3 * np.sin(7.0 * t)
     trace = simulate(follower(), Prescribed((t, v)), 6.0, engine="ifelse", t_eval=t)
-    friction = FrictionState(follower(), engine=needs(engine))
+    friction = FrictionState(follower(), engine=engine)
     forces, means, log = [friction.peek(v[0], v[0], 0.0)], [], []
     for j in range(1, len(t)):
         forces.append(friction.advance_to(v[j - 1], v[j], t[j]))
@@ -312,8 +267,7 @@ def test_a_belt_that_jumps_drags_the_mass_after_it(belt: Any, switching: bool) -
 
 
 @pytest.mark.parametrize("switching", [True, False], ids=["states", "sign"])
-@pytest.mark.parametrize("engine", ["machines", COMPILED])
-def test_an_impact_moves_a_mass_that_friction_held(engine: str, switching: bool) -> None:
+def test_an_impact_moves_a_mass_that_friction_held(switching: bool) -> None:
     """Of two equal masses with restitution 0.6 the struck one takes 0.8 of the speed."""
     system = System(
         "impact",
@@ -326,7 +280,7 @@ def test_an_impact_moves_a_mass_that_friction_held(engine: str, switching: bool)
             Contact("stop", END_STOP, {"x_s": 0.5, "e": 0.6, "v_r": 1e-3}, v="va - vb"),
         ),
     )
-    trace = simulate(system, 2.0, initial={"va": 1.0}, engine=needs(engine))
+    trace = simulate(system, 2.0, initial={"va": 1.0})
     assert trace.body("a").v[-1] == pytest.approx(0.2, abs=1e-12)
     assert trace.body("b").v[-1] == pytest.approx(0.0, abs=1e-15)
     assert trace.body("b").x[-1] == pytest.approx(0.32, abs=1e-12)  # v^2 / 2 a

@@ -9,66 +9,26 @@ import pytest
 from scipy.integrate import RK45, Radau
 
 from gms_fsm import (
-    GMS,
     Chart,
     ChartModel,
-    GMSParameters,
     PulledSlider,
     Session,
     Slider,
     State,
-    Stribeck,
     Trace,
     Transition,
     simulate,
 )
 from gms_fsm.inspection.explain import explain
 from tests import older_files
-from tests.helpers import same_bits
-
-ENGINES = ["machines", "ifelse", "compiled"]
-BANK = GMS(
-    GMSParameters(
-        [82e3, 146e3, 110e3],
-        [29, 2.6, 114],
-        [2.8e-3, 2.16e-3, 1.53e-3],
-        sigma_2=1.3,
-        stribeck=Stribeck(2.88, 3.155, 8.8e-3),
-        v_c=3.3e-6,
-        weights=[3.9e-6, 3e-6, 2.15e-6],
-    ),
-    law="signed",
-)
-PUSHED = Slider(1.4, "2.9*sin(4.7*t)")
-
-
-def coulomb(outputs: str = "F_c * sgn(v)") -> ChartModel:
-    """Return Coulomb friction without stiction."""
-    chart = Chart(
-        "Coulomb friction",
-        inputs=("v", "x"),
-        variables=("z",),
-        parameters=("F_c",),
-        states=(State("on", flow={"z": "0"}),),
-        transitions=(),
-        outputs={"F": outputs},
-    )
-    return ChartModel(chart, {"F_c": 1.0})
-
-
-def needs(engine: str) -> str:
-    """Skip without the extra."""
-    if engine == "compiled":
-        pytest.importorskip("llvmlite", reason="needs the extra fast")
-    return engine
+from tests.corpus import HELD, PUSHED, Belt, coulomb, runs_down
+from tests.helpers import FASTEST, same_bits
 
 
 # --------------------------------------------------------------------------- the bank
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_slipping_element_holds_v_at_zero_until_it_arrests(engine):
+def test_a_slipping_element_holds_v_at_zero_until_it_arrests():
     """Times from an independent hybrid loop around DOP853."""
-    trace = simulate(BANK, PUSHED, 4.0, engine=needs(engine))
+    trace = simulate(HELD, PUSHED, 4.0, engine=FASTEST)
     assert len(trace.transitions) == 14
     (slide,) = trace.sliding
     assert slide.surface == "v"
@@ -80,26 +40,16 @@ def test_a_slipping_element_holds_v_at_zero_until_it_arrests(engine):
     assert np.abs(trace.F[on] - 2.9 * np.sin(4.7 * trace.t[on])).max() < 1e-12
 
 
-def test_the_engines_agree_to_the_last_bit():
-    pytest.importorskip("llvmlite", reason="needs the extra fast")
-    one = simulate(BANK, PUSHED, 0.6, engine="machines")
-    assert len(one.sliding) == 1
-    for engine in ("ifelse", "compiled"):
-        same_bits(one, simulate(BANK, PUSHED, 0.6, engine=engine))
-
-
 def test_finer_tolerances_move_sliding_as_little_as_the_rest():
-    coarse, fine = (simulate(BANK, PUSHED, 0.4, engine="ifelse", rtol=r) for r in (1e-6, 1e-10))
+    coarse, fine = (simulate(HELD, PUSHED, 0.4, engine="ifelse", rtol=r) for r in (1e-6, 1e-10))
     for name in ("t_start", "t_end", "sigma_start", "sigma_end"):
         assert coarse.sliding[name][0] == pytest.approx(fine.sliding[name][0], rel=1e-4)
 
 
 # --------------------------------------------------------------------------- Coulomb friction
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_mass_on_coulomb_friction_waits_for_its_spring(engine):
+def test_a_mass_on_coulomb_friction_waits_for_its_spring():
     """At rest until the spring pulls with F_c, then v = speed (1 - cos): exact."""
-    trace = simulate(coulomb(), PulledSlider(1.0, 2.0, 0.1), 10.0, engine=needs(engine))
+    trace = simulate(coulomb(), PulledSlider(1.0, 2.0, 0.1), 10.0, engine=FASTEST)
     slide = trace.sliding[0]
     assert (slide.t_start, slide.sigma_start) == (0.0, 0.0)
     assert slide.t_end == pytest.approx(1.0 / (2.0 * 0.1), abs=1e-12)
@@ -149,52 +99,25 @@ def test_a_flow_that_is_not_linear_in_the_sign_is_combined_from_both_sides():
     assert trace.F[-1] == pytest.approx(0.5, abs=1e-15)
 
 
-class Belt:
-    """A mass on a belt that moves."""
-
-    title = "mass on a belt"
-    acceleration = "(stiffness * (0 - x) - F - F_b * sgn(v - w)) / mass"
-
-    def __init__(self, w: str) -> None:
-        from gms_fsm.systems.signals import as_signal
-
-        self.signals = {"w": as_signal(w)}
-        self.numbers = {"mass": 1.0, "stiffness": 4.0, "F_b": 1.0}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     ("w", "place"), [("0.1", lambda t: 0.1 * t), ("0.1 * cos(t)", lambda t: 0.1 * np.sin(t))]
 )
-def test_a_mass_rides_on_a_belt_along_a_surface_that_moves(engine, w, place):
+def test_a_mass_rides_on_a_belt_along_a_surface_that_moves(w, place):
     """In a text of the rig; the sign's argument depends on a signal."""
     free = coulomb("0 * F_c")
     initial = {"v": 0.1}
-    trace = simulate(free, Belt(w), 1.2, engine=needs(engine), initial=initial)
+    trace = simulate(free, Belt(w), 1.2, engine=FASTEST, initial=initial)
     assert trace.sliding[0].surface == "v - w"
     on = trace.rows.mode[:, 1] == 1
     assert on.sum() >= 5
     assert np.abs(trace.x[on] - place(trace.t[on])).max() < 1e-7
-    same_bits(trace, simulate(free, Belt(w), 1.2, engine="ifelse", initial=initial))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-def test_elements_come_to_rest_on_their_own_surfaces(engine):
+def test_elements_come_to_rest_on_their_own_surfaces():
     """dz = -C sgn(z) reaches 0 in a finite time, each element by itself, two of them together."""
-    chart = Chart(
-        "runs down",
-        inputs=("v",),
-        variables=("z",),
-        parameters=("C",),
-        states=(State("on", flow={"z": "v - C * sgn(z)"}),),
-        transitions=(),
-        outputs={"F": "z"},
-    )
-    model = ChartModel(chart, {"C": [1.0, 2.0, 2.0, 0.1]}, n=4)
+    model = runs_down([1.0, 2.0, 2.0, 0.1])
     trace = simulate(
-        model, Slider(1e9, "0"), 2.0, engine=needs(engine), initial={"z": [1.0, 1.0, -1.0, 1.0]}
+        model, Slider(1e9, "0"), 2.0, engine=FASTEST, initial={"z": [1.0, 1.0, -1.0, 1.0]}
     )
     names = {str(r.surface): float(r.t_start) for r in trace.sliding}
     assert names == pytest.approx(
@@ -203,11 +126,9 @@ def test_elements_come_to_rest_on_their_own_surfaces(engine):
     assert trace.z[-1] == pytest.approx([0.0, 0.0, 0.0, 0.8], abs=1e-6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("guard", ["v >= 0 and z > 4", "abs(v) <= 0 and z > 4", "v <= 0 and z > 4"])
 @pytest.mark.parametrize("v0", [2.0, 1.7, -1.7, 0.3])
-def test_guards_that_compare_with_the_surface_are_evaluated_on_it(guard, v0, engine):
+def test_guards_that_compare_with_the_surface_are_evaluated_on_it(guard, v0):
     """A rounding error off it another comparison keeps them false; they were not evaluated."""
     chart = Chart(
         "waits",
@@ -219,7 +140,7 @@ def test_guards_that_compare_with_the_surface_are_evaluated_on_it(guard, v0, eng
         outputs={"F": "F_c * sgn(v)"},
     )
     model = ChartModel(chart, {"F_c": 1.0})
-    trace = simulate(model, Slider(1.0, "0"), 8.0, engine=needs(engine), initial={"v": v0})
+    trace = simulate(model, Slider(1.0, "0"), 8.0, engine=FASTEST, initial={"v": v0})
     assert trace.transitions.t.tolist() == [pytest.approx(4.0, abs=1e-9)]
 
 
@@ -237,7 +158,7 @@ def test_the_force_next_to_sliding_is_that_of_the_arc(v0):
 
 
 def test_sigma_at_the_end_is_that_before_a_firing_or_a_jump():
-    trace = simulate(BANK, PUSHED, 0.4)
+    trace = simulate(HELD, PUSHED, 0.4)
     row = int(np.flatnonzero(trace.rows.mode[:, 3])[-1])
     while trace.microstep[row]:
         row -= 1
@@ -248,34 +169,18 @@ def test_sigma_at_the_end_is_that_before_a_firing_or_a_jump():
 
 @pytest.mark.slow
 def test_twenty_elements_slide_at_once():
-    chart = Chart(
-        "runs down",
-        inputs=("v",),
-        variables=("z",),
-        parameters=("C",),
-        states=(State("on", flow={"z": "v - C * sgn(z)"}),),
-        transitions=(),
-        outputs={"F": "z"},
-    )
-    model = ChartModel(chart, {"C": np.linspace(1.0, 2.0, 20)}, n=20)
+    model = runs_down(np.linspace(1.0, 2.0, 20))
     trace = simulate(model, Slider(1e9, "0"), 2.0, initial={"z": [1.0] * 20})
     assert len(trace.sliding) == 20
     assert (trace.z[-1] == 0.0).all()
 
 
 # --------------------------------------------------------------------------- where it shows
-def test_files_store_sliding(tmp_path):
-    trace = simulate(BANK, PUSHED, 0.4, engine="ifelse")
-    for name in ("a.npz", "a.csv"):
-        back = Trace.load(trace.save(tmp_path / name))
-        assert back.sliding.tolist() == trace.sliding.tolist()
-        assert np.array_equal(back.rows.mode, trace.rows.mode)
-        assert np.array_equal(back.F, trace.F)
 
 
 def test_older_files_without_sliding_are_read(tmp_path):
     """Their rows have no flags of surfaces, which means no sliding."""
-    trace = simulate(BANK, PUSHED, 0.3, engine="ifelse")
+    trace = simulate(HELD, PUSHED, 0.3, engine="ifelse")
     assert len(trace.sliding) == 0
     arrays = older_files.format_1(trace, tmp_path / "a.npz")
     for kind in ("rows_mode", "stops_mode"):
@@ -283,17 +188,16 @@ def test_older_files_without_sliding_are_read(tmp_path):
     same_bits(trace, Trace.load(older_files.write(tmp_path / "old.npz", arrays)))
 
 
-@pytest.mark.parametrize("engine", ["ifelse", "compiled"])
-def test_requested_times_and_samples_lie_on_the_surface(engine):
-    whole = simulate(BANK, PUSHED, 0.4, engine=needs(engine))
+def test_requested_times_and_samples_lie_on_the_surface():
+    whole = simulate(HELD, PUSHED, 0.4, engine=FASTEST)
     slide = whole.sliding[0]
     times = np.linspace(slide.t_start, slide.t_end, 7)[1:-1]
-    wanted = simulate(BANK, PUSHED, 0.4, engine=engine, t_eval=times)
+    wanted = simulate(HELD, PUSHED, 0.4, engine=FASTEST, t_eval=times)
     for trace in (wanted, whole.sample(times)):
         assert (trace.v == 0.0).all()
         assert np.abs(trace.F - 2.9 * np.sin(4.7 * times)).max() < 1e-12
     assert wanted.sliding.tolist() == whole.sliding.tolist()
-    assert len(simulate(BANK, PUSHED, 0.4, engine=engine, output="end").sliding) == 0
+    assert len(simulate(HELD, PUSHED, 0.4, engine=FASTEST, output="end").sliding) == 0
 
 
 def test_why_explains_sliding():
@@ -306,39 +210,18 @@ def test_why_explains_sliding():
 
 
 def test_a_session_steps_over_sliding():
-    session = Session(BANK, PUSHED, 0.4)
+    session = Session(HELD, PUSHED, 0.4)
     session.proceed()
     rows = session.branch.trace()
-    same_bits(rows, simulate(BANK, PUSHED, 0.4))
+    same_bits(rows, simulate(HELD, PUSHED, 0.4))
     (first,) = np.flatnonzero(np.diff(rows.rows.mode[:, 3]) == 1) + 1
     assert session.at(int(first)).fired is None
     assert session.at(int(first)).v == 0.0
 
 
-def test_a_checkpoint_during_sliding_resumes_bit_for_bit(tmp_path):
-    from gms_fsm.run._checkpoint import Checkpointer
-    from gms_fsm.run.simulate import Run
-    from gms_fsm.run.start import Start
-
-    start = Start.of(BANK, PUSHED, 0.4, rows_at_once=1)
-    run = Run(start)
-    while not any(run.recorder.latest[2][3:]):
-        run.advance()
-    run.advance()
-    keeper = Checkpointer(run, tmp_path / "run.check", 0.0)
-    keeper.look()
-    other = Run(start)
-    Checkpointer(other, tmp_path / "run.check", 1e9)
-    while other.advance():
-        pass
-    while run.advance():
-        pass
-    same_bits(run.recorder.trace(), other.recorder.trace())
-
-
 @pytest.mark.parametrize("method", [RK45, Radau])
 def test_scipy_solvers_slide_too(method):
-    trace = simulate(BANK, PUSHED, 0.4, method=method)
+    trace = simulate(HELD, PUSHED, 0.4, method=method)
     assert trace.sliding.t_start[0] == pytest.approx(0.3322785, abs=3e-6)
     assert len(trace.transitions) == 4
 

@@ -7,10 +7,8 @@ the machines end in the states of the last row. The run is the same to the last 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import pytest
 
 from gms_fsm import (
@@ -26,11 +24,11 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.charts import gms_element
-from gms_fsm.errors import ChartError, ParameterError
+from gms_fsm.errors import ParameterError
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.traces.failures import CallbackError, LivelockError
+from gms_fsm.traces.failures import LivelockError
+from tests.corpus import run
 from tests.helpers import (
     CURVE,
     non_drifting,
@@ -98,9 +96,11 @@ def _both(case: str, **options: Any) -> tuple[Trace, list[Call]]:
     return other, calls
 
 
+PAIRS = [(case, [*OPTIONS][k % len(OPTIONS)]) for k, case in enumerate(CASES)]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("options", OPTIONS)
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(("case", "options"), PAIRS)
 def test_every_callback_sees_the_same_values(case: str, options: str) -> None:
     trace, calls = _both(case, **OPTIONS[options])
     log = trace.transitions
@@ -160,59 +160,6 @@ def test_the_second_firing_at_one_time_sees_what_the_first_assigned() -> None:
     assert seen[0] == seen[1]
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_machines_end_in_the_states_of_the_last_row_and_restart_cleanly(case: str) -> None:
-    model, rig, t_end = CASES[case]
-    machines = ElementMachines(model)
-    for fraction in (0.6, 0.2, 1.0):
-        trace = simulate(model, rig, fraction * t_end, engine="compiled", machines=machines)
-        assert [e.state for e in machines.elements] == trace.states[-1].tolist()
-        same_bits(trace, simulate(model, rig, fraction * t_end, engine="compiled"))
-
-
-def test_a_run_without_firings_calls_nothing() -> None:
-    machines, calls = _watched(stick_slip("signed"))
-    trace = simulate(
-        machines.model, Prescribed("0.01*sin(t)"), 20.0, engine="compiled", machines=machines
-    )
-    assert len(trace.transitions) == 0
-    assert calls == []
-
-
-def test_every_element_starts_in_its_own_state() -> None:
-    machines, calls = _watched(stick_slip("signed"))
-    states = ["stick", "slip", "slip", "stick"]
-    initial = {"states": states, "z": [0.0, 0.1, 0.2, 0.3]}
-    simulate(
-        machines.model,
-        Prescribed("0.1"),
-        0.5,
-        engine="compiled",
-        machines=machines,
-        initial=initial,
-    )
-    assert [e.state for e in machines.elements] == states
-    assert calls == [], "setting the initial state is not a firing"
-
-
-def test_elements_of_a_user_defined_class() -> None:
-    @dataclass(eq=False)
-    class Counting(Element):
-        hits: int = 0
-
-        def on_enter_slip(self, event: Any) -> None:
-            self.hits += 1
-            assert event.model is self
-
-    model, rig = pulled_mass()
-    machines = ElementMachines(model, Counting)
-    trace = simulate(model, rig, 30.0, engine="compiled", machines=machines)
-    for i, element in enumerate(machines.elements):
-        log = trace.transitions
-        wanted = int(np.sum((log.element == i) & (log.target == "slip")))
-        assert element.hits == wanted > 0  # type: ignore[attr-defined]
-
-
 def test_more_firings_than_the_columns_hold_at_first() -> None:
     model, _ = pulled_mass()
     machines, calls = _watched(model)
@@ -246,64 +193,13 @@ def test_an_error_in_a_callback_reaches_the_user_unchanged(error: type[BaseExcep
     assert seen["machines"] == seen["compiled"]
 
 
-def test_a_callback_that_changes_the_values_before_the_guard_is_refused() -> None:
-    machines = ElementMachines(stick_slip("signed"))
-
-    def stop(event: Any) -> None:
-        event.model.v = 0.0
-
-    machines.machine.prepare_event = [stop]
-    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only read"
-    with pytest.raises(CallbackError, match=said):
-        simulate(machines.model, open_loop(), 20.0, engine="compiled", machines=machines)
-
-
-def test_values_written_by_a_callback_after_the_guard_do_not_affect_the_run() -> None:
-    machines = ElementMachines(stick_slip("signed"))
-
-    def scribble(event: Any) -> None:
-        event.model.z, event.model.v, event.model.t = 1e9, 1e9, 1e9
-
-    machines.machine.on_enter_slip(scribble)
-    same_bits(
-        simulate(machines.model, open_loop(), 61.0, engine="compiled", machines=machines),
-        simulate(machines.model, open_loop(), 61.0),
-    )
-
-
-def test_a_machine_given_another_edge_or_condition_is_refused() -> None:
-    model = stick_slip("signed")
-    panics, picky = ElementMachines(model), ElementMachines(model)
-    panics.machine.add_transition("panic", "slip", "stick")
-    (edge,) = picky.machine.get_transitions("arrest", "slip", "stick")
-    edge.conditions.append(type(edge.conditions[0])(lambda event: False))
-    for machines, word in ((panics, "panic"), (picky, "arrest")):
-        with pytest.raises(ChartError, match=word):
-            simulate(model, open_loop(), 20.0, engine="compiled", machines=machines)
-
-
 def test_callbacks_run_up_to_a_livelock_too() -> None:
-    sound = gms_element("signed")
-    edges = (
-        Transition("break_away", "stick", "slip", guard="abs(z) >= s and abs(v) <= v_c"),
-        Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < 10 * s"),
-    )
-    chart = Chart(
-        "broken",
-        sound.inputs,
-        sound.variables,
-        sound.parameters,
-        sound.states,
-        edges,
-        sound.outputs,
-    )
-    values = {"k": 1, "sigma": 0.1, "C": 0.1, "v_c": 0.2}
-    model = ChartModel(chart, values, n=2, stribeck=CURVE, weights=[2, 1])
+    model, rig = run("livelock").subject
     seen = []
     for engine in ("machines", "compiled"):
         machines, calls = _watched(model)
         with pytest.raises(LivelockError) as caught:
-            simulate(model, Prescribed("0.15"), 20.0, engine=engine, machines=machines)
+            simulate(model, rig, 20.0, engine=engine, machines=machines)
         assert len(calls) == 6 * len(caught.value.trace.transitions) == 600
         seen.append((calls, str(caught.value), [e.state for e in machines.elements]))
     assert seen[0] == seen[1]

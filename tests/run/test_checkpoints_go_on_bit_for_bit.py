@@ -1,4 +1,7 @@
-"""A run interrupted anywhere and continued from its checkpoint equals the uninterrupted run."""
+"""Checkpoints survive a killed process; those of other runs, and damaged ones, are refused.
+
+That runs go on bit for bit is in tests/laws.
+"""
 
 from __future__ import annotations
 
@@ -21,19 +24,8 @@ from gms_fsm.app.report import run_scenario
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import CheckpointError, OutputError, ParameterError
 from gms_fsm.run._checkpoint import Checkpointer
+from tests.corpus import belt
 from tests.helpers import ROOT, open_loop, pulled_mass, same_bits, stick_slip
-
-ENGINES = [
-    "machines",
-    "ifelse",
-    pytest.param(
-        "compiled",
-        marks=pytest.mark.skipif(
-            not __import__("importlib.util").util.find_spec("llvmlite"),
-            reason="needs the extra fast",
-        ),
-    ),
-]
 
 
 class Interrupted(Exception):
@@ -52,37 +44,6 @@ def interrupted(path: Path, after: int, *arguments: Any, **options: Any) -> Trac
         return simulate(*arguments, **options, checkpoint=path, checkpoint_every=0.0, progress=stop)
     except Interrupted:
         return None
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(
-    "options",
-    [
-        {},
-        {"t_eval": np.linspace(0, 25, 333)},
-        {"output": "end"},
-        {"method": "rk4", "step": 0.0101},
-        {"events": "step", "max_step": 0.05},
-    ],
-    ids=["all", "t_eval", "end", "rk4", "step"],
-)
-def test_repeated_interruptions_change_nothing(
-    engine: str, options: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
-    model, rig = pulled_mass()
-    whole = simulate(model, rig, 25.0, engine=engine, **options)
-    path, rounds, trace = tmp_path / "run.checkpoint", 0, None
-    while trace is None:
-        rounds += 1
-        trace = interrupted(
-            path, 3 if engine == "compiled" else 17, model, rig, 25.0, engine=engine, **options
-        )
-    assert rounds > 1
-    assert not path.exists()
-    same_bits(trace, whole)
-    np.testing.assert_array_equal(trace.stops.y, whole.stops.y)
 
 
 @pytest.mark.slow
@@ -242,3 +203,49 @@ def test_the_command_line_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert not (tmp_path / "run.checkpoint").exists()
     whole = simulate(loaded.model, loaded.rig, **loaded.arguments)
     same_bits(Trace.load(tmp_path / "trace.npz"), whole)
+
+
+# --------------------------------------------------------------------------- systems
+def belted(path: Path, speed: Any = "0.1", **options: Any) -> Trace:
+    initial = {"q2": 0.2, "pad.states": ["backward"]}
+    return simulate(belt(speed), 12.0, initial=initial, engine="ifelse", checkpoint=path, **options)
+
+
+def begun_system(path: Path) -> None:
+    def stop(moment: Any) -> None:
+        if moment.t > 7.0:
+            raise Interrupted
+
+    with pytest.raises(Interrupted):
+        belted(path, checkpoint_every=0.0, progress=stop)
+
+
+def test_another_system_is_refused(tmp_path: Path) -> None:
+    begun_system(tmp_path / "run.checkpoint")
+    with pytest.raises(CheckpointError, match="another model, rig, signal"):
+        belted(tmp_path / "run.checkpoint", "0.2")
+
+
+def test_a_function_that_cannot_be_identified_is_refused_before_the_run(tmp_path: Path) -> None:
+    told: list[object] = []
+    with pytest.raises(ParameterError, match="signal 'r' cannot be resumed"):
+        belted(tmp_path / "run.checkpoint", abs, progress=told.append)
+    assert told == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("loop_mode", 3), ("loop_edges", 9), ("kept_log", "none")]
+)
+def test_values_that_no_run_can_have_are_refused(name: str, value: Any, tmp_path: Path) -> None:
+    path = tmp_path / "run.checkpoint"
+    begun_system(path)
+    with np.load(path) as file:
+        arrays = dict(file)
+    if name == "kept_log":
+        arrays[name]["contact"][0] = value
+    else:  # those of the second machine: it has two states and three edges
+        arrays[name][1] = value
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+    with pytest.raises(CheckpointError, match="damaged"):
+        belted(path)

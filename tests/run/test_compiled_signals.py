@@ -32,7 +32,6 @@ from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering._store import Store
 from gms_fsm.traces.failures import NotFiniteError, SimulationError
 from tests.helpers import non_drifting, same_bits, stick_slip
-from tests.systems_cases import same_system_bits
 
 pytestmark = pytest.mark.slow
 
@@ -311,7 +310,7 @@ def test_a_function_that_only_a_guard_reads_ends_the_run_where_it_raises() -> No
         with pytest.raises(SimulationError) as one:
             simulate(system, 10.0, engine=engine)
         caught.append(one.value)
-    same_system_bits(*(each.trace for each in caught))
+    same_bits(*(each.trace for each in caught))
     assert str(caught[0]) == str(caught[1])
     assert 2.0 < caught[0].trace.t[-1] <= 3.0
 

@@ -22,13 +22,12 @@ from gms_fsm import (
     State,
     Stribeck,
     Trace,
-    Transition,
     simulate,
 )
-from gms_fsm.charts import gms_element
 from gms_fsm.errors import ChartError, GMSError, ParameterError
 from gms_fsm.traces.failures import LivelockError, NotFiniteError, SimulationError, StepSizeError
-from tests.helpers import FASTEST, FunctionBelt, open_loop, pulled_mass, stick_slip
+from tests.corpus import BOTH_WAYS, SELF_LOOP, flow_of, go
+from tests.helpers import FASTEST, open_loop, pulled_mass, stick_slip
 
 CURVE = Stribeck(1.0, 1.5, 1e-3)
 
@@ -146,32 +145,9 @@ def _failed(error: type[SimulationError], *args: Any, **options: Any) -> Simulat
     return caught.value
 
 
-def _broken(*edges: Transition, law: str = "signed") -> ChartModel:
-    sound = gms_element(law)  # type: ignore[arg-type]
-    chart = Chart(
-        "broken",
-        sound.inputs,
-        sound.variables,
-        sound.parameters,
-        sound.states,
-        edges,
-        sound.outputs,
-    )
-    return ChartModel(
-        chart, {"k": 1, "sigma": 0.1, "C": 0.1, "v_c": 0.2}, n=2, stribeck=CURVE, weights=[2, 1]
-    )
-
-
-BOTH_WAYS = _broken(
-    Transition("break_away", "stick", "slip", guard="abs(z) >= s and abs(v) <= v_c"),
-    Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < 10 * s"),
-)
-
-
-@pytest.mark.parametrize("engine", ["machines", "ifelse"])
 @pytest.mark.parametrize("rows", [None, [0.0, 1.0, 5.0, 7.0, 20.0]], ids=["steps", "t_eval"])
-def test_guards_that_hold_both_ways_are_a_livelock(engine: str, rows: Any) -> None:
-    error = _failed(LivelockError, BOTH_WAYS, Prescribed("0.15"), 20.0, engine=engine, t_eval=rows)
+def test_guards_that_hold_both_ways_are_a_livelock(rows: Any) -> None:
+    error = _failed(LivelockError, BOTH_WAYS, Prescribed("0.15"), 20.0, t_eval=rows)
     t = 1.0 / 0.15  # s = 1 away from v = 0: element 2 is the first on its threshold
     for word in [
         "element 2 at t = 6.66666666",
@@ -202,34 +178,9 @@ def test_with_events_at_steps_the_same_chart_flips_but_time_advances() -> None:
 
 
 def test_a_self_loop_whose_guard_stays_true_is_a_livelock() -> None:
-    model = _broken(Transition("again", "stick", "stick", guard="z >= s"))
-    error = _failed(LivelockError, model, Prescribed("0.5"), 5.0)
+    error = _failed(LivelockError, SELF_LOOP, Prescribed("0.5"), 5.0)
     for word in ("element 2", "'again'", "from stick to stick", "z >= s"):
         assert word in str(error)
-
-
-def test_a_surface_whose_slope_is_not_known_is_a_livelock_of_its_comparison() -> None:
-    # A belt moved by a Python function: v is pushed onto it from both sides, and to follow it the
-    # run would have to know its acceleration.
-    chart = Chart("free", ("v",), ("z",), ("k",), (State("on", {"z": "0"}),), (), {"F": "k * z"})
-    with pytest.raises(LivelockError) as caught:
-        simulate(ChartModel(chart, {"k": 0.0}), FunctionBelt(), 2.0, initial={"v": 1.0})
-    for word in (
-        "v - w > 0.0",
-        "changed 100 times",
-        "element 1 at t = 0.9",
-        "is in on",
-        "no value of the sign",
-    ):
-        assert word in str(caught.value)
-    assert caught.value.trace.t[-1] == pytest.approx(0.9, abs=0.01)
-
-
-def _singular(flow: str, n: int = 2) -> ChartModel:
-    chart = Chart(
-        "singular", ("v", "t"), ("z",), ("k",), (State("on", {"z": flow}),), (), {"F": "k * z"}
-    )
-    return ChartModel(chart, {"k": 1.0}, n=n, stribeck=CURVE)
 
 
 @pytest.mark.parametrize(
@@ -250,7 +201,7 @@ def test_a_flow_that_escapes_to_infinity_is_a_step_size_error(
     # z' = z^2, z(0) = 1: z = 1/(1 - t) diverges at t = 1.
     error = _failed(
         SimulationError,
-        _singular("z * z"),
+        flow_of("z * z"),
         Prescribed("0"),
         2.0,
         t_eval=rows,
@@ -270,62 +221,12 @@ def test_a_flow_that_escapes_to_infinity_is_a_step_size_error(
     np.testing.assert_allclose(trace.z[early, 1], 1 / (1 - trace.t[early]), rtol=2e-2)
 
 
-@pytest.mark.parametrize(
-    ("flow", "t_break"), [("1 / (1 - t)**2", 1.0), ("1 / (t - 1)", 1.0), ("1 / (k - 1)", 0.0)]
-)
-def test_a_singular_flow_stops_before_it_is_singular(flow: str, t_break: float) -> None:
-    error = _failed(SimulationError, _singular(flow), Prescribed("0"), 2.0)
-    assert isinstance(error, StepSizeError | NotFiniteError)
-    if len(error.trace):
-        assert error.trace.t[-1] <= t_break + 1e-6
-        assert np.isfinite(error.trace.rows.y).all()
-
-
-@pytest.mark.parametrize("step", [0.01, 0.125])
-@pytest.mark.parametrize("events", ["located", "step"])
-def test_with_fixed_steps_infinity_is_not_finite(step: float, events: str) -> None:
-    error = _failed(
-        NotFiniteError,
-        _singular("z * z"),
-        Prescribed("0"),
-        20.0,
-        initial={"z": [1.0, 1.0]},
-        method="rk4",
-        step=step,
-        events=events,
-    )
-    assert "not finite" in str(error)
-    assert 0.9 < error.trace.t[-1] < 10.0
-    assert np.isfinite(error.trace.rows.y).all()
-
-
-@pytest.mark.parametrize("engine", ["machines", "ifelse"])
 @pytest.mark.parametrize("guard", ["0 / (z - z) > 0", "sqrt(-1 - z) > 0", "z - z < 0 / (z - z)"])
-def test_a_guard_that_cannot_be_computed_is_a_simulation_error(guard: str, engine: str) -> None:
-    model = _broken(Transition("go", "stick", "slip", guard=guard))
-    error = _failed(SimulationError, model, Prescribed("0.1"), 1.0, engine=engine)
+def test_a_guard_that_cannot_be_computed_is_a_simulation_error(guard: str) -> None:
+    model = go(guard)
+    error = _failed(SimulationError, model, Prescribed("0.1"), 1.0)
     assert len(error.trace) <= 1
     assert "compares NaN" in str(error)
-
-
-@pytest.mark.parametrize("engine", ["machines", "ifelse"])
-@pytest.mark.parametrize("guard", ["1 / (z - z) > 0", "exp(1e4 + z) > 0"])
-def test_an_infinite_side_of_a_guard_compares_as_ieee_arithmetic_does(
-    guard: str, engine: str
-) -> None:
-    """Python raises for 1/0 and exp(1e4); the engines agree to treat them as infinity."""
-    model = _broken(Transition("go", "stick", "slip", guard=guard))
-    trace = simulate(model, Prescribed("0.1"), 1.0, engine=engine)
-    assert set(trace.transitions.t.tolist()) == {0.0}
-
-
-@pytest.mark.parametrize("engine", ["machines", "ifelse"])
-def test_an_action_that_cannot_be_computed_is_a_simulation_error(engine: str) -> None:
-    model = _broken(
-        Transition("go", "stick", "slip", guard="z >= 0.05", actions={"z": "1 / (z - z)"})
-    )
-    error = _failed(SimulationError, model, Prescribed("0.1"), 1.0, engine=engine)
-    assert error.trace.t[-1] == pytest.approx(0.5, abs=1e-9)
 
 
 def test_an_output_that_is_infinite_is_shown_as_infinite() -> None:
@@ -347,13 +248,6 @@ def test_transitions_before_the_failure_are_kept() -> None:
     np.testing.assert_array_equal(error.trace.F, whole.F)
     assert error.trace.settings["t_end"] == 61.0
     assert error.trace.sample([10.0]).z.shape == (1, 4)
-
-
-def test_a_kept_trace_can_be_saved(tmp_path: Any) -> None:
-    error = _failed(LivelockError, BOTH_WAYS, Prescribed("0.15"), 20.0)
-    for name in ("kept.npz", "kept.csv"):
-        loaded = Trace.load(error.trace.save(tmp_path / name))
-        np.testing.assert_array_equal(loaded.z, error.trace.z)
 
 
 def test_an_exception_from_the_progress_callback_is_passed_on() -> None:
@@ -418,7 +312,7 @@ def test_a_trial_step_outside_the_domain_does_not_end_the_run(velocity: str) -> 
 
 def test_a_flow_that_is_not_finite_is_named_with_its_element() -> None:
     error = _failed(
-        NotFiniteError, _singular("v / (z - 1)"), Prescribed("1"), 2.0, initial={"z": [0.0, 1.0]}
+        NotFiniteError, flow_of("v / (z - 1)"), Prescribed("1"), 2.0, initial={"z": [0.0, 1.0]}
     )
     assert "the flow of z in state on, [v / (z - 1)], is not finite in element 2" in str(error)
 

@@ -1,6 +1,6 @@
 """output= decides only which rows are recorded: "all", the times in t_eval, or the end.
 
-The transition log is complete in each case, with every engine; contradictions are refused.
+Which rows these are is in tests/laws/test_output_observes.py; contradictions are refused.
 """
 
 from __future__ import annotations
@@ -10,31 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import LuGre, Prescribed, Stribeck, Trace, simulate
+from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
+from tests.helpers import open_loop, pulled_mass, same_bits, stick_slip
 
 JUMPS = [(0, 0.1), (1, 0.2), (1, -0.3), (6, -0.3), (6, 0.4), (9, 0.4)]
 CASES: dict[str, tuple[Model, Rig, float]] = {
     "open loop": (stick_slip("signed"), open_loop(), 31.0),
     "pulled mass": (*pulled_mass(), 10.0),
-    "fig. 3, slipping": (*non_drifting("signed", slipping=True), 10.0),
     "jumps": (stick_slip("published"), Prescribed(JUMPS), 12.0),
-    "no edges": (
-        LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4.0, stribeck=Stribeck(1.0, 1.5, 1e-3)),
-        Prescribed("1e-3*sin(t)"),
-        8.0,
-    ),
 }
-METHODS: dict[str, dict[str, Any]] = {
-    "dp45": {},
-    "rk4": {"method": "rk4", "step": 4.03e-3},
-    "by step": {"method": "bs23", "max_step": 1e-2, "events": "step"},
-}
-every_case = pytest.mark.parametrize("case", CASES)
-every_method = pytest.mark.parametrize("method", METHODS)
 
 
 @pytest.fixture(params=["machines", "ifelse", "compiled"])
@@ -43,57 +30,6 @@ def engine(request: pytest.FixtureRequest) -> str:
     if request.param == "compiled":
         pytest.importorskip("llvmlite", reason="needs the extra fast")
     return str(request.param)
-
-
-def _row(trace: Trace, row: int) -> dict[str, Any]:
-    names = ("t", "microstep", "x", "v", "z", "s", "F", "F_elements", "dz", "states")
-    return {name: np.array(getattr(trace, name)[row]) for name in names}
-
-
-def _same_row(one: dict[str, Any], other: dict[str, Any]) -> None:
-    for name, value in one.items():
-        np.testing.assert_array_equal(value, other[name], err_msg=name)
-
-
-@pytest.mark.slow
-@every_method
-@every_case
-def test_the_end_is_the_last_of_all_rows(case: str, method: str, engine: str) -> None:
-    model, rig, t_end = CASES[case]
-    options = METHODS[method] | {"engine": engine}
-    whole = simulate(model, rig, t_end, output="all", **options)
-    end = simulate(model, rig, t_end, output="end", **options)
-    assert len(end) == len(end.rows) == len(end.stops) == 1
-    assert end.t.tolist() == [t_end]
-    assert end.microstep.tolist() == [0]
-    last = _row(whole, -1) | {"microstep": np.array(0)}
-    _same_row(last, _row(end, -1))
-    np.testing.assert_array_equal(end.transitions, whole.transitions)
-    assert end.transitions.dtype == whole.transitions.dtype
-    assert (len(whole.transitions) > 0) == (case != "no edges")
-
-
-@pytest.mark.slow
-@every_method
-@every_case
-def test_only_requested_rows_are_recorded(case: str, method: str, engine: str) -> None:
-    model, rig, t_end = CASES[case]
-    options = METHODS[method] | {"engine": engine}
-    whole = simulate(model, rig, t_end, **options)
-    events = np.unique(whole.transitions.t[:4])  # a row on a switch is the one after it
-    times = np.unique([0.0, 0.1 * t_end, *events, 0.77 * t_end, t_end])
-    trace = simulate(model, rig, t_end, output="t_eval", t_eval=times, **options)
-    np.testing.assert_array_equal(trace.t, times)
-    assert not trace.microstep.any()
-    np.testing.assert_array_equal(trace.transitions, whole.transitions)
-    _same_row(_row(whole, -1) | {"microstep": np.array(0)}, _row(trace, -1))
-    if method != "by step":  # that one takes an edge after the step's end
-        on_event = np.searchsorted(whole.t, events, side="right") - 1
-        for name in ("x", "z", "F", "states"):
-            np.testing.assert_array_equal(
-                getattr(trace, name)[np.searchsorted(times, events)],
-                getattr(whole, name)[on_event],
-            )
 
 
 def test_the_default_output_depends_on_t_eval(engine: str) -> None:
@@ -126,19 +62,11 @@ def test_both_sides_of_every_stop_are_recorded_with_requested_rows(engine: str) 
     np.testing.assert_array_equal(between.states, sampled.states)
 
 
-@pytest.mark.parametrize("rows", [[0.0], [31.0], [15.5], np.linspace(0, 31, 4001)])
-def test_few_and_many_requested_rows(rows: Any, engine: str) -> None:
-    model, rig, t_end = CASES["open loop"]
-    trace = simulate(model, rig, t_end, t_eval=rows, engine=engine)
-    assert trace.t.tolist() == list(rows)
-    assert len(trace.transitions) == 24
-
-
 def test_the_end_can_be_saved_and_sampled(engine: str, tmp_path: Any) -> None:
     model, rig, t_end = CASES["open loop"]
     end = simulate(model, rig, t_end, output="end", engine=engine)
     for name in ("end.npz", "end.csv"):
-        _same_row(_row(end, 0), _row(Trace.load(end.save(tmp_path / name)), 0))
+        same_bits(end, Trace.load(end.save(tmp_path / name)))
     assert end.sample([t_end]).z.tolist() == end.z.tolist()
     with pytest.raises(ValueError, match="outside the run"):
         end.sample([0.5 * t_end])

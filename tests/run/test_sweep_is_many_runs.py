@@ -126,13 +126,12 @@ def _one(case: str, run: int) -> tuple[Model, Rig]:
     return with_values(model, values), with_numbers(rig, values)
 
 
+TIGHT, RK4 = {"rtol": 1e-9, "atol": 1e-12}, {"method": "rk4", "step": 9.03e-3}
+PAIRS = [(case, ({}, TIGHT, RK4)[k % 3]) for k, case in enumerate(CASES)]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "options",
-    [{}, {"rtol": 1e-9, "atol": 1e-12}, {"method": "rk4", "step": 9.03e-3}],
-    ids=["dp45", "tight", "rk4"],
-)
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(("case", "options"), PAIRS)
 def test_each_row_is_a_run(case: str, options: dict[str, Any], engine: str) -> None:
     model, rig, t_end, parameters = CASES[case]
     times = np.linspace(0.0, t_end, 7)

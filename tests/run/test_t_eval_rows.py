@@ -12,49 +12,7 @@ CASES = {
     "pulled mass": (*pulled_mass(), 20.0),
     "fig. 3, slipping": (*non_drifting("signed", slipping=True), 10.0),
 }
-MANY_STEPS = pytest.param({"method": "rk4", "step": 2.03e-3}, marks=pytest.mark.slow)
-METHODS = [{}, {"method": "bs23"}, MANY_STEPS]
 cases = pytest.mark.parametrize("case", CASES)
-
-
-@pytest.mark.parametrize("options", METHODS)
-@cases
-def test_rows_are_at_the_requested_times(case, options):
-    """Few times, many times, unevenly spread: these are the rows, all with micro-step 0."""
-    model, rig, T = CASES[case]
-    full = simulate(model, rig, T, engine=FASTEST, **options)
-    rng = np.random.default_rng(7)
-    for times in (
-        [T],
-        [0.0],
-        [0.0, T],
-        [0.3 * T, 0.3 * T + 1e-9, 0.7 * T],
-        np.linspace(0, T, 2501),
-        np.sort(rng.uniform(0, T, 300)),
-    ):
-        trace = simulate(model, rig, T, engine=FASTEST, t_eval=times, **options)
-        np.testing.assert_array_equal(trace.t, times)
-        assert (trace.microstep == 0).all()
-        np.testing.assert_array_equal(trace.transitions, full.transitions)
-
-
-@pytest.mark.parametrize("options", METHODS)
-@cases
-def test_a_row_on_an_event_is_the_state_after_it(case, options):
-    """At the exact time of a transition, the row has the values of the last micro-step."""
-    model, rig, T = CASES[case]
-    full = simulate(model, rig, T, engine=FASTEST, **options)
-    times = np.unique(full.transitions.t)
-    trace = simulate(model, rig, T, engine=FASTEST, t_eval=times, **options)
-    last = np.searchsorted(full.t, times, side="right") - 1
-    for name in ("x", "v", "z", "F", "F_elements", "states"):
-        np.testing.assert_array_equal(getattr(trace, name), getattr(full, name)[last], name)
-    just_before = np.nextafter(times, 0)
-    before = simulate(model, rig, T, engine=FASTEST, t_eval=just_before, **options)
-    first = np.searchsorted(full.t, times, side="left")
-    np.testing.assert_array_equal(before.states, full.states[first])
-    assert (before.states != trace.states).any(axis=1).all()
-    np.testing.assert_allclose(before.z, full.z[first], rtol=0, atol=1e-12)
 
 
 @cases

@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 from gms_fsm import Body, Chart, Contact, LockError, State, System, Trace, Transition, simulate
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ChartError
-from tests.helpers import FASTEST
-from tests.random_systems import bits
+from tests.helpers import FASTEST, bits
 
 ENGINES = ["ifelse", "machines", "compiled"]
 if not importlib.util.find_spec("llvmlite"):

@@ -111,13 +111,3 @@ def test_the_servo_is_where_an_independent_loop_has_it() -> None:
     assert len(trace.transitions) == 24
     close = simulate(servo(), 0.2, engine="ifelse", rtol=1e-9)
     assert close.body("load").x[-1] == pytest.approx(trace.body("load").x[-1], rel=1e-6)
-
-
-@pytest.mark.parametrize("engine", ENGINES[1:])
-def test_engines_agree_bit_for_bit(engine: str) -> None:
-    one, other = simulate(servo(), 0.2, engine="ifelse"), _run(servo(), 0.2, engine)
-    np.testing.assert_array_equal(one.rows.t, other.rows.t)
-    np.testing.assert_array_equal(one.rows.y, other.rows.y)
-    np.testing.assert_array_equal(one.rows.mode, other.rows.mode)
-    np.testing.assert_array_equal(one.F, other.F)
-    assert one.transitions.tolist() == other.transitions.tolist()

@@ -352,12 +352,3 @@ def test_an_expression_that_becomes_undefined_keeps_the_run_so_far(
     if len(error.trace):
         assert error.trace.t[-1] <= t_break + 1e-6
         assert np.isfinite(error.trace.rows.y).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("text", ["sqrt(1 - t)", "1/(1 - t)", "exp(1e3*t)"])
-def test_with_fixed_steps_it_is_not_finite(text: str) -> None:
-    error = _fails(NotFiniteError, text, 5.0, method="rk4", step=0.25)
-    assert "not finite" in str(error)
-    assert error.trace.t[0] == 0.0
-    assert error.trace.t[-1] <= 1.0

@@ -11,8 +11,7 @@ import pytest
 
 from gms_fsm import Trace
 from gms_fsm.app.scenario import load_scenario
-from tests.helpers import ROOT
-from tests.systems_cases import same_system_bits
+from tests.helpers import ROOT, same_bits
 
 pytestmark = pytest.mark.slow
 
@@ -26,9 +25,9 @@ def test_the_load_and_the_switches() -> None:
     assert trace.t[-1] == 0.2
     assert 1e3 * trace.body("load").x[-1] == pytest.approx(1.32993, abs=5e-6)
     assert len(trace.transitions) == 24
-    same_system_bits(trace, _run("machines"))
+    same_bits(trace, _run("machines"))
 
 
 @pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="needs the extra 'fast'")
 def test_compiled_bits_are_equal() -> None:
-    same_system_bits(_run("ifelse"), _run("compiled"))
+    same_bits(_run("ifelse"), _run("compiled"))

@@ -7,7 +7,6 @@ from bisect import bisect_left, bisect_right
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -82,38 +81,6 @@ def test_every_tick_sees_what_is_listed_before_it_at_the_same_instant(
         before = bisect_right if order.index(j) < order.index(i) else bisect_left
         assert trace.value(f"n{i}")[rows[i]].tolist() == [*range(1, len(rows[i]) + 1)]
         assert trace.value(f"n{i}{j}")[rows[i]].tolist() == [before(ticks[j], t) for t in ticks[i]]
-
-
-# --------------------------------------------------------------------------- engines
-def mixed() -> System:
-    """Two contacts with periods, and two samplers."""
-    return System(
-        "mixed",
-        bodies=(
-            Body("slide", velocity="60 * cos(100 * t)"),
-            Body("other", inertia=1.0, force="30 * (x - x_o) + u", x="x_o", v="v_o"),
-        ),
-        contacts=(
-            Contact("fast", stick_slip("signed"), v="v_o", period=1e-4),
-            Contact("pad", stick_slip("signed"), v="v", period=1.1e-3),
-        ),
-        sampled=(
-            Sampled("slow", period=7e-4, offset=2e-4, updates={"w": "e - 0.1 * v"}),
-            Sampled("often", period=5e-5, updates={"e": "x - x_o", "u": "e + w"}),
-        ),
-    )
-
-
-@pytest.mark.parametrize("engine", ["machines", "compiled"])
-def test_engines_agree_bit_for_bit(engine: str) -> None:
-    if engine == "compiled":
-        pytest.importorskip("llvmlite")
-    one, other = (simulate(mixed(), 0.16, t_start=0.1, engine=each) for each in ("ifelse", engine))
-    assert len(one.transitions) == 4
-    np.testing.assert_array_equal(one.rows.t, other.rows.t)
-    np.testing.assert_array_equal(one.rows.y, other.rows.y)
-    np.testing.assert_array_equal(one.rows.mode, other.rows.mode)
-    assert one.transitions.tolist() == other.transitions.tolist()
 
 
 # --------------------------------------------------------------------------- times

@@ -8,8 +8,8 @@ import pytest
 
 from gms_fsm import Trace
 from gms_fsm.app.scenario import load_scenario
+from tests.helpers import same_bits
 from tests.scenario_files import CommandLine
-from tests.systems_cases import same_system_bits
 
 SCENARIO = """
 [rig]
@@ -69,7 +69,7 @@ def test_a_scenario_file_runs(
     assert done.code == 0, done.err
     saved = Trace.load("out/trace.npz")
     assert len(saved.transitions) >= least
-    same_system_bits(saved, load_scenario("zoo.toml").simulate())
+    same_bits(saved, load_scenario("zoo.toml").simulate())
 
 
 SYSTEM = """

@@ -1,0 +1,606 @@
+"""Named runs that laws hold for, each made once a session: `tests/laws` walks over them.
+
+`CORPUS` has runs that reach their end, `FAILING` runs that stop with an error. A run is a small
+object, made when it is asked for; `trace` computes it once per engine. Its groups say what a law
+may assume: ``"rig"`` is a model on a rig, ``"system"`` anything else.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import math
+import zlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import (
+    GMS,
+    Body,
+    Chart,
+    ChartModel,
+    Contact,
+    GMSParameters,
+    LuGre,
+    Prescribed,
+    PulledSlider,
+    Sampled,
+    Slider,
+    State,
+    Stribeck,
+    System,
+    Trace,
+    Transition,
+    simulate,
+)
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.charts import CHARTS, gms_element
+from gms_fsm.charts.registry import entry
+from gms_fsm.errors import GMSError
+from gms_fsm.systems.models import demonstration
+from gms_fsm.systems.signals import Signal, as_signal
+from gms_fsm.traces.failures import (
+    LivelockError,
+    NotFiniteError,
+    SignalEndError,
+    SimulationError,
+    StepLimitError,
+    StepSizeError,
+)
+from tests import random_systems, systems_cases
+from tests.helpers import (
+    CURVE,
+    FASTEST,
+    FIG3_FORCE,
+    FIG4_SINE,
+    ROOT,
+    FunctionBelt,
+    banging,
+    bank,
+    non_drifting,
+    one_element,
+    open_loop,
+    pulled_mass,
+    stick_slip,
+    wear,
+)
+from tests.scenario_files import data_folder
+from tests.zoo import zoo_cases
+
+ENGINES = ("ifelse", "machines", *(("compiled",) if importlib.util.find_spec("llvmlite") else ()))
+
+
+# --------------------------------------------------------------------------- what a run is
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A subject of `simulate`, model and rig or a system, and its further arguments."""
+
+    subject: tuple[Any, ...]
+    t_end: float
+    how: Mapping[str, Any] = field(default_factory=dict)
+
+    def __call__(self, **more: Any) -> Trace:
+        """Simulate it."""
+        return simulate(*self.subject, self.t_end, **{**self.how, **more})
+
+    def outcome(self, **more: Any) -> tuple[Trace | None, str]:
+        """Return what was computed, and the error's name and text if it stopped."""
+        try:
+            return self(**more), ""
+        except GMSError as error:
+            return getattr(error, "trace", None), f"{type(error).__name__}: {error}"
+
+
+Maker = Callable[[], Run]
+
+
+def _on(model: Any, rig: Any, t_end: float, **how: Any) -> Maker:
+    """A model on a rig."""
+    return lambda: Run((model, rig), t_end, how)
+
+
+def _case(make: Callable[[], systems_cases.Case]) -> Maker:
+    def made() -> Run:
+        case = make()
+        return Run((case.system,), case.t_end, {"initial": dict(case.initial), "rtol": 1e-8})
+
+    return made
+
+
+# --------------------------------------------------------------------------- the paper's models
+@dataclass(frozen=True, eq=False)
+class TwoForces:
+    """A rig of one's own with two signals, a number, time and position in its equation."""
+
+    first: Any
+    second: Any
+    mass: float = 1.0
+    title: str = field(default="two forces", init=False)
+    acceleration: str = field(default="(F_a + F_b * cos(t) - 0.1 * x - F) / mass", init=False)
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """Both forces."""
+        return {"F_a": as_signal(self.first), "F_b": as_signal(self.second)}
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """The mass."""
+        return {"mass": self.mass}
+
+
+LUGRE = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4.0, stribeck=Stribeck(1.0, 1.5, 1e-3))
+JUMPS = [0, 1, 1, 2, 2.5, 2.5, 2.5, 10], [0.1, 0.2, -0.3, -0.3, 0.5, 0.6, 0.7, 0]
+_noise = np.random.default_rng(3)
+SAMPLES = np.linspace(0, 10, 501), _noise.normal(size=501).cumsum() * 0.02
+SIGNED, PUBLISHED = stick_slip("signed"), stick_slip("published")
+PULLED = pulled_mass()
+STARTED = {"x": 0.5, "v": 0.01, "z": [0, 0.001, 0.002, 0.003], "states": ["slip"] * 4}
+GMS_RUNS: dict[str, Maker] = {
+    "open loop": _on(SIGNED, open_loop(), 31.0),
+    "open loop, published": _on(PUBLISHED, open_loop(), 31.0),
+    "fig. 4, published": _on(PUBLISHED, Prescribed(FIG4_SINE), 100.0),
+    "fig. 3": _on(*non_drifting("published"), 30.0),
+    "fig. 3, slipping": _on(*non_drifting("signed", slipping=True), 12.0),
+    "fig. 3, slipping, published": _on(*non_drifting("published", slipping=True), 12.0),
+    "pulled mass": _on(*PULLED, 30.0),
+    "slider": _on(PULLED[0], Slider(1.0, "2.5*sin(0.7*t)"), 12.0),
+    "twelve elements": _on(bank(12), Prescribed("0.2*sin(2*pi*t/7)"), 14.0),
+    "before zero": _on(SIGNED, open_loop(), 11.0, t_start=-20.5),
+    "started": _on(*PULLED, 5.0, initial=STARTED),
+    "lugre": _on(LUGRE, Prescribed("1e-3*(1.5+cos(10*t))"), 6.0),
+    "lugre slider": _on(LUGRE, Slider(1.0, FIG3_FORCE), 6.0),
+    "four at once": _on(SIGNED, Prescribed(FIG4_SINE), 6.0),
+    "velocity window": _on(one_element("signed", F_c=0.4, v_s=1e-3, k=0.7), open_loop(), 13.0),
+}
+METHODS: dict[str, dict[str, Any]] = {
+    "bs23": {"method": "bs23"},
+    "tight": {"rtol": 1e-10, "atol": 1e-13},
+    "loose": {"rtol": 1, "atol": 1},  # integers
+    "max_step": {"max_step": 1e-2},
+    "dp45 on a grid": {"step": 1e-2},
+    "euler": {"method": "euler", "step": 5.003e-3},
+    "heun": {"method": "heun", "step": 5.003e-3},
+    "rk4": {"method": "rk4", "step": 7.003e-3},
+    "rk4 by step": {"method": "rk4", "step": 7.003e-3, "events": "step"},
+    "euler by step": {"method": "euler", "step": 5.003e-3, "events": "step"},
+    "dp45 by step": {"events": "step", "max_step": 1e-2},
+    "bs23 by step": {"method": "bs23", "events": "step", "max_step": 1e-2},
+    "t_eval": {"t_eval": np.linspace(0, 12, 777)},
+}
+_BASES = ("open loop", "fig. 4, published", "fig. 3, slipping", "pulled mass")
+_SUBJECTS: dict[str, Callable[[], tuple[Any, Any]]] = {
+    "open loop": lambda: (SIGNED, open_loop()),
+    "fig. 4, published": lambda: (PUBLISHED, Prescribed(FIG4_SINE)),
+    "fig. 3, slipping": lambda: non_drifting("signed", slipping=True),
+    "pulled mass": lambda: PULLED,
+}
+
+
+def _by_method(place: int, name: str) -> tuple[str, Maker]:
+    """Each method on one of four runs, in turn."""
+    base = _BASES[place % len(_BASES)]
+    return f"{base}, {name}", lambda: Run(_SUBJECTS[base](), 12.0, METHODS[name])
+
+
+METHOD_RUNS = dict(_by_method(place, name) for place, name in enumerate(METHODS))
+VELOCITIES: dict[str, Any] = {
+    "a number": 0.1,
+    "ramps": [(0, 0), (2, 0.2), (4, -0.2), (9, 0.3)],
+    "ramps with jumps": list(zip(*JUMPS, strict=True)),
+    "a jump at the start and at the end": [(0, 0.1), (0, 0.2), (10, -0.2), (10, 0.2)],
+    "ramps that begin later": [(3, 0.2), (4, -0.2)],
+    "a record": SAMPLES,
+    "a record with jumps": JUMPS,
+    "corners": "0.1*abs(sin(t)) + min(0.1, max(-0.1, sin(5*t)))",
+    "jumps of an expression": "0.2*sgn(cos(0.7*t)) - 0.05*sgn(sin(t))",
+    "powers": "0.2*sin(t)*8**(sin(3*t)/3) + 0.05*(1.1 + cos(t))**0.5 - 0.02*2**cos(t)",
+    "all functions": "0.4*tanh(sin(t))*exp(-0.1*t) + 0.1*cos(3*t)*sqrt(t)/(1 + t**2)",
+    "a function": lambda t: 0.2 * math.sin(0.3 * t) + 0.05,
+}
+FORCES: dict[str, tuple[Any, Any]] = {
+    "two records": (([0, 3, 3, 7, 12.0], [0, 1, 0.5, 2, 0]), (SAMPLES[0] * 1.2, SAMPLES[1])),
+    "ramps and a record": ([(0, 0), (5, 3)], (np.linspace(0, 12, 7), [0, 1, 0, 2, 0, 3, 0])),
+    "expression and ramps": ("sgn(sin(t))*2", [(0, 0), (5, 3), (5, -3)]),
+    "ramps and a number": ([(0, 1), (1, 2), (1, -2), (6, 4)], 0.5),
+}
+SIGNAL_RUNS: dict[str, Maker] = {
+    name: _on(SIGNED, Prescribed(signal), 10.0) for name, signal in VELOCITIES.items()
+} | {name: _on(SIGNED, TwoForces(*forces), 12.0) for name, forces in FORCES.items()}
+
+
+# --------------------------------------------------------------------------- charts of one's own
+ORDER = Chart(
+    "Stateflow's order",
+    inputs=("t",),
+    variables=("z", "w"),
+    states=(
+        State("a", {"z": "0", "w": "0"}, exit={"z": "z + 1", "w": "z"}),
+        State("b", {"z": "0", "w": "1"}, entry={"z": "z + 0.5", "w": "w + z"}),
+    ),
+    transitions=(Transition("go", "a", "b", "t >= 1", actions={"z": "10 * z", "w": "w * z"}),),
+    outputs={"F": "z"},
+)
+
+
+RISING = ("1 + 0.3 * t", "-1 + 0.3 * t")  # p' below and above q = 0
+FALLING = ("1 - 0.3 * t", "-1 - 0.3 * t")
+
+
+def relay(
+    flows: tuple[str, str] = RISING,
+    guards: tuple[str, str] = ("p > q", "p < q"),
+    more: Sequence[Transition] = (),
+    n: int = 1,
+) -> ChartModel:
+    """A variable p pushed towards q from both sides, along which the run slides."""
+    below, above = flows
+    chart = Chart(
+        "relay",
+        inputs=("t",),
+        variables=("p", "q"),
+        parameters=("k",),
+        states=(
+            State("below", flow={"p": below, "q": "0"}),
+            State("above", flow={"p": above, "q": "0"}),
+            State("off", flow={"p": "0", "q": "0"}),
+        ),
+        transitions=(
+            Transition("rise", "below", "above", guard=guards[0]),
+            Transition("fall", "above", "below", guard=guards[1]),
+            *more,
+        ),
+        outputs={"F": "k * p"},
+    )
+    return ChartModel(chart, {"k": 1.0}, n=n)
+
+
+def coulomb(outputs: str = "F_c * sgn(v)") -> ChartModel:
+    """Coulomb friction without stiction: a sign."""
+    chart = Chart(
+        "Coulomb friction",
+        inputs=("v", "x"),
+        variables=("z",),
+        parameters=("F_c",),
+        states=(State("on", flow={"z": "0"}),),
+        outputs={"F": outputs},
+    )
+    return ChartModel(chart, {"F_c": 1.0})
+
+
+def runs_down(C: Any) -> ChartModel:
+    """Elements that come to rest on z = 0, each in its time."""
+    chart = Chart(
+        "runs down",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("C",),
+        states=(State("on", flow={"z": "v - C * sgn(z)"}),),
+        outputs={"F": "z"},
+    )
+    return ChartModel(chart, {"C": C}, n=len(C))
+
+
+class Belt:
+    """A mass on a belt that moves."""
+
+    title = "mass on a moving belt"
+    acceleration = "(stiffness * (0 - x) - F - F_b * sgn(v - w)) / mass"
+
+    def __init__(self, w: str) -> None:
+        self.signals = {"w": as_signal(w)}
+        self.numbers = {"mass": 1.0, "stiffness": 4.0, "F_b": 1.0}
+
+
+# An element that slips holds v at 0 for a tenth of a millisecond.
+HELD = GMS(
+    GMSParameters(
+        [82e3, 146e3, 110e3],
+        [29, 2.6, 114],
+        [2.8e-3, 2.16e-3, 1.53e-3],
+        sigma_2=1.3,
+        stribeck=Stribeck(2.88, 3.155, 8.8e-3),
+        v_c=3.3e-6,
+        weights=[3.9e-6, 3e-6, 2.15e-6],
+    ),
+    law="signed",
+)
+PUSHED = Slider(1.4, "2.9*sin(4.7*t)")
+
+
+def _broken(*edges: Transition) -> ChartModel:
+    """The signed element with other edges."""
+    sound = gms_element("signed")
+    chart = Chart(
+        "broken",
+        sound.inputs,
+        sound.variables,
+        sound.parameters,
+        sound.states,
+        edges,
+        sound.outputs,
+    )
+    values = {"k": 1, "sigma": 0.1, "C": 0.1, "v_c": 0.2}
+    return ChartModel(chart, values, n=2, stribeck=Stribeck(1.0, 1.5, 1e-3), weights=[2, 1])
+
+
+def go(guard: str, **actions: str) -> ChartModel:
+    return _broken(Transition("go", "stick", "slip", guard=guard, actions=actions))
+
+
+OWN_RUNS: dict[str, Maker] = {
+    "wear": _on(wear(), Prescribed("0.3*sin(2*pi*t/17)"), 40.0),
+    "wear, pulled": _on(wear(1), PulledSlider(1, 2, 0.1), 40.0, method="rk4", step=7.003e-3),
+    "order of actions": _on(
+        ChartModel(ORDER, {}, n=2, stribeck=CURVE),
+        Prescribed("0"),
+        2.0,
+        initial={"z": [2.0, 3.0], "w": [0.0, 0.0]},
+    ),
+    "sliding": _on(relay(FALLING), Prescribed("0"), 5.0, initial={"p": [-0.1], "q": [0.0]}),
+    "held at standstill": _on(HELD, PUSHED, 0.4),
+    "coulomb": _on(coulomb(), PulledSlider(1.0, 2.0, 0.1), 10.0),
+    "on a belt": _on(coulomb("0 * F_c"), Belt("0.1 * cos(t)"), 1.2, initial={"v": 0.1}),
+    "runs down": _on(
+        runs_down([1.0, 2.0, 2.0, 0.1]),
+        Slider(1e9, "0"),
+        2.0,
+        initial={"z": [1.0, 1.0, -1.0, 1.0]},
+    ),
+    "an infinite side": _on(go("exp(1e4 + z) > 0"), Prescribed("0.1"), 1.0),
+    "divided by zero": _on(go("1 / (z - z) > 0"), Prescribed("0.1"), 1.0),
+    "fast switching": _on(banging(1e-2), Prescribed("1"), 2.0),
+}
+
+
+# --------------------------------------------------------------------------- the zoo
+SOFT = {"k_t": 2e3, "v_s": 0.02}  # or the mass would ring at 50 Hz
+
+
+def _demonstration(name: str) -> Maker:
+    """A chart of the zoo with the numbers of its demonstration."""
+
+    def made() -> Run:
+        if name == "seven-parameter":
+            model = ChartModel(CHARTS[name], {**entry(name).demonstration.values, **SOFT})
+            return Run((model, PulledSlider(1.0, 2.0, 0.1)), 11.0)
+        drive = Prescribed("2e-3 * (cos(3 * t) + 0.9 * cos(9.3 * t))")
+        return Run((demonstration(entry(name)), drive), 4.0)
+
+    return made
+
+
+DEMONSTRATIONS = ("rate-state-ageing", "rate-state-slip", "bouc-wen", "seven-parameter")
+ZOO_RUNS: dict[str, Maker] = {
+    **{name: _case(functools.partial(make)) for name, make in zoo_cases.CASES.items()},
+    **{name: _demonstration(name) for name in DEMONSTRATIONS},
+}
+
+
+# --------------------------------------------------------------------------- systems
+def rates() -> System:
+    """Two contacts with periods, and two samplers, one of them with an offset."""
+    return System(
+        "several rates",
+        bodies=(
+            Body("slide", velocity="60 * cos(100 * t)"),
+            Body("other", inertia=1.0, force="30 * (x - x_o) + u", x="x_o", v="v_o"),
+        ),
+        contacts=(
+            Contact("fast", SIGNED, v="v_o", period=1e-4),
+            Contact("pad", SIGNED, v="v", period=1.1e-3),
+        ),
+        sampled=(
+            Sampled("slow", period=7e-4, offset=2e-4, updates={"w": "e - 0.1 * v"}),
+            Sampled("often", period=5e-5, updates={"e": "x - x_o", "u": "e + w"}),
+        ),
+    )
+
+
+def loaded() -> System:
+    """Two contacts whose normal force varies, and one whose threshold is an input."""
+    lugre = LuGre(sigma_0=10.0, sigma_1=0.2, sigma_2=0.1, stribeck=Stribeck(0.3, 0.5, 0.01))
+    bound = Contact(
+        "bound", SIGNED.chart, SIGNED.values, n=4, v="v", inputs={"s": "w + 0.1 * abs(x)"}
+    )
+    return System(
+        "loaded",
+        bodies=(Body("mass", inertia=1.0, force="2 * sin(t)", x="x", v="v"),),
+        contacts=(
+            Contact("pad", SIGNED, v="v", inputs={"N": "2 + 1.5 * sin(3 * t)"}),
+            Contact("oil", lugre, v="v", inputs={"N": "1 + 0.1 * t"}),
+            bound,
+        ),
+        signals={"w": "0.2 + 0.01 * t"},
+    )
+
+
+def belt(speed: Any = "0.1") -> System:
+    """Two blocks on a belt, with a contact of each kind: locked, a bank, in the plane."""
+    stiction = {"F_c": 1.0, "F_s": 1.5, "b": 0.0}
+    oil = Chart(
+        "viscous in the plane",
+        velocities=("v", "w"),
+        variables=("p", "q"),
+        states=(State("slip", flow={"p": "v", "q": "w - q"}, outputs={"F": "v + p", "F_w": "w"}),),
+    )
+    return System(
+        "two blocks on a belt, and oil",
+        bodies=(
+            Body("one", inertia="m", force="1.3 * (q2 - q1) - 2 * q1 + 4 * sin(t)", x="q1", v="w1"),
+            Body("two", inertia=1.2, force="1.3 * (q1 - q2) - 2 * q2 + i", x="q2", v="w2"),
+            Body("belt", velocity="r", x="x_b", v="w_b"),
+        ),
+        contacts=(
+            Contact("pad", CHARTS["stiction"], stiction, v="w1 - w_b"),
+            Contact("bank", SIGNED, v="w2 - w_b"),
+            Contact("oil", oil, v=("w1", "w1 - w2")),
+        ),
+        signals={"r": speed},
+        numbers={"m": 1.0},
+        flow={"i": "q1 - i"},
+    )
+
+
+RANDOM_SEED, RANDOM_SHAPES = 7, 8
+
+
+def _random(index: int) -> Maker:
+    def made() -> Run:
+        one = random_systems.trial(RANDOM_SEED, index, RANDOM_SHAPES)
+        return Run((one.system,), random_systems.T_END, one.how)
+
+    return made
+
+
+SYSTEM_RUNS: dict[str, Maker] = {
+    **{
+        f"system {name.replace('_', ' ')}": _case(make)
+        for name, make in systems_cases.CASES.items()
+    },
+    "several rates": lambda: Run((rates(),), 0.16, {"t_start": 0.1}),
+    "loads": lambda: Run((loaded(),), 8.0),
+    "every kind of contact": lambda: Run(
+        (belt(),), 12.0, {"initial": {"q2": 0.2, "pad.states": ["backward"]}}
+    ),
+    **{f"random system {k}": _random(k) for k in range(RANDOM_SHAPES - 1)},  # the last one stops
+}
+
+
+# --------------------------------------------------------------------------- scenarios
+def _scenario(name: str) -> Maker:
+    def made() -> Run:
+        with pytest.MonkeyPatch.context() as patch:
+            if name == "tribometer":
+                patch.setenv("GMS_FSM_DATA", str(data_folder()))
+            read = load_scenario(ROOT / "scenarios" / f"{name}.toml")
+        how = {key: u for key, u in read.arguments.items() if key not in ("engine", "t_end")}
+        *subject, t_end = read.subject
+        return Run(tuple(subject), t_end, how)
+
+    return made
+
+
+SCENARIOS = tuple(sorted(path.stem for path in (ROOT / "scenarios").glob("*.toml")))
+SCENARIO_RUNS: dict[str, Maker] = {f"scenario {name}": _scenario(name) for name in SCENARIOS}
+
+
+# --------------------------------------------------------------------------- runs that stop
+def flow_of(text: str) -> ChartModel:
+    """Two variables with one flow and no edges."""
+    chart = Chart(
+        "flow", ("v", "t"), ("z",), ("k",), (State("on", {"z": text}),), (), {"F": "k * z"}
+    )
+    return ChartModel(chart, {"k": 1.0}, n=2, stribeck=CURVE)
+
+
+BOTH_WAYS = _broken(
+    Transition("break_away", "stick", "slip", guard="abs(z) >= s and abs(v) <= v_c"),
+    Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < 10 * s"),
+)
+SELF_LOOP = _broken(Transition("again", "stick", "stick", guard="z >= s"))
+RECORD = np.linspace(0, 35, 701), 0.2 * np.sin(2 * np.pi * np.linspace(0, 35, 701) / 20)
+_UP = {"initial": {"z": [0.1, 1.0]}}
+_RK4 = {"method": "rk4", "step": 0.01}
+_BY_STEP = {"events": "step", "max_step": 0.05}
+_Failure = tuple[type[SimulationError], Maker]
+FAILURES: dict[str, _Failure] = {
+    "livelock": (LivelockError, _on(BOTH_WAYS, Prescribed("0.15"), 20.0)),
+    "self-loop": (LivelockError, _on(SELF_LOOP, Prescribed("0.5"), 5.0)),
+    "chattering": (LivelockError, _on(banging(1e-8), Prescribed("1"), 10.0)),
+    "no slope": (LivelockError, _on(flow_of("0"), FunctionBelt(), 5.0, initial={"v": 1.0})),
+    "blow-up": (StepSizeError, _on(flow_of("z * z"), Prescribed("0"), 2.0, **_UP)),
+    "blow-up, bs23": (
+        StepSizeError,
+        _on(flow_of("z * z"), Prescribed("0"), 2.0, method="bs23", rtol=1e-4, **_UP),
+    ),
+    "blow-up by step": (
+        StepSizeError,
+        _on(flow_of("z * z"), Prescribed("0"), 2.0, **_BY_STEP, **_UP),
+    ),
+    "blow-up, rk4": (NotFiniteError, _on(flow_of("z * z"), Prescribed("0"), 20.0, **_RK4, **_UP)),
+    "blow-up, rk4 by step": (
+        NotFiniteError,
+        _on(flow_of("z * z"), Prescribed("0"), 20.0, events="step", **_RK4, **_UP),
+    ),
+    "pole of t": (StepSizeError, _on(flow_of("1 / (1 - t)**2"), Prescribed("0"), 2.0)),
+    "odd pole of t": (SimulationError, _on(flow_of("1 / (t - 1)"), Prescribed("0"), 2.0)),
+    "infinite at once": (NotFiniteError, _on(flow_of("1 / (k - 1)"), Prescribed("0"), 2.0)),
+    "root of a negative": (NotFiniteError, _on(PUBLISHED, Prescribed("0.1*sqrt(3 - t)"), 10.0)),
+    "root, fixed steps": (
+        NotFiniteError,
+        _on(PUBLISHED, Prescribed("0.1*sqrt(3 - t)"), 10.0, **_RK4),
+    ),
+    "exp overflows": (NotFiniteError, _on(PUBLISHED, Prescribed("exp(800*(t - 2.9))"), 10.0)),
+    "division by zero": (SimulationError, _on(SIGNED, Prescribed("0.1/(2 - t)"), 10.0)),
+    "nothing at the start": (NotFiniteError, _on(SIGNED, Prescribed("sqrt(-1 - t)"), 10.0)),
+    "a force without end": (SimulationError, _on(PULLED[0], Slider(1.0, "exp(300*t)"), 10.0)),
+    "a guard of NaN": (NotFiniteError, _on(go("0 / (z - z) > 0"), Prescribed("0.1"), 1.0)),
+    "a root in a guard": (NotFiniteError, _on(go("sqrt(-1 - z) > 0"), Prescribed("0.1"), 1.0)),
+    "an action of NaN": (
+        NotFiniteError,
+        _on(go("z >= 0.05", z="1 / (z - z)"), Prescribed("0.1"), 1.0),
+    ),
+    "the record ends": (SignalEndError, _on(SIGNED, Prescribed(RECORD), 61.0)),
+    "the record ends, rk4": (SignalEndError, _on(SIGNED, Prescribed(RECORD), 61.0, **_RK4)),
+    "too many steps": (StepLimitError, _on(*PULLED, 60.0, max_steps=300)),
+    "random system 7": (LivelockError, _random(7)),
+}
+
+# --------------------------------------------------------------------------- all of them
+RIG_RUNS = {**GMS_RUNS, **METHOD_RUNS, **SIGNAL_RUNS, **OWN_RUNS}
+CORPUS: dict[str, Maker] = {**RIG_RUNS, **ZOO_RUNS, **SYSTEM_RUNS, **SCENARIO_RUNS}
+FAILING: dict[str, Maker] = {name: make for name, (_, make) in FAILURES.items()}
+# One of each kind, for laws that cost more than two runs.
+FEW = (
+    "open loop",
+    "fig. 3, slipping, published",
+    "pulled mass",
+    "pulled mass, rk4",
+    "open loop, rk4 by step",
+    "ramps with jumps",
+    "lugre slider",
+    "wear",
+    "sliding",
+    "karnopp",
+    "maxwell-slip",
+    "system two blocks",
+    "system puck",
+    "system servo",
+    "system pushed against a stop",
+    "several rates",
+    "every kind of contact",
+    "random system 3",
+)
+
+
+@functools.cache
+def run(name: str) -> Run:
+    """Return a run by its name."""
+    return {**CORPUS, **FAILING}[name]()
+
+
+@functools.cache
+def trace(name: str, engine: str = FASTEST) -> Trace:
+    """Return the trace of a run, computed once."""
+    return run(name)(engine=engine)
+
+
+@functools.cache
+def outcome(name: str, engine: str = FASTEST) -> tuple[Trace | None, str]:
+    """Return how a run ended, computed once."""
+    return run(name).outcome(engine=engine)
+
+
+def each(names: Iterable[str] = CORPUS) -> pytest.MarkDecorator:
+    """Parametrise a test by the names of runs."""
+    return pytest.mark.parametrize("name", list(names))
+
+
+def in_turn(name: str) -> str:
+    """Return one engine for a run, always the same: pairs, where the product would cost more."""
+    return ENGINES[zlib.crc32(name.encode()) % len(ENGINES)]

@@ -1,0 +1,34 @@
+"""The C99 text of a run, compiled by a C compiler without contraction, gives the engine's bits."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from tests.corpus import each, run, trace
+from tests.helpers import other_parts
+from tests.platforms import in_c
+
+pytest.importorskip("llvmlite", reason="needs the extra fast")
+
+STRICT = ("-Wall", "-Wno-unused", "-Werror")
+TRANSLATED = (
+    "open loop",
+    "pulled mass, rk4",
+    "open loop, t_eval",
+    "a function",
+    "sliding",
+    "system servo",
+    "system puck",
+)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+@each(TRANSLATED)
+def test_a_run_in_c_is_the_run(name: str) -> None:
+    with in_c("cc", "-O2", STRICT) as translated:
+        found = run(name)(engine="compiled")
+    assert translated, "nothing was compiled"
+    assert other_parts(found, trace(name, "machines")) == []

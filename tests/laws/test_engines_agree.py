@@ -1,0 +1,98 @@
+"""State machines, if-else text and machine code give the same run to the last bit, failures too.
+
+Compared are rows, micro-steps, states, all that rows show, both sides of every stop, slides and the
+log; where a run fails, the same error with the same text, and the same part that was computed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gms_fsm
+from tests.corpus import CORPUS, ENGINES, FAILING, FAILURES, each, outcome, run, trace
+from tests.helpers import other_parts
+from tests.random_systems import trial
+
+
+@each(CORPUS)
+def test_runs_are_equal_to_the_last_bit(name: str) -> None:
+    one = trace(name, ENGINES[0])
+    assert len(one) > 1
+    for engine in ENGINES[1:]:
+        assert other_parts(one, trace(name, engine)) == [], engine
+
+
+@each(FAILING)
+def test_failures_say_the_same_and_keep_the_same(name: str) -> None:
+    one, said = outcome(name, ENGINES[0])
+    kind, _, text = said.partition(": ")
+    assert one is not None
+    assert issubclass(getattr(gms_fsm, kind), FAILURES[name][0]), said
+    assert "kept" in text
+    assert "np." not in text
+    for engine in ENGINES[1:]:
+        other, too = outcome(name, engine)
+        assert too == said, engine
+        assert other_parts(one, other) == [], engine
+
+
+@each(FAILING)
+@pytest.mark.parametrize("output", ["end", "t_eval"])
+def test_failures_are_the_same_whatever_is_recorded(name: str, output: str) -> None:
+    """With "end" the row recorded is the last that "all" would record; the log is complete."""
+    whole, said = outcome(name)
+    assert whole is not None
+    times = np.linspace(run(name).how.get("t_start", 0.0), run(name).t_end, 41)
+    how = {"output": output, "t_eval": times if output == "t_eval" else None}
+    found = [run(name).outcome(engine=engine, **how) for engine in ENGINES]
+    for other, too in found:
+        assert too == said
+        assert other is not None
+        assert other_parts(found[0][0], other) == []
+        assert [part for part in other_parts(other, whole) if part.startswith("log")] == []
+        if output == "end":
+            assert other.t.tolist() == whole.t[-1:].tolist()
+            assert other.rows.y.tobytes() == whole.rows.y[-1:].tobytes()
+        else:
+            assert other.t.tolist() == times[times <= whole.t[-1]][: len(other)].tolist()
+
+
+STILL = {  # the others switch
+    "fig. 3",
+    "scenario paper_fig3_non_drifting",
+    "lugre",
+    "lugre slider",
+    "dahl",
+    "lugre-sigma1",
+    "bouc-wen",
+    "rate-state-ageing",
+    "rate-state-slip",
+    "seven-parameter",
+    "prandtl-tomlinson",
+    "coulomb",
+    "on a belt",
+    "runs down",
+    "random system 1",
+    "random system 4",
+}
+
+
+def test_the_corpus_switches() -> None:
+    """The laws would hold for runs in which nothing happens, too."""
+    counts = {name: len(trace(name).transitions) for name in CORPUS}
+    assert {name for name, count in counts.items() if not count} <= STILL
+    assert sum(counts.values()) > 3000
+
+
+def test_random_systems_are_drawn_again_by_their_numbers() -> None:
+    one, same, other = (trial(7, index, 8) for index in (3, 3, 11))
+    assert one.system.numbers == same.system.numbers
+    assert one.kinds == other.kinds  # the same shape
+    assert one.system.numbers != other.system.numbers
+
+
+def test_another_bit_is_found() -> None:
+    changed = run("random system 0")(engine=ENGINES[0], rtol=1e-5)
+    again = run("random system 0")(engine=ENGINES[0], rtol=1.0000000001e-5)
+    assert "rows y" in other_parts(changed, again)
