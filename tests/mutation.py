@@ -38,9 +38,8 @@ PHYSICS = [
 ]
 NEAR = {  # module: its tests, those that detect most first
     "gms_fsm/charts/chart.py": [
-        "charts/test_a_chart_cannot_be_changed",
         "charts/test_chart_refuses_contradictions",
-        "charts/test_broken_chart_files_say_what_is_wrong",
+        "test_refusals",
         "charts/test_edges_by_time_and_from_several_states",
         "charts/test_named_expressions_mean_what_they_stand_for",
         "charts/test_chart_files_round_trip",

@@ -62,15 +62,6 @@ def drive(
     return app
 
 
-def keys(*pressed: str, size: tuple[int, int] = SMALL, made: Session | None = None) -> FullScreen:
-    """Open the debugger, press keys, and return it."""
-
-    async def action(_: FullScreen, pilot: Pilot[Any]) -> None:
-        await press(pilot, *pressed)
-
-    return drive(action, size, made)
-
-
 def typed(text: str) -> list[str]:
     """Return the keys that type a text."""
     names = {" ": "space", "=": "equals_sign", "-": "minus", ".": "full_stop", ":": "colon"}

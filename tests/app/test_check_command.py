@@ -91,38 +91,6 @@ def test_the_list_names_all_charts_and_describes_the_faults(gms_fsm: CommandLine
     assert "lugre" in said
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ((), ("it must be one of ", "gms, ", "lugre, ", "broken:overlap")),
-        (("literal",), ("'literal'", "broken:literal")),
-        (("gms",), ("--law signed or --law published",)),
-        (("lugre", "--law", "signed"), ("takes no --law",)),
-        (("broken:arms", "--law", "signed"), ("takes no --law",)),
-    ],
-)
-def test_a_wrong_name_is_one_message(
-    gms_fsm: CommandLine, arguments: tuple[str, ...], words: tuple[str, ...]
-) -> None:
-    one_message(gms_fsm("check", *arguments), *words)
-
-
-@pytest.mark.parametrize(
-    ("domain", "words"),
-    [
-        (("s > 0", "s < 0"), "is empty"),
-        (("s > q",), "unknown name 'q'"),
-        (("exp(s) > 1",), "exp is not encoded"),
-    ],
-)
-def test_a_wrong_domain_is_one_message(
-    gms_fsm: CommandLine, domain: tuple[str, ...], words: str
-) -> None:
-    z3()
-    options = [part for text in domain for part in ("--domain", text)]
-    one_message(gms_fsm("check", "gms", "--law", "signed", *options), words)
-
-
 def test_without_z3_the_message_names_the_extra(
     gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:

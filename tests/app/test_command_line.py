@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from gms_fsm import GMS, GMSParameters, Prescribed, Trace, __version__
+from gms_fsm import GMS, GMSParameters, Prescribed, __version__
 from gms_fsm.lowering.program import lower
 from tests.scenario_files import CommandLine
 
@@ -34,35 +32,3 @@ def test_version_and_help(gms_fsm: CommandLine) -> None:
     help_text = gms_fsm("--help").out
     assert "paper" in help_text
     assert "code" in help_text
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["code"], "--law"),
-        (["code", "--law", "singed"], "signed"),
-        (["nonsense"], "nonsense"),
-        (["paper", "--force", "0.1*"], "column 5: the text ends too early"),
-        (["paper", "--force", "0.1*x"], "unknown name 'x'"),
-        (["paper", "--force", "__import__('os')"], "unknown function '__import__'"),
-        (["paper", "--velocity", "0.1*sqrt(2 - t)"], "not finite"),
-        (["paper", "-o", "file/out"], "choose another folder"),
-    ],
-)
-def test_a_mistake_is_one_message_and_exit_code_2(
-    arguments: list[str], said: str, gms_fsm: CommandLine
-) -> None:
-    Path("file").write_text("in the way")
-    done = gms_fsm(*arguments)
-    assert done.code == 2, done.err
-    assert said in done.err
-    assert "Traceback" not in done.err + done.out
-    assert done.err.count("error:") <= 1
-
-
-def test_a_failed_run_keeps_its_rows(gms_fsm: CommandLine) -> None:
-    done = gms_fsm("paper", "-o", "out", "--force", "0.1*sqrt(3 - t)")
-    assert done.code == 2
-    assert "partial.npz" in done.err
-    assert Trace.load(Path("out", "partial.npz")).t[-1] > 2.9

@@ -9,7 +9,7 @@ import pytest
 
 from gms_fsm import Prescribed, simulate
 from tests.helpers import stick_slip
-from tests.scenario_files import Answer, CommandLine
+from tests.scenario_files import Answer, CommandLine, one_message
 
 pytestmark = pytest.mark.slow
 SERVO = Path(__file__).parents[2] / "scenarios" / "servo.toml"
@@ -84,26 +84,11 @@ def test_plot_animate_and_replay(draw: CommandLine, files: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["chart", "gms"], "--law signed or --law published"),
-        (["chart", "gms", "--law", "signed", "-o", "c.jpg"], ".svg, .png, .pdf"),
-        (["chart", "gms", "--law", "signed", "--elements", "0"], "elements is 0"),
-        (["blocks", "--elements", "-1"], "elements is -1"),
-        (["blocks", "--schematic"], "no system is given"),
-        (["blocks", str(SERVO), "--schematic", "-o", "s.dot"], ".png, .svg or .pdf"),
-        (["plot", "bad.npz"], "damaged or incomplete"),
-        (["plot", "none.npz"], "no such file"),
         (["animate", "t.npz", "-o", "film.avi"], ".gif, .mp4 or .webm"),
         (["animate", "bad.npz"], "damaged or incomplete"),
-        (["replay", "bad.npz"], "damaged or incomplete"),
         (["replay", "t.npz", "bad.npz"], "damaged or incomplete"),
         (["replay", "t.npz", "-o", "nowhere/page.html"], "choose another folder"),
-        (["debug", "none.toml"], "no such file"),
     ],
 )
-def test_a_mistake_is_one_message_and_exit_code_2(
-    draw: CommandLine, arguments: list[str], words: str
-) -> None:
-    done = draw(*arguments)
-    assert done.code == 2, done.err
-    assert words in done.err
-    assert "Traceback" not in done.err + done.out
+def test_a_mistake_is_one_message(draw: CommandLine, arguments: list[str], words: str) -> None:
+    one_message(draw(*arguments), words)

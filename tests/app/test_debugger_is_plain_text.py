@@ -14,7 +14,7 @@ from gms_fsm import GMS, Chart, ChartModel, GMSParameters, Prescribed, State, St
 from gms_fsm.app.debugger import COMMANDS, Debugger, run_debugger
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.inspection.session import Session
-from tests.app.test_debugger_transcripts import FIG_4, PULLED, SCENARIOS, talk
+from tests.app.test_debugger_transcripts import FIG_4, SCENARIOS, talk
 from tests.helpers import ROOT
 
 EVERYTHING = (
@@ -77,17 +77,16 @@ def _wordy() -> Session:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scenario", [FIG_4, PULLED])
-def test_nothing_is_wider_than_80_columns(scenario: str) -> None:
+def test_nothing_is_wider_than_80_columns() -> None:
     prompts = re.compile(r"^\(t=[^)]*\) ")
-    for line in talk(scenario, *EVERYTHING).splitlines():
+    for line in talk(FIG_4, *EVERYTHING).splitlines():
         if not prompts.match(line):  # except the echo of a long command
             assert len(line) <= 80, line
         assert line.isascii()
         assert "\x1b" not in line
 
 
-@pytest.mark.parametrize("session", [_bank(12), _bank(1), _wordy()], ids=["12", "1", "wordy"])
+@pytest.mark.parametrize("session", [_bank(12), _wordy()], ids=["12", "wordy"])
 def test_nor_with_twelve_elements_or_long_names(session: Session) -> None:
     made = Debugger(session, "A title that is quite long " * 5, io.StringIO(), io.StringIO())
     for command in EVERYTHING:
@@ -131,7 +130,7 @@ def test_a_terminal_gets_colour_without_extra_information(monkeypatch: pytest.Mo
     assert bare.replace("=", "-").replace("#", "-") == plain.replace("=", "-").replace("#", "-")
 
 
-@pytest.mark.parametrize("columns", [60, 100, 160])
+@pytest.mark.parametrize("columns", [60, 160])
 def test_a_terminal_gets_lines_of_its_width(columns: int, monkeypatch: pytest.MonkeyPatch) -> None:
     text = _on_a_terminal(monkeypatch, TERM="xterm", COLUMNS=str(columns))
     lines = [line.rstrip() for line in re.sub(r"\x1b\[[0-9;]*m", "", text).splitlines()]
@@ -178,27 +177,15 @@ def _piped(script: str, **environment: str) -> subprocess.CompletedProcess[bytes
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("environment", "end"),
-    [({}, ""), ({"PYTHONIOENCODING": "ascii"}, "quit\n"), ({"NO_COLOR": "1"}, "q")],
-)
-def test_a_pipe_gets_plain_text_and_exit_code_0(environment: dict[str, str], end: str) -> None:
-    done = _piped(f"goto 25\nwhy 1\n{end}", **environment)
+def test_a_pipe_gets_plain_text_and_exit_code_0() -> None:
+    """Also where it cannot carry a character that was typed."""
+    done = _piped("goto 25\nwhy 1\nfrage nach ß und →\nq", PYTHONIOENCODING="ascii:surrogateescape")
     assert done.returncode == 0, done.stderr
     assert done.stderr == b""
-    text = done.stdout.decode("ascii").replace("\r\n", "\n")
-    assert "(t=25.0000 s) why 1\n" in text
-    assert "arrest does not fire: |z| < s is false by 0.776 m.\n" in text
-    assert text == talk(FIG_4, "goto 25", "why 1", *([end.strip()] if end else []))
+    text = done.stdout.replace(b"\r\n", b"\n")
+    assert text.startswith(talk(FIG_4, "goto 25", "why 1").rpartition("(t=")[0].encode("ascii"))
+    assert b"error: unknown command" in text
 
 
-@pytest.mark.slow
-def test_a_character_the_pipe_cannot_carry_does_not_break_it() -> None:
-    done = _piped("frage nach ß und →\nprint t\n", PYTHONIOENCODING="ascii:surrogateescape")
-    assert done.returncode == 0, done.stderr
-    assert b"error: unknown command" in done.stdout
-
-
-@pytest.mark.slow
 def test_empty_input_is_accepted() -> None:
-    assert _piped("").returncode == 0
+    assert talk(FIG_4).endswith("(t=0.0000 s) \n")

@@ -48,58 +48,6 @@ def test_the_view_is_plain_data() -> None:
     assert len(seen.elements) == 5
 
 
-@pytest.mark.parametrize(
-    ("command", "said"),
-    [
-        ("why bank 2", "bank 2 is in stick at t = "),
-        ("why BANK 2 Break_Away_Forward", "bank 2 is in stick"),
-        ("why pad", "pad 1 is in stuck"),
-        ("why 1", "pad 1 is in stuck"),
-        ("why 2", "error: no element 2 of pad; there are 1 to 1"),
-        ("why bank 5", "error: no element 5 of bank; there are 1 to 4"),
-        ("why gear 1", "error: 'gear 1' is not an edge; there are release_forward"),
-        ("element bank 3", "bank 3 is in stick"),
-        ("break arrest bank", "breakpoint 1: fires arrest, bank"),
-        ("break arrest bank 2 if w2 > 0", "breakpoint 1: fires arrest, bank 2, if w2 > 0"),
-        ("break stuck", "breakpoint 1: enter stuck, all elements"),
-        ("poke q1=0.1 u=2*0.1 bank.z2=0.1", "branch 1, from branch 0: q1 = 0.1, u = 0.2, bank.z2"),
-        ("poke bank.state2=SLIP", "branch 1, from branch 0: state of bank 2 = slip"),
-        ("poke state2=slip", "error: 'state2' names no contact; write, for example, pad.state1"),
-        (
-            "poke bank.state=slip",
-            "error: 'bank.state' cannot be poked; for element 1 write bank.st",
-        ),
-        ("poke m=2", "error: m is a number; to change it, make another system and session"),
-        ("print pad.state == stuck", "true"),
-        ("print F", "error: column 1: unknown name 'F'; write pad.F"),
-    ],
-)
-def test_commands_name_elements_by_contact(command: str, said: str) -> None:
-    assert made().reply(command).replace("\n  ", " ").startswith(said)
-
-
-def test_the_chosen_element_is_explained_and_drawn() -> None:
-    debugger = made()
-    debugger.reply("element bank 3")
-    assert debugger.reply("why").startswith("bank 3 is in stick")
-    assert debugger.reply("why 2").startswith("bank 2 is in stick")
-    assert debugger.reply("list").startswith("bank 3 of 4: GMS element, signed law")
-
-
-def test_a_chart_without_variables() -> None:
-    debugger = pulled()
-    assert debugger.reply("why 1") == debugger.reply("why") == debugger.reply("why pad 1")
-    assert debugger.reply("next").splitlines()[1:] == [
-        "  pad 1: stuck -> forward by release_forward",
-        "  pad: v = 0 m/s, F = 1 N, forward",
-    ]
-    said = debugger.reply("where").splitlines()
-    assert said[4].split() == ["el", "state", "F_i", "[N]", "edges"]
-    listed = debugger.reply("list")
-    assert "locked: v = 0, F is what holds it" in listed
-    assert "F = F_c + b * v" in listed
-
-
 @pytest.mark.parametrize("name", ["why", "print", "watch", "element", "until", "break", "poke"])
 @pytest.mark.parametrize("which", [pulled, made])
 def test_help_has_examples_of_this_system(name: str, which: Callable[[], Debugger]) -> None:

@@ -5,16 +5,14 @@ from __future__ import annotations
 import inspect
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 
 from gms_fsm.app._tables import FitTable
 from gms_fsm.app.fits import load_fit
 from gms_fsm.identification import fit
 from tests.identification.fits_made import record, small
-from tests.scenario_files import CommandLine, changed, nothing_written, one_message, table
+from tests.scenario_files import CommandLine, changed, one_message, table
 
 pytest.importorskip("matplotlib", reason="the report has a figure")
 
@@ -47,8 +45,6 @@ cycles = 2.0
 search = "local"
 """
 
-GIVEN = {"rig.csv", "rig.toml"}
-
 
 @pytest.fixture
 def scenario(tmp_path: Path) -> Path:
@@ -75,20 +71,11 @@ def test_a_scenario_is_fitted_and_reported(
     assert again.code == 0, again.err
 
 
-def test_keys_can_be_overridden(gms_fsm: CommandLine, scenario: Path) -> None:
-    done = gms_fsm("fit", scenario, "--set", "fit.free=['k2']", "--set", "fit.nuisance=[]")
-    assert done.code == 0, done.err
-    assert "k2" in done.out
-    assert "k1" not in done.out
-    assert "offset" not in done.out
-    assert "start with out/rig-fit/report.md" in done.out
-
-
 def test_the_table_gives_the_arguments(scenario: Path) -> None:
-    given = ["fit.bounds.k=[1e3, 1e5]", "record.smoothing=0.05", "fit.seed=3"]
+    given = ["fit.bounds.k=[1e3, 1e5]", "record.smoothing=0.05", "fit.seed=3", "fit.nuisance=[]"]
     options = load_fit(scenario, given).task.options
     assert (options.free, options.train, options.test) == (("k",), (0.0, 8.0), (8.0, 12.0))
-    assert options.bounds == {"k": (1e3, 1e5)}
+    assert (options.bounds, options.nuisance) == ({"k": (1e3, 1e5)}, ())
     assert (options.smoothing, options.seed, options.most_steps) == (0.05, 3, None)
 
 
@@ -127,33 +114,6 @@ def test_what_a_fit_does_not_use_is_said(scenario: Path) -> None:
     assert load_fit(scenario).notes == ()
 
 
-MISTAKES: dict[str, tuple[list[str], list[str]]] = {
-    "wrong name": (["fit.free=['kk']"], ["[fit]", "'kk'", "did you mean 'k'?"]),
-    "near key": (["fit.fre=['k']"], ["fit.fre", "did you mean 'free'?"]),
-    "empty": (["fit.free=[]"], ["fit.free"]),
-    "bounds": (["fit.bounds.k=[2.0, 1.0]"], ["[fit]", "bounds", "not below the highest"]),
-    "three bounds": (["fit.bounds.k=[1.0, 2.0, 3.0]"], ["fit.bounds.k"]),
-    "bounds of another": (["fit.bounds.C=[1.0, 2.0]"], ["[fit]", "'C'", "not among the free"]),
-    "no rows": (["fit.train=[50.0, 60.0]"], ["50"]),
-    "search": (["fit.search=genetic"], ["fit.search", "'hops', 'local' or 'de'"]),
-    "nuisance": (["fit.nuisance=['bias']"], ["fit.nuisance", "'offset'"]),
-    "measured": (["fit.measured=G"], ["[fit]", "'G'"]),
-    "column": (["record.force.column=f"], ["rig.csv", "'f'"]),
-    "cycles": (["fit.cycles=-1.0"], ["fit.cycles"]),
-    "most_steps": (["fit.most_steps=0"], ["fit.most_steps"]),
-}
-
-
-@pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_is_one_message_and_nothing_is_written(
-    name: str, gms_fsm: CommandLine, scenario: Path, tmp_path: Path
-) -> None:
-    overrides, said = MISTAKES[name]
-    options = [part for each in overrides for part in ("--set", each)]
-    one_message(gms_fsm("fit", scenario, "-o", "out", *options), *said)
-    nothing_written(tmp_path, GIVEN)
-
-
 def test_a_file_without_the_table(gms_fsm: CommandLine, scenario: Path) -> None:
     scenario.write_text(SCENARIO.partition("[fit]")[0])
     one_message(gms_fsm("fit", scenario), "there is no table [fit]", "free = ")
@@ -164,27 +124,6 @@ def test_a_file_without_a_record(gms_fsm: CommandLine, scenario: Path) -> None:
     head, _, rest = text.partition("[record]")
     scenario.write_text(head + "[run]\nt_end = 1.0\n[fit]" + rest.partition("[fit]")[2])
     one_message(gms_fsm("fit", scenario), "there is no table [record]", "measured force")
-
-
-def test_a_record_without_a_force(gms_fsm: CommandLine, scenario: Path) -> None:
-    scenario.write_text(changed(SCENARIO, 'force = { column = "F", unit = "N" }\n', ""))
-    one_message(gms_fsm("fit", scenario), "force")
-
-
-@pytest.mark.parametrize("constant", ["x", "F"])
-def test_a_constant_record(
-    constant: str, gms_fsm: CommandLine, scenario: Path, tmp_path: Path
-) -> None:
-    columns = {"x": 1e3 * record().columns["position"], "F": record().columns["force"]}
-    columns[constant] = np.full(600, 0.25)
-    values: Any = (record().columns["time"], columns["x"], columns["F"])
-    (tmp_path / "rig.csv").write_text(table(["t", "x", "F"], *values))
-    one_message(gms_fsm("fit", scenario, "-o", "out"), "constant")
-    nothing_written(tmp_path, GIVEN)
-
-
-def test_a_file_that_is_not_there(gms_fsm: CommandLine) -> None:
-    one_message(gms_fsm("fit", "none.toml"), "none.toml", "no such file")
 
 
 def test_a_folder_of_the_users_is_refused_before_the_search(
@@ -200,12 +139,13 @@ def test_a_folder_of_the_users_is_refused_before_the_search(
 def test_ctrl_c_keeps_the_best_so_far(
     gms_fsm: CommandLine, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole, said = fit.fitted, "The search was interrupted: this is the best so far."
-    monkeypatch.setattr(fit, "fitted", lambda *a, **o: replace(whole(*a, **o), stopped=said))
-    done = gms_fsm("fit", scenario, "-o", "out")
+    said = "The search was interrupted: this is the best so far."
+    monkeypatch.setattr(fit, "fitted", lambda *_, **__: replace(small(), stopped=said))
+    done = gms_fsm("fit", scenario)
     assert done.code == 130
     assert f"note: {said}" in done.err
-    assert said in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "start with out/rig-fit/report.md" in done.out
+    assert said in (tmp_path / "out" / "rig-fit" / "report.md").read_text(encoding="utf-8")
 
 
 def test_ctrl_c_before_anything_was_found(

@@ -22,7 +22,6 @@ from tests.app.full_screen import (
     LARGE,
     SMALL,
     drive,
-    keys,
     press,
     screen_text,
     session,
@@ -40,31 +39,31 @@ def _row(app: FullScreen) -> int:
     return app.commands.session.branch.cursor
 
 
-@pytest.mark.parametrize("size", [SMALL, LARGE])
-def test_why_element_1_does_not_arrest_at_25_s_is_three_keys(size: tuple[int, int]) -> None:
-    seen: list[str] = []
-
-    async def action(app: FullScreen, pilot: Any) -> None:
-        await press(pilot, "2", "5", "w")
-        seen.append(screen_text(app))
-
-    app = drive(action, size)
-    assert ANSWER in app.panels["why"].shown.replace("\n  ", " ")
-    assert ANSWER in app.said
-    assert ANSWER in seen[0]
-    assert "-776.2 mm" in seen[0]
-    assert "✗ |z| < s" in seen[0]
-    assert "24.9999735 s" in seen[0]
+def _all_said(app: FullScreen, texts: list[str]) -> None:
+    for text in texts:
+        assert text.replace("\n  by", " by") in "\n".join(app.said)
 
 
-def test_a_number_before_a_key_shows_what_it_can_become() -> None:
+def test_keys_find_out_why_on_a_small_screen() -> None:
+    """Numbers before keys, moves, elements, zoom, help, colours; and out."""
+
     async def action(app: FullScreen, pilot: Any) -> None:
         await press(pilot, "2", "5")
         assert "why at 25 s" in screen_text(app)
         await press(pilot, "backspace", "escape")
         assert "why at" not in screen_text(app)
         assert app.number == ""
-        await press(pilot, "1", "0", "s")
+        await press(pilot, "2", "5", "w")
+        seen = screen_text(app)
+        for text in (ANSWER, "-776.2 mm", "✗ |z| < s", "24.9999735 s"):
+            assert text in seen
+        assert ANSWER in app.panels["why"].shown.replace("\n  ", " ")
+        assert ANSWER in app.said
+        theme = app.theme
+        await press(pilot, "d")
+        assert app.theme != theme
+        assert screen_text(app) == seen
+        await press(pilot, "home", "1", "0", "s")
         assert _row(app) == 10
         await press(pilot, "3", "left")
         assert _row(app) == 7
@@ -72,8 +71,27 @@ def test_a_number_before_a_key_shows_what_it_can_become() -> None:
         assert app.said[-2].startswith("row 34, t = 12.4999735 s")
         await press(pilot, "3", "e")
         assert app.commands.element == 2
+        await press(pilot, "9", "e")
+        assert app.said[-1] == "error: there is no element 9; there are 1 to 4"
+        await press(pilot, "1", "e", "5", "0", "g", "plus")
+        assert app.span[1] - app.span[0] == pytest.approx(25.0)
+        assert app.span[0] < app.commands.session.here.t < app.span[1]
+        await press(pilot, "minus", "minus")
+        assert app.span == (0.0, 100.0)
+        await press(pilot, "question_mark")
+        assert isinstance(app.screen, Help)
+        for key in KEYS:
+            assert f"{key.shown:<4}{key.says}" in app.screen.panel.shown
+        for name in COMMANDS:
+            assert name in app.screen.panel.shown
+        await press(pilot, "down", "escape")
+        assert not isinstance(app.screen, Help)
+        await press(pilot, "ctrl+c")
+        assert app.is_running
+        assert [each.message for each in app._notifications] == ["q quits"]
+        await press(pilot, "q")
 
-    drive(action)
+    assert drive(action).return_value == 0
 
 
 def test_moves_end_where_those_of_the_prompt_end() -> None:
@@ -82,71 +100,54 @@ def test_moves_end_where_those_of_the_prompt_end() -> None:
         *["step", "next", "step", "next", "next", "back", "prev"],
         *["goto 100", "back", "goto 0", "next"],
     ]
-    app = keys(*pressed)
-    said = answers(FIG_4, *lines)
-    assert said[-1] in "\n".join(app.said)
-    asked = [line.partition(") ")[2] for line in app.said if line.startswith("(t=")]
-    assert [each.removesuffix(".0") for each in asked] == lines
-    for text in said:
-        assert text in "\n".join(app.said)
+
+    async def action(app: FullScreen, pilot: Any) -> None:
+        await press(pilot, *pressed)
+        asked = [line.partition(") ")[2] for line in app.said if line.startswith("(t=")]
+        assert [each.removesuffix(".0") for each in asked] == lines
+        _all_said(app, answers(FIG_4, *lines))
+        await press(pilot, "home", "n", "s", "s", "s", "s", "b", "c", "w")
+        said = answers(FIG_4, "next", *["step"] * 4, "break valid arrest element 1", "continue")
+        assert said[6].startswith("breakpoint 1: valid arrest, element 1\nrow ")
+        _all_said(app, said[5:])
+        assert "● break" in app.panels["why"].shown
+        assert "● 1 valid arrest, element 1; hits: 1" in app.panels["session"].shown
+        await press(pilot, "home", "7", "b")
+        assert app.said[-1] == "error: stick has 2 edges, so there is no edge 7"
+        await press(pilot, "2", "b")
+        points = app.commands.session.breakpoints
+        assert [point.name for point in points] == ["arrest", "break_away_backward"]
+
+    drive(action, LARGE)
 
 
-def test_it_breaks_at_a_guard() -> None:
-    app = keys("n", "s", "s", "s", "s", "b", "c", "w", size=LARGE)
-    lines = ("next", *["step"] * 4, "break valid arrest element 1", "continue", "why 1")
-    said = answers(FIG_4, *lines)
-    assert said[6].startswith("breakpoint 1: valid arrest, element 1\nrow ")
-    for text in said[5:]:
-        assert text.replace("\n  by", " by") in "\n".join(app.said)
-    assert "● break" in app.panels["why"].shown
-    assert "● 1 valid arrest, element 1; hits: 1" in app.panels["session"].shown
+def test_branches_are_poked_compared_and_marked_where_they_differ() -> None:
+    async def action(app: FullScreen, pilot: Any) -> None:
+        await press(pilot, "5", "g", "o", "o")
+        assert app.commands.session.current == 0
+        await press(pilot, "2", "5", "g", "p", *typed("-1.4"), "enter", "escape", "x")
+        assert [branch.parent for branch in app.commands.session.branches] == [None, 0]
+        _all_said(app, answers(FIG_4, "goto 25", "poke z1=-1.4", "compare"))
+        tree = " ".join(app.panels["session"].shown.split())
+        assert "▶ branch 1 from 0 at 24.9999735 s: z1 = -1.4" in tree
+        one, other = (branch.trace() for branch in app.commands.session.branches)
+        ribbon: Any = app.ribbon
+        start, end = ribbon.span
+        middle = [start + (end - start) * (i + 0.5) / ribbon.parts for i in range(ribbon.parts)]
+        rows = [[trace.t.searchsorted(t, "right") - 1 for t in middle] for trace in (one, other)]
+        pairs = zip(*rows, strict=True)
+        expected = [bool((one.states[a] != other.states[b]).any()) for a, b in pairs]
+        last = ribbon.rows[-2].line
+        assert last[0].text.strip() == "differs"
+        assert [mark == "≠" for mark in last[1].text] == expected
+        assert any(expected)
+        await press(pilot, "o")
+        assert app.commands.session.current == 0
+
+    drive(action, LARGE)
 
 
-def test_the_number_before_b_is_the_edge() -> None:
-    app = keys("2", "b")
-    assert [point.name for point in app.commands.session.breakpoints] == ["break_away_backward"]
-    app = keys("7", "b")
-    assert app.commands.session.breakpoints == []
-    assert app.said[-1] == "error: stick has 2 edges, so there is no edge 7"
-    app = keys("9", "e")
-    assert app.said[-1] == "error: there is no element 9; there are 1 to 4"
-
-
-def test_poke_and_compare_branches() -> None:
-    app = keys("2", "5", "g", "p", *typed("-1.4"), "enter", "escape", "x", size=LARGE)
-    assert [branch.parent for branch in app.commands.session.branches] == [None, 0]
-    said = answers(FIG_4, "goto 25", "poke z1=-1.4", "compare")
-    for text in said:
-        assert text in "\n".join(app.said)
-    tree = " ".join(app.panels["session"].shown.split())
-    assert "▶ branch 1 from 0 at 24.9999735 s: z1 = -1.4" in tree
-    last = app.ribbon.rows[-2].line
-    assert last[0].text.strip() == "differs"
-    assert "≠" in last[1].text
-
-
-def test_where_branches_differ_is_marked_in_their_ribbons() -> None:
-    app = keys("2", "5", "g", "p", *typed("-1.4"), "enter", "escape", "x", size=LARGE)
-    one, other = (branch.trace() for branch in app.commands.session.branches)
-    ribbon: Any = app.ribbon
-    start, end = ribbon.span
-    middle = [start + (end - start) * (i + 0.5) / ribbon.parts for i in range(ribbon.parts)]
-    rows = [[trace.t.searchsorted(t, "right") - 1 for t in middle] for trace in (one, other)]
-    expected = [bool((one.states[a] != other.states[b]).any()) for a, b in zip(*rows, strict=True)]
-    marks = ribbon.rows[-2].line[1].text
-    assert [mark == "≠" for mark in marks] == expected
-    assert any(expected)
-
-
-def test_the_other_branch_is_one_key_away() -> None:
-    app = keys("5", "g", "p", *typed("0.1"), "enter", "escape", "o")
-    assert app.commands.session.current == 0
-    app = keys("5", "g", "o", "o")
-    assert app.commands.session.current == 0
-
-
-# --------------------------------------------------------------------------- the command line
-def test_commands_are_completed_and_remembered() -> None:
+def test_commands_are_completed_remembered_and_repeated() -> None:
     async def action(app: FullScreen, pilot: Any) -> None:
         prompt = app.prompt
         await press(pilot, "colon", *typed("br"), "tab")
@@ -166,60 +167,41 @@ def test_commands_are_completed_and_remembered() -> None:
         await press(pilot, "escape", "s")
         assert app.focused is None
         assert app.said[-2].startswith("(t=25.0000 s) step")
+        await press(pilot, "home", "colon", *typed("step 3"), "enter", "enter", "enter")
+        assert _row(app) == 9
+        await press(pilot, *typed("quit"), "enter")
 
-    drive(action)
-
-
-def test_an_empty_line_repeats_the_last_move() -> None:
-    app = keys("colon", *typed("step 3"), "enter", "enter", "enter")
-    assert _row(app) == 9
+    assert drive(action, light=True).return_value == 0
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "stpe",
-        "goto yesterday",
-        "why 9",
-        "poke z1=nan",
-        "until (((",
-        "compare",
-        "branch 7",
-        "load nothing.json",
-        "print 1 / x",
-        "[bold]x[/]",
-        "save no/folder/here.json",
-    ],
-)
-def test_a_mistake_is_answered_as_at_the_prompt(line: str) -> None:
-    async def action(app: FullScreen, pilot: Any) -> None:
-        app.give(line)
-        await settle(pilot)
+def test_mistakes_are_answered_as_at_the_prompt(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = [
+        *["stpe", "goto yesterday", "why 9", "poke z1=nan", "until (((", "compare", "branch 7"],
+        *["load nothing.json", "print 1 / x", "[bold]x[/]", "save no/folder/here.json"],
+    ]
 
-    app = drive(action, LARGE)
     made = Debugger(session())
-    expected = " ".join(made.reply(line).split())
-    assert expected.startswith("error: ")
-    begin = max(i for i, text in enumerate(app.said) if text.startswith("(t="))
-    assert " ".join(" ".join(app.said[begin + 1 :]).split()) == expected
-    shown = " ".join(app.panels["answers"].shown.split())
-    assert expected in shown
-    assert app.return_code in (0, None)
+    wanted = {line: " ".join(made.reply(line).split()) for line in lines}
 
-
-def test_a_value_that_cannot_be_computed_does_not_end_the_session(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr("gms_fsm.app.debugger.tui._app.chart_states", broken)
-    app = keys("s")
-    assert app.panels["chart"].shown == "cannot be shown here: division by zero"
-    assert _row(app) == 1
+    async def action(app: FullScreen, pilot: Any) -> None:
+        for line, expected in wanted.items():
+            app.give(line)
+            await settle(pilot)
+            assert expected.startswith("error: ")
+            begin = max(i for i, text in enumerate(app.said) if text.startswith("(t="))
+            assert " ".join(" ".join(app.said[begin + 1 :]).split()) == expected
+            assert expected in " ".join(app.panels["answers"].shown.split())
+        monkeypatch.setattr("gms_fsm.app.debugger.tui._app.chart_states", broken)
+        await press(pilot, "s")
+        assert app.panels["chart"].shown == "cannot be shown here: division by zero"
+        assert _row(app) == 1
+
+    assert drive(action, LARGE).return_code in (0, None)
 
 
-# --------------------------------------------------------------------------- the mouse
 def test_clicks_give_commands() -> None:
     async def action(app: FullScreen, pilot: Any) -> None:
         await press(pilot, "3", "0", "g")
@@ -252,12 +234,11 @@ def test_clicks_give_commands() -> None:
     drive(action, LARGE)
 
 
-# --------------------------------------------------------------------------- long moves
-def test_escape_stops_a_long_move() -> None:
-    made = Session(stick_slip("published"), Prescribed(FIG4_SINE), 1e7)
+def test_escape_stops_a_long_move_and_leaving_does_not_wait_for_one() -> None:
+    made = Session(stick_slip("published"), Prescribed(FIG4_SINE), 1e9)
 
     async def action(app: FullScreen, pilot: Any) -> None:
-        app.give("goto 1e7")
+        app.give("goto 1e9")
         for _ in range(200):
             await asyncio.sleep(0.01)
             if "working" in screen_text(app).splitlines()[0]:
@@ -266,55 +247,14 @@ def test_escape_stops_a_long_move() -> None:
             pytest.fail("it does not say that it works")
         await press(pilot, "escape")
         assert "stopped" in app.said
-        assert 0.0 < app.commands.session.here.t < 1e7
+        assert 0.0 < app.commands.session.here.t < 1e9
         await press(pilot, "left")
         assert any(text.endswith(" s) back") for text in app.said[-3:])
-
-    drive(action, SMALL, made)
-
-
-def test_leaving_does_not_wait_for_a_long_move() -> None:
-    made = Session(stick_slip("published"), Prescribed(FIG4_SINE), 1e9)
-
-    async def action(app: FullScreen, pilot: Any) -> None:
         app.give("goto 1e9")
         await asyncio.sleep(0.3)
         await pilot.press("q")
 
-    app = drive(action, SMALL, made)
-    assert app.return_value == 0
-
-
-def test_ctrl_c_says_how_to_leave() -> None:
-    async def action(app: FullScreen, pilot: Any) -> None:
-        await press(pilot, "ctrl+c")
-        assert app.is_running
-        assert [each.message for each in app._notifications] == ["q quits"]
-
-    drive(action)
-
-
-@pytest.mark.parametrize("pressed", [("q",), ("colon", *typed("quit"), "enter")])
-def test_leaving_is_success(pressed: tuple[str, ...]) -> None:
-    assert keys(*pressed).return_value == 0
-
-
-# --------------------------------------------------------------------------- looks
-def test_the_help_names_every_key_and_command() -> None:
-    async def action(app: FullScreen, pilot: Any) -> None:
-        await press(pilot, "question_mark")
-        assert isinstance(app.screen, Help)
-        shown = app.screen.panel.shown
-        for key in KEYS:
-            assert f"{key.shown:<4}{key.says}" in shown
-        for name in COMMANDS:
-            assert name in shown
-        await press(pilot, "down", "escape")
-        assert not isinstance(app.screen, Help)
-        await press(pilot, "s")
-        assert _row(app) == 1
-
-    drive(action)
+    assert drive(action, SMALL, made).return_value == 0
 
 
 def _luminance(colour: str) -> float:
@@ -331,26 +271,3 @@ def test_every_colour_can_be_read_on_its_ground(palette: Any, grounds: tuple[str
         front, _, own = style.partition(" on ")
         pair = sorted(_luminance(c[-7:]) for c in (front, own or ground))
         assert (pair[1] + 0.05) / (pair[0] + 0.05) >= 4.5, (style, ground)
-
-
-def test_dark_and_light_show_the_same_text() -> None:
-    async def action(app: FullScreen, pilot: Any) -> None:
-        await press(pilot, "2", "5", "w")
-        before, theme = screen_text(app), app.theme
-        await press(pilot, "d")
-        assert app.theme != theme
-        assert screen_text(app) == before
-
-    drive(action, LARGE)
-    assert drive(action, SMALL, light=True).theme == "gms-dark"
-
-
-def test_zoom_shows_the_time_around_the_cursor() -> None:
-    async def action(app: FullScreen, pilot: Any) -> None:
-        await press(pilot, "5", "0", "g", "plus")
-        assert app.span[1] - app.span[0] == pytest.approx(25.0)
-        assert app.span[0] < app.commands.session.here.t < app.span[1]
-        await press(pilot, "minus", "minus")
-        assert app.span == (0.0, 100.0)
-
-    drive(action)

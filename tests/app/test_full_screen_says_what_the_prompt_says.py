@@ -43,9 +43,8 @@ def test_every_command_has_the_same_answer() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scenario", ["paper_fig4_stick_slip", "friction_damper"])
-def test_panels_show_the_values_of_the_view_with_units(scenario: str) -> None:
-    made = session(scenario)
+def test_panels_show_the_values_of_the_view_with_units() -> None:
+    made = session()
 
     async def action(app: FullScreen, pilot: Any) -> None:
         app.give("next", "next", "next", "step 3")

@@ -16,21 +16,21 @@ from tests import fuzz
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_expressions(data: bytes) -> None:
     fuzz.one_expression(data)
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_scenario_files(data: bytes) -> None:
     fuzz.one_scenario(data)
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_trace_files(data: bytes) -> None:
     fuzz.one_trace_file(data)
@@ -40,5 +40,5 @@ def test_trace_files(data: bytes) -> None:
 @pytest.mark.parametrize("name", fuzz.BODIES)
 def test_the_bodies_reach_both_sides(name: str) -> None:
     """Long random inputs, as `make soak` makes them: some are accepted, most are rejected."""
-    answers = [fuzz.BODIES[name](random.Random(f"{i}").randbytes(128)) for i in range(150)]
-    assert 3 <= sum(answers) <= 120
+    answers = [fuzz.BODIES[name](random.Random(f"{i}").randbytes(128)) for i in range(60)]
+    assert 1 <= sum(answers) <= 50

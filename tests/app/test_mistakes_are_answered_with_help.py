@@ -1,8 +1,4 @@
-"""A mistake on the command line or in a call is answered with helpful advice and nothing else.
-
-The intended key, the available formats and lessons, the correct form of a number; no prefix of
-another library, no empty line of a progress bar, no number in NumPy notation.
-"""
+"""Formats are told from one table, no bar stands before an error, and numbers are plain."""
 
 from __future__ import annotations
 
@@ -16,35 +12,17 @@ import pytest
 from rich.console import Console
 
 from gms_fsm import Prescribed, Session, Trace, simulate
-from gms_fsm.app.lessons import LESSONS
 from gms_fsm.app.live import LiveView
-from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import LUGRE, gms_element
-from gms_fsm.errors import OutputError, ParameterError, ScenarioError, shown
+from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.run.simulate import Moment
 from plots import block_diagram, mermaid, render, statechart
 from plots.formats import of
 from tests.helpers import pulled_mass, stick_slip
-from tests.scenario_files import OPEN_LOOP, CommandLine
-
-
-@pytest.fixture
-def scenario(tmp_path: Path) -> Path:
-    path = tmp_path / "open.toml"
-    path.write_text(OPEN_LOOP)
-    return path
-
+from tests.scenario_files import CommandLine
 
 # --------------------------------------------------------------------------- formats
 FORMATS = {each.name: each for each in of("graph", "chart")}
-
-
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_a_chart_takes_every_format(suffix: str, tmp_path: Path) -> None:
-    if FORMATS[suffix].extra == "render":
-        pytest.importorskip("pygraphviz", reason="pictures need Graphviz, extra 'render'")
-    assert render(statechart(LUGRE), tmp_path / f"chart{suffix}").suffix == suffix
-    assert (tmp_path / f"chart{suffix}").stat().st_size > 100
 
 
 def test_mermaid_text_is_the_charts(tmp_path: Path) -> None:
@@ -73,111 +51,7 @@ def test_only_a_chart_is_mermaid_text(graph: graphviz.Digraph, tmp_path: Path) -
         render(graph, tmp_path / "x.mmd")
 
 
-# --------------------------------------------------------------------------- scenarios
-@pytest.mark.parametrize("text", ["", "\n", "# nothing yet\n"])
-def test_an_empty_file_is_called_empty(text: str, tmp_path: Path) -> None:
-    path = tmp_path / "empty.toml"
-    path.write_text(text)
-    with pytest.raises(ScenarioError, match=r"empty\.toml: the file is empty; .*\[model\]"):
-        load_scenario(path)
-
-
-@pytest.mark.parametrize(
-    ("given", "meant"),
-    [
-        ("t_end=3", "run.t_end"),
-        ("tend=3", "run.t_end"),
-        ("law=signed", "model.law"),
-        ("model.velocity=1", "rig.velocity"),
-        ("run.csv=true", "output.csv"),
-        ("run.tend=3", "t_end"),
-    ],
-)
-def test_the_key_of_another_table_is_named(scenario: Path, given: str, meant: str) -> None:
-    with pytest.raises(ScenarioError, match=f"unknown key; did you mean '{meant}'[?] valid here: "):
-        load_scenario(scenario, [given])
-
-
-def test_a_key_of_an_absent_table_is_not_suggested(scenario: Path) -> None:
-    with pytest.raises(ScenarioError, match="unknown key; valid here: "):
-        load_scenario(scenario, ["smoothing=3"])  # of [record]
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "advice"),
-    [
-        ("[100.0, 50.0]", "[.25, 50.0]", "line 6: write 0.25, not .25"),
-        ("[100.0, 50.0]", "[100.0, -.5e-3]", "line 6: write -0.5e-3, not -.5e-3"),
-        ("[100.0, 50.0]", "[100., 50.0]", "line 6: write 100.0, not 100."),
-        ("t_end = 1.0", "t_end = 1. # s", "write 1.0, not 1."),
-        ("t_end = 1.0", "t_end = 1.e3", "write 1.0e3, not 1.e3"),
-        ("t_end = 1.0", "t_end = +.1", r"write \+0.1, not \+.1"),
-    ],
-)
-def test_a_number_without_a_digit_on_one_side(
-    scenario: Path, old: str, new: str, advice: str
-) -> None:
-    assert old in OPEN_LOOP
-    scenario.write_text(OPEN_LOOP.replace(old, new))
-    with pytest.raises(ScenarioError, match=rf"not valid TOML: .*{advice}$"):
-        load_scenario(scenario)
-
-
-@pytest.mark.parametrize(
-    "value", ["title = '.5' x", 'title = "1. a', "title = 1.2.3", "title = # .5"]
-)
-def test_other_mistakes_get_no_such_advice(scenario: Path, value: str) -> None:
-    scenario.write_text(value)
-    with pytest.raises(ScenarioError, match="not valid TOML") as caught:
-        load_scenario(scenario)
-    assert "write" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("given", "advice"),
-    [
-        ("model.k=[.25, 1]", "write 0.25, not .25"),
-        ("model.v_c=.25", "write 0.25, not .25"),
-        ("run.t_end=3.", "write 3.0, not 3."),
-    ],
-)
-def test_such_a_number_on_the_command_line(scenario: Path, given: str, advice: str) -> None:
-    with pytest.raises(ScenarioError, match=f"--set {given[:7]}.*{advice}"):
-        load_scenario(scenario, [given])
-
-
-def test_a_formula_may_have_one(scenario: Path) -> None:
-    assert load_scenario(scenario, ["rig.velocity=.5*sin(t)"]).rig.signals["v"]
-
-
 # --------------------------------------------------------------------------- the command line
-@pytest.mark.parametrize("asked", ["hysteresis", "99", "0", "1.0", "-1"])
-def test_an_unknown_lesson_lists_the_lessons(gms_fsm: CommandLine, asked: str) -> None:
-    done = gms_fsm("lesson", "--", asked)
-    assert done.code == 2
-    assert done.message.startswith(f"there is no lesson '{asked}'; choose one of")
-    for number, each in LESSONS.items():
-        assert f"{number}  {each.title}: {each.question}" in done.message
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("code", "--law", "foo"), "error: code gms has no law 'foo'; give --law signed"),
-        (
-            ("chart", "foo"),
-            "error: name is 'foo'; it must be one of backlash, ",
-        ),
-        (("blocks", "--elements", "x"), "Invalid value"),
-    ],
-)
-def test_no_prefix_of_another_library(
-    arguments: tuple[str, ...], said: str, gms_fsm: CommandLine
-) -> None:
-    done = gms_fsm(*arguments)
-    assert done.code == 2
-    assert said in done.err
-    assert "Value error" not in done.err
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,6 @@ from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
     changed,
-    nothing_written,
     one_message,
 )
 from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
@@ -63,27 +62,6 @@ def test_the_arguments_of_simulate_include_them(path: Path) -> None:
     assert len(given) == 4
     assert "monitors" not in load_scenario(path, ["run.monitors=[]"]).arguments
     assert len(load_scenario(path, ["run.monitors=['all']"]).arguments["monitors"]) == 3
-
-
-@pytest.mark.parametrize(
-    ("value", "said"),
-    [
-        ("['pasivity']", ("run.monitors", "'pasivity'", "did you mean 'passivity'?")),
-        ("['z <= q']", ("run.monitors", "invariant, column 6", "'q'", "z1, z2")),
-        ("['state == slide']", ("run.monitors", "unknown state", "stick, slip")),
-        ("['coverage', 'coverage']", ("run.monitors", "'coverage' twice")),
-        ("[3]", ("run.monitors.0 = 3", "string")),
-        ("coverage", ("run.monitors = 'coverage'", "list")),
-        ("[\"__import__('os')\"]", ("run.monitors", "column 1")),
-    ],
-)
-def test_a_wrong_one_is_one_message(
-    value: str, said: tuple[str, ...], gms_fsm: CommandLine, path: Path, tmp_path: Path
-) -> None:
-    one_message(
-        gms_fsm("run", path, "-o", tmp_path / "out", "--set", f"run.monitors={value}"), *said
-    )
-    nothing_written(tmp_path, {"given.toml"})
 
 
 def test_a_run_that_fails_reports_them_too(

@@ -85,31 +85,3 @@ def test_a_chart_file_takes_values(gms_fsm: CommandLine) -> None:
     done = gms_fsm("phenomena", "own.toml", *given, "--phenomenon", "break-away", "-o", "o")
     assert done.code == 0, done.err
     assert "1.5 N" in Path("o/phenomena.md").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--model", "lugree"], "there is no model 'lugree'"),
-        (["--phenomenon", "lagg"], "there is no phenomenon 'lagg'"),
-        (["--set", "F_s"], "--set 'F_s': it must be name=number, for example F_s=1.5"),
-        (["--set", "F_x=1"], "the bench has no number 'F_x'"),
-        (["own.toml"], "own.toml: it is a chart file, and F_c [N], F_s [N], b [Ns/m] have no"),
-        (["two.toml"], "two.toml: it has the contacts 'a', 'b'; say which one: --contact a"),
-        (["lugre"], "'lugre' is not a file; included charts are named by --model"),
-    ],
-)
-def test_mistakes_are_named(gms_fsm: CommandLine, arguments: list[str], message: str) -> None:
-    CHARTS["stiction"].save("own.toml")
-    System(
-        "two",
-        bodies=(Body("mass", inertia="1"),),
-        contacts=tuple(
-            Contact(name, CHARTS["lugre"], {"sigma_0": 1.0, "sigma_1": 1.0}, inputs={"s": 1.0})
-            for name in "ab"
-        ),
-    ).save("two.toml")
-    done = gms_fsm("phenomena", *arguments, "-o", "o")
-    assert done.code == 2
-    assert message in done.err.replace("\n", " ")
-    assert not Path("o").exists() or not list(Path("o").glob("*.md"))

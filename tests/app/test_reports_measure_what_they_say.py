@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -40,14 +41,20 @@ CASES: dict[str, Callable[[], tuple[Model, Rig, float]]] = {
 }
 
 
+@functools.cache
+def whole(case: str) -> Trace:
+    return run(case)
+
+
 def run(case: str, **options: object) -> Trace:
     model, rig, t_end = CASES[case]()
     return simulate(model, rig, t_end, **options)  # type: ignore[arg-type]
 
 
 # --------------------------------------------------------------------------- dwell times
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("start", [0.0, 2.5])
+@pytest.mark.parametrize(
+    ("case", "start"), [*((case, 0.0) for case in CASES), ("pulled mass", 2.5)]
+)
 def test_dwell_times_fill_the_run_and_equal_the_rows(case: str, start: float) -> None:
     trace = run(case, t_start=start)
     dwell = dwell_times(trace)
@@ -67,7 +74,7 @@ def test_dwell_times_equal_the_ribbons_drawn(case: str) -> None:
 
     from plots import panels
 
-    trace = run(case)
+    trace = whole(case)
     ax = Figure().subplots()
     panels.ribbons(ax, trace)
     states = len(trace.model.chart.states)
@@ -80,20 +87,13 @@ def test_dwell_times_equal_the_ribbons_drawn(case: str) -> None:
     )
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("rows", [2, 7, 500])
+@pytest.mark.parametrize(("case", "rows"), [*((case, 7) for case in CASES), ("signed law", 500)])
 def test_dwell_times_do_not_depend_on_the_requested_rows(case: str, rows: int) -> None:
-    trace = run(case)
+    trace = whole(case)
     times = np.linspace(1.0, trace.t[-1] - 1.0, rows)  # neither the start nor the end is a row
     few = run(case, t_eval=times)
     np.testing.assert_allclose(dwell_times(few), dwell_times(trace), rtol=1e-12)
     np.testing.assert_allclose(dwell_times(trace.sample(times)), dwell_times(trace), rtol=1e-12)
-
-
-def test_dwell_times_survive_a_file(tmp_path: Path) -> None:
-    trace = run("signed law", t_eval=[1.0, 30.0])
-    loaded = Trace.load(trace.save(tmp_path / "trace.npz"))
-    np.testing.assert_array_equal(dwell_times(loaded), dwell_times(trace))
 
 
 def test_a_first_state_of_slip_is_counted_from_the_start() -> None:
@@ -113,8 +113,9 @@ def element_rows(text: str) -> list[dict[str, str]]:
     return [dict(zip(head, row, strict=True)) for row in rows]
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("every", [None, 0.5])
+@pytest.mark.parametrize(
+    ("case", "every"), [*((case, None) for case in CASES), ("published law", 0.5)]
+)
 def test_transitions_per_element_equal_the_log(
     case: str, every: float | None, tmp_path: Path
 ) -> None:
@@ -157,9 +158,14 @@ def speed(t: np.ndarray) -> np.ndarray:
 RIG = Prescribed(Corners(TIMES, speed(TIMES), held=False))
 
 
+@functools.cache
+def exact_run() -> Trace:
+    return simulate(MODEL, RIG, 10.0, t_eval=TIMES, rtol=1e-9, atol=1e-12)
+
+
 def measured(noise: np.ndarray, chosen: np.ndarray | None = None) -> tuple[Trace, Record]:
     """Return a run with the motion of a record, and the record: force of the model plus noise."""
-    trace = simulate(MODEL, RIG, 10.0, t_eval=TIMES, rtol=1e-9, atol=1e-12)
+    trace = exact_run()
     assert len(trace.transitions) > 20
     columns = {"time": TIMES, "velocity": speed(TIMES), "force": trace.F + noise}
     chosen = np.ones(TIMES.size, dtype=bool) if chosen is None else chosen
@@ -181,13 +187,6 @@ def test_r2_and_rmse_are_those_of_numpy() -> None:
     assert found.rmse == pytest.approx(rmse, rel=1e-12)
     assert found.rmse == pytest.approx(0.05, rel=0.05)
     assert 0.9 < found.r2 < 1.0
-
-
-def test_a_perfect_record_has_r2_of_1() -> None:
-    trace, record = measured(np.zeros(TIMES.size))
-    found = compare(trace, record)
-    assert found is not None
-    assert (found.r2, found.rmse) == (1.0, 0.0)
 
 
 @pytest.mark.slow
@@ -217,8 +216,8 @@ def test_only_selected_rows_are_compared() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "rows",
-    [None, TIMES[::4], np.linspace(0.0, 10.0, 333), np.linspace(2.0, 8.0, 100)],
-    ids=["all accepted steps", "every fourth", "other times", "a part"],
+    [None, np.linspace(2.0, 8.0, 100)],
+    ids=["all accepted steps", "a part"],
 )
 def test_the_rows_of_the_trace_do_not_matter(rows: np.ndarray | None) -> None:
     exact, record = measured(NOISE)
@@ -360,10 +359,3 @@ def test_a_v_c_below_the_noise_is_reported_and_one_above_is_not() -> None:
     assert velocity_note(trace, ONE_SPEED) == ""
     lugre = LuGre(sigma_0=1e4, sigma_1=1.0, sigma_2=0.4, stribeck=Stribeck(1, 1.5, 1e-3))
     assert velocity_note(simulate(lugre, rig, 1.0), noisy) == ""
-
-
-def test_a_motion_at_rest_is_reported() -> None:
-    still = motion(np.zeros(100))
-    rig = Prescribed(Corners(still.time, still.velocity, held=False))
-    trace = simulate(MODEL, rig, float(still.time[-1]))
-    assert isinstance(what_it_cannot_tell(trace, still), list)

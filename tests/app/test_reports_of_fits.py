@@ -196,14 +196,6 @@ def test_a_motion_too_long_for_a_scenario_is_said(
     assert "gms-fsm run" not in page
 
 
-def test_files_of_the_users_stay(tmp_path: Path) -> None:
-    (tmp_path / "parameters.csv").write_text("mine")
-    with pytest.raises(OutputError, match="was not written by gms-fsm"):
-        write_report(small(), tmp_path)
-    assert (tmp_path / "parameters.csv").read_text() == "mine"
-    assert not (tmp_path / "report.md").exists()
-
-
 def test_something_else_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"it must be a Fit, from gms_fsm\.fit"):
         write_report("fit", tmp_path)  # type: ignore[arg-type]

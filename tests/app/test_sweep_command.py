@@ -16,8 +16,6 @@ from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
     changed,
-    nothing_written,
-    one_message,
 )
 
 SWEPT = ("--over", "F_s=1:2:3", "--over", "v_s=1e-3:1e-1:3,log", "--engine", "ifelse")
@@ -115,31 +113,6 @@ def test_the_files_are_kept_apart_from_those_of_a_run(
     assert gms_fsm("run", path).code == 0
     assert gms_fsm("sweep", path, *SWEPT).code == 0
     assert {folder.name for folder in (tmp_path / "out").iterdir()} == {"given", "given-sweep"}
-
-
-@pytest.mark.parametrize(
-    ("over", "words"),
-    [
-        (("F_s",), ("--over F_s", "name=from:to:count")),
-        (("F_s=1:2",), ("--over F_s=1:2", "name=from:to:count")),
-        (("=1:2:3",), ("name=from:to:count",)),
-        (("F_s=1:2:3,lin",), ("--over F_s=1:2:3,lin", ",log")),
-        (("F_s=a:2:3",), ("numbers",)),
-        (("F_s=1:2:3.5",), ("an integer",)),
-        (("F_s=1:inf:3",), ("finite",)),
-        (("F_s=1:2:1",), ("count is 1", "between 2 and")),
-        (("F_s=0:2:3,log",), ("> 0",)),
-        (("F_q=1:2:3",), ("--over F_q", "choose from k [N/m], sigma [Ns/m]", "v_s [m/s]")),
-        (("F_s=1:2:3", "F_s=1:2:3"), ("--over F_s", "twice")),
-        (("F_s=1:2:2000", "v_s=1:2:2000"), ("4000000 runs",)),
-    ],
-)
-def test_a_wrong_grid_is_one_message(
-    over: tuple[str, ...], words: tuple[str, ...], gms_fsm: CommandLine, path: Path, tmp_path: Path
-) -> None:
-    options = [part for text in over for part in ("--over", text)]
-    one_message(gms_fsm("sweep", path, *options, "-o", tmp_path / "out"), *words)
-    nothing_written(tmp_path, {"given.toml"})
 
 
 def test_without_a_grid_the_help_is_named(gms_fsm: CommandLine, path: Path) -> None:

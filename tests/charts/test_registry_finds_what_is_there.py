@@ -25,7 +25,7 @@ from gms_fsm import (
     System,
     simulate,
 )
-from gms_fsm.charts import GMS_ELEMENT, LAWS, LUGRE
+from gms_fsm.charts import CHARTS, GMS_ELEMENT, LAWS, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.charts.registry import Demonstration, Entry, entry, registered
 from gms_fsm.errors import ChartError, ParameterError
@@ -38,6 +38,19 @@ CURVE = Stribeck(1.0, 1.5, 1e-3)
 
 def every() -> list[tuple[str, str]]:
     return [(name, law) for name, each in registered().items() for law in each.laws or ("",)]
+
+
+def test_the_registry_is_the_only_list() -> None:
+    wanted = [
+        each.chart(law)
+        for each in registered().values()
+        if not each.wrong
+        for law in each.laws or ("",)
+    ]
+    assert list(CHARTS.values()) == wanted
+    for name in {*CHARTS} & {*registered()} - {"lugre"}:  # the others than the paper's
+        assert CHARTS[name].reference
+        assert registered()[name].demonstration.source.startswith("chosen by us")
 
 
 def test_the_built_in_charts_are_found() -> None:

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Record, Stribeck, simulate
 from gms_fsm.systems.models import Model
+from tests.helpers import FASTEST
 
 
 def noise(seed: int, rows: int, correlation: float = 0.0) -> Any:
@@ -33,9 +34,8 @@ def bank(k: Any, weights: Any, **given: Any) -> GMS:
 def measured(model: Model, motion: Record, sd: float, seed: int, ar: float = 0.0) -> Record:
     """Return the record of a model moved like another record, with noise in its force."""
     t, v = motion.columns["time"], motion.motion().velocity
-    run = simulate(
-        model, Prescribed((t, v)), float(t[-1]), t_start=float(t[0]), t_eval=t, rtol=1e-9
-    )
+    options = {"t_start": float(t[0]), "t_eval": t, "rtol": 1e-9, "engine": FASTEST}
+    run = simulate(model, Prescribed((t, v)), float(t[-1]), **options)
     return Record.from_arrays(
         time=t, velocity=v, force=run.F + sd * noise(seed, t.size, ar), name="synthetic"
     )

@@ -58,7 +58,7 @@ def test_thresholds_on_the_grid_are_exact(places: list[int], seed: int | None) -
     np.testing.assert_allclose(forces(model, record) + 0.3, force, atol=1e-6 * np.ptp(force))
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_other_thresholds_are_nearly_exact(seed: int) -> None:
     rng = np.random.default_rng(seed)
     r = np.sort(rng.uniform(0.03, 0.9, 3)) * 0.5 * TRAVEL
@@ -70,7 +70,7 @@ def test_other_thresholds_are_nearly_exact(seed: int) -> None:
     assert r2 > 0.999, f"seed {seed}: thresholds {r.tolist()}, stiffnesses {k.tolist()}: R2 {r2}"
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 7, 20, 60])
+@pytest.mark.parametrize("n", [1, 7, 60])
 def test_there_are_exactly_n_elements(n: int) -> None:
     record, _ = made([2e4, 1e4, 5e3], [1e-4, 3e-4, 6e-4])
     model = initial_bank(record, n, smoothing=0.0)
@@ -82,7 +82,7 @@ def test_there_are_exactly_n_elements(n: int) -> None:
     np.testing.assert_allclose(model.parameters.C / r, model.parameters.C[0] / r[0], rtol=1e-9)
 
 
-@pytest.mark.parametrize("n", [3, 7, 20, 60])
+@pytest.mark.parametrize("n", [3, 60])
 def test_halves_of_elements_keep_the_sums(n: int) -> None:
     record, _ = made([2e4, 1e4, 5e3], [1e-4, 3e-4, 6e-4])
     model = initial_bank(record, n, smoothing=0.0)
@@ -107,8 +107,7 @@ def test_many_rows_give_the_bank_of_few() -> None:
     np.testing.assert_allclose(model.weights * model.stribeck.F_c, [1e-4, 3e-4], rtol=1e-4)
 
 
-@pytest.mark.parametrize("length", [2.0**-40, 2.0**30])
-@pytest.mark.parametrize("load", [2.0**-40, 2.0**60])
+@pytest.mark.parametrize(("length", "load"), [(2.0**-40, 2.0**60), (2.0**30, 2.0**-40)])
 def test_other_units_give_the_same_bank(length: float, load: float) -> None:
     record, force = made([2e4, 1e4, 3e3], [1e-4, 3e-4, 7e-4], 0.1, seed=2)
     t, x = record.columns["time"], record.columns["position"]

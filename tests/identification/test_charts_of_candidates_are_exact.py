@@ -46,8 +46,7 @@ def backlash(**given: float) -> ChartModel:
     return ChartModel(BEHIND_BACKLASH, values | given)
 
 
-@pytest.mark.parametrize("ratio", [0.5, 1.0, 1.5])
-@pytest.mark.parametrize("b", [-2.0, 0.0, 1.0])
+@pytest.mark.parametrize(("ratio", "b"), [(0.5, -2.0), (1.0, 0.0), (1.5, 1.0), (0.5, 1.0)])
 def test_behind_backlash_is_a_dead_zone_behind_two_thresholds(ratio: float, b: float) -> None:
     x, found = forces(backlash(ratio=ratio, b=b), TURNS)
     z = play(x, 0.2 + 0.3, 0.2 + ratio * 0.3)
@@ -77,7 +76,7 @@ def test_stiffer_one_way_is_a_bent_spring_behind_a_threshold() -> None:
     np.testing.assert_allclose(found, 3.0 * z - np.abs(z), atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_closed_cycle_never_gives_energy(seed: int) -> None:
     rng = np.random.default_rng(seed)
     k, g, r, ratio = rng.uniform(0.1, 1.0, 4).tolist()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pytest
 
-from gms_fsm import GMSError, ParameterError, Record, RecordError, choose, initial_bank
+from gms_fsm import GMSError, Record, choose, initial_bank
 from gms_fsm.identification.bank import stop_operators
 from gms_fsm.identification.candidates import Candidate, Start
 
@@ -19,38 +18,6 @@ X = 1e-3 * np.sin(2.0 * np.pi * T / 2.0)
 F = stop_operators(X, [2e-4]) @ [5e3]
 RECORD = Record.from_arrays(time=T, position=X, force=F, name="rig")
 ONE = {"one": (initial_bank(RECORD, 1), ["k", "weights"])}
-
-
-@pytest.mark.parametrize(
-    ("records", "given", "words"),
-    [
-        (RECORD, {"fold": "record"}, ["only one record", "fold='cycles'"]),
-        (RECORD, {"fold": "rows"}, ["'record' or 'cycles'", "'rows'"]),
-        (RECORD, {"cycles": 8.0}, ["12 s", "less than two cycles of 8 s"]),
-        (RECORD, {"cycles": -1.0}, ["cycles", "-1"]),
-        (RECORD, {"candidates": []}, ["candidates", "there is none"]),
-        (RECORD, {"candidates": 3}, ["candidates", "3"]),
-        (RECORD, {"candidates": [("a", ONE["one"][0])]}, ["(name, model, free)"]),
-        (RECORD, {"candidates": [("a", *ONE["one"])] * 2}, ["two are called 'a'"]),
-        (RECORD, {"candidates": {"one": 1}}, ["(model, free)", "1"]),
-        (RECORD, {"candidates": {"one": (5, ["k"])}}, ["model of candidate 'one' is 5"]),
-        (RECORD, {"train": (50.0, 60.0)}, ["rig", "no selected row is in train"]),
-        (RECORD, {"train": (3.0, 1.0)}, ["train", "after its start"]),
-        (RECORD, {"seed": 0.5}, ["seed"]),
-        ([], {}, ["records"]),
-        ("rig", {}, ["Record"]),
-        (Record.from_arrays(time=T, position=X, name="rig"), {}, ["rig", "no force"]),
-        (
-            Record.from_arrays(time=T, position=T, force=F, name="rig"),
-            {},
-            ["rig", "does not repeat", "cycles=period"],
-        ),
-    ],
-)
-def test_a_mistake_is_one_message(records: Any, given: dict[str, Any], words: list[str]) -> None:
-    with pytest.raises((ParameterError, RecordError)) as caught:
-        choose(records, **({"candidates": ONE} | given))
-    assert [word for word in words if word not in str(caught.value)] == []
 
 
 def test_a_candidate_that_fails_is_noted_and_the_others_are_compared() -> None:

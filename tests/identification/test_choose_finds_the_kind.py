@@ -78,24 +78,6 @@ def test_backlash_is_found_in_the_cycles_left_out(found: Fit) -> None:
     assert found.held_out["rmse"] < 1.2 * NOISE
 
 
-def test_test_rows_are_not_read() -> None:
-    record = made(BACKLASH)
-    force = record.columns["force"].copy()
-    force[record.columns["time"] >= 10.0] = 1e6
-    other = Record.from_arrays(
-        time=record.columns["time"], velocity=record.columns["velocity"], force=force
-    )
-    one, two = (
-        choose(each, candidates=[KINDS[1]], train=(0.0, 10.0), test=(10.0, 20.0))
-        for each in (record, other)
-    )
-    assert [each.value for each in one.table] == [each.value for each in two.table]
-    assert one.choice is not None
-    assert two.choice is not None
-    assert one.choice.rows[0].rmse == two.choice.rows[0].rmse
-    assert one.held_out != two.held_out
-
-
 def test_the_simplest_kind_is_found_leaving_records_out() -> None:
     records = [made(PLAIN, size, seed) for seed, size in enumerate((1e-3, 5e-4, 2e-3))]
     springs = {f"{n}": (gms(records, None, n=n).model, ["k", "weights"]) for n in (2, 1)}

@@ -94,30 +94,3 @@ def test_a_speed_out_of_reach_names_the_largest(limit: dict[str, float]) -> None
     assert excite(0.1, [possible], **limit).columns["velocity"].max() > 0.9 * possible
     with pytest.raises(ParameterError, match="cannot be reached"):
         excite(0.1, [1.02 * possible], **limit)
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"stroke": 0.0},
-        {"stroke": -1.0},
-        {"stroke": np.inf},
-        {"stroke": 1e-200},
-        {"stroke": "long"},
-        {"speeds": []},
-        {"speeds": [1e-3, 0.0]},
-        {"speeds": [-1e-3]},
-        {"speeds": [1e300]},
-        {"speeds": 1e-3},
-        {"rate": 0.0},
-        {"acceleration": -1.0},
-    ],
-)
-def test_wrong_numbers_are_named(wrong: dict[str, Any]) -> None:
-    with pytest.raises(ParameterError, match=next(iter(wrong))):
-        excite(**{"stroke": 2e-3, "speeds": [1e-3]} | wrong)
-
-
-def test_a_motion_without_end_is_refused_before_it_is_made() -> None:
-    with pytest.raises(ParameterError, match=r"would have .* rows .* raise the lowest speed"):
-        excite(1.0, [1e-9, 1.0])

@@ -7,6 +7,7 @@ import pytest
 
 from gms_fsm import Fit, Record, excite, fit, initial_bank
 from gms_fsm.systems.models import with_values
+from tests.identification.fits_made import small
 from tests.identification.records import bank, measured
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
@@ -47,7 +48,7 @@ def test_the_truth_is_within_three_standard_deviations() -> None:
 
 @pytest.mark.slow
 def test_equal_arguments_give_equal_results() -> None:
-    one, two = (_fit(seed=4, search="local") for _ in range(2))
+    one, two = small(), small.__wrapped__()
     assert [each.value for each in one.table] == [each.value for each in two.table]
     assert np.array_equal(one.covariance, two.covariance)
     assert one.runs == two.runs

@@ -65,7 +65,7 @@ def test_a_proposal_costs_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     assert lost > 0, "no proposal was ever lost, so this tested nothing"
 
 
-@pytest.mark.parametrize("most_steps", range(430, 480, 10))  # 412 is enough for the search alone
+@pytest.mark.parametrize("most_steps", [430, 470])  # 412 is enough for the search alone
 def test_what_ran_in_the_search_runs_at_the_end(most_steps: int) -> None:
     """The runs at the end, with smaller tolerances, need some 460 steps."""
     free = ("k", "rate")

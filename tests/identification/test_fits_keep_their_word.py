@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -20,8 +21,9 @@ TRUTH = bank([2e4, 5e3], [5e-5, 1e-4])
 LOCAL: Any = {"search": "local"}
 
 
-def _record(**given: Any) -> Record:
-    return measured(TRUTH, sine(3e-4, 2.0, 5.0), 0.01, 0, **given)
+@functools.cache
+def _record() -> Record:
+    return measured(TRUTH, sine(3e-4, 2.0, 5.0), 0.01, 0)
 
 
 @pytest.mark.parametrize("bounds", [{}, {"z_c1": (2e-5, 2e-4), "z_c2": (2e-5, 1.1e-4)}])
@@ -136,7 +138,7 @@ def test_terms_of_the_measurement_have_its_unit(tmp_path: Path) -> None:
 
 def test_many_predictions_keep_few_runs() -> None:
     found = fit(_record(), TRUTH, free=["k"], **LOCAL)
-    for _ in range(40):
+    for _ in range(34):
         found.predict(_record())
     assert len(found.task.fine.driver._runs) <= 32
 

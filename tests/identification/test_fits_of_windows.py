@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ TRUTH = bank([2e4, 5e3], [5e-5, 1e-4])
 START = bank([1e4, 1e4], [4e-5, 9e-5])
 
 
+@functools.cache
 def _record(cycles: float = 6.0) -> Record:
     return measured(TRUTH, sine(3e-4, 2.0, cycles), 0.01, 0)
 

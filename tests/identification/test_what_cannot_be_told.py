@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
-from gms_fsm import Record, fit
+from gms_fsm import Fit, Record, fit
 from tests.identification.records import bank, measured, sine
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
 
 
 def test_an_element_that_never_slips_shows_its_stiffness_only() -> None:
-    record = measured(bank([2e4, 5e3], [5e-5, 1e-2]), sine(2e-4, 2.0, 4.0), 0.01, 1)
-    found = fit(record, bank([1e4, 1e4], [4e-5, 2e-2]), free=("k", "weights"), search="local")
+    found = never_slipping()
     assert found.never_slipped == (2,)
     assert found.open == ("weights2",)
     assert found["weights2"].note == "cannot be told: no influence on this record"
@@ -22,7 +23,7 @@ def test_an_element_that_never_slips_shows_its_stiffness_only() -> None:
     assert any("without influence" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("rows", [(0.0, 8.0), (3.0, 8.0), (3.0, 6.0)])
+@pytest.mark.parametrize("rows", [(0.0, 8.0), (3.0, 6.0)])
 def test_slip_before_the_training_rows_does_not_count(rows: tuple[float, float]) -> None:
     """One wide stroke, then narrow ones, in which the second element sticks."""
     truth = bank([2e4, 5e3], [5e-5, 3e-4])
@@ -44,19 +45,30 @@ def test_a_product_is_told_and_its_factors_are_not() -> None:
     assert "F_c" in found.weakest.split("The weakest direction:")[1]
 
 
-def test_what_is_told_is_said() -> None:
+@functools.cache
+def one_element() -> Fit:
     record = measured(bank([2e4], [5e-5]), sine(2e-4, 2.0, 4.0), 0.01, 3)
-    found = fit(record, bank([1e4], [4e-5]), free=("k", "weights"), search="local")
+    return fit(record, bank([1e4], [4e-5]), free=("k", "weights"), search="local")
+
+
+@functools.cache
+def never_slipping() -> Fit:
+    record = measured(bank([2e4, 5e3], [5e-5, 1e-2]), sine(2e-4, 2.0, 4.0), 0.01, 1)
+    return fit(record, bank([1e4, 1e4], [4e-5, 2e-2]), free=("k", "weights"), search="local")
+
+
+def test_what_is_told_is_said() -> None:
+    found = one_element()
     assert found.open == ()
     assert found.weakest.startswith("All parameters are determined.")
     assert found["k1"].low < 2e4 < found["k1"].high
-    assert found.effective_rows == pytest.approx(len(record), rel=0.3)  # white noise
+    rows = len(found.task.records[0])
+    assert found.effective_rows == pytest.approx(rows, rel=0.3)  # white noise
 
 
 @pytest.mark.slow
 def test_profile_and_bootstrap_agree_with_the_table() -> None:
-    record = measured(bank([2e4], [5e-5]), sine(2e-4, 2.0, 4.0), 0.02, 5)
-    found = fit(record, bank([1e4], [4e-5]), free=("k", "weights"), search="local")
+    found = one_element()
     half = 0.5 * (found["k1"].high - found["k1"].low)
     profile = found.profile("k1")
     assert profile.low < found["k1"].value < profile.high
@@ -69,9 +81,7 @@ def test_profile_and_bootstrap_agree_with_the_table() -> None:
 
 
 def test_a_profile_of_what_cannot_be_told_is_open() -> None:
-    record = measured(bank([2e4, 5e3], [5e-5, 1e-2]), sine(2e-4, 2.0, 4.0), 0.01, 1)
-    found = fit(record, bank([1e4, 1e4], [4e-5, 2e-2]), free=("k", "weights"), search="local")
-    profile = found.profile("weights2", restarts=False)
+    profile = never_slipping().profile("weights2", restarts=False)
     assert profile.open
     assert str(profile).startswith("weights2: 95 % interval any above ")
 
@@ -85,7 +95,7 @@ def test_the_stribeck_exponent_is_searched_across_two() -> None:
     assert found["k1"].low < 2e4 < found["k1"].high
 
 
-@pytest.mark.parametrize("start", [8e-5, 1.3e-4, 1.8e-4, 2.3e-4])
+@pytest.mark.parametrize("start", [8e-5, 2.3e-4])
 def test_a_search_that_ends_at_the_edge_of_slipping_is_not_sure(start: float) -> None:
     """The element never slips; any threshold beyond the stroke fits as well, from any start."""
     truth = bank([2e4, 5e3], [5e-5, 2e-4], F_s=1.001)

@@ -6,6 +6,7 @@ Every counterexample is checked with the guards and flows of the chart.
 from __future__ import annotations
 
 import doctest
+import functools
 import inspect
 from collections.abc import Mapping
 from typing import Any
@@ -26,6 +27,13 @@ STEP = 2.0**-20  # s; exact in floats
 OF_EVERY_CHART = [check for check in CHECKS if check != "release"]
 
 
+@functools.cache
+def proved(law: str) -> Report:
+    """Return the report on the paper's chart."""
+    return prove(gms_element(law))  # type: ignore[arg-type]
+
+
+@functools.cache
 def report(name: str) -> Report:
     """Return the report on a faulty reading, in the domain where its fault shows."""
     return prove(BROKEN[name].chart, BROKEN[name].domain)
@@ -58,7 +66,7 @@ def after_a_moment(chart: Chart, state: str, point: Mapping[str, float]) -> dict
 # --------------------------------------------------------------------------- the paper's guards
 @pytest.mark.parametrize("law", LAWS)
 def test_the_papers_guards_pass(law: str) -> None:
-    found = prove(gms_element(law))  # type: ignore[arg-type]
+    found = proved(law)
     assert found.domain == ("s > 0", "C > 0", "v_c > 0")
     passes(found, "determinism", "livelock", "reachability", "chattering")
     assert found.of("determinism")[0].where == (
@@ -85,13 +93,11 @@ def test_the_published_law_is_unstable_for_v_below_0_and_the_signed_law_is_not()
     assert evaluate(flow, point) == 0
     assert evaluate(flow, {**point, "z": point["z"] + 0.25}) > 0  # away from it, on both sides
     assert evaluate(flow, {**point, "z": point["z"] - 0.25}) < 0
-    assert prove(gms_element("signed")).refuted == ()
+    assert proved("signed").refuted == ()
 
 
 def test_the_equilibria_are_named() -> None:
-    said = {
-        f.case: f.text for f in prove(gms_element("signed")).of("stability") if f.where == ("slip",)
-    }
+    said = {f.case: f.text for f in proved("signed").of("stability") if f.where == ("slip",)}
     assert said == {
         "z for v > 0": "stable: z = s attracts",
         "z for v < 0": "stable: z = -s attracts",
@@ -430,7 +436,7 @@ def test_a_text_of_high_degree_is_not_tried() -> None:
 
 
 def test_the_report_says_what_was_asked_and_of_what() -> None:
-    found = prove(gms_element("published"))
+    found = proved("published")
     assert [check for check in CHECKS if found.of(check)] == OF_EVERY_CHART
     text = str(found)
     assert text.startswith("GMS element, published law\nassumed: s > 0, C > 0, v_c > 0\n")

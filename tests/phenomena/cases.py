@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from gms_fsm import Chart, ChartModel, LuGre, State, Stribeck, Transition
+import functools
+
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    LuGre,
+    PhenomenaTable,
+    State,
+    Stribeck,
+    Transition,
+    measure_phenomena,
+)
 from gms_fsm.charts import CHARTS
 from gms_fsm.phenomena.measure import Bench
 
@@ -33,3 +44,12 @@ STIFFNESSES = (53e3, 27e3, 13e3, 7e3)  # N/m; 0.375 N each
 MAXWELL = ChartModel(
     ELEMENT, {"k": STIFFNESSES, "limit": tuple(0.375 / k for k in STIFFNESSES)}, n=4
 )
+
+
+MODELS = ("lugre", "gms-signed", "gms-published", "stiction", "backlash")
+
+
+@functools.cache
+def known() -> PhenomenaTable:
+    """Return what the bench measures of these models."""
+    return measure_phenomena(MODELS)

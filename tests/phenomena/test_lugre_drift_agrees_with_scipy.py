@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gms_fsm import measure_phenomena
-from tests.phenomena.cases import BENCH, LUGRE
+from tests.phenomena.cases import BENCH, known
 
 
 @pytest.mark.slow
 def test_drift_per_period() -> None:
-    table = measure_phenomena({"lugre": LUGRE}, ["break-away", "drift"])
+    table = known()
     force = table.cell("lugre", "break-away").number("break-away force at 0.1 N/s")
 
     def flow(t, y):

@@ -9,13 +9,13 @@ import pytest
 
 from gms_fsm import Prescribed, measure_phenomena, simulate
 from tests.helpers import FASTEST
-from tests.phenomena.cases import LUGRE, MAXWELL
+from tests.phenomena.cases import MAXWELL, known
 
 
 @pytest.mark.slow
 def test_on_the_bench() -> None:
-    table = measure_phenomena({"maxwell": MAXWELL, "lugre": LUGRE}, ["memory"])
-    maxwell, lugre = (table.cell(name, "memory") for name in ("maxwell", "lugre"))
+    maxwell = measure_phenomena({"maxwell": MAXWELL}, ["memory"]).cell("maxwell", "memory")
+    lugre = known().cell("lugre", "memory")
     assert maxwell.verdict == "shows"
     assert maxwell.number("gap of the inner loops over their stroke") < 0.05  # %
     assert lugre.number("gap of the inner loops over their stroke") > 10.0

@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import measure_phenomena
-from tests.phenomena.cases import BENCH, CURVE
+from tests.phenomena.cases import BENCH, CURVE, known
 
 
 @pytest.mark.slow
 def test_lugre_and_gms() -> None:
-    table = measure_phenomena(["lugre", "gms-signed"], ["stribeck"])
-    for cell in table:
-        (curve,) = cell.measured.curves
+    for model in ("lugre", "gms-signed"):
+        (curve,) = known().cell(model, "stribeck").curves
         v = 1e-3 * curve.x
         assert v[0] == pytest.approx(1e-5, rel=1e-3)
         assert v[-1] == pytest.approx(0.1, rel=1e-3)

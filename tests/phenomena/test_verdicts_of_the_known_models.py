@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import pytest
 
-from gms_fsm import PhenomenaTable, measure_phenomena
+from gms_fsm import PhenomenaTable
 from gms_fsm.phenomena.limits import LIMITS
 from gms_fsm.phenomena.measure import PHENOMENA
+from tests.phenomena.cases import MODELS, known
 
 pytestmark = pytest.mark.slow
-MODELS = ("lugre", "gms-signed", "gms-published", "stiction", "backlash")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def table() -> PhenomenaTable:
-    return measure_phenomena(MODELS)
+    return known()
 
 
 @pytest.mark.parametrize(

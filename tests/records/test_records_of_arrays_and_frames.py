@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import GMSError, Record, RecordError
+from gms_fsm import Record, RecordError
 from gms_fsm.records import Column
 from tests.scenario_files import table
 
@@ -73,41 +73,6 @@ def test_masked_entries_are_gaps() -> None:
         Record.from_arrays(time=T, position=X, force=masked)
     record = Record.from_arrays(time=T, position=X, force=masked, missing="drop")
     assert 2.0 not in record.columns["time"]
-
-
-# place -> changed arguments, and what the message must contain
-WRONG: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
-    "no motion": ({"position": None}, ("neither position nor velocity", "give one of them")),
-    "a shorter array": ({"force": F[:-1]}, ("force has 39 entries", "time has 40")),
-    "two dimensions": ({"position": np.ones((40, 2))}, ("position has the shape (40, 2)",)),
-    "one number": ({"force": 1.0}, ("force has the shape ()",)),
-    "no time": ({"time": None}, ("time has the shape ()",)),
-    "words": ({"force": ["a"] * 40}, ("force is not an array of numbers",)),
-    "dates": ({"time": np.arange(40).astype("M8[s]")}, ("time", "datetime64", "seconds since")),
-    "complex numbers": ({"force": F + 0j}, ("force", "complex128", "real numbers")),
-    "lists of different lengths": ({"force": [[1], [1, 2]]}, ("force is not an array",)),
-    "NaN": ({"force": np.where(T == 2, np.nan, F)}, ("force, index 8", "finite", "missing = ")),
-    "infinity": ({"position": np.where(T == 2, np.inf, X)}, ("position, index 8", "finite")),
-    "time back": ({"time": T[::-1]}, ("time does not increase after indices 0, 1", "9.75 s")),
-    "time twice": ({"time": np.where(T == 2, 2.25, T)}, ("after index 8", "2.25 s, next: 2.25")),
-    "four rows": (
-        {"time": T[:4], "position": X[:4], "force": F[:4]},
-        ("only 4 rows", "at least 5"),
-    ),
-    "no rows": ({"time": [], "position": [], "force": []}, ("time is empty",)),
-    "a wrong option": ({"missing": "fill"}, ("missing is 'fill'", "'error', 'drop'")),
-    "a name that is no text": ({"name": 5}, ("name is 5", "a text")),
-}
-
-
-@pytest.mark.parametrize("wrong", WRONG)
-def test_what_is_wrong_is_named(wrong: str) -> None:
-    changed, said = WRONG[wrong]
-    with pytest.raises(GMSError) as caught:
-        Record.from_arrays(**{"time": T, "position": X, "force": F, "name": "rig"} | changed)
-    for part in said:
-        assert part in str(caught.value)
-    assert "'rig'" in str(caught.value) or "option" in wrong or "text" in wrong
 
 
 # --------------------------------------------------------------------------- data frames
@@ -190,24 +155,6 @@ def test_a_part_of_a_part_keeps_the_selection(tmp_path: Path) -> None:
     part = record.between(1.0, 8.0).between(2.0, 7.0)
     expected = (record.columns["time"] >= 2.0) & (record.columns["time"] < 7.0)
     np.testing.assert_array_equal(part.chosen, record.chosen[expected])
-
-
-@pytest.mark.parametrize(
-    ("t0", "t1", "said"),
-    [
-        (5.0, 5.0, "0 selected row"),
-        (8.0, 2.0, "from 8 s to 2 s"),
-        (20.0, None, "from 20 s to its end"),
-        (None, 1.0, "4 selected row(s) of 4 from its start to 1 s"),
-        (float("nan"), None, "t0 is nan"),
-        ("a", None, "t0 is 'a'"),
-    ],
-)
-def test_an_empty_part_is_refused(t0: Any, t1: Any, said: str) -> None:
-    record = Record.from_arrays(time=T, position=X, name="rig")
-    with pytest.raises(GMSError) as caught:
-        record.between(t0, t1)
-    assert said in str(caught.value)
 
 
 def test_a_motion_is_computed_once() -> None:

@@ -1,0 +1,1582 @@
+"""Everything the product refuses, in one table: call, class of the error, place and value.
+
+A group makes calls of one kind; a row is what one call is given, behind the end of the place and
+the value that its error must name (... for none). `tests/test_refusals.py` makes the calls and
+compares the messages with `tests/refusals.approved.txt`, which ``python -m tests.refusals`` writes
+anew. A new refusal is a row.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import os
+import re
+import tempfile
+from collections.abc import Callable, Mapping
+from contextlib import chdir
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
+from unittest import mock
+
+import numpy as np
+
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSError,
+    GMSParameters,
+    LuGre,
+    Parameter,
+    Prescribed,
+    PulledSlider,
+    Record,
+    Slider,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    choose,
+    excite,
+    fit,
+    initial_bank,
+    simulate,
+)
+from gms_fsm.app.cli import CliOptions, app
+from gms_fsm.charts import gms_element
+from gms_fsm.errors import (
+    NOTHING,
+    ChartError,
+    ExpressionError,
+    OutputError,
+    ParameterError,
+    RecordError,
+    ScenarioError,
+    TraceFileError,
+    UnitError,
+)
+from gms_fsm.traces.monitors import Chattering, Passivity
+from tests import older_files, own_files
+from tests.helpers import ROOT, stick_slip
+from tests.scenario_files import MEASURED, OPEN_LOOP, changed, sine_table, table
+
+APPROVED = ROOT / "tests" / "refusals.approved.txt"
+# What other libraries say differs with their versions; a new chart, format or lesson is in a list.
+VARYING = (
+    r"(?<=not valid TOML: )[^;]*",
+    r"(?<=\()(Validation|Key|Value|Overflow|UnicodeDecode|EOF|Attribute)?Error: .*?(?=\); write)",
+    r"(?<=\()BadZipFile: .*?(?=\); write)",
+    r"\[Errno .*",
+    r"embedded null[^)]*",
+    r"(?<=must be one of )backlash,.*",
+    r"(?<=there are )(backlash|break-away),.*",
+    r"(?<=must end in )\.(svg|png),.*",
+    r"(?<=choose one of)\n[\s\S]*",
+)
+LONG = "x" * 50_000
+NAN, INF = np.nan, np.inf
+
+
+class Refusal(NamedTuple):
+    """A call in an empty folder, and the fields of its error."""
+
+    call: Callable[[], object]
+    error: type[GMSError]
+    place: str
+    value: object = NOTHING
+
+
+REFUSALS: dict[str, Refusal] = {}
+
+
+def group(
+    what: str,
+    error: type[GMSError],
+    call: Callable[..., object],
+    rows: Mapping[str, Any],
+    place: str | None = None,
+) -> None:
+    """Add rows to the table: place, value (... for none), and what the call is given.
+
+    With a place for all rows, they have only what the call is given.
+    """
+    for name, row in rows.items():
+        at, value, *given = row if place is None else (place, ..., *row)
+        assert f"{what}: {name}" not in REFUSALS
+        found = NOTHING if value is ... else value
+        REFUSALS[f"{what}: {name}"] = Refusal(partial(call, *given), error, at, found)
+
+
+def refused(call: Callable[[], object]) -> tuple[GMSError | None, set[str]]:
+    """Return the error of a call in an empty folder, and the files that are there afterwards."""
+    others = {name: value for name, value in os.environ.items() if name != "GMS_FSM_DATA"}
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        chdir(folder),
+        mock.patch.dict(os.environ, others, clear=True),
+    ):
+        try:
+            call()
+        except GMSError as error:
+            return error, {path.as_posix() for path in Path().rglob("*") if path.is_file()}
+    return None, set()
+
+
+def place_of(error: GMSError) -> str:
+    """Return the place of an error, with all that contains it."""
+    return ": ".join(filter(None, (error.outer, error.place)))
+
+
+def told(error: GMSError) -> str:
+    """Return the message of an error, without the parts of it that vary."""
+    said = str(error).replace("\0", "\\0")
+    for pattern in VARYING:
+        said = re.sub(pattern, "...", said)
+    return said.replace("\n", "\n    ")
+
+
+def transcript() -> str:
+    """Return the messages of all refusals."""
+    errors = ((name, refused(row.call)[0]) for name, row in REFUSALS.items())
+    return "".join(f"{name}\n    {told(error)}\n" for name, error in errors if error)
+
+
+@cache
+def approved() -> dict[str, str]:
+    """Return the approved message of each refusal."""
+    found = re.split(r"^(?=\S)", APPROVED.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {name: said[:-1] for name, _, said in (each.partition("\n    ") for each in found[1:])}
+
+
+# --------------------------------------------------------------------------- the command line
+def verb(*arguments: str) -> None:
+    """Call ``gms-fsm``, and let its error pass."""
+    app(arguments, obj=CliOptions(), standalone_mode=False)
+
+
+def scenario(text: str | bytes, *overrides: str) -> None:
+    """Run a scenario file with these contents."""
+    Path("a.toml").write_bytes(text.encode() if isinstance(text, str) else text)
+    verb("run", "a.toml", "-o", "out", *(each for set_ in overrides for each in ("--set", set_)))
+
+
+def edited(old: str, new: str) -> None:
+    """Run the open loop, edited."""
+    scenario(changed(OPEN_LOOP, old, new))
+
+
+MODEL = OPEN_LOOP[OPEN_LOOP.index("[model]") : OPEN_LOOP.index("[rig]")]
+RIG = OPEN_LOOP[OPEN_LOOP.index("[rig]") : OPEN_LOOP.index("[run]")]
+PAPER = '[model]\nkind = "GMS"\nlaw = "signed"\npreset = "stick-slip"\n'
+SIN, END, ONE_C = "0.1*sin(t)", "t_end = 1.0", "C = [0.1, 0.1]"
+QUOTED = f'"{SIN}"'
+COLUMN = 'time = { column = "t", unit = "s" }'
+SIGNAL = f'{{ file = "%s", {COLUMN}, value = {{ column = "x", unit = "m" }} }}'
+
+rows = {
+    "typo of a table": ("[rig]", "[rgi]"),
+    "typo": ("v_c = 1e-6", "vc = 1e-6"),
+    "typo of a required key": ("law =", "lwa ="),
+    "typo two tables deep": ("F_s = 1.5", "Fs = 1.5"),
+    "unknown": (END, f"{END}\nspeed_of_light = 3e8"),
+    "of another rig": ('kind = "prescribed"', 'kind = "pulled"'),
+    "of another model": ('"GMS"', '"LuGre"'),
+    "called float": (END, f"{END}\nfloat = 1"),
+    "typo in a measured signal": (QUOTED, f'{{ file = "a.csv", {COLUMN}, valeu = 1 }}'),
+    "record that no rig uses": ("[run]", f'[record]\nfile = "a.csv"\n{COLUMN}\n[run]'),
+    "rig that wants a record": (RIG, '[rig]\nkind = "record"\n'),
+    "no model": (MODEL, ""),
+    "no law": ('law = "signed"\n', ""),
+    "no end": (END, ""),
+    "no v_s": (", v_s = 1e-3", ""),
+    "no stiffness": ("k = [100.0, 50.0]\n", ""),
+    "very long": ('title = "open loop"', f'"{LONG}" = 1'),
+    "very long value": (END, f"{END}\nend = '{LONG}'"),
+    "3000 tables deep": ("[run]", f"{'a.' * 3000}b = 1\n[run]"),
+}
+group("key of a scenario", ScenarioError, edited, rows, "a.toml")
+rows = {
+    "unknown model": ('"GMS"', '"GSM"'),
+    "unknown law": ('"signed"', '"singed"'),
+    "unknown column of Table I": (MODEL, PAPER.replace("stick-slip", "stickslip")),
+    "unknown method": (END, f'{END}\nmethod = "rk45"'),
+    "unknown picture format": ("figures = []", 'figures = ["jpg"]'),
+    "very long kind": ('kind = "GMS"', f'kind = "{LONG}"'),
+    "text for a number": ("v_c = 1e-6", 'v_c = "1e-6"'),
+    "text in a list": ("[100.0, 50.0]", '[100.0, "50"]'),
+    "number for a list": ("[100.0, 50.0]", "100.0"),
+    "true for a number": (END, "t_end = true"),
+    "value for a table": (MODEL, "model = 3\n"),
+    "list of tables for a table": ("[rig]", "[[rig]]"),
+    "date for a signal": (QUOTED, "2020-01-01"),
+    "NaN": ("v_c = 1e-6", "v_c = nan"),
+    "negative step": (END, f"{END}\nstep = -0.1"),
+    "negative stiffness": ("[100.0, 50.0]", "[100.0, -50.0]"),
+    "less stiction than friction": ("F_s = 1.5", "F_s = 0.5"),
+    "row a picosecond": ("figures = []", "every = 1e-12"),
+    "negative row distance": ("figures = []", "every = -1.0"),
+    "too many C": ("[0.1, 0.1]", "[0.1, 0.1, 0.1]"),
+    "preset and parameters": (MODEL, PAPER + "v_c = 1e-6\n"),
+    "shares that are not everything": (ONE_C, "C = 2.0\nshares = [0.5, 0.4]"),
+    "negative share": (ONE_C, "C = 2.0\nshares = [1.5, -0.5]"),
+    "shares with a list of C": (ONE_C, f"{ONE_C}\nshares = [0.5, 0.5]"),
+    "one C for all": (ONE_C, "C = 2.0"),
+    "corner of three numbers": (QUOTED, "[[0.0, 0.0, 1.0], [1.0, 1.0, 2.0]]"),
+    "number of 5000 digits": (END, f"t_end = 1{'0' * 5000}"),
+    "number without a digit before the point": ("[100.0, 50.0]", "[100.0, -.5e-3]"),
+    "number without a digit behind the point": (END, "t_end = 1. # s"),
+    "file that cannot be": (QUOTED, SIGNAL % "a\\u0000.csv"),
+    "file of a very long name": (QUOTED, SIGNAL % LONG),
+    "file without a name": (QUOTED, SIGNAL % ""),
+    "file that is missing": (QUOTED, SIGNAL % "b.csv"),
+}
+group("value of a scenario", ScenarioError, edited, rows, "a.toml")
+rows = {
+    "mass of 0": ("[rig] mass", 0.0, '"prescribed"\nvelocity =', '"slider"\nmass = 0.0\nforce ='),
+    "expression that ends early": ("signal, column 8", ..., "sin(t)", "sin(t"),
+    "unknown name": ("signal, column 9", ..., "sin(t)", "sin(x)"),
+    "name that is an emoji elsewhere": ("signal, column 1", ..., SIN, ":warning:"),
+    "program": ("signal, column 1", ..., QUOTED, """'__import__("os").mkdir("pwned")'"""),
+    "one corner": ("a.toml: rig.velocity = [[0.0, 0.1]]: signal", ..., QUOTED, "[[0.0, 0.1]]"),
+    "no corner": ("a.toml: rig.velocity = []: signal", ..., QUOTED, "[]"),
+    "ramps that go back in time": ("signal", ..., QUOTED, "[[0.0, 0.0], [2.0, 1.0], [1.0, 1.0]]"),
+    "very long expression": ("signal, column 10001", ..., SIN, "t + " * 50_000 + "x"),
+    "deep expression": ("signal, column 10001", ..., SIN, "(" * 5000 + "t" + ")" * 5000),
+}
+group("value of a scenario", ScenarioError, edited, rows)
+rows = {
+    "end before the start": (END, "t_end = -1.0"),
+    "no time at all": (END, "t_end = 0.0"),
+    "step under the clock": (END, f"{END}\nmax_step = 1e-18"),
+    "no step for a method without error estimate": (END, f'{END}\nmethod = "rk4"'),
+    "events per step without a step": (END, f'{END}\nevents = "step"'),
+    "too few initial z": ("[output]", "[initial]\nz = [0.0]\n[output]"),
+    "unknown initial state": ("[output]", '[initial]\nstates = ["stick", "slide"]\n[output]'),
+    "initial velocity of a prescribed motion": ("[output]", "[initial]\nv = 0.1\n[output]"),
+}
+group("run of a scenario", ScenarioError, edited, rows, "a.toml")
+rows = {
+    "empty": (b"",),
+    "only a comment": ("# later\n",),
+    "half a table head": (OPEN_LOOP.replace("[run]", "[run"),),
+    "a key twice": (OPEN_LOOP + "figures = []\n",),
+    "binary": (bytes(range(256)) * 10,),
+    "zeros": (bytes(1000),),
+    "UTF-16": (OPEN_LOOP.encode("utf-16"),),
+    "brackets without end": ("a = " + "[" * 5000,),
+    "a line of 2 MB": ("title = '" + "a" * 2_000_000 + "'\n",),
+    "YAML": ("model:\n  kind: GMS\n",),
+    "no number at all": ("title = 1.2.3",),
+    "a text that ends before a point": ("title = '.5' x",),
+    "a bare key without end": ("\n" + "a." * 300_000 + "a = 1\n",),
+    "a quoted key without end": ("\n" + '"a".' * 200_000 + "a = 1\n",),
+    "a spaced key without end": ("\n" + "'a' . " * 100_000 + "a = 1\n",),
+    "a head without end": ("\n[" + "a." * 300_000 + "a]\n",),
+    "an inline key without end": ("\nk = { " + "a." * 300_000 + "a = 1 }\n",),
+}
+group("file that is no scenario", ScenarioError, scenario, rows, "a.toml")
+rows = {
+    "of another table": (OPEN_LOOP, "law=signed"),
+    "typo": (OPEN_LOOP, "tend=3"),
+    "in the wrong table": (OPEN_LOOP, "model.velocity=1"),
+    "typo in the right table": (OPEN_LOOP, "run.tend=3"),
+    "of a table that is absent": (OPEN_LOOP, "smoothing=3"),
+    "very long key": (OPEN_LOOP, f"model.{LONG}.a=1"),
+    "rows too close together": (OPEN_LOOP, "output.every=5e-324"),
+}
+group("override", ScenarioError, scenario, rows, "a.toml")
+rows = {
+    "digit before the point": ("--set model.k=[.25, 1]", ..., OPEN_LOOP, "model.k=[.25, 1]"),
+    "digit behind the point": ("--set run.t_end=3.", ..., OPEN_LOOP, "run.t_end=3."),
+    "no assignment": ("", ..., OPEN_LOOP, LONG),
+    "deep key": ("", ..., OPEN_LOOP, "title={" + "a." * 50_000 + "a=1}"),
+}
+group("override", ScenarioError, scenario, rows)
+
+rows = {
+    "unknown key": (OPEN_LOOP, "model.lwa=published"),
+    "unknown table": (OPEN_LOOP, "modell.law=published"),
+    "unknown law": (OPEN_LOOP, "model.law=singed"),
+    "word for a number": (OPEN_LOOP, "run.t_end=soon"),
+    "nothing for a number": (OPEN_LOOP, "run.t_end="),
+    "half a list": (OPEN_LOOP, "model.k=[1.0"),
+    "three elements": (OPEN_LOOP, "model.k=[1.0, 2.0, 3.0]"),
+    "half a table": (OPEN_LOOP, "record.file=own.csv"),
+    "monitor that is a number": (OPEN_LOOP, "run.monitors=[3]"),
+    "monitor without a list": (OPEN_LOOP, "run.monitors=coverage"),
+}
+group("override", ScenarioError, scenario, rows, "a.toml")
+rows = {
+    "monitor that is none": ("run.monitors", ..., OPEN_LOOP, "run.monitors=['pasivity']"),
+    "no key": ("--set =3", ..., OPEN_LOOP, "=3"),
+    "no table": ("--set .t_end=3", ..., OPEN_LOOP, ".t_end=3"),
+    "two points": ("--set run..t_end=3", ..., OPEN_LOOP, "run..t_end=3"),
+    "key of a number": ("--set run.t_end.x=3", ..., OPEN_LOOP, "run.t_end.x=3"),
+    "two lines": ("--set run.t_end=2", ..., OPEN_LOOP, "run.t_end=2\nrun.rtol = 1e-3"),
+    "endless list": ("", ..., OPEN_LOOP, "model.k=" + "[" * 5000),
+}
+group("override", ScenarioError, scenario, rows)
+
+
+def grid(*over: str) -> None:
+    """Sweep the open loop over these."""
+    Path("a.toml").write_text(OPEN_LOOP)
+    verb("sweep", "a.toml", "-o", "out", *(part for each in over for part in ("--over", each)))
+
+
+rows = {
+    "no numbers": ("--over F_s", ..., "F_s"),
+    "no count": ("--over F_s=1:2", ..., "F_s=1:2"),
+    "no name": ("--over =1:2:3", ..., "=1:2:3"),
+    "unknown spacing": ("--over F_s=1:2:3,lin", ..., "F_s=1:2:3,lin"),
+    "word": ("--over F_s=a:2:3", ..., "F_s=a:2:3"),
+    "fraction of a run": ("--over F_s=1:2:3.5", ..., "F_s=1:2:3.5"),
+    "infinity": ("--over F_s=1:inf:3", ..., "F_s=1:inf:3"),
+    "one run": ("--over F_s=1:2:1", ..., "F_s=1:2:1"),
+    "logarithm of zero": ("--over F_s=0:2:3,log", ..., "F_s=0:2:3,log"),
+    "unknown name": ("", ..., "F_q=1:2:3"),
+    "name twice": ("", ..., "F_s=1:2:3", "F_s=1:2:3"),
+    "too many runs": ("", ..., "F_s=1:2:2000", "v_s=1:2:2000"),
+}
+group("grid of a sweep", ParameterError, grid, rows)
+
+
+def own(name: str, old: str, new: str, command: str) -> None:
+    """Call a verb beside a system and a chart in files of one's own, one of them edited."""
+    own_files.write(Path())
+    path = Path(f"{name}.toml")
+    path.write_text(changed(path.read_text(), old, new))
+    verb(*command.split())
+
+
+def command(text: str) -> None:
+    """Call a verb beside a system and a chart in files of one's own."""
+    own_files.write(Path())
+    verb(*text.split())
+
+
+STICTION, TO_FORWARD, FIGURES = 'name = "stiction"', 'guard = "F > F_s"', "figures = []"
+UNTIL = "t_end = 12.0"
+rows = {
+    "unknown key": ("pair", "inertia = 0.5", "inertia = 0.5\nmass = 1", "run pair.toml"),
+    "initial text": ("pair", "one.x = 1e-3", 'one.x = "1e-3"', "run pair.toml"),
+    "key of the run": ("pair", UNTIL, f"{UNTIL}\nrtoll = 1e-8", "run pair.toml"),
+    "too many rows": ("pair", FIGURES, f"{FIGURES}\nevery = 1e-9", "run pair.toml"),
+    "initial value": ("pair", "one.x = 1e-3", "one.y = 1e-3", "run pair.toml"),
+    "held outputs of the whole run": (
+        "pair",
+        UNTIL,
+        f'{UNTIL}\nstep = 1e-3\nevents = "held"',
+        "run pair.toml",
+    ),
+}
+group("own file", ScenarioError, own, rows, "pair.toml")
+rows = {
+    "guard": ("guard, column 5", ..., "own", TO_FORWARD, 'guard = "F > F_k"', "run pair.toml"),
+    "missing chart": ("one.toml", ..., "pulled", '"own.toml"', '"one.toml"', "blocks pulled.toml"),
+    "its own chart": (
+        "pulled.toml",
+        ...,
+        "pulled",
+        '"own.toml"',
+        '"pulled.toml"',
+        "run pulled.toml",
+    ),
+    "no TOML": ("own.toml", ..., "own", STICTION, "name = stiction", "chart own.toml"),
+}
+group("own file", ScenarioError, own, rows)
+rows = {
+    "guard of a chart": (
+        "column 1",
+        ...,
+        "own",
+        TO_FORWARD,
+        'guard = "F >> F_s"',
+        "check own.toml",
+    ),
+    "circle of names": (
+        "column 1",
+        ...,
+        "own",
+        STICTION,
+        f'{STICTION}\nlet = {{ a = "b", b = "a" }}',
+        "chart own.toml",
+    ),
+}
+group("own file", ExpressionError, own, rows)
+rows = {
+    "chart file that is missing": ("none.toml", ..., "chart none.toml"),
+    "run of a chart file": ("own.toml", ..., "run own.toml"),
+    "sweep of a chart file": ("own.toml", ..., "sweep own.toml --over F_s=1:2:2"),
+    "missing body": ("--set body.tow.inertia=1", ..., "run pair.toml --set body.tow.inertia=1"),
+    "unknown name in an override": ("column 1", ..., "run pair.toml --set body.two.inertia=q"),
+    "no inertia": ("system 'pair', body 'two'", ..., "run pair.toml --set body.two.inertia=0"),
+    "value for a contact": ("pair.toml", ..., "run pair.toml --set contact.gear=1"),
+    "scenario that is missing": ("gone.toml", ..., "run gone.toml"),
+    "scenario that is a folder": (".", ..., "run ."),
+}
+group("command", ScenarioError, command, rows)
+rows = {
+    "chart that is missing": ("chart none",),
+    "chart that is a folder": ("chart .",),
+    "chart file with a law": ("chart own.toml --law signed",),
+    "contact that is missing": ("check pair.toml --contact pad",),
+    "law that is missing": ("code --law foo",),
+    "lesson by another name": ("lesson hysteresis",),
+    "lesson by another number": ("lesson 99",),
+    "lesson by a fraction": ("lesson 1.0",),
+}
+group("command", ParameterError, command, rows, "")
+rows = {
+    "chart file with a contact": ("--contact pad: own.toml", ..., "chart own.toml --contact pad"),
+    "chart with a contact": ("--contact pad", ..., "chart lugre --contact pad"),
+    "chart without a contact": ("pair.toml", ..., "chart pair.toml"),
+    "blocks of no file": ("own", ..., "blocks own"),
+    "ending of a chart": ("path", "x.tex", "chart lugre -o x.tex"),
+}
+group("command", ParameterError, command, rows)
+rows = {
+    "force of the paper": ("signal, column 4", ..., "paper --force sin( -o p"),
+}
+group("command", ExpressionError, command, rows)
+rows = {
+    "output folder in a file": ("", ..., "run pulled.toml -o own.toml/out"),
+    "output folder that is a file": ("", ..., "run pulled.toml -o own.toml"),
+}
+group("command", OutputError, command, rows)
+
+
+rows = {
+    "law of a chart with several": ("", ..., "chart gms"),
+    "ending of a picture": ("path", "c.jpg", "chart gms --law signed -o c.jpg"),
+    "no elements": ("elements", 0, "chart gms --law signed --elements 0"),
+    "elements below zero": ("elements", -1, "blocks --elements -1"),
+    "schematic of no system": ("--schematic", ..., "blocks --schematic"),
+    "ending of a schematic": ("path", "s.dot", "blocks pair.toml --schematic -o s.dot"),
+    "elements of a system": ("--elements", ..., "blocks pair.toml --elements 3"),
+    "blocks of a chart file": ("own.toml", ..., "blocks own.toml"),
+    "check of a missing chart": ("", ..., "check nothing"),
+    "law of a broken chart": ("", ..., "check broken:arms --law signed"),
+    "domain that is empty": ("", ..., "check gms --law signed --domain s>0 --domain s<0"),
+    "domain that is not encoded": ("", ..., "check gms --law signed --domain exp(s)>1"),
+    "code of a chart without a rig": ("contact 'friction'", ..., "code own.toml"),
+    "rig of a system": ("--rig", ..., "code pair.toml --rig slider"),
+    "sweep over a missing contact": ("", ..., "sweep pair.toml --over pad3.F_s=1:2:2"),
+    "unknown model of the bench": ("", ..., "phenomena --model lugree -o o"),
+    "unknown phenomenon": ("", ..., "phenomena --phenomenon lagg -o o"),
+    "number without a value": ("", ..., "phenomena --set F_s -o o"),
+    "unknown number of the bench": ("", ..., "phenomena --set F_x=1 -o o"),
+    "chart without values": ("own.toml", ..., "phenomena own.toml -o o"),
+    "system of several contacts": ("pair.toml", ..., "phenomena pair.toml -o o"),
+    "model that is no file": ("", ..., "phenomena lugre -o o"),
+    "data set that is missing": ("dataset", "skates", "reportcard --only skates -o out"),
+}
+group("command", ParameterError, command, rows)
+rows = {
+    "debug of a missing scenario": ("none.toml", ..., "debug none.toml"),
+    "debug of a program": ("", ..., "debug mine.py"),
+    "debug of a trace": ("", ..., "debug t.CSV"),
+    "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),
+    "fit of a missing scenario": ("none.toml", ..., "fit none.toml"),
+}
+group("command", ScenarioError, command, rows)
+rows = {
+    "domain of an unknown name": ("domain, column 3", ..., "check gms --law signed --domain s>q"),
+    "velocity of the paper": ("column 1", ..., "paper --velocity __import__('os') -o p"),
+}
+group("command", ExpressionError, command, rows)
+rows = {
+    "plot of a missing trace": ("none.npz", ..., "plot none.npz"),
+    "plot of no trace": ("own.toml", ..., "plot own.toml"),
+}
+group("command", TraceFileError, command, rows)
+rows = {"data that are missing": ("nowhere", ..., "reportcard --data nowhere -o out")}
+group("command", RecordError, command, rows)
+
+
+# --------------------------------------------------------------------------- records
+GOOD = sine_table()
+LINES = GOOD.splitlines()
+EVEN = np.arange(60) * 0.01
+
+
+def measured(content: str | bytes) -> None:
+    """Run over a table with these contents."""
+    Path("own.csv").write_bytes(content.encode() if isinstance(content, str) else content)
+    scenario(MEASURED)
+
+
+def row(number: int, text: str) -> str:
+    """Return the good table with one row replaced; the header is row 1."""
+    return "\n".join([*LINES[: number - 1], text, *LINES[number:]]) + "\n"
+
+
+rows = {
+    "text in a number column": (row(5, "0.03,abc,1"),),
+    "empty cell": (row(5, "0.03,,1"),),
+    "hexadecimal number": (row(5, "0x3,1,1"),),
+    "very long cell": (row(5, f"0.03,{LONG},1"),),
+    "NaN in the position": (row(5, "0.03,nan,1"),),
+    "infinity": (row(60, "0.58,-inf,1"),),
+    "number too big": (row(5, "0.03,1e400,1"),),
+    "many NaN": ("\n".join([LINES[0], *(f"{i},nan,1" for i in range(20))]),),
+    "row that is too short": (row(5, "0.03,1"),),
+    "row that is too long": (row(5, "0.03,1,2,3"),),
+    "empty row": (row(5, ""),),
+    "empty row between two tables": (GOOD + "\n\n1,1,1\n",),
+    "decimal commas": (GOOD.replace(",", ";").replace(".", ","),),
+    "decimal commas between commas": (GOOD.replace(".", ","),),
+    "remark below": (GOOD + "the end\n",),
+    "quote that never closes": (row(5, '"0.03,1,1'),),
+    "quote that never closes, and a long file": (row(5, '"0.03,1,1') + "0,0,0\n" * 50_000,),
+    "time that goes backward": (row(10, "0.01,1,1"),),
+    "time that falls all along": (table(["t", "x", "F"], -EVEN, EVEN, EVEN),),
+    "missing column": ("t,pos,F\n0,0,0\n1,1,1\n",),
+    "very long head": (GOOD.replace("F", LONG, 1),),
+    "columns divided by /": (GOOD.replace(",", "/"),),
+    "column twice": ("t,x,F,x\n0,0,0,0\n1,1,1,1\n",),
+    "no head line": (GOOD.partition("\n")[2],),
+    "units that contradict the scenario": (row(2, "[ms],[mm],[N]"),),
+    "words in the second line": (row(2, "a,b,c"),),
+    "empty file": ("",),
+    "head line only": ("t,x,F\n",),
+    "four rows": ("t,x,F\n0,0,0\n1,1,1\n2,2,2\n3,3,3\n",),
+    "line of 2 MB": ("t,x,F\n0,0," + "1" * 2_000_000 + "\n",),
+    "binary": (bytes(range(256)) * 50,),
+    "zero byte in a row": (row(5, "0.03,\0,1"),),
+    "UTF-16 without a mark": (GOOD.encode("utf-16-le"),),
+    "UTF-16 cut short": (GOOD.encode("utf-16")[:-1],),
+    "Latin-1": (GOOD.replace("F", "µ", 1).encode("latin-1"),),
+}
+group("table", RecordError, measured, rows, "own.csv")
+
+
+def setting(old: str, new: str) -> None:
+    """Run over a good table by an edited scenario in an inner folder; the table is outside, too."""
+    Path("own.csv").write_text(GOOD)
+    Path("in").mkdir()
+    os.chdir("in")
+    Path("own.csv").write_text(GOOD)
+    scenario(changed(MEASURED, old, new))
+
+
+FILE = 'file = "own.csv"'
+rows = {
+    "unknown unit": ('"mm"', '"furlong"'),
+    "unit of something else": ('"mm"', '"ms"'),
+    "very long unit": ('unit = "N"', f'unit = "{LONG}"'),
+}
+group("setting of a record", ScenarioError, setting, rows, "a.toml: [record]")
+rows = {
+    "no unit": (', unit = "mm"', ""),
+    "typo": ('"N" }', '"N", sgin = -1 }'),
+    "sign of 2": ('"N" }', '"N", sign = 2 }'),
+    "unknown quantity": ("force =", "friction ="),
+    "no time": (f"{COLUMN}\n", ""),
+    "another folder": ('"own.csv"', '"../own.csv"'),
+    "absolute path": ('"own.csv"', '"/etc/passwd"'),
+    "no such file": ('"own.csv"', '"gone.csv"'),
+    "negative smoothing": (FILE, f"{FILE}\nsmoothing = -1.0"),
+    "two delimiters": (FILE, f'{FILE}\ndelimiter = ";;"'),
+    "line end as delimiter": (FILE, f'{FILE}\ndelimiter = "\\n"'),
+    "start before the record": ("[output]", "[run]\nt_start = -1.0\n[output]"),
+    "start after the record": ("[output]", "[run]\nt_start = 0.7\n[output]"),
+    "end before the record": ("[output]", "[run]\nt_end = -0.7\n[output]"),
+}
+group("setting of a record", ScenarioError, setting, rows, "a.toml")
+rows = {
+    "no motion": ('position = { column = "x", unit = "mm" }\n', ""),
+    "smoothing beyond all bounds": (FILE, f"{FILE}\nsmoothing = 1e100"),
+    "selection by an unknown name": (FILE, f'{FILE}\nwhere = "F > 1 N"'),
+    "selection that ends early": (FILE, f'{FILE}\nwhere = "force >"'),
+    "selection that is no comparison": (FILE, f'{FILE}\nwhere = "force"'),
+    "program as selection": (FILE, f"""{FILE}\nwhere = '__import__("os").mkdir("x") > 0'"""),
+    "selection by a number of many digits": (FILE, f'{FILE}\nwhere = "{"1" * 500_000}"'),
+    "another column": ('column = "x"', 'column = "pos"'),
+    "very long column": ('column = "x"', f'column = "{LONG}"'),
+    "column that looks like markup": ('column = "x"', 'column = "[bold]x:warning:"'),
+    "wrong delimiter": (FILE, f'{FILE}\ndelimiter = ";"'),
+    "selection that nothing fulfils": (FILE, f'{FILE}\nwhere = "force > 100 N"'),
+    "selection of one row": (FILE, f'{FILE}\nwhere = "force > 0.9999 N"'),
+    "selection by a column that is not given": (FILE, f'{FILE}\nwhere = "normal > 4.5 N"'),
+    "selection that divides by zero": (FILE, f'{FILE}\nwhere = "1 / (time - 0.1) > 0"'),
+    "selection that cannot be computed": (FILE, f'{FILE}\nwhere = "sqrt(force) > 1 N"'),
+}
+group("setting of a record", RecordError, setting, rows, "own.csv")
+rows = {
+    "selection by a unit": (
+        "record.where = 'force > 1 lb'",
+        ...,
+        FILE,
+        f'{FILE}\nwhere = "force > 1 lb"',
+    ),
+    "selection by another unit": (
+        "record.where = 'force > -5 mm'",
+        ...,
+        FILE,
+        f'{FILE}\nwhere = "force > -5 mm"',
+    ),
+}
+group("setting of a record", RecordError, setting, rows)
+
+
+INSTRUMENT = "t_s;x_mm;F_N\n" + "".join(f"{i / 4};{i};{i / 2}\n" for i in range(20))
+COMMAS = INSTRUMENT.replace(".", ",")
+
+
+def read(content: str | bytes, **options: Any) -> None:
+    """Read a table with these contents."""
+    Path("own.csv").write_bytes(content.encode() if isinstance(content, str) else content)
+    Record.from_csv("own.csv", **options)
+
+
+def from_csv(content: str | bytes = INSTRUMENT, **options: Any) -> dict[str, Any]:
+    return {"content": content, **options}
+
+
+rows = {
+    "another column": (from_csv(force=("Kraft", "N")),),
+    "decimal commas without the option": (from_csv(COMMAS),),
+    "option without decimal commas": (from_csv(decimal=","),),
+    "both marks": (from_csv(COMMAS.replace("0,0;", "1.234,5;", 1), decimal=","),),
+    "another encoding": (from_csv(INSTRUMENT.replace("F_N", "F_µN").encode("latin-1")),),
+    "another encoding far down": (from_csv((INSTRUMENT + "9;9;é").encode("latin-1")),),
+    "wrong encoding": (from_csv(INSTRUMENT[:-1], encoding="utf-16"),),
+    "not of the encoding": (from_csv(b"\x81" + INSTRUMENT.encode(), encoding="cp1252"),),
+    "NaN": (from_csv(INSTRUMENT.replace(";4;2.0", ";4;nan")),),
+}
+group("Record.from_csv", RecordError, lambda given: read(**given), rows, "own.csv")
+rows = {
+    "encoding that is none": ("encoding", "klingon", from_csv(encoding="klingon")),
+    "encoding of bytes": ("encoding", "base64", from_csv(encoding="base64")),
+    **{
+        f"{quantity} is {given!r}": (
+            quantity,
+            given,
+            from_csv(**{quantity: given}),
+        )
+        for quantity, given in {
+            "time": 5,
+            "position": (),
+            "velocity": ("x_mm",),
+            "force": ("x_mm", 3),
+            "normal": ("x_mm", "mm", 2),
+        }.items()
+    },
+    **{
+        f"{option} is {given!r}": (
+            option,
+            given,
+            from_csv(**{option: given}),
+        )
+        for option, wrong in {
+            "where": (None, 0),
+            "missing": ("", None, True),
+            "delimiter": ("ab", 0),
+            "decimal": ("", 1.5),
+            "comment": (None, "", [None]),
+            "header": (-1, True, NAN),
+            "encoding": ("", []),
+            "name": (0, {}),
+        }.items()
+        for given in wrong
+    },
+}
+group("Record.from_csv", ParameterError, lambda given: read(**given), rows)
+rows = {
+    "unit of something else": ("", ..., from_csv(force=("F_N", "mm"))),
+}
+group("Record.from_csv", UnitError, lambda given: read(**given), rows)
+rows = {
+    "none": ("path", None, None),
+    "number": ("path", 5, 5),
+    "empty": ("path", "", ""),
+}
+group("path of a record", ParameterError, Record.from_csv, rows)
+rows = {
+    "missing": ("gone.csv", ..., "gone.csv"),
+    "zero byte": ("'a\\x00b'", ..., "a\0b"),
+    "very long": ("", ..., "x" * 300),
+    "folder": (".", ..., "."),
+}
+group("path of a record", RecordError, Record.from_csv, rows)
+
+
+def moving(scale: float) -> None:
+    """Make a motion of a record of a sine this large."""
+    Record.from_arrays(time=EVEN, position=scale * np.sin(EVEN)).motion()
+
+
+rows = {
+    "too large": ("record 'arrays'", ..., 1.7e308),
+}
+group("motion", RecordError, moving, rows)
+
+
+def fit_command(override: str) -> None:
+    """Fit the good table."""
+    Path("own.csv").write_text(GOOD)
+    Path("a.toml").write_text(f'{MEASURED}\n[fit]\nfree = ["k"]\nsearch = "local"\n')
+    verb("fit", "a.toml", "-o", "out", "--set", override)
+
+
+rows = {
+    "wrong name": ("[fit]: free", ..., "fit.free=['kk']"),
+    "near key": ("a.toml", ..., "fit.fre=['k']"),
+    "nothing free": ("a.toml", ..., "fit.free=[]"),
+    "bounds reversed": ("[fit]: bounds of 'k1'", ..., "fit.bounds.k=[2.0, 1.0]"),
+    "three bounds": ("a.toml", ..., "fit.bounds.k=[1.0, 2.0, 3.0]"),
+    "bounds and not free": ("[fit]: bounds", ..., "fit.bounds.C=[1.0, 2.0]"),
+    "search": ("a.toml", ..., "fit.search=genetic"),
+    "measured": ("[fit]: measured", ..., "fit.measured=G"),
+}
+group("table of a fit", ScenarioError, fit_command, rows)
+rows = {
+    "no rows": ("own.csv", ..., "fit.train=[50.0, 60.0]"),
+    "column": ("own.csv", ..., "record.force.column=f"),
+}
+group("table of a fit", RecordError, fit_command, rows)
+
+
+# --------------------------------------------------------------------------- fits
+T = np.linspace(0.0, 4.0, 201)
+X = 2e-4 * np.sin(2.0 * T)
+F = np.sign(np.cos(2.0 * T)) + 1e3 * X
+STRIBECK = Stribeck(1.0, 1.5, 1e-3)
+
+
+@cache
+def fitted() -> GMS:
+    k = np.array([1e4, 1e4])
+    parameters = GMSParameters(
+        k, [0.0, 0.0], [1e-3, 1e-3], sigma_2=0.0, stribeck=STRIBECK, v_c=1e-6, weights=0.5 / k
+    )
+    return GMS(parameters, law="signed")
+
+
+def arrays(**given: Any) -> Record:
+    """Return a record of a sine."""
+    columns = {"time": T, "position": X, "force": F, "name": "rig"}
+    return Record.from_arrays(**(columns | given))  # type: ignore[arg-type]
+
+
+rows = {
+    "no motion": ({"position": None},),
+    "shorter array": ({"force": F[:-1]},),
+    "two dimensions": ({"position": np.ones((40, 2))},),
+    "one number": ({"force": 1.0},),
+    "no time": ({"time": None},),
+    "words": ({"force": ["a"] * 201},),
+    "dates": ({"time": np.arange(201).astype("M8[s]")},),
+    "complex numbers": ({"force": F + 0j},),
+    "lists of different lengths": ({"force": [[1], [1, 2]]},),
+    "NaN": ({"force": np.where(T == 2.0, NAN, F)},),
+    "infinity": ({"position": np.where(T == 2.0, INF, X)},),
+    "time back": ({"time": T[::-1]},),
+    "time twice": ({"time": np.where(T == 2.0, T[101], T)},),
+    "four rows": ({"time": T[:4], "position": X[:4], "force": F[:4]},),
+    "no rows": ({"time": [], "position": [], "force": []},),
+}
+group("Record.from_arrays", RecordError, lambda given: arrays(**given), rows, "record 'rig'")
+rows = {
+    "wrong option": ("missing", "fill", {"missing": "fill"}),
+    "name that is no text": ("name", 5, {"name": 5}),
+}
+group("Record.from_arrays", ParameterError, lambda given: arrays(**given), rows)
+rows = {
+    "empty": (3.0, 3.0),
+    "reversed": (3.0, 2.0),
+    "behind the end": (20.0, None),
+    "too short": (None, 0.05),
+}
+part = arrays().between
+group("part of a record", RecordError, part, rows, "record 'rig'")
+rows = {"not a number": ("t0", NAN, NAN, None), "word": ("t0", "a", "a", None)}
+group("part of a record", ParameterError, part, rows)
+
+
+def fitting(given: dict[str, Any]) -> None:
+    """Fit with other arguments."""
+    fit(**({"records": arrays(), "model": fitted(), "free": ["k"]} | given))
+
+
+rows = {
+    "typo": ({"free": ["kk"]},),
+    "twice": ({"free": ["k", "k2"]},),
+    "nothing": ({"free": []},),
+    "parameter without influence": ({"records": arrays(position=X / 200), "free": ["v_s"]},),
+}
+group("fit", ParameterError, fitting, rows, "free")
+rows = {
+    "tied and not free": ("tied", ..., {"tied": ["C"]}),
+    "fixed and free": ("fixed", ..., {"fixed": {"k": 2.0}}),
+    "unknown fixed": ("fixed", ..., {"fixed": {"q": 2.0}}),
+    "fixed against the rule": ("v_c", -1.0, {"fixed": {"v_c": -1.0}}),
+    "bounds and not free": ("bounds", ..., {"bounds": {"C": (0, 1)}}),
+    "bounds reversed": ("bounds of 'k1'", ..., {"bounds": {"k": (2, 1)}}),
+    "bound": ("bounds of 'k1'", 3, {"bounds": {"k": 3}}),
+    "nuisance": ("nuisance", "bias", {"nuisance": ["bias"]}),
+    "search": ("search", "anneal", {"search": "anneal"}),
+    "begin": ("begin", "warm", {"begin": "warm"}),
+    "measured": ("measured", ..., {"measured": "x"}),
+    "drive": ("drive", "v", {"drive": "v"}),
+    "interval reversed": ("train", ..., {"train": (3, 1)}),
+    "linear": ("linear", ..., {"linear": ["q"]}),
+    "cycles": ("cycles", -1.0, {"cycles": -1.0}),
+    "model": ("model", 3, {"model": 3}),
+    "no records": ("records", ..., {"records": []}),
+    "no record": ("records", 3, {"records": [3]}),
+}
+group("fit", ParameterError, fitting, rows)
+rows = {
+    "interval outside": ({"train": (30, 40)},),
+    "no force": ({"records": arrays(force=None)},),
+    "constant force": ({"records": arrays(force=np.full(201, 2.5))},),
+    "no motion": ({"records": arrays(position=0.0 * T)},),
+    "ten rows": ({"records": arrays(time=T[:10], position=X[:10], force=F[:10])},),
+}
+group("record to fit", RecordError, fitting, rows, "record 'rig'")
+
+
+def choosing(given: dict[str, Any]) -> None:
+    """Choose with other arguments."""
+    one = {"one": (fitted(), ["k"])}
+    choose(**({"records": arrays(), "candidates": one} | given))
+
+
+rows = {
+    "unknown fold": ("fold", "rows", {"fold": "rows"}),
+    "negative cycles": ("cycles", -1.0, {"cycles": -1.0}),
+    "no candidates": ("candidates", ..., {"candidates": []}),
+    "number of candidates": ("candidates", 3, {"candidates": 3}),
+    "short candidate": ("candidate 'candidates[0]'", ("a", 3), {"candidates": [("a", 3)]}),
+    "name twice": ("candidates", ..., {"candidates": [("a", fitted(), ["k"])] * 2}),
+    "candidate by name that is a number": ("candidate 'one'", 1, {"candidates": {"one": 1}}),
+    "model of a candidate": ("model of candidate 'one'", 5, {"candidates": {"one": (5, ["k"])}}),
+    "interval reversed": ("train", ..., {"train": (3.0, 1.0)}),
+    "seed": ("seed", 0.5, {"seed": 0.5}),
+    "no records": ("records", [], {"records": []}),
+    "name for a record": ("records", "r", {"records": "rig"}),
+    "one record for a fold of records": ("fold", "record", {"fold": "record"}),
+}
+group("choose", ParameterError, choosing, rows)
+rows = {
+    "too few cycles": ({"cycles": 8.0},),
+    "interval outside": ({"train": (50.0, 60.0)},),
+    "no force": ({"records": arrays(force=None)},),
+    "motion that does not repeat": ({"records": arrays(position=T)},),
+}
+group("record to choose by", RecordError, choosing, rows, "record 'rig'")
+
+
+def banking(given: dict[str, Any]) -> None:
+    """Make the initial bank with other arguments."""
+    initial_bank(**({"records": arrays(), "n": 2} | given))
+
+
+rows = {
+    **{f"n is {n!r}": ("n", n, {"n": n}) for n in (0, 2.5, True, None, "4", 61)},
+    **{f"train is {train!r}": ("train", train, {"train": train}) for train in ((5.0, 5.0), "all")},
+    **{f"records is {each!r}": ("records", each, {"records": each}) for each in ([], None)},
+    "name for a record": ("records[0]", "r", {"records": "rig.csv"}),
+    "records with none": ("records[1]", None, {"records": [arrays(), None]}),
+    "law": ("law", "fair", {"law": "fair"}),
+    "v_c": ("v_c", 0.0, {"v_c": 0.0}),
+}
+group("initial_bank", ParameterError, banking, rows)
+rows = {
+    "smoothing": ("record 'rig'", ..., {"smoothing": -1.0}),
+}
+group("initial_bank", RecordError, banking, rows)
+rows = {
+    "no force": ({"records": arrays(force=None)},),
+    "no motion": ({"records": arrays(position=np.full(201, 0.2))},),
+    "constant force": ({"records": arrays(force=np.full(201, 3.0))},),
+    "force of the other sign": ({"records": arrays(force=-F)},),
+    "few rows": ({"records": arrays(time=T[:12], position=X[:12], force=F[:12])},),
+    "one way": ({"records": arrays(time=5 * T[:100], position=T[:100], force=T[:100])},),
+    "interval outside": ({"train": (100.0, 200.0)},),
+}
+group("record for an initial bank", RecordError, banking, rows, "record 'rig'")
+
+
+def exciting(given: dict[str, Any]) -> None:
+    """Design a motion with other arguments."""
+    excite(**({"stroke": 2e-3, "speeds": [1e-3]} | given))
+
+
+rows = {
+    "no stroke": ("stroke", 0.0, {"stroke": 0.0}),
+    "infinite stroke": ("stroke", INF, {"stroke": INF}),
+    "stroke of no float": ("stroke", 1e-200, {"stroke": 1e-200}),
+    "word": ("stroke", "long", {"stroke": "long"}),
+    "no speeds": ("", ..., {"speeds": []}),
+    "speed of zero": ("speeds[1] (element 2)", 0.0, {"speeds": [1e-3, 0.0]}),
+    "endless speed": ("speeds[0] (element 1)", 1e300, {"speeds": [1e300]}),
+    "one speed": ("", ..., {"speeds": 1e-3}),
+    "rate": ("rate", 0.0, {"rate": 0.0}),
+    "acceleration": ("acceleration", -1.0, {"acceleration": -1.0}),
+    "motion without end": ("excite", ..., {"stroke": 1.0, "speeds": [1e-9, 1.0]}),
+}
+group("excite", ParameterError, exciting, rows)
+
+
+# --------------------------------------------------------------------------- charts
+CHART_FILE = """\
+name = "stiction"
+parameters = ["F_c", "F_s"]
+
+[let]
+level = "F_c * sgn(v)"
+
+[[state]]
+name = "stuck"
+locked = true
+
+[[state]]
+name = "slip"
+outputs.F = "level"
+
+[[edge]]
+name = "release"
+from = "stuck"
+to = "slip"
+guard = "F > F_s"
+
+[[edge]]
+name = "arrest"
+from = "slip"
+to = "stuck"
+guard = "v < 0"
+do.v = "0"
+"""
+PLAIN = 'parameters = ["F_c", "F_s"]'
+TABLES = '[[parameter]]\nname = "F_c"\n[[parameter]]\nname = "F_s"\nrule = ">= F_x"\n'
+
+
+def chart_file(old: str, new: str) -> None:
+    """Load an edited chart file."""
+    Path("own.toml").write_text(CHART_FILE.replace(old, new, 1), encoding="utf-8")
+    Chart.load("own.toml")
+
+
+def chart_bytes(content: bytes) -> None:
+    """Load a chart file with these contents."""
+    Path("own.toml").write_bytes(content)
+    Chart.load("own.toml")
+
+
+rows = {
+    "unknown state": ("chart 'stiction', edge 'arrest'", ..., 'to = "stuck"', 'to = "stick"'),
+    "action": ("chart 'stiction', edge 'arrest', action", ..., 'do.v = "0"', 'do.q = "0"'),
+    "name used twice": ("chart 'stiction'", ..., '"arrest"', '"release"'),
+    "no force": ("chart 'stiction', state 'slip'", ..., 'outputs.F = "level"\n', ""),
+    "force of a locked state": (
+        "state 'stuck'",
+        ...,
+        "locked = true",
+        'locked = true\noutputs.F = "1"',
+    ),
+    "bad name": ("chart 'stiction'", ..., '"slip"\nout', '"is_x"\nout'),
+    "rule": ("own.toml: line 6, parameter.1.rule", ..., PLAIN, TABLES),
+    "loop": ("chart 'stiction', state 'slip', output 'F'", ..., '"level"', '"F"'),
+}
+group("chart file", ChartError, chart_file, rows)
+rows = {
+    "unknown key": ("guard", "gard"),
+    "wrong type": ("locked = true", "locked = 1"),
+    "missing key": ('to = "slip"\n', ""),
+    "unknown table": ("[[state]]", "[[stat]]"),
+    "both kinds of parameters": (PLAIN, PLAIN + "\n[[parameter]]\nname = 'k'"),
+}
+group("chart file", ChartError, chart_file, rows, "own.toml")
+rows = {
+    "unknown name": ("edge 'release', guard, column 5", ..., "F > F_s", "F > F_k"),
+    "let": ("chart 'stiction', let 'level', column 7", ..., '"F_c * sgn(v)"', '"F_c * (v"'),
+}
+group("chart file", ExpressionError, chart_file, rows)
+rows = {
+    "empty": (b"",),
+    "no TOML": (b"name = ",),
+    "no text": (b"\xff\xfe",),
+    "endless key": (b".".join([b"a"] * 500) + b" = 1",),
+    "long array": (b'name = "a"\nstate = [\n' + b"{},\n" * 4_000 + b"]\nq = 1\n",),
+    "too large": (b"#" * 1_100_000,),
+    "deep": (b"name = " + b"[" * 5000,),
+}
+group("file that is no chart", ChartError, chart_bytes, rows, "own.toml")
+rows = {
+    "missing": ("none.toml", ..., "none.toml"),
+    "folder": (".", ..., "."),
+    "zero byte": ("a\x00b.toml", ..., "a\0b.toml"),
+}
+group("path of a chart", ChartError, Chart.load, rows)
+rows = {
+    "number": ("path", 5, 5),
+}
+group("path of a chart", ParameterError, Chart.load, rows)
+
+STICK = State("stick", flow={"z": "v"})
+SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})
+GO = Transition("go", "stick", "slip", guard="z >= s and v > v_c")
+BACK = Transition("back", "slip", "stick", guard="abs(v) <= v_c")
+K = ("k", "C", "v_c")
+
+
+def chart(changes: Mapping[str, Any]) -> Chart:
+    """Return a valid chart with changes."""
+    sound: dict[str, Any] = {
+        "name": "rubber",
+        "inputs": ("v", "s"),
+        "variables": ("z",),
+        "parameters": K,
+        "states": (STICK, SLIP),
+        "transitions": (GO, BACK),
+        "outputs": {"F": "k * z + 0.1 * dz"},
+    }
+    return Chart(**{**sound, **changes})
+
+
+def edge(**changes: Any) -> dict[str, Any]:
+    """Return the valid chart's edges with the first one changed."""
+    return {"transitions": (dataclasses.replace(GO, **changes), BACK)}
+
+
+def state(**changes: Any) -> dict[str, Any]:
+    """Return the valid chart's states with the second one changed."""
+    return {"states": (STICK, dataclasses.replace(SLIP, **changes))}
+
+
+rows = {
+    "unknown source": (edge(source="glue"),),
+    "line end in a name": (edge(source="gl\nue"),),
+    "unknown one of two sources": (edge(source=("stick", "glue")),),
+}
+group("chart", ChartError, chart, rows, "chart 'rubber', edge 'go'")
+rows = {
+    "flow of no variable": ("state 'slip', flow", ..., state(flow={"z": "v", "w": "1"})),
+    "entry of no variable": ("chart 'rubber', state 'slip', entry", ..., state(entry={"w": "1"})),
+    "action of no variable": ("chart 'rubber', edge 'go', action", ..., edge(actions={"s": "0"})),
+    "no outputs": ("chart 'rubber', state 'stick'", ..., {"outputs": {}}),
+    "unknown output": ("chart 'rubber', outputs", ..., {"outputs": {"G": "k"}}),
+    "unknown output of a state": ("state 'slip', outputs", ..., state(outputs={"G": "k"})),
+    "force of a locked state": ("state 'slip'", ..., state(locked=True, outputs={"F": "k"})),
+    "F in a flow": ("chart 'rubber', state 'slip', flow of 'z'", ..., state(flow={"z": "F"})),
+    "a in a force": ("chart 'rubber', state 'slip', output 'F'", ..., state(outputs={"F": "a"})),
+    "let of a parameter": (
+        "contact_outputs 'F'",
+        ...,
+        {"let": {"u": "k * z"}, "contact_outputs": {"F": "F + u"}},
+    ),
+}
+group("chart", ChartError, chart, rows)
+rows = {
+    "no states": ({"states": (), "transitions": ()},),
+    "no velocity": ({"velocities": ()},),
+    "outputs by state": ({"outputs": {"F": {"stick": "k * z"}}},),
+    "let and parameter": ({"let": {"k": "1"}},),
+    "force and parameter": ({"velocities": ("v", "w"), "parameters": (*K, "F_w")},),
+    "text for a state": ({"states": (STICK, "slip")},),
+    "none for an edge": ({"transitions": (GO, None)},),
+    "parameter twice": ({"parameters": (*K, "k")},),
+    "variable and parameter": ({"parameters": (*K, "z")},),
+    "derivative and parameter": ({"parameters": (*K, "dz")},),
+    "state twice": ({"states": (STICK, STICK)},),
+    "state and edge": (edge(name="slip"),),
+    "parameter and edge": (edge(name="k"),),
+    "parameter t": ({"parameters": (*K, "t")},),
+    "parameter v": ({"inputs": ("s",), "parameters": ("v",)},),
+    "edge x": (edge(name="x"),),
+    "name with a digit before": ({"parameters": (*K, "2k")},),
+    "empty name": ({"parameters": (*K, "")},),
+    "keyword": ({"parameters": (*K, "if")},),
+    "number for a parameter": ({"parameters": (*K, 3)},),
+    "private name": ({"parameters": (*K, "_k")},),
+    "method of an edge": (state(name="to_slip"),),
+    "accent beside its letter": ({"parameters": (*K, "e\u0301")},),
+    "letter of mathematics": (edge(name="\U0001d467"),),
+}
+group("chart", ChartError, chart, rows, "chart 'rubber'")
+rows = {
+    "rule of an unknown name": ({"parameters": ("k", "C", Parameter("v_c", "m/s", "< v_max"))},),
+    "parameters as a text": ({"parameters": "k C"},),
+    "a state for states": ({"states": STICK},),
+}
+group("chart", ChartError, chart, rows, "")
+rows = {
+    "unknown name in a guard": ("guard, column 12", ..., edge(guard="z >= s and u > v_c")),
+    "guard of equality": ("chart 'rubber', edge 'go', guard, column 6", ..., edge(guard="z == s")),
+    "flow that is a condition": ("flow of 'z', column 1", ..., state(flow={"z": "v > 0"})),
+    "two operators": ("state 'slip', entry 'z', column 4", ..., state(entry={"z": "1 +* v"})),
+    "two names": ("edge 'go', action 'z', column 3", ..., edge(actions={"z": "s s"})),
+    "unknown name in an output": ("output 'F', column 5", ..., {"outputs": {"F": "k * zz"}}),
+    "contact's output": ("column 5", ..., {"contact_outputs": {"F": "F + k * z"}}),
+    "bytes for a flow": ("state 'slip', flow of 'z', column 1", ..., state(flow={"z": b"v"})),
+}
+group("text of a chart", ExpressionError, chart, rows)
+rows = {
+    "guard that is a number": (edge(guard="z"),),
+    "derivative in a guard": (edge(guard="dz > 0"),),
+    "empty guard": (edge(guard=""),),
+    "attribute": (edge(guard="\u00e9 > z.real"),),
+    "no guard": (edge(guard=None),),
+}
+group("text of a chart", ExpressionError, chart, rows, "chart 'rubber', edge 'go', guard, column 1")
+rows = {
+    "state that is unknown": (lambda: chart({}).state_index("slide"),),
+    "edge that is unknown": (lambda: chart({}).guard_text("slide"),),
+    "edge that is none": (lambda: chart({}).guard_text(None),),
+    "edge of none": (lambda: chart({"transitions": ()}).guard_text("go"),),
+}
+group("part of a chart", ChartError, lambda make: make(), rows, "")
+rows = {
+    "part that no state has": (
+        "state 'stick'",
+        ...,
+        lambda: State("stick", flow={"z": "v"}, during="z = 0"),
+    ),
+    "locked by a number": ("state 'slip': locked", 1, lambda: State("slip", locked=1)),
+    "edge from nowhere": ("edge 'go'", ..., lambda: Transition("go", (), "slip", guard="v > 0")),
+    "name that is none": ("chart 5: name", 5, lambda: Chart(5, states=(), outputs={})),
+}
+group("part of a chart", ChartError, lambda make: make(), rows)
+
+
+# --------------------------------------------------------------------------- parameters
+BANK = {"k": (40, 10), "stribeck": STRIBECK, "v_c": 1e-6}
+RULED = (
+    Parameter("a", "1", ">= 0 and < 2"),
+    Parameter("b", "1", "> a"),
+    Parameter("c", "m", "< a", meaning="height"),
+    Parameter("d", "m", "<=c"),
+)
+
+
+def one_state(
+    *parameters: Parameter | str, inputs: tuple[str, ...] = ("v",), F: str = "z"
+) -> Chart:
+    """Return a chart of one state."""
+    return Chart("r", inputs, ("z",), parameters, (State("a_", {"z": inputs[-1]}),), (), {"F": F})
+
+
+def own_model(values: Any = None, **changes: Any) -> ChartModel:
+    """Return a model of the GMS element."""
+    values = {"k": 1.0, "sigma": 0.0, "C": 1.0, "v_c": 1e-6, **(values or {})}
+    return ChartModel(gms_element("signed"), values, **{"n": 2, "stribeck": STRIBECK, **changes})
+
+
+def ruled(**changes: Any) -> ChartModel:
+    """Return a model whose parameters are bounded by each other."""
+    return ChartModel(one_state(*RULED), {"a": 1, "b": 2, "c": 0.5, "d": 0.25, **changes}, n=2)
+
+
+def bank(**changes: Any) -> GMSParameters:
+    """Return parameters of two elements."""
+    given = {"sigma": (1, 2), "C": (0.1, 0.2), "sigma_2": 0.4, **BANK, **changes}
+    return GMSParameters(**given)
+
+
+def shares(**changes: Any) -> GMSParameters:
+    """Return parameters of two elements that share the friction."""
+    return GMSParameters.from_shares(**{"alpha": (0.5, 0.5), "C": 2.0, **BANK, **changes})
+
+
+def lugre(**changes: Any) -> LuGre:
+    """Return a LuGre model."""
+    given = {"sigma_0": 1e3, "sigma_1": 31.6, "sigma_2": 4.0, "stribeck": STRIBECK}
+    return LuGre(**{**given, **changes})
+
+
+def curve(**changes: Any) -> Stribeck:
+    """Return a curve."""
+    return Stribeck(**{"F_c": 1.0, "F_s": 1.5, "v_s": 1e-3, **changes})
+
+
+def pulled(**changes: Any) -> PulledSlider:
+    """Return a rig."""
+    return PulledSlider(**{"mass": 1, "stiffness": 1, "speed": 1, **changes})
+
+
+def pushed(mass: Any) -> Slider:
+    """Return a rig."""
+    return Slider(mass, "t")
+
+
+rows = {
+    "curve with F_c = 0": ("F_c", 0.0, curve, {"F_c": 0}),
+    "curve with F_c = NAN": ("F_c", NAN, curve, {"F_c": NAN}),
+    "curve with F_c = [1, 2]": ("F_c", [1, 2], curve, {"F_c": [1, 2]}),
+    "curve with F_s = INF": ("F_s", INF, curve, {"F_s": INF}),
+    "curve with v_s = 0": ("v_s", 0.0, curve, {"v_s": 0}),
+    "curve with v_s = 'fast'": ("v_s", "fast", curve, {"v_s": "fast"}),
+    "curve with v_s = None": ("v_s", None, curve, {"v_s": None}),
+    "bank with k = (40, 0)": ("k[1] (element 2)", 0.0, bank, {"k": (40, 0)}),
+    "bank with k = (NAN, 1)": ("k[0] (element 1)", NAN, bank, {"k": (NAN, 1)}),
+    "bank with k = ('a', 'b')": ("k", ("a", "b"), bank, {"k": ("a", "b")}),
+    "bank with k = [[1], [1, 2]]": ("k", [[1], [1, 2]], bank, {"k": [[1], [1, 2]]}),
+    "bank with sigma = (1, -2)": ("sigma[1] (element 2)", -2.0, bank, {"sigma": (1, -2)}),
+    "bank with C = (0.1, INF)": ("C[1] (element 2)", INF, bank, {"C": (0.1, INF)}),
+    "bank with weights = (1, 0)": ("weights[1] (element 2)", 0.0, bank, {"weights": (1, 0)}),
+    "bank with v_c = 0": ("v_c", 0.0, bank, {"v_c": 0}),
+    "bank with stribeck = None": ("stribeck", None, bank, {"stribeck": None}),
+    "shares with alpha = (0.5, 0.4)": ("alpha", ..., shares, {"alpha": (0.5, 0.4)}),
+    "shares with alpha = (1.0, 0.0)": ("alpha[1] (element 2)", 0.0, shares, {"alpha": (1.0, 0.0)}),
+    "shares with C = -1": ("C", -1.0, shares, {"C": -1}),
+    "shares with C = NAN": ("C", NAN, shares, {"C": NAN}),
+    "lugre with sigma_0 = 0": ("sigma_0", 0.0, lugre, {"sigma_0": 0}),
+    "lugre with stribeck = 3": ("stribeck", 3, lugre, {"stribeck": 3}),
+    "own with n = 0": ("n", 0, own_model, {"n": 0}),
+    "own with n = 2.5": ("n", 2.5, own_model, {"n": 2.5}),
+    "own with n = 'two'": ("n", "two", own_model, {"n": "two"}),
+    "own with weights = (1, -1)": ("weights[1] (element 2)", -1.0, own_model, {"weights": (1, -1)}),
+    "own with stribeck = None": ("signed law'", ..., own_model, {"stribeck": None}),
+    "own with values = {'k': NAN}": ("k", NAN, own_model, {"values": {"k": NAN}}),
+    "own with values = {'k': '100'}": ("k", "100", own_model, {"values": {"k": "100"}}),
+    "own with values = {'k': None}": ("k", None, own_model, {"values": {"k": None}}),
+    "own with values = {'v_c': [1e-6, 1e-6]}": (
+        "v_c",
+        [1e-06, 1e-06],
+        own_model,
+        {"values": {"v_c": [1e-6, 1e-6]}},
+    ),
+    "own with values = {'k': [[1], [1, 2]]}": (
+        "k",
+        [[1], [1, 2]],
+        own_model,
+        {"values": {"k": [[1], [1, 2]]}},
+    ),
+    "ruled with a = 3": ("a", 3.0, ruled, {"a": 3}),
+    "ruled with a = -1": ("a", -1.0, ruled, {"a": -1}),
+    "pushed with mass = 0": ("mass", 0.0, pushed, {"mass": 0}),
+    "pulled with mass = -1": ("mass", -1.0, pulled, {"mass": -1}),
+    "pulled with stiffness = 0": ("stiffness", 0.0, pulled, {"stiffness": 0}),
+    "GMS without parameters": ("parameters", {}, GMS, {"parameters": {}, "law": "signed"}),
+}
+group("parameter", ParameterError, lambda make, given: make(**given), rows)
+rows = {
+    "curve with F_s = 0.5": (curve, {"F_s": 0.5}),
+    "bank with k = 40": (bank, {"k": 40}),
+    "bank with k = []": (bank, {"k": []}),
+    "bank with k = None": (bank, {"k": None}),
+    "bank with sigma = 1": (bank, {"sigma": 1}),
+    "own with values = {'q': 1.0}": (own_model, {"values": {"q": 1.0}}),
+    "own with values = {'k': [1, 2, 3]}": (own_model, {"values": {"k": [1, 2, 3]}}),
+    "ruled with b = 0.5": (ruled, {"b": 0.5}),
+    "ruled with b = [2, 1]": (ruled, {"b": [2, 1]}),
+    "ruled with c = 1": (ruled, {"c": 1}),
+    "ruled with d = 2": (ruled, {"d": 2}),
+    "another column of Table I": (GMSParameters.paper, {"column": "slow"}),
+    "input that no model supplies": (
+        ChartModel,
+        {"chart": one_state(inputs=("v", "u")), "values": {}},
+    ),
+    "missing values": (ChartModel, {"chart": one_state("q", "r"), "values": {"q": 1}}),
+    "length of no parameter k": (
+        ChartModel,
+        {"chart": one_state("q"), "values": {"q": [1] * 3}, "n": 2},
+    ),
+}
+group("parameter", ParameterError, lambda make, given: make(**given), rows, "")
+rows = {
+    "word": ("parameter 'k', rule 'positive'", ..., "k", {"rule": "positive"}),
+    "bound without a number": ("parameter 'k', rule '> '", ..., "k", {"rule": "> "}),
+    "half a rule": ("parameter 'k', rule '> 0 and'", ..., "k", {"rule": "> 0 and"}),
+    "equality": ("parameter 'k', rule '== 0'", ..., "k", {"rule": "== 0"}),
+    "infinite bound": ("parameter 'k', rule '> 1e999'", ..., "k", {"rule": "> 1e999"}),
+    "assumption": ("parameter 'k', rule '0 <'", ..., "k", {"rule": "> 0", "assumed": "0 <"}),
+    "number": ("parameter 'k'", ..., "k", {"rule": 0}),
+    "bound of an unknown name": ("", ..., "k", {"rule": "> q"}),
+    "bound of itself": ("", ..., "k", {"rule": "> k"}),
+}
+group(
+    "rule of a parameter",
+    ChartError,
+    lambda name, given: one_state(Parameter(name, **given), "h"),
+    rows,
+)
+
+
+# --------------------------------------------------------------------------- monitors
+def monitored(monitors: Callable[[], Any]) -> None:
+    """Run with these monitors."""
+    simulate(stick_slip("signed"), Prescribed(0.2), 1.0, monitors=monitors())
+
+
+rows = {
+    "typo": ("", ..., lambda: "pasivity"),
+    "twice": ("", ..., lambda: ["chattering", Chattering(5)]),
+    "condition twice": ("", ..., lambda: ["z <= s", "z <= s"]),
+    "number": ("", ..., lambda: [3]),
+    "contact of a model": ("", ..., lambda: "pad: passivity"),
+    "name alone": ("", ..., lambda: "z"),
+    "one time": ("times", 1, lambda: Chattering(times=1)),
+    "fraction of a time": ("times", 2.5, lambda: Chattering(times=2.5)),
+    "no time": ("within", 0.0, lambda: Chattering(within=0.0)),
+    "tolerance": ("tolerance", -1.0, lambda: Passivity(tolerance=-1.0)),
+}
+group("monitors", ParameterError, monitored, rows)
+rows = {
+    "unknown name": ("invariant, column 6", ..., lambda: "z <= q"),
+    "half a text": ("invariant, column 15", ..., lambda: "abs(z) <= 1.1*"),
+    "unknown element": ("invariant, column 1", ..., lambda: "state(9) == slip"),
+    "unknown state": ("invariant, column 10", ..., lambda: "state == slide"),
+    "equality": ("invariant, column 6", ..., lambda: "z == s"),
+}
+group("monitors", ExpressionError, monitored, rows)
+
+
+# --------------------------------------------------------------------------- trace files
+@cache
+def saved(ending: str) -> Mapping[str, bytes]:
+    """Return the files of a short run."""
+    trace = simulate(stick_slip("signed"), Prescribed("0.3"), 2.0)
+    with tempfile.TemporaryDirectory() as folder:
+        trace.save(Path(folder) / f"run{ending}")
+        return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
+
+
+def archive(change: Callable[[dict[str, Any]], object], file: str = "run.npz") -> None:
+    """Load the arrays of an archive, one of them changed."""
+    with np.load(io.BytesIO(saved(".npz")["run.npz"])) as npz:
+        arrays = dict(npz)
+    change(arrays)
+    with Path(file).open("wb") as out:
+        np.savez(out, **arrays)
+    Trace.load(file)
+
+
+def array(name: str, change: Callable[[Any], Any]) -> None:
+    """Load an archive with one array changed; of stops, which are added first."""
+
+    def to(arrays: dict[str, Any]) -> None:
+        if name.startswith("stops"):
+            for each in ("t", "microstep", "y", "mode"):
+                arrays[f"stops_{each}"] = arrays[f"rows_{each}"]
+        arrays[name] = change(arrays[name])
+
+    archive(to)
+
+
+def header(*path: Any) -> None:
+    """Load an archive with one place of its header changed to the last argument."""
+    *keys, last, value = path
+
+    def to(arrays: dict[str, Any]) -> None:
+        whole = place = json.loads(str(arrays["header"]))
+        for key in keys:
+            place = place[key]
+        place[last] = value
+        arrays["header"] = np.array(json.dumps(whole))
+
+    archive(to)
+
+
+def format_1(change: Callable[[Any], Any]) -> None:
+    """Load a file of format 1 with another log."""
+    trace = simulate(stick_slip("signed"), Prescribed("0.3"), 2.0)
+    arrays = older_files.format_1(trace, Path("run.npz"))
+    arrays["transitions"] = change(arrays["transitions"])
+    Trace.load(older_files.write(Path("run.npz"), arrays))
+
+
+def cell(column: str, value: Any) -> Callable[[Any], Any]:
+    """Return a change of one cell of the log."""
+
+    def to(log: Any) -> Any:
+        log[column][1] = value
+        return log
+
+    return to
+
+
+def lines(change: Callable[[list[str]], object], name: str = "run.csv") -> None:
+    """Load a CSV trace with some lines changed."""
+    for each, content in saved(".csv").items():
+        Path(each).write_bytes(content)
+    text = Path(name).read_text(encoding="utf-8").split("\n")
+    change(text)
+    Path(name).write_text("\n".join(text), encoding="utf-8")
+    Trace.load("run.csv")
+
+
+def replaced(line: int, old: str, new: str, name: str = "run.csv") -> None:
+    """Load a CSV trace with a text in a line replaced."""
+
+    def to(text: list[str]) -> None:
+        assert old in text[line]
+        text[line] = text[line].replace(old, new, 1)
+
+    lines(to, name)
+
+
+def files(contents: Mapping[str, bytes], path: str = "run.csv") -> None:
+    """Load a trace from these files."""
+    for name, content in contents.items():
+        Path(name).write_bytes(content)
+    Trace.load(path)
+
+
+LOG = "run.transitions.csv"
+rows = {
+    "y has a column too few": ("rows_y", lambda a: a[:, :-1]),
+    "y is flat": ("rows_y", lambda a: a[:, 0]),
+    "y of a stop has a column too few": ("stops_y", lambda a: a[:, :-1]),
+    "y holds text": ("rows_y", lambda a: a.astype("U32")),
+    "y is complex": ("rows_y", lambda a: a + 1j),
+    "t is shorter": ("rows_t", lambda a: a[:-1]),
+    "t is one number": ("rows_t", lambda a: np.float64(0)),
+    "t goes backward": ("rows_t", lambda a: a[::-1]),
+    "t is not finite": ("rows_t", lambda a: a * np.nan),
+    "microstep is shorter": ("rows_microstep", lambda a: a[:-1]),
+    "microstep without a firing": ("rows_microstep", lambda a: a + 9),
+    "microstep is huge": ("rows_microstep", lambda a: a + np.int64(2**40)),
+    "state number is too large": ("rows_mode", lambda a: a + 2),
+    "state numbers are text": ("rows_mode", lambda a: a.astype("U4")),
+    "state numbers are fractions": ("rows_mode", lambda a: a + 0.5),
+    "state number of a stop": ("stops_mode", lambda a: a + 7),
+    "F holds text": ("observed_F", lambda a: a.astype("U32")),
+    "s has a column too few": ("observed_s", lambda a: a[:, :-1]),
+    "times of the log are text": ("log_t", lambda a: a.astype("U32")),
+    "times of the log are records": ("log_t", lambda a: np.zeros(3, dtype=[("a", "f8")])),
+    "times of the log are not finite": ("log_t", lambda a: a * NAN),
+    "times of the log are late": ("log_t", lambda a: a + 9e9),
+    "edges are fractions": ("log_edge", lambda a: a + 0.5),
+    "edges are negative": ("log_edge", lambda a: a.astype(np.int64) - 1),
+    "edges are too large": ("log_edge", lambda a: a + 99),
+    "edges are huge": ("log_edge", lambda a: a.astype(np.uint64) + 2**63),
+    "edges are 2**32 too large": ("log_edge", lambda a: a.astype(np.int64) + 2**32),
+    "machine too many": ("log_machine", lambda a: a + 99),
+    "numbers of the log are one too few": ("log_numbers", lambda a: a[:, :-1]),
+    "header is numbers": ("header", lambda a: np.zeros(3)),
+    "header is no JSON": ("header", lambda a: np.array("{not json")),
+    "header is a list": ("header", lambda a: np.array("[]")),
+    "header is deep": ("header", lambda a: np.array("[" * 100_000)),
+}
+group("array of a trace file", TraceFileError, array, rows, "run.npz")
+rows = {
+    "no header": (lambda a: a.pop("header"),),
+    "no dz": (lambda a: a.pop("observed_dz"),),
+    "no log": (lambda a: a.pop("log_t"),),
+    "no edges": (lambda a: a.pop("log_edge"),),
+    "no rows": (lambda a: a.update({n: v[:0] for n, v in a.items() if n[:3] in ("row", "obs")}),),
+}
+group("archive", TraceFileError, archive, rows, "run.npz")
+rows = {
+    "another ending": ("run.txt", ..., lambda a: None, "run.txt"),
+    "no ending": (".npz", ..., lambda a: None, ".npz"),
+}
+group("archive", TraceFileError, archive, rows)
+rows = {
+    "another format": ("format", "gms-fsm trace 99"),
+    "unknown key": ("surprise", 1),
+    "no elements": ("model", "n", 0),
+    "more elements than weights": ("model", "n", 5),
+    "very many elements": ("model", "n", 10**15),
+    "weights that are none": ("model", "weights", ["heavy"]),
+    "value that is missing": ("model", "values", {}),
+    "value that is text": ("model", "values", "k", "stiff"),
+    "F_c of zero": ("model", "stribeck", "F_c", 0),
+    "curve that is missing": ("model", "stribeck", None),
+    "unknown rig": ("rig", "title", "a cart"),
+    "rig without its numbers": ("rig", "title", "slider pulled through a spring"),
+    "signal that is missing": ("rig", "signals", {}),
+    "signal of no kind": ("rig", "signals", "v", {"kind": "magic"}),
+    "signal that cannot be read": ("rig", "signals", "v", {"kind": "formula", "text": "t +"}),
+    "signal that runs backward": (
+        "rig",
+        "signals",
+        "v",
+        {"kind": "corners", "times": [1, 0], "values": [0, 0], "held": True},
+    ),
+    "flow that runs code": (
+        "model",
+        "chart",
+        "states",
+        0,
+        "flow",
+        "z",
+        "__import__('os').getpid()",
+    ),
+    "guard that runs code": ("model", "chart", "transitions", 0, "guard", "exec('1') > 0"),
+    "state whose name runs code": ("model", "chart", "states", 0, "name", "x = 1\nimport os"),
+    "parameter that is no name": ("model", "chart", "parameters", ["k", "sigma", "C", "v = 1; a"]),
+    "edge to nowhere": ("model", "chart", "transitions", 0, "target", "nowhere"),
+    "input no model supplies": ("model", "chart", "inputs", ["v", "s", "u"]),
+}
+group("header of a trace file", TraceFileError, header, rows, "run.npz")
+rows = {
+    "no columns": (lambda a: np.zeros(3),),
+    "other columns": (lambda a: np.zeros(3, dtype=[("a", "f8")]),),
+    "two axes": (lambda a: a[:, None],),
+    "element too many": (lambda a: np.array([(0.0, 99, *list(r)[2:]) for r in a], a.dtype),),
+    "names of contacts": (lambda a: np.zeros(3, [*a.dtype.descr, ("contact", a.dtype["edge"])]),),
+    "unknown edge": (cell("edge", "nowhere"),),
+    "source of another edge": (cell("source", "slip"),),
+    "unknown target": (cell("target", "x"),),
+    "time that is not finite": (cell("t", NAN),),
+    "time that is late": (cell("t", 9e9),),
+}
+group("log of format 1", TraceFileError, format_1, rows, "run.npz")
+rows = {
+    "bad JSON": (0, '"model"', "model"),
+    "missing column": (1, ",v,", ",u,"),
+    "missing state column": (1, "state2", "stateB"),
+    "column twice": (1, ",v,", ",x,"),
+    "word for a number": (3, ",0,", ",soon,"),
+    "unknown state": (3, "stick", "glue"),
+    "fraction of a micro-step": (3, ",0,", ",0.5,"),
+    "huge micro-step": (3, ",0,", f",{10**30},"),
+    "endless cell": (3, ",0,", f",{'0' * 200_000},"),
+    "hostile flow": (0, '"z": "v"', '"z": "__import__(\'os\').getpid()"'),
+}
+group("line of a CSV trace", TraceFileError, replaced, rows, "run.csv")
+rows = {
+    "short row": ("run.csv: line 4", ..., 3, ",", ""),
+    "long row": ("run.csv: line 4", ..., 3, ",", ",,"),
+}
+group("line of a CSV trace", TraceFileError, replaced, rows)
+rows = {
+    "log without a column": (0, "edge", "ledge", LOG),
+    "log with a short row": (1, ",", "", LOG),
+    "log with a word for a number": (1, ",1,", ",one,", LOG),
+    "log with a huge element": (1, ",1,", f",{10**30},", LOG),
+}
+group("line of a CSV trace", TraceFileError, replaced, rows, "run.transitions.csv")
+rows = {
+    "no header": (lambda text: text.pop(0),),
+    "no head line": (lambda text: text.pop(1),),
+    "deep JSON": (lambda text: text.__setitem__(0, "# {" + '"a":[' * 50_000),),
+}
+group("lines of a CSV trace", TraceFileError, lines, rows, "run.csv")
+rows = {
+    "only a header": ("run.csv: line 2", ..., lambda text: text.__delitem__(slice(1, None))),
+}
+group("lines of a CSV trace", TraceFileError, lines, rows)
+rows = {
+    "no log": ("run.transitions.csv", ..., lambda: {"run.csv": saved(".csv")["run.csv"]}),
+    "empty log": ("run.transitions.csv", ..., lambda: {**saved(".csv"), LOG: b""}),
+    "no text": ("run.csv", ..., lambda: {**saved(".csv"), "run.csv": b"# {\xff\xfe\x00}"}),
+    "log that is no text": ("run.csv", ..., lambda: {**saved(".csv"), LOG: b"\xff\xfe\x00"}),
+    "missing archive": ("none.npz", ..., lambda: {}, "none.npz"),
+    "missing CSV": ("none.csv", ..., lambda: {}, "none.csv"),
+}
+group("files of a trace", TraceFileError, lambda contents, *path: files(contents(), *path), rows)
+rows = {
+    "archive cut in half": (lambda: {"run.npz": saved(".npz")["run.npz"][:2000]}, "run.npz"),
+    "archive cut to nothing": (lambda: {"run.npz": b""}, "run.npz"),
+    "archive without its end": (lambda: {"run.npz": saved(".npz")["run.npz"][:-20]}, "run.npz"),
+}
+group(
+    "files of a trace",
+    TraceFileError,
+    lambda contents, *path: files(contents(), *path),
+    rows,
+    "run.npz",
+)
+
+
+if __name__ == "__main__":
+    APPROVED.write_text(transcript(), encoding="utf-8")
