@@ -35,7 +35,8 @@ each_lesson = pytest.mark.parametrize(
 
 
 def test_a_module_in_the_folder_is_a_lesson() -> None:
-    assert list(LESSONS) == list(range(1, len(LESSONS) + 1)) == list(range(1, 12))
+    assert list(LESSONS) == list(range(1, len(LESSONS) + 1))
+    assert len(LESSONS) >= 11
     for number, lesson in LESSONS.items():
         assert lesson.heading == f"Lesson {number}: {lesson.question}"
         assert lesson.module.startswith(f"gms_fsm.app.lessons.l{number}_")

@@ -1,22 +1,14 @@
-"""Eleven lessons: the behaviour of friction models, and the pitfalls of simulating and fitting.
+r"""Lessons: the behaviour of friction models, and the pitfalls of simulating and fitting.
 
 Each lesson answers one question: ``run()`` makes the runs and measures, ``figure(result)`` draws
 what it returns, and ``result.lines()`` summarizes it in five lines, in which every number is
 measured in that run. A module ``lN_name`` in this folder with a `LESSON` is a lesson.
 
->>> for number, lesson in LESSONS.items():
-...     print(number, lesson.question)
-1 What is pre-sliding hysteresis?
-2 Why does LuGre drift and GMS not?
-3 What happens when an integrator misses v_c?
-4 What depends on the sign of s(v) for v < 0?
-5 How many elements are enough?
-6 Why does a pulled mass stick and slip?
-7 Why does friction lag behind the speed?
-8 Does it matter whether a chart or if-else code decides?
-9 What counts as a contact?
-10 Which friction model shows what?
-11 What can a record tell about the parameters?
+>>> print(lesson(7).question)
+Why does friction lag behind the speed?
+>>> print(*lesson(7).run().lines(), sep="\n")  # doctest: +ELLIPSIS
+Question: Why does friction lag behind the speed?
+Run: GMS, 4 elements, signed law, all in slip, v = 1.5 + 1 cos(w t) mm/s, ...
 """
 
 from __future__ import annotations
@@ -71,7 +63,7 @@ def lesson(number: int) -> Lesson:
     Parameters
     ----------
     number : int
-        1 to 11.
+        For example 7.
 
     Returns
     -------
@@ -132,7 +124,7 @@ def teach(number: int, folder: str | Path) -> Taught:
     Parameters
     ----------
     number : int
-        1 to 11.
+        For example 7.
     folder : str or Path
         Output folder for ``lesson_N.txt``, the figure and the replay page; created before the run
         if it does not exist.

@@ -155,12 +155,13 @@ class Result:
 
     def lines(self) -> tuple[str, ...]:
         """Return the question, the runs, two lines of measured values, and the conclusion."""
+        said = (" ".join(each.split()) for each in self.lesson.words["said"].split("\n\n"))
+        return (f"Question: {self.lesson.question}", *map(self.filled, said))
+
+    def filled(self, text: str) -> str:
+        """Fill the numbers of the run, and of the lesson's module, into a text with braces."""
         known = {**vars(sys.modules[self.lesson.module]), **self.values}
-        said = [" ".join(each.split()) for each in self.lesson.words["said"].split("\n\n")]
-        return (
-            f"Question: {self.lesson.question}",
-            *(_Words().vformat(each, (), known) for each in said),
-        )
+        return _Words().vformat(text, (), known)
 
 
 def grid(
@@ -187,6 +188,24 @@ def draw(name: str, ax: Axes, *data: Any, **options: Any) -> Any:
     from plots import panels
 
     return getattr(panels, name)(ax, *data, **options)
+
+
+def shown(name: str, run: str, title: str, **options: Any) -> Panel:
+    """Return a panel of `plots.panels` about one run; the title is a text with braces."""
+
+    def panel(ax: Axes, result: Result) -> str:
+        draw(name, ax, result.values[run], **options)
+        return result.filled(title)
+
+    return panel
+
+
+def forces(ax: Axes, result: Result) -> str:
+    """Draw the forces of both runs of the replay page."""
+    for (name, trace), look in zip(result.replayed.items(), (FIRST, SECOND), strict=True):
+        draw("force", ax, trace)[0].set(label=name, **look)
+    ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
+    return f"friction, {trace.model.title}"
 
 
 def note(

@@ -99,23 +99,12 @@ vary(with_step, 1.003, 0.5, 2, 0.001, "step [ms]")
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
-from gms_fsm.app.lessons._lesson import (
-    DOTS,
-    FASTEST,
-    FIRST,
-    SECOND,
-    Lesson,
-    draw,
-    grid,
-    note,
-    ticks,
-)
+from gms_fsm.app.lessons._lesson import DOTS, FASTEST, Lesson, forces, grid, note, shown, ticks
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import INK, LINE_GREY, PALE_GREY
 
@@ -214,27 +203,15 @@ def _luck(ax: Any, r: Any) -> str:
     return "luck (above: reversals hit by a sample)"
 
 
-def _friction(ax: Any, r: Any) -> str:
-    for (name, trace), look in zip(r.replayed.items(), (FIRST, SECOND), strict=True):
-        draw("force", ax, trace)[0].set(label=name, **look)
-    ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
-    return f"friction, {MODEL.title}"
-
-
-def _states(ax: Any, r: Any, name: str) -> str:
-    trace = r.replayed[name]
-    draw("ribbons", ax, trace)
-    return f"states, {name}: {len(trace.transitions)} switches"
-
-
 LESSON = Lesson(
     __name__,
     run,
     (
         _reversal,
         _luck,
-        _friction,
-        *(partial(_states, name=n) for n in ("located", "once per step")),
+        forces,
+        shown("ribbons", "located", "states, located: {total} switches"),
+        shown("ribbons", "once", "states, once per step: {found} switches"),
     ),
     grid("ab;cc;dd;ee", (8.2, 8.2), (1.7, 1.5, 1, 1)),
 )

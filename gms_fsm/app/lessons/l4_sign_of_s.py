@@ -186,6 +186,7 @@ def _balance(ax: Any, r: Any, law: str) -> str:
         return "energy (hatched: heat turns back)"
     ax.legend(loc="upper left")
     _beside(ax, 2)
+    ax.autoscale(axis="y")  # to both
     return f"energy ({1e3 * r.vanished[1]:.1f} mJ turn back: invisible)"
 
 

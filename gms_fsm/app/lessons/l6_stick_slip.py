@@ -105,7 +105,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, PulledSlider, Stribeck, Trace, simulate
-from gms_fsm.app.lessons._lesson import GUIDE, Lesson, draw, grid, note, ticks
+from gms_fsm.app.lessons._lesson import GUIDE, Lesson, draw, grid, note, shown, ticks
 from plots.style import INK, LINE_GREY, TEXT_GREY
 
 MASS, STIFFNESS = 1.0, 2.0  # kg, N/m
@@ -205,16 +205,6 @@ def last_cycle(trace: Trace) -> Cycle:
     return Cycle(V, stop - starts[0], starts[1] - stop, pull_at_slip=at_slip, pull_at_stop=at_stop)
 
 
-def _velocity(ax: Any, r: Any) -> str:
-    draw("velocity", ax, r.portrait, window=WINDOW)
-    return f"velocity, pulled at {SPEED:g} m/s; {r.portrait.model.title}"
-
-
-def _states(ax: Any, r: Any) -> str:
-    draw("ribbons", ax, r.portrait, window=WINDOW)
-    return "states"
-
-
 def _portrait(ax: Any, r: Any) -> str:
     draw("portrait", ax, r.portrait, window=WINDOW)
     v = np.linspace(0.0, 0.38, 400)
@@ -250,9 +240,15 @@ def _parts(ax: Any, r: Any) -> str:
     return "a cycle and its parts"
 
 
+VELOCITY = "velocity, pulled at {SPEED:g} m/s; {portrait.model.title}"
 LESSON = Lesson(
     __name__,
     run,
-    (_velocity, _states, _portrait, _parts),
+    (
+        shown("velocity", "portrait", VELOCITY, window=WINDOW),
+        shown("ribbons", "portrait", "states", window=WINDOW),
+        _portrait,
+        _parts,
+    ),
     grid("aa;bb;cd", (8.2, 7.8), (1, 0.9, 2)),
 )

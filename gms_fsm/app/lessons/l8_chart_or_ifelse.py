@@ -100,7 +100,17 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Slider, Trace, simulate
-from gms_fsm.app.lessons._lesson import DOTS, FASTEST, FIRST, SECOND, Lesson, draw, grid, note
+from gms_fsm.app.lessons._lesson import (
+    DOTS,
+    FASTEST,
+    FIRST,
+    SECOND,
+    Lesson,
+    draw,
+    forces,
+    grid,
+    note,
+)
 from gms_fsm.app.paper import FORCE, HELD_STEPS, PAPER_RTOL, PAPER_STEP, VELOCITY
 from gms_fsm.app.paper.claims import differing_numbers, force_difference
 from gms_fsm.app.paper.held import OSCILLATION, PAPERS_FORCE, PAPERS_PLACE, RAMP, lag_of
@@ -179,13 +189,6 @@ def predicted(late: FloatArray, chart: Trace) -> FloatArray:
     return np.asarray(first.v * late * per_metre)
 
 
-def _friction(ax: Any, r: Any) -> str:
-    for (name, trace), look in zip(r.replayed.items(), (FIRST, SECOND), strict=True):
-        draw("force", ax, trace)[0].set(label=name, **look)
-    ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
-    return f"friction, {MODEL.title}"
-
-
 def _residual(ax: Any, r: Any) -> str:
     draw("difference", ax, r.t, r.residual)
     ax.set(ylim=(1e-7, 30), xlim=(0, END))
@@ -240,6 +243,6 @@ def _held_over_period(ax: Any, r: Any) -> str:
 LESSON = Lesson(
     __name__,
     run,
-    (_friction, _residual, _breakaway, _lateness, _held_over_time, _held_over_period),
+    (forces, _residual, _breakaway, _lateness, _held_over_time, _held_over_period),
     grid("aa;bb;cd;ef", (8.2, 10.6), (1, 1.2, 1.5, 1.5)),
 )

@@ -281,12 +281,16 @@ def _total(inertias: tuple[float, float], trace: Trace, power: int = 1) -> Float
     return np.asarray(inertias[0] * one + inertias[1] * two)
 
 
-def _moving(ax: Any, r: Any) -> str:
+def _mass(ax: Any, r: Any, end: float, name: str, factor: float) -> None:
     for trace, look in ((r.stiction, FIRST), (r.bristles, SECOND)):
-        fine = trace.sample(np.linspace(0.0, trace.t[-1], 2001))
-        ax.plot(fine.t, fine.v, **look)
+        fine = trace.sample(np.linspace(0.0, end, 2001))
+        ax.plot(fine.t, factor * getattr(fine, name), **look)
+
+
+def _moving(ax: Any, r: Any) -> str:
+    _mass(ax, r, r.stiction.t[-1], "v", 1.0)
     ax.set(xlabel="t [s]", ylabel="v [m/s]", xlim=(0, r.stiction.t[-1]))
-    return f"pulled mass; dashed: {bank().title}"
+    return f"pulled mass; dashed: {r.title}"
 
 
 def _states(ax: Any, r: Any) -> str:
@@ -296,9 +300,7 @@ def _states(ax: Any, r: Any) -> str:
 
 
 def _before(ax: Any, r: Any) -> str:
-    for trace, look in ((r.stiction, FIRST), (r.bristles, SECOND)):
-        fine = trace.sample(np.linspace(0.0, r.released, 1001))
-        ax.plot(fine.t, 1e3 * fine.x, **look)
+    _mass(ax, r, r.released, "x", 1e3)
     note(ax, "bank: the bristles yield", (3.0, 600 * r.crept[1]))
     note(ax, "stiction: x = 0", (3.0, 1.0), color=INK)
     ax.set(xlabel="t [s]", ylabel="x [mm]", xlim=(0, 8))

@@ -37,7 +37,7 @@ def write_notebook(number: int, folder: str | Path) -> Path:
     Parameters
     ----------
     number : int
-        1 to 11.
+        For example 7.
     folder : str or Path
         Output folder for ``lesson_N.ipynb``; created if it does not exist.
 
@@ -71,7 +71,7 @@ def composed(number: int) -> tuple[Cell, ...]:
     Parameters
     ----------
     number : int
-        1 to 11.
+        For example 7.
 
     Returns
     -------
