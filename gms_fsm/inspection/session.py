@@ -91,6 +91,7 @@ class Session:
         on, end = mounted("Session", model, rig, t_end)
         self.made_of = model, on, end
         self.tree = Tree(Adjustable(model, on), end, t_start, initial, self.settings)
+        len(self.branch)  # makes its first row: errors in the arguments belong here
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[str] = []
 
