@@ -12,8 +12,7 @@ from typing import Any
 from unittest import mock
 
 from gms_fsm.app.cli import main
-from gms_fsm.app.debugger import run_debugger
-from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.scenario import load_scenario, run_debugger
 from tests.helpers import ROOT
 
 FENCE = re.compile(

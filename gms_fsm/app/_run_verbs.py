@@ -251,8 +251,8 @@ def debug_command(
     ] = False,
 ) -> None:
     """Step through a scenario in the terminal: break, why, back, poke, compare."""
-    from gms_fsm.app.debugger import run_debugger, scenario_to_debug, session_of
     from gms_fsm.app.debugger.tui import run_tui
+    from gms_fsm.app.scenario import run_debugger, scenario_to_debug, session_of
 
     if light and not tui:
         raise typer.BadParameter("it is an option of --tui", param_hint="--light")

@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -29,6 +29,7 @@ from gms_fsm.app._tables import (
 )
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
+from gms_fsm.inspection.session import Session
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import simulate
@@ -40,7 +41,15 @@ from gms_fsm.systems.system import System
 from gms_fsm.traces.monitors import Monitor, checked
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["DATA_VARIABLE", "Loaded", "Scenario", "load_scenario", "load_system", "schema"]
+__all__ = [
+    "DATA_VARIABLE",
+    "Loaded",
+    "Scenario",
+    "load_scenario",
+    "load_system",
+    "scenario_to_debug",
+]
+__all__ += ["schema", "session_of"]
 
 DATA_VARIABLE = "GMS_FSM_DATA"
 
@@ -409,3 +418,98 @@ def find_file(scenario: Path, name: str) -> Path:
     raise ScenarioError(
         f"file = {shown(name)}: no such file in {looked}{hint}", place=str(scenario)
     )
+
+
+def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
+    """Read the scenario for ``gms-fsm debug``; for other files, raise an error with advice.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file.
+    overrides : sequence of str
+        See `load_scenario`.
+
+    Returns
+    -------
+    Loaded
+        The scenario, for `session_of`.
+
+    Raises
+    ------
+    ScenarioError
+        If it is a trace, a Python file, or not a valid scenario.
+
+    Examples
+    --------
+    >>> scenario_to_debug("t.npz")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    gms_fsm.errors.ScenarioError: t.npz is a trace; `gms-fsm replay t.npz` steps through it; ...
+    """
+    match Path(path).suffix.lower():
+        case ".py":
+            raise ScenarioError(
+                f"{path} is a Python file",
+                advice="debug takes a scenario (.toml); for a custom model use "
+                "Debugger(Session(model, rig, t_end)).run(), see "
+                "docs/howto/debugging.md",
+            )
+        case ".npz" | ".csv":
+            raise ScenarioError(
+                f"{path} is a trace",
+                advice=f"`gms-fsm replay {path}` steps through it; debug takes a scenario (.toml)",
+            )
+    return load_scenario(path, overrides)
+
+
+def session_of(loaded: Loaded) -> Session:
+    """Return a session of a scenario.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        From `load_scenario`. Requested times are ignored: a session has a row
+        at every step.
+
+    Returns
+    -------
+    Session
+        At the start of the run.
+
+    Raises
+    ------
+    ScenarioError
+        If the run of the scenario cannot be set up.
+    """
+    not_here = ("t_end", "t_eval", "monitors")
+    options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
+    try:
+        return Session(*loaded.subject, **options)
+    except GMSError as error:
+        raise ScenarioError.of(error).inside(loaded.path) from None
+
+
+def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
+    """Open a scenario in the debugger.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        As for `session_of`.
+    stdin, stdout : text files, optional
+        The terminal by default.
+
+    Returns
+    -------
+    int
+        Exit code: 0 at `quit` and at the end of input.
+
+    Raises
+    ------
+    ScenarioError
+        If the run of the scenario cannot be set up.
+    """
+    from gms_fsm.app.debugger import Debugger
+
+    return Debugger(session_of(loaded), loaded.title, stdin, stdout).run()

@@ -91,6 +91,7 @@ class Session:
         self.made_of = model, on, end
         what = mounted(model, on, self.settings.held_period)
         self.tree = Tree(what, end, t_start, initial, self.settings)
+        len(self.branch)  # makes its first row: errors in the arguments belong here
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[str] = []
 

@@ -16,7 +16,7 @@ from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.run._joint import Asked, ElementSwitch, Joint, Line
 from gms_fsm.run._steppable import start_of
-from gms_fsm.run._stepper import BlockMemory, ListMemory, StepMemory, fast, machine_code
+from gms_fsm.run._stepper import BlockMemory, ListMemory, fast, machine_code
 from gms_fsm.run.start import LATEST
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
@@ -74,7 +74,9 @@ def in_use() -> ParameterError:
 class JointGroup:
     """Joints in one memory, advanced by one call; of one joint, all values are numbers."""
 
-    def __init__(self, joints: Sequence[Joint], memory: StepMemory, places: Any) -> None:
+    def __init__(
+        self, joints: Sequence[Joint], memory: BlockMemory | ListMemory, places: Any
+    ) -> None:
         self.joints, self.places = joints, places
         self.copy, self.take = memory.copy, memory.take
         self._run, self._sample = memory.run, memory.sample

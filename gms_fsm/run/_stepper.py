@@ -6,7 +6,7 @@ import functools
 import importlib.util
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,6 @@ __all__ = [
     "BlockMemory",
     "JointMemory",
     "ListMemory",
-    "StepMemory",
     "arguments_of",
     "fast",
     "machine_code",
@@ -64,32 +63,6 @@ class JointMemory(NamedTuple):
         return {f"input {k}": self.tables[2 * k + 1] for k in range(len(self.sample.inputs))}
 
 
-class StepMemory(Protocol):
-    """The memory of joints that are advanced together."""
-
-    @property
-    def each(self) -> Sequence[JointMemory]:
-        """The memory of each joint."""
-
-    @property
-    def sample(self) -> Any:
-        """The numbers of `Sample`; of several joints each is an array, assigned as a whole."""
-
-    @property
-    def lines(self) -> Sequence[Any]:
-        """Of each input its value at the start and at the end; of several joints, arrays."""
-
-    @property
-    def run(self) -> Callable[[], int]:
-        """What advances all; it returns not 0 if `step_to` does for one of them."""
-
-    def copy(self, into: Any = None, /) -> Any:
-        """Return the present state, in the memory of an older copy if one is given."""
-
-    def take(self, copy: Any) -> None:
-        """Return to what `copy` returned, here or in the memory of the same systems."""
-
-
 def fast() -> bool:
     """Return whether machine code can be made here."""
     return all(map(importlib.util.find_spec, ("llvmlite", "platformdirs")))
@@ -97,7 +70,10 @@ def fast() -> bool:
 
 # --------------------------------------------------------------------------- in Python
 class ListMemory:
-    """Of one joint, in lists; its steps are Python functions."""
+    """Of one joint, in lists; its steps are Python functions.
+
+    Calling `run` advances it; see `step_to`.
+    """
 
     def __init__(self, starts: Sequence[Start]) -> None:
         (start,) = starts
@@ -190,7 +166,11 @@ def _clocks(start: Start) -> Clocks:
 
 # --------------------------------------------------------------------------- machine code
 class BlockMemory:
-    """Of joints that differ in numbers only: blocks one after the other, for machine code."""
+    """Of joints that differ in numbers only: blocks one after the other, for machine code.
+
+    Calling `run` advances all; it returns not 0 if `step_to` does for one of them. In `sample`, an
+    item is a number if there is one joint, else one number per joint.
+    """
 
     def __init__(self, starts: Sequence[Start]) -> None:
         from integrators.machine_code.layout import Block

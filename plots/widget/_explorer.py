@@ -230,8 +230,8 @@ class Explorer(anywidget.AnyWidget):
     def show(self, branch: int) -> None:
         """Show one branch, which becomes the current one."""
         with self._changing():
-            self._tree.current = self._tree.checked(branch)
-            self._shown = (branch,)
+            self._tree.trace(branch)
+            self._tree.current, self._shown = branch, (branch,)
 
     def compare(self, a: int, b: int) -> BranchComparison:
         """Show two branches side by side; the second becomes the current one.

@@ -10,8 +10,8 @@ from typing import Any
 
 from textual.pilot import Pilot
 
-from gms_fsm.app.debugger import scenario_to_debug, session_of
 from gms_fsm.app.debugger.tui._app import FullScreen
+from gms_fsm.app.scenario import scenario_to_debug, session_of
 from gms_fsm.inspection.session import Session
 from tests.helpers import ROOT
 

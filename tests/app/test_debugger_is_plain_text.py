@@ -11,8 +11,8 @@ import sys
 import pytest
 
 from gms_fsm import GMS, Chart, ChartModel, GMSParameters, Prescribed, State, Stribeck, Transition
-from gms_fsm.app.debugger import COMMANDS, Debugger, run_debugger
-from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.debugger import COMMANDS, Debugger
+from gms_fsm.app.scenario import load_scenario, run_debugger
 from gms_fsm.inspection.session import Session
 from tests.app.test_debugger_transcripts import FIG_4, SCENARIOS, talk
 from tests.helpers import ROOT
@@ -162,7 +162,7 @@ def test_no_colour_where_it_is_not_wanted(
 
 def _piped(script: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
     code = (
-        "import sys; from gms_fsm.app.debugger import run_debugger; "
+        "import sys; from gms_fsm.app.scenario import run_debugger; "
         "from gms_fsm.app.scenario import load_scenario; "
         f"sys.exit(run_debugger(load_scenario('scenarios/{FIG_4}.toml')))"
     )

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition
-from gms_fsm.app.debugger import COMMANDS, Debugger, help_of, scenario_to_debug
+from gms_fsm.app.debugger import COMMANDS, Debugger, help_of
+from gms_fsm.app.scenario import scenario_to_debug
 from gms_fsm.inspection.session import Session
 from tests.helpers import ROOT, stick_slip
 

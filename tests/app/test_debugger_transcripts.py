@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition, simulate
-from gms_fsm.app.debugger import Debugger, run_debugger, session_of
-from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.debugger import Debugger
+from gms_fsm.app.scenario import load_scenario, run_debugger, session_of
 from gms_fsm.inspection.session import Session
 from tests.app.test_debugger_on_a_model_of_ones_own import own, session_on
 from tests.app.test_debugger_shows_systems import made, pulled

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm.app.debugger import run_debugger
 from gms_fsm.app.report import monitor_lines, run_scenario
-from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.scenario import load_scenario, run_debugger
 from gms_fsm.traces.failures import LivelockError
 from gms_fsm.traces.monitors import Invariant
 from tests.scenario_files import (

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Sweep, System, Trace
-from gms_fsm.app.debugger import run_debugger, scenario_to_debug
-from gms_fsm.app.scenario import load_scenario, load_system
+from gms_fsm.app.scenario import load_scenario, load_system, run_debugger, scenario_to_debug
 from gms_fsm.lowering.program import lower
 from tests import own_files
 from tests.plots.stored import data_of

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm.app.debugger import run_debugger
-from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.scenario import load_scenario, run_debugger
 from tests.helpers import ROOT
 
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")

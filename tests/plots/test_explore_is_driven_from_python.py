@@ -7,7 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm import Body, Contact, MissingExtraError, Prescribed, System
+from gms_fsm import (
+    Body,
+    Chart,
+    ChartModel,
+    Contact,
+    MissingExtraError,
+    Prescribed,
+    State,
+    System,
+)
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import CHARTS
 from tests.helpers import FIG4_SINE, stick_slip
@@ -103,6 +112,22 @@ def test_a_failed_run_says_why() -> None:
     widget = plots.explore(stick_slip("published"), rig, 30.0, sliders=ranges, max_steps=60)
     assert "60" in widget.panel["failed"]
     assert widget.runs["runs"][0]["rows"] > 0
+
+
+def test_a_branch_that_cannot_be_made_any_more_is_not_shown() -> None:
+    """Its parent now ends before the poke."""
+    chart = Chart(
+        "root", inputs=("v",), variables=("z",), parameters=("g",),
+        states=(State("only", flow={"z": "v * g * sqrt(sgn(0.5 - z))"}, outputs={"F": "z"}),),
+    )  # fmt: skip
+    model = ChartModel(chart, {"g": 1.0})
+    widget = plots.explore(model, Prescribed("0.1"), 3.0, sliders={"g": (0.5, 20.0)})
+    widget.poke({"z": {0: 0.0}}, t=2.0)
+    widget.show(0)
+    widget.set(g=10.0)
+    panel = ask(widget, do="show", branch=1)
+    assert "before the poke" in str(panel["said"])
+    assert (widget.shown, widget.current) == ((0,), 0)
 
 
 def test_a_system() -> None:

@@ -6,12 +6,7 @@ executes a command and answers in lines; `_terminal` reads and prints. The full-
 """
 
 from gms_fsm.app.debugger._help import ALIASES, COMMANDS, help_of
-from gms_fsm.app.debugger._terminal import (
-    Debugger,
-    run_debugger,
-    scenario_to_debug,
-    session_of,
-)
+from gms_fsm.app.debugger._terminal import Debugger
 from gms_fsm.app.debugger._view import View, view
 
 __all__ = [
@@ -20,8 +15,5 @@ __all__ = [
     "Debugger",
     "View",
     "help_of",
-    "run_debugger",
-    "scenario_to_debug",
-    "session_of",
     "view",
 ]

@@ -14,17 +14,13 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TextIO
 
 from gms_fsm.app.debugger._commands import Commands
 from gms_fsm.app.debugger._text import DRAWN, PLAIN, WIDTH, wrapped
-from gms_fsm.app.scenario import Loaded, load_scenario
-from gms_fsm.errors import GMSError, ScenarioError
 from gms_fsm.inspection.session import Session
 
-__all__ = ["Debugger", "run_debugger", "scenario_to_debug", "session_of"]
+__all__ = ["Debugger"]
 
 NARROWEST = 40  # columns; a narrower terminal breaks the lines itself
 COLOURS = ("34", "33", "35", "36", "32")  # for states
@@ -199,96 +195,3 @@ class Debugger(cmd.Cmd):
         return self.commands.complete(text, line[:begin])
 
     complete_help = completedefault
-
-
-def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
-    """Read the scenario for ``gms-fsm debug``; for other files, raise an error with advice.
-
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file.
-    overrides : sequence of str
-        See `gms_fsm.app.scenario.load_scenario`.
-
-    Returns
-    -------
-    Loaded
-        The scenario, for `run_debugger`.
-
-    Raises
-    ------
-    ScenarioError
-        If it is a trace, a Python file, or not a valid scenario.
-
-    Examples
-    --------
-    >>> scenario_to_debug("t.npz")  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-    ...
-    gms_fsm.errors.ScenarioError: t.npz is a trace; `gms-fsm replay t.npz` steps through it; ...
-    """
-    match Path(path).suffix.lower():
-        case ".py":
-            raise ScenarioError(
-                f"{path} is a Python file",
-                advice="debug takes a scenario (.toml); for a custom model use "
-                "Debugger(Session(model, rig, t_end)).run(), see "
-                "docs/howto/debugging.md",
-            )
-        case ".npz" | ".csv":
-            raise ScenarioError(
-                f"{path} is a trace",
-                advice=f"`gms-fsm replay {path}` steps through it; debug takes a scenario (.toml)",
-            )
-    return load_scenario(path, overrides)
-
-
-def session_of(loaded: Loaded) -> Session:
-    """Return a session of a scenario.
-
-    Parameters
-    ----------
-    loaded : Loaded
-        From `gms_fsm.app.scenario.load_scenario`. Requested times are ignored: a session has a row
-        at every step.
-
-    Returns
-    -------
-    Session
-        At the start of the run.
-
-    Raises
-    ------
-    ScenarioError
-        If the run of the scenario cannot be set up.
-    """
-    not_here = ("t_end", "t_eval", "monitors")
-    options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
-    try:
-        return Session(*loaded.subject, **options)
-    except GMSError as error:
-        raise ScenarioError.of(error).inside(loaded.path) from None
-
-
-def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
-    """Open a scenario in the debugger.
-
-    Parameters
-    ----------
-    loaded : Loaded
-        As for `session_of`.
-    stdin, stdout : text files, optional
-        The terminal by default.
-
-    Returns
-    -------
-    int
-        Exit code: 0 at `quit` and at the end of input.
-
-    Raises
-    ------
-    ScenarioError
-        If the run of the scenario cannot be set up.
-    """
-    return Debugger(session_of(loaded), loaded.title, stdin, stdout).run()
