@@ -142,12 +142,12 @@ class JointGroups:
             found[group.places] = group.step(v0, v1, t, own, lost, now, mean=mean)
         return found
 
-    def copy(self, into: Any = None, /) -> list[Any]:
+    def copy(self, into: Any = None, /) -> Any:
         """Return the present state, in the memory of an older copy if one is given."""
         older = [None] * len(self.groups) if into is None else into
         return [group.copy(old) for group, old in zip(self.groups, older, strict=True)]
 
-    def take(self, copy: list[Any]) -> None:
+    def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
         for group, each in zip(self.groups, copy, strict=True):
             group.take(each)

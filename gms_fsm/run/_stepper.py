@@ -86,14 +86,14 @@ class ListMemory:
         self.each = (JointMemory(buffers, functions.p[2], self.sample, self.run),)
         self.lines = self.sample.inputs
 
-    def copy(self, _into: Any = None, /) -> dict[str, list[Any]]:
+    def copy(self, _into: Any = None, /) -> Any:
         """Return the present state."""
         log = {f"log {name}": getattr(self.sample, name) for name in LOGGED}
         numbers = {"sample": numbers_in(self.sample, SAMPLED)}
         state = {**self.each[0].state(), **log, **numbers}
         return {name: list(place) for name, place in state.items()}
 
-    def take(self, copy: dict[str, list[Any]]) -> None:
+    def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
         self.each[0].put(copy)
         put_numbers(self.sample, SAMPLED, copy["sample"])
