@@ -80,7 +80,8 @@ class JointGroup:
         self.joints, self.places = joints, places
         self.copy, self.take = memory.copy, memory.take
         self._run, self._sample = memory.run, memory.sample
-        self._v, *others = memory.lines
+        lines: Sequence[Any] = memory.lines
+        self._v, *others = lines
         self._others = [*zip(joints[0].inputs, others, strict=False)]
         self._entering = joints[0].enters
 
