@@ -1,7 +1,7 @@
 """Any bytes as a text, scenario file or trace file raise only documented errors.
 
 A few hundred inputs each; `make soak` tries them for minutes, with limits on time and memory. The
-inputs that once broke something are in the test_hostile_* files.
+inputs that once broke something are rows of `tests/refusals.py`.
 """
 
 from __future__ import annotations

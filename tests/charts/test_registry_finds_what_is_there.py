@@ -14,15 +14,11 @@ import pytest
 
 import gms_fsm.charts
 from gms_fsm import (
-    Body,
     Chart,
     ChartModel,
-    Contact,
     Parameter,
     Prescribed,
-    PulledSlider,
     Stribeck,
-    System,
     simulate,
 )
 from gms_fsm.charts import CHARTS, GMS_ELEMENT, LAWS, LUGRE
@@ -69,38 +65,25 @@ def test_the_built_in_charts_are_found() -> None:
 
 @pytest.mark.parametrize(("name", "law"), every())
 def test_every_parameter_has_a_unit_and_a_meaning(name: str, law: str) -> None:
+    assert entry(name).demonstration.source
     for each in entry(name).chart(law).parameters:
         assert each.unit
         assert each.meaning
 
 
-def mounted(found: Entry, law: str) -> tuple[Any, ...]:
-    """Return a chart on a rig, or in a system if it has several velocities."""
-    chart = found.chart(law)
-    if len(chart.velocities) > 1:
-        names = [f"v{i}" for i, _ in enumerate(chart.velocities)]
-        bodies = [
-            Body(f"b{v}", inertia=1.0, force=f"2 * sin(t + {i})", x=f"x{v}", v=v)
-            for i, v in enumerate(names)
-        ]
-        contact = Contact("pad", chart, dict(found.demonstration.values), v=names)
-        return (System("plane", bodies=bodies, contacts=[contact]),)
-    held = chart.locks or chart.sets_velocity  # needs a free body
-    rig = PulledSlider(1.0, 2.0, 0.1) if held else Prescribed("0.2*sin(t)")
-    return demonstration(found, law), rig
+FAULTY = [name for name, each in registered().items() if each.wrong]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "law"), every())
-def test_every_demonstration_runs_alike_on_two_engines(name: str, law: str) -> None:
-    assert entry(name).demonstration.source
-    what = mounted(entry(name), law)
+@pytest.mark.parametrize("name", FAULTY)
+def test_a_faulty_reading_runs_alike_on_two_engines(name: str) -> None:
+    """The others are runs of the corpus of `tests/laws`."""
+    model, rig = demonstration(entry(name), ""), Prescribed("0.2*sin(t)")
     runs = []
     for engine in ("machines", "ifelse"):
         try:
-            runs.append(simulate(*what, 8.0, engine=engine))
+            runs.append(simulate(model, rig, 8.0, engine=engine))
         except LivelockError as error:
-            assert entry(name).wrong
             runs.append(error.trace)
     same_bits(*runs)
     assert len(runs[0]) > 2

@@ -33,6 +33,7 @@ CASES = [
 def test_force_is_affine_in_them(name: str, law: str) -> None:
     model = demonstration(registered()[name], law)
     options: dict[str, Any] = {"t_eval": np.linspace(0.0, 4.0, 41), "atol": 1e-9, "rtol": 1e-8}
+    options["engine"] = "ifelse"
     at = simulate(model, RIG, 4.0, **options)
     for each in linear_names(mounted_alone(model)):
         start = np.asarray(value_in(mounted_alone(model), each))

@@ -89,7 +89,7 @@ def test_over_a_run_heat_and_spring_add_up_to_what_was_taken() -> None:
     """On a separate fine grid, by the trapezoid rule, from the forces of the trace."""
     model, rig = pulled_mass()
     times = np.linspace(0.0, 20.0, 200_001)
-    fine = simulate(model, rig, 20.0, t_eval=times)
+    fine = simulate(model, rig, 20.0, t_eval=times, engine=FASTEST)
     power = fine.F_elements * fine.v[:, np.newaxis]
     taken = np.sum(0.5 * (power[1:] + power[:-1]), axis=0) * 1e-4
     found = passivity(simulate(model, rig, 20.0, monitors="passivity"))
@@ -207,7 +207,8 @@ def test_the_published_law_creates_energy_in_fig_4() -> None:
     """2.16 J by element 1; checked on a fine grid from the forces, by the trapezoid rule."""
     model, rig = stick_slip("published"), Prescribed(FIG4_SINE)
     found = passivity(simulate(model, rig, 100.0, monitors="passivity"))
-    fine = simulate(model, rig, 100.0, t_eval=np.linspace(0.0, 100.0, 100_001))
+    times = np.linspace(0.0, 100.0, 100_001)
+    fine = simulate(model, rig, 100.0, t_eval=times, engine=FASTEST)
     power = fine.F_elements * fine.v[:, np.newaxis]
     taken = np.cumsum(0.5e-3 * (power[1:] + power[:-1]), axis=0)
     heat = taken - 0.5 * model.values["k"] * fine.z[1:] ** 2
@@ -257,7 +258,8 @@ def test_lugre_is_a_spring_and_a_damper_too() -> None:
     trace = simulate(model, Prescribed("0.01*sin(t)"), 10.0, monitors="passivity")
     found = passivity(trace)
     assert found.applicable
-    fine = simulate(model, Prescribed("0.01*sin(t)"), 10.0, t_eval=np.linspace(0, 10, 100_001))
+    times = np.linspace(0, 10, 100_001)
+    fine = simulate(model, Prescribed("0.01*sin(t)"), 10.0, t_eval=times, engine=FASTEST)
     power = fine.F_elements[:, 0] * fine.v
     assert found.taken[0] == pytest.approx(0.5e-4 * (power[1:] + power[:-1]).sum(), rel=1e-3)
 
@@ -318,7 +320,8 @@ def test_the_tolerance_covers_the_error_of_the_sums(options: dict[str, object]) 
     """Coarse steps or few rows give the same energies as fine ones, within the stated tolerance."""
     model, rig = stick_slip("published"), Prescribed(FIG4_SINE)
     fine = exactly()
-    found = passivity(simulate(model, rig, 60.0, monitors=[Passivity(1e-3)], **options))  # type: ignore[arg-type]
+    options = {"engine": FASTEST, "monitors": [Passivity(1e-3)], **options}
+    found = passivity(simulate(model, rig, 60.0, **options))  # type: ignore[arg-type]
     for name in ("deficit", "made"):
         for value, right, tolerance in zip(
             getattr(found, name), getattr(fine, name), found.tolerance, strict=True
