@@ -50,12 +50,6 @@ def seen_by_deuteranopes(picture: Floats) -> Floats:
     return encoded(linear(picture) @ MACHADO.T)
 
 
-def in_grey(picture: Floats) -> Floats:
-    """Return a picture, shape (..., 3) from 0 to 1, in grey."""
-    grey = encoded(linear(picture) @ WEIGHTS)
-    return np.repeat(grey[..., np.newaxis], 3, axis=-1)
-
-
 def deuteranopia(colour: str) -> str:
     """Return a colour as deuteranopes see it."""
     seen = seen_by_deuteranopes(_channels(colour))
