@@ -71,6 +71,7 @@ STILL = {  # the others switch
     "seven-parameter",
     "prandtl-tomlinson",
     "coulomb",
+    "micrometres",
     "on a belt",
     "runs down",
     "random system 1",

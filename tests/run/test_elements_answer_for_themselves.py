@@ -11,9 +11,7 @@ import pytest
 from gms_fsm import ChartModel, Prescribed, Stribeck, simulate
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ChartError
-from gms_fsm.language import (
-    parse_condition,
-)
+from gms_fsm.language import parse_condition
 from gms_fsm.run.machines import Element, ElementMachines, Guard
 from tests.helpers import pulled_mass, stick_slip
 
