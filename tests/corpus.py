@@ -561,7 +561,7 @@ FAILURES: dict[str, _Failure] = {
 RIG_RUNS = {**GMS_RUNS, **METHOD_RUNS, **SIGNAL_RUNS, **OWN_RUNS}
 CORPUS: dict[str, Maker] = {**RIG_RUNS, **ZOO_RUNS, **SYSTEM_RUNS, **SCENARIO_RUNS}
 FAILING: dict[str, Maker] = {name: make for name, (_, make) in FAILURES.items()}
-# One of each kind, for laws that cost more than two runs.
+# One of each kind, for laws that cost more than two runs, and for make quick.
 FEW = (
     "open loop", "fig. 3, slipping, published", "pulled mass", "pulled mass, rk4",
     "open loop, rk4 by step", "ramps with jumps", "lugre slider", "wear", "sliding", "karnopp",
@@ -588,9 +588,11 @@ def outcome(name: str, engine: str = FASTEST) -> tuple[Trace | None, str]:
     return run(name).outcome(engine=engine)
 
 
-def each(names: Iterable[str] = CORPUS) -> pytest.MarkDecorator:
-    """Parametrise a test by the names of runs."""
-    return pytest.mark.parametrize("name", list(names))
+def each(names: Iterable[str]) -> pytest.MarkDecorator:
+    """Parametrise a test by the names of runs; those that are not one of a few are slow."""
+    slow = pytest.mark.slow
+    values = [pytest.param(name, marks=() if name in FEW else slow) for name in names]
+    return pytest.mark.parametrize("name", values)
 
 
 def in_turn(name: str) -> str:

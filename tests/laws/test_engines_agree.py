@@ -79,6 +79,7 @@ STILL = {  # the others switch
 }
 
 
+@pytest.mark.slow
 def test_the_corpus_switches() -> None:
     """The laws would hold for runs in which nothing happens, too."""
     counts = {name: len(trace(name).transitions) for name in CORPUS}

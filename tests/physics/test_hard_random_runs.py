@@ -163,13 +163,13 @@ def engines_agree(model: Any, rig: Any, given: dict[str, Any], engines: tuple[st
     fired(one)
 
 
-@hard(25)
+@hard(15)
 @given(chart_models(), rigs(), options())
 def test_engines_agree_on_random_charts(model: ChartModel, rig: Any, given: dict[str, Any]) -> None:
     engines_agree(model, rig, given, ("ifelse",))
 
 
-@hard(20)
+@hard(8)
 @given(banks(), ramps(jumps=True), options(), st.booleans())
 def test_engines_agree_on_random_banks(
     model: GMS, corners: Any, given: dict[str, Any], pushed: bool
@@ -179,7 +179,7 @@ def test_engines_agree_on_random_banks(
     engines_agree(model, rig, given, ENGINES)
 
 
-@hard(4, most=20)  # each is compiled, which takes seconds
+@hard(2, most=20)  # each is compiled, which takes seconds
 @given(chart_models(), ramps(), options())
 def test_machine_code_agrees_on_random_charts(
     model: ChartModel, corners: Any, given: dict[str, Any]
