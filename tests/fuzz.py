@@ -120,39 +120,11 @@ def _is_a_message(error: GMSError) -> None:
 
 # --------------------------------------------------------------------------- text
 NUMBERS = [
-    "0",
-    "1",
-    "-1",
-    "0.5",
-    "1e-3",
-    "1e-300",
-    "1e-400",
-    "1e300",
-    "1e308",
-    "1e309",
-    "1e999",
-    "nan",
-    "inf",
-    "-inf",
-    "-0.0",
-    "1e5000",
-    "9" * 310,
-    "9" * 5000,
-    "0x1f",
-    "1_0",
-    "1__0",
-    "1.",
-    ".5",
-    "00",
-    "1e",
-    "0b1",
-    "0o7",
-    "1E+05",
-    "2j",
-    "4.9e-324",
-    "1.7976931348623157e308",
+    "0", "1", "-1", "0.5", "1e-3", "1e-300", "1e-400", "1e300", "1e308", "1e309", "1e999", "nan",
+    "inf", "-inf", "-0.0", "1e5000", "9" * 310, "9" * 5000, "0x1f", "1_0", "1__0", "1.", ".5",
+    "00", "1e", "0b1", "0o7", "1E+05", "2j", "4.9e-324", "1.7976931348623157e308",
     "123456789012345678",
-]
+]  # fmt: skip
 MARKS = [
     "+", "-", "*", "/", "**", "<", "<=", ">", ">=", "==", "!=", "(", ")", "[", "]", "{", "}", ",",
     ".", ":", ";", "=", ":=", "'", '"', '"""', "#", "\\", "@", "%", "&", "|", "~", "^", "!", "?",
@@ -161,50 +133,18 @@ MARKS = [
     "\U0001f600", "e\u0301", "\uff36",
 ]  # fmt: skip
 WORDS = [
-    "z",
-    "s",
-    "v",
-    "v_c",
-    "t",
-    "u",
-    "pi",
-    "and",
-    "or",
-    "not",
-    "if",
-    "else",
-    "lambda",
-    "for",
-    "in",
-    "is",
-    "await",
-    "None",
-    "True",
-    "False",
-    "__import__",
-    "os",
-    "exec",
-    "state",
-    "stick",
-    "slip",
+    "z", "s", "v", "v_c", "t", "u", "pi", "and", "or", "not", "if", "else", "lambda", "for", "in",
+    "is", "await", "None", "True", "False", "__import__", "os", "exec", "state", "stick", "slip",
     *FUNCTIONS,
-]
+]  # fmt: skip
 TOKENS = NUMBERS + MARKS + WORDS
 NAMES = ("z", "s", "v", "v_c")
 VALID_TEXTS = [
-    "z >= s and v > v_c",
-    "abs(v) <= v_c and abs(z) < s",
-    "sgn(v) * v_c * (1 - z / s)",
-    "v**2 + 1",
-    "min(z, max(s, v), 3) * exp(-(v / v_c)**2)",
-    "not (z < s or v > 0) and 0 < v < 1",
-    "state(1) == slip and state(2) != stick",
-    "z",
-    "-z**-2",
-    "tanh(cos(sin(sqrt(abs(z)))))",
-    "0.2*sin(2*pi*v/20)",
-    "((z**3)**4)**5 - z**0.5",
-]
+    "z >= s and v > v_c", "abs(v) <= v_c and abs(z) < s", "sgn(v) * v_c * (1 - z / s)",
+    "v**2 + 1", "min(z, max(s, v), 3) * exp(-(v / v_c)**2)", "not (z < s or v > 0) and 0 < v < 1",
+    "state(1) == slip and state(2) != stick", "z", "-z**-2", "tanh(cos(sin(sqrt(abs(z)))))",
+    "0.2*sin(2*pi*v/20)", "((z**3)**4)**5 - z**0.5",
+]  # fmt: skip
 
 
 def _mutated_text(choices: Choices, text: str) -> str:
@@ -486,46 +426,15 @@ PLAIN = [
     ["slip", "stick"], "m", "mm", "um", "s", "ms", "N", "kN", "x", "F", 0.05, 1, -1,
 ]  # fmt: skip
 OVERRIDES = [
-    "model.law=published",
-    "run.t_end=1",
-    "run.engine=compiled",
-    "rig.velocity=t",
-    "a=b",
-    "=",
-    "a",
-    "run.t_end=",
-    "run.t_end=1\nx=2",
-    "model=3",
-    "model.k.a=1",
-    "run.t_end=[",
-    "a.b.c.d.e.f.g=1",
-    "run.method='LSODA'",
-    "record.where=force > 0 N",
-    "run..t_end=1",
+    "model.law=published", "run.t_end=1", "run.engine=compiled", "rig.velocity=t", "a=b", "=",
+    "a", "run.t_end=", "run.t_end=1\nx=2", "model=3", "model.k.a=1", "run.t_end=[",
+    "a.b.c.d.e.f.g=1", "run.method='LSODA'", "record.where=force > 0 N", "run..t_end=1",
     "'run'.t_end=1",
-]
+]  # fmt: skip
 CELLS = [
-    "",
-    "nan",
-    "inf",
-    "-inf",
-    "1e999",
-    "1e300",
-    "-1e300",
-    "1e-320",
-    "x",
-    "1,5",
-    '"1"',
-    '"',
-    "0_3",
-    "0",
-    "-0.0",
-    "1" * 400,
-    " 1 ",
-    "\u0661",
-    "0x1",
-    "None",
-]
+    "", "nan", "inf", "-inf", "1e999", "1e300", "-1e300", "1e-320", "x", "1,5", '"1"', '"', "0_3",
+    "0", "-0.0", "1" * 400, " 1 ", "\u0661", "0x1", "None",
+]  # fmt: skip
 
 
 @functools.cache

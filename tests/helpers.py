@@ -145,6 +145,11 @@ def same_bits(a: Trace, b: Trace) -> None:
     assert [*mine] == [*its]
     for name, column in mine.items():
         np.testing.assert_array_equal(column, its[name], err_msg=name)
+    same_logs(a, b)
+
+
+def same_logs(a: Trace, b: Trace) -> None:
+    """Assert that the logs of two traces are equal."""
     for name in a.transitions.dtype.names:
         np.testing.assert_array_equal(a.transitions[name], b.transitions[name], err_msg=name)
 

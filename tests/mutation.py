@@ -69,16 +69,8 @@ NEAR = {  # module: its tests, those that detect most first
     ],
 }
 LANGUAGE = [
-    "tree",
-    "functions",
-    "read",
-    "fold",
-    "powers",
-    "print",
-    "evaluate",
-    "normal",
-    "derivative",
-]
+    "tree", "functions", "read", "fold", "powers", "print", "evaluate", "normal", "derivative",
+]  # fmt: skip
 NEAR |= {
     f"gms_fsm/language/_{name}.py": [
         "language/test_limits_and_columns",

@@ -107,28 +107,13 @@ def _bank(dice: Dice) -> GMS:
 
 
 FLOWS = (
-    "v",
-    "0",
-    "-z",
-    "a * (sgn(v) - z / s)",
-    "a * v * cos(z)",
-    "tanh(v) - z",
-    "v - abs(v) * z / s",
-    "min(v, a) - b * z",
-    "max(-a, v) * exp(-abs(z))",
-)
+    "v", "0", "-z", "a * (sgn(v) - z / s)", "a * v * cos(z)", "tanh(v) - z", "v - abs(v) * z / s",
+    "min(v, a) - b * z", "max(-a, v) * exp(-abs(z))",
+)  # fmt: skip
 CLAUSES = (
-    "z >= a * s",
-    "z <= -a * s",
-    "abs(z) < b * s",
-    "abs(z) >= s",
-    "abs(v) <= c",
-    "v > c",
-    "v < -c",
-    "z * v > 0",
-    "sin(4 * t) > b",
-    "not (z < a * s)",
-)
+    "z >= a * s", "z <= -a * s", "abs(z) < b * s", "abs(z) >= s", "abs(v) <= c", "v > c",
+    "v < -c", "z * v > 0", "sin(4 * t) > b", "not (z < a * s)",
+)  # fmt: skip
 ACTIONS: tuple[dict[str, str], ...] = ({}, {}, {}, {"z": "b * z"}, {"z": "0"})
 
 

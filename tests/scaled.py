@@ -12,16 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm import (
-    GMS,
-    GMSParameters,
-    LuGre,
-    Prescribed,
-    PulledSlider,
-    Slider,
-    Stribeck,
-    Trace,
-)
+from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, PulledSlider, Slider, Stribeck, Trace
 from gms_fsm.language import Binary, Call, Name, Negative, Number, Value, spell
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig

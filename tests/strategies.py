@@ -109,34 +109,15 @@ def rounded(low: float, high: float) -> st.SearchStrategy[float]:
 
 
 FLOWS = [
-    "v",
-    "0",
-    "-z",
-    "0.5 * (sgn(v) - z / s)",
-    "0.2 * v * cos(z)",
-    "tanh(v) - z",
-    "v - abs(v) * z / s",
-    "min(v, 0.2) - 0.5 * z",
-    "max(-0.3, v) * exp(-abs(z))",
+    "v", "0", "-z", "0.5 * (sgn(v) - z / s)", "0.2 * v * cos(z)", "tanh(v) - z",
+    "v - abs(v) * z / s", "min(v, 0.2) - 0.5 * z", "max(-0.3, v) * exp(-abs(z))",
     "0.1 * sin(3 * t) - 0.2 * z",
-]
+]  # fmt: skip
 CLAUSES = [
-    "z >= {a}",
-    "z <= -{a}",
-    "abs(z) < {a}",
-    "abs(z) >= s",
-    "z >= s",
-    "z <= -s",
-    "abs(v) <= {b}",
-    "v > {b}",
-    "v < -{b}",
-    "v >= {b}",
-    "z * v > 0",
-    "t > {a}",
-    "sin(4 * t) > {b}",
-    "z + v < {a}",
+    "z >= {a}", "z <= -{a}", "abs(z) < {a}", "abs(z) >= s", "z >= s", "z <= -s", "abs(v) <= {b}",
+    "v > {b}", "v < -{b}", "v >= {b}", "z * v > 0", "t > {a}", "sin(4 * t) > {b}", "z + v < {a}",
     "not (z < {a})",
-]
+]  # fmt: skip
 EDGE_ACTIONS = [{}, {}, {}, {"z": "0.5 * z"}, {"z": "0"}, {"z": "z + 0.01"}]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 from gms_fsm import Body, Contact, System, Trace, simulate
@@ -210,6 +211,36 @@ def clutched_bearings() -> Case:
         ),
         12.0,
     )
+
+
+# --------------------------------------------------------------------------- masses in a row
+def mass(name: str, m: float, force: str = "0") -> Body:
+    """A free body."""
+    return Body(name, inertia=repr(m), force=force, x=f"x_{name}", v=f"v_{name}")
+
+
+def pad(name: str, v: str, F_c: float, F_s: float) -> Contact:
+    """Stiction."""
+    return Contact(name, STICTION, {"F_c": F_c, "F_s": F_s, "b": 0.0}, v=v)
+
+
+def stop(name: str, v: str, x_s: float = 0.5, e: float = 0.6, v_r: float = 1e-3) -> Contact:
+    """An end stop."""
+    return Contact(name, END_STOP, {"x_s": x_s, "e": e, "v_r": v_r}, v=v)
+
+
+def cradle(*, pads: bool) -> Case:
+    """Newton's cradle of four balls, which touch, with or without friction."""
+    names = ["a", "b", "c", "d"]
+    contacts = [
+        stop(f"hit_{k}", f"v_{one} - v_{other}", x_s=0.0, e=0.999, v_r=1e-9)
+        for k, (one, other) in enumerate(pairwise(names))
+    ]
+    friction = [pad(f"pad_{name}", f"v_{name}", 0.1, 0.2) for name in names]
+    start = {"v_a": 1.0, "x_a": -0.1} | ({"pad_a.states": ["forward"]} if pads else {})
+    bodies = [mass(name, 1.0) for name in names]
+    system = System("cradle", bodies=bodies, contacts=contacts + friction * pads)
+    return Case(system, 0.1006, start)
 
 
 CASES = {

@@ -47,16 +47,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm import (
-    GMS,
-    GMSParameters,
-    Prescribed,
-    PulledSlider,
-    Slider,
-    Stribeck,
-    Trace,
-    simulate,
-)
+from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider, Stribeck, Trace, simulate
 from gms_fsm.errors import GMSError
 from gms_fsm.traces.failures import SimulationError
 

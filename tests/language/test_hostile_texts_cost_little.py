@@ -12,9 +12,7 @@ from typing import Any
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition, simulate
-from gms_fsm.errors import (
-    ExpressionError,
-)
+from gms_fsm.errors import ExpressionError
 from gms_fsm.language import evaluate, names_in, parse_condition, parse_value, spell
 
 LONG = "x" * 50_000

@@ -7,15 +7,7 @@ from typing import Any
 import pytest
 
 from gms_fsm.errors import ExpressionError
-from gms_fsm.language import (
-    InState,
-    Name,
-    Not,
-    evaluate,
-    parse_condition,
-    parse_value,
-    spell,
-)
+from gms_fsm.language import InState, Name, Not, evaluate, parse_condition, parse_value, spell
 
 
 def _refused(text: str, *names: str, **states: Any) -> ExpressionError:

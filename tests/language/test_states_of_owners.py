@@ -35,10 +35,7 @@ def test_dotted_names_are_values() -> None:
     ("text", "said"),
     [
         ("pad.state == slip", r"pad\.state needs a number.*pad\.state\(1\)"),
-        (
-            "pad.state(0) == slip",
-            r"pad\.state\(...\) takes an .*pad\.state\(1\) to pad\.st",
-        ),
+        ("pad.state(0) == slip", r"pad\.state\(...\) takes an .*pad\.state\(1\) to pad\.st"),
         ("pad.state(3) == slip", r"takes an element number"),
         ("gear.state(2) == left", r"gear\.state\(1\) to gear\.state\(1\)"),
         ("gear.state == slip", "unknown state"),

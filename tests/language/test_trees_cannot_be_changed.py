@@ -6,12 +6,7 @@ import dataclasses
 
 import pytest
 
-from gms_fsm.language import (
-    MATLAB_LIKE,
-    Requirement,
-    parse_condition,
-    split,
-)
+from gms_fsm.language import MATLAB_LIKE, Requirement, parse_condition, split
 from gms_fsm.language._tree import walk
 
 

@@ -16,7 +16,6 @@ STRICT = ("-Wall", "-Wno-unused", "-Werror")
 TRANSLATED = (
     "open loop",
     "pulled mass, rk4",
-    "open loop, t_eval",
     "a function",
     "sliding",
     "system servo",

@@ -1,19 +1,15 @@
-"""What is read from a file is what was saved: traces, sessions, systems, charts."""
+"""What is read from a file is what was saved: traces, sessions, systems."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
-import pytest
-from hypothesis import given, settings
 
-from gms_fsm import Chart, Session, System, Trace
-from gms_fsm.charts import CHARTS
+from gms_fsm import Session, System, Trace
 from gms_fsm.lowering.program import lower
 from tests.corpus import CORPUS, FAILING, FEW, SYSTEM_RUNS, each, outcome, run, trace
 from tests.helpers import other_parts, same_bits
-from tests.strategies import charts
 
 FUNCTIONS = {"a function", "no slope"}
 
@@ -76,19 +72,3 @@ def test_a_system_file_is_the_same_program(name: str, tmp_path: Path) -> None:
     assert (read.bodies, read.sampled, read.flow) == (system.bodies, system.sampled, system.flow)
     again = read.save(tmp_path / "again.toml")
     assert again.read_text() == (tmp_path / "own.toml").read_text()
-
-
-@pytest.mark.parametrize("name", CHARTS)
-def test_every_included_chart_is_read_back_equal(name: str, tmp_path: Path) -> None:
-    assert Chart.load(CHARTS[name].save(tmp_path / "chart.toml")) == CHARTS[name]
-
-
-@pytest.mark.slow
-@given(chart=charts())
-@settings(max_examples=60, deadline=None)
-def test_any_chart_is_read_back_equal(
-    chart: Chart, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    again = Chart.load(chart.save(tmp_path_factory.mktemp("chart") / "own.toml"))
-    assert (again, repr(again)) == (chart, repr(chart))
-    assert (again.forces, again.guards) == (chart.forces, chart.guards)

@@ -12,10 +12,7 @@ FLOWS = {
         "max(v, 2) + 10 * max(v - 2, 0)",
         lambda v: np.maximum(v, 2) + 10 * np.maximum(v - 2, 0),
     ),
-    "min": (
-        "min(v, 2) - 3 * min(v - 2, 0)",
-        lambda v: np.minimum(v, 2) - 3 * np.minimum(v - 2, 0),
-    ),
+    "min": ("min(v, 2) - 3 * min(v - 2, 0)", lambda v: np.minimum(v, 2) - 3 * np.minimum(v - 2, 0)),
     "thrice": (
         "max(v, 2) + max(2, v) + max(v - 2, 0) + min(v, 2)",
         lambda v: 2 * np.maximum(v, 2) + np.maximum(v - 2, 0) + np.minimum(v, 2),

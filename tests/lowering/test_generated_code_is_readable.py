@@ -103,22 +103,9 @@ def test_no_user_value_is_in_the_text() -> None:
     model, rig = odd_numbers(4, seed=3), Slider(0.7351, [(0.123, 0.456), (0.789, 0.987)])
     p = model.parameters
     theirs = {
-        *p.k,
-        *p.sigma,
-        *p.C,
-        *p.weights,
-        p.sigma_2,
-        p.v_c,
-        0.7351,
-        0.123,
-        0.456,
-        0.789,
-        0.987,
-        p.stribeck.F_c,
-        p.stribeck.F_s,
-        p.stribeck.v_s,
-        p.stribeck.dip,
-    }
+        *p.k, *p.sigma, *p.C, *p.weights, p.sigma_2, p.v_c, 0.7351, 0.123, 0.456, 0.789, 0.987,
+        p.stribeck.F_c, p.stribeck.F_s, p.stribeck.v_s, p.stribeck.dip,
+    }  # fmt: skip
     found = _numbers(lower(model, rig).source)
     assert found & {float(number) for number in theirs} == set()
     assert all(number == int(number) and number < 20 for number in found)

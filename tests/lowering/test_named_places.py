@@ -149,19 +149,10 @@ OLD = {
     "printed velocity": 'line = "v = y[1]"',
 }
 FINE = (
-    "y[places.index('z', i)]",
-    "y[layout.y.block('z')]",
-    "mode[i]",
-    "times[i + 1]",
-    "rows.y[row - 1]",
-    "rows.y[0]",
-    "first.t_last - first.t_first",
-    "cells[i : i + 3]",
-    "values[f'{name}{i + 1}']",
-    "'''Blocks of n: first + j * n + i.'''",
-    "range(n)",
-    "n * [0.0]",
-)
+    "y[places.index('z', i)]", "y[layout.y.block('z')]", "mode[i]", "times[i + 1]",
+    "rows.y[row - 1]", "rows.y[0]", "first.t_last - first.t_first", "cells[i : i + 3]",
+    "values[f'{name}{i + 1}']", "'''Blocks of n: first + j * n + i.'''", "range(n)", "n * [0.0]",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("case", OLD)

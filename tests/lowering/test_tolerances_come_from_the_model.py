@@ -24,30 +24,15 @@ from gms_fsm import (
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.scales import scales_of
-from tests.helpers import ROOT, pulled_mass
-
-CARRIAGE = GMS(
-    GMSParameters(
-        [4e6],
-        [3e3],
-        [1e-5],
-        sigma_2=250,
-        stribeck=Stribeck(8, 9.5, 5e-4),
-        v_c=7.3e-7,
-        weights=[1 / 4e6],
-    ),
-    law="signed",
-)
+from tests.corpus import MICROMETRES
+from tests.helpers import FASTEST, ROOT, pulled_mass
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
-def test_a_carriage_on_micrometres_creeps_and_does_not_break_away(engine):
+def test_a_carriage_on_micrometres_creeps_and_does_not_break_away():
     """k = 4e6 N/m, thresholds of 2 um: atol = 1e-9 made a break-away at 3.826 s."""
-    if engine == "compiled":
-        pytest.importorskip("llvmlite", reason="needs the extra fast")
     times = np.linspace(0.0, 8.0, 8001)
-    trace = simulate(CARRIAGE, PulledSlider(40, 1600, 1.8e-3), 8.0, engine=engine, t_eval=times)
+    trace = simulate(MICROMETRES, PulledSlider(40, 1600, 1.8e-3), 8.0, engine=FASTEST, t_eval=times)
     assert len(trace.transitions) == 0
     assert trace.v[-1] == pytest.approx(7.19712e-7, rel=3e-4)
     assert trace.v.max() == pytest.approx(1.19883e-6, rel=1e-4)

@@ -253,10 +253,7 @@ def test_a_belt_that_jumps_drags_the_mass_after_it(belt: Any, switching: bool) -
     """The friction F_c = 1 N brings 1 kg to 0.5 m/s in half a second, not at once."""
     system = System(
         "belt",
-        bodies=(
-            Body("m", inertia=1.0, force="0"),
-            Body("belt", velocity="vw", x="xw", v="vw"),
-        ),
+        bodies=(Body("m", inertia=1.0, force="0"), Body("belt", velocity="vw", x="xw", v="vw")),
         contacts=(Contact("pad", dry(switching), {"F_c": 1.0}, v="v - vw"),),
         signals={"vw": belt},
     )

@@ -22,13 +22,13 @@ from gms_fsm import (
 from gms_fsm.inspection.explain import explain
 from tests import older_files
 from tests.corpus import HELD, PUSHED, Belt, coulomb, runs_down
-from tests.helpers import FASTEST, same_bits
+from tests.helpers import same_bits
 
 
 # --------------------------------------------------------------------------- the bank
 def test_a_slipping_element_holds_v_at_zero_until_it_arrests():
     """Times from an independent hybrid loop around DOP853."""
-    trace = simulate(HELD, PUSHED, 4.0, engine=FASTEST)
+    trace = simulate(HELD, PUSHED, 4.0, engine="ifelse")
     assert len(trace.transitions) == 14
     (slide,) = trace.sliding
     assert slide.surface == "v"
@@ -49,7 +49,7 @@ def test_finer_tolerances_move_sliding_as_little_as_the_rest():
 # --------------------------------------------------------------------------- Coulomb friction
 def test_a_mass_on_coulomb_friction_waits_for_its_spring():
     """At rest until the spring pulls with F_c, then v = speed (1 - cos): exact."""
-    trace = simulate(coulomb(), PulledSlider(1.0, 2.0, 0.1), 10.0, engine=FASTEST)
+    trace = simulate(coulomb(), PulledSlider(1.0, 2.0, 0.1), 10.0, engine="ifelse")
     slide = trace.sliding[0]
     assert (slide.t_start, slide.sigma_start) == (0.0, 0.0)
     assert slide.t_end == pytest.approx(1.0 / (2.0 * 0.1), abs=1e-12)
@@ -106,7 +106,7 @@ def test_a_mass_rides_on_a_belt_along_a_surface_that_moves(w, place):
     """In a text of the rig; the sign's argument depends on a signal."""
     free = coulomb("0 * F_c")
     initial = {"v": 0.1}
-    trace = simulate(free, Belt(w), 1.2, engine=FASTEST, initial=initial)
+    trace = simulate(free, Belt(w), 1.2, engine="ifelse", initial=initial)
     assert trace.sliding[0].surface == "v - w"
     on = trace.rows.mode[:, 1] == 1
     assert on.sum() >= 5
@@ -117,7 +117,7 @@ def test_elements_come_to_rest_on_their_own_surfaces():
     """dz = -C sgn(z) reaches 0 in a finite time, each element by itself, two of them together."""
     model = runs_down([1.0, 2.0, 2.0, 0.1])
     trace = simulate(
-        model, Slider(1e9, "0"), 2.0, engine=FASTEST, initial={"z": [1.0, 1.0, -1.0, 1.0]}
+        model, Slider(1e9, "0"), 2.0, engine="ifelse", initial={"z": [1.0, 1.0, -1.0, 1.0]}
     )
     names = {str(r.surface): float(r.t_start) for r in trace.sliding}
     assert names == pytest.approx(
@@ -140,7 +140,7 @@ def test_guards_that_compare_with_the_surface_are_evaluated_on_it(guard, v0):
         outputs={"F": "F_c * sgn(v)"},
     )
     model = ChartModel(chart, {"F_c": 1.0})
-    trace = simulate(model, Slider(1.0, "0"), 8.0, engine=FASTEST, initial={"v": v0})
+    trace = simulate(model, Slider(1.0, "0"), 8.0, engine="ifelse", initial={"v": v0})
     assert trace.transitions.t.tolist() == [pytest.approx(4.0, abs=1e-9)]
 
 
@@ -189,15 +189,15 @@ def test_older_files_without_sliding_are_read(tmp_path):
 
 
 def test_requested_times_and_samples_lie_on_the_surface():
-    whole = simulate(HELD, PUSHED, 0.4, engine=FASTEST)
+    whole = simulate(HELD, PUSHED, 0.4, engine="ifelse")
     slide = whole.sliding[0]
     times = np.linspace(slide.t_start, slide.t_end, 7)[1:-1]
-    wanted = simulate(HELD, PUSHED, 0.4, engine=FASTEST, t_eval=times)
+    wanted = simulate(HELD, PUSHED, 0.4, engine="ifelse", t_eval=times)
     for trace in (wanted, whole.sample(times)):
         assert (trace.v == 0.0).all()
         assert np.abs(trace.F - 2.9 * np.sin(4.7 * times)).max() < 1e-12
     assert wanted.sliding.tolist() == whole.sliding.tolist()
-    assert len(simulate(HELD, PUSHED, 0.4, engine=FASTEST, output="end").sliding) == 0
+    assert len(simulate(HELD, PUSHED, 0.4, engine="ifelse", output="end").sliding) == 0
 
 
 def test_why_explains_sliding():

@@ -11,7 +11,8 @@ import importlib.util
 import numpy as np
 import pytest
 
-from gms_fsm import GMS, GMSParameters, PulledSlider, Slider, Stribeck
+from gms_fsm import PulledSlider
+from tests.corpus import HELD, MICROMETRES, PUSHED
 from tests.helpers import pulled_mass
 from tests.trials import JUDGED, Trial, reference, trial
 from tests.witness import witness
@@ -21,44 +22,8 @@ pytestmark = pytest.mark.slow
 HAS_FAST = bool(importlib.util.find_spec("llvmlite"))
 ENGINE = "compiled" if HAS_FAST else "ifelse"
 
-CARRIAGE = Trial(
-    "a carriage",
-    0,
-    0,
-    GMS(
-        GMSParameters(
-            [4e6],
-            [3e3],
-            [1e-5],
-            sigma_2=250,
-            stribeck=Stribeck(8, 9.5, 5e-4),
-            v_c=7.3e-7,
-            weights=[1 / 4e6],
-        ),
-        law="signed",
-    ),
-    PulledSlider(40, 1600, 1.8e-3),
-    8.0,
-)
-HELD = Trial(
-    "held on v = 0",
-    0,
-    0,
-    GMS(
-        GMSParameters(
-            [82e3, 146e3, 110e3],
-            [29, 2.6, 114],
-            [2.8e-3, 2.16e-3, 1.53e-3],
-            sigma_2=1.3,
-            stribeck=Stribeck(2.88, 3.155, 8.8e-3),
-            v_c=3.3e-6,
-            weights=[3.9e-6, 3e-6, 2.15e-6],
-        ),
-        law="signed",
-    ),
-    Slider(1.4, "2.9*sin(4.7*t)"),
-    4.0,
-)
+CARRIAGE = Trial("a carriage", 0, 0, MICROMETRES, PulledSlider(40, 1600, 1.8e-3), 8.0)
+STANDSTILL = Trial("held on v = 0", 0, 0, HELD, PUSHED, 4.0)
 
 
 def agrees(one: Trial) -> None:
@@ -80,13 +45,13 @@ def test_a_carriage_that_never_breaks_away() -> None:
 
 
 def test_a_mass_held_at_standstill() -> None:
-    seen = witness(HELD.model, HELD.rig, HELD.t_end)
+    seen = witness(HELD, PUSHED, 4.0)
     assert len(seen.transitions) == 14
     ((begin, end),) = seen.sliding
     assert begin == pytest.approx(0.3322785, abs=5e-8)
     assert end == pytest.approx(0.3323773, abs=5e-8)
     assert (end, 2, "arrest") in seen.transitions
-    agrees(HELD)
+    agrees(STANDSTILL)
 
 
 def test_the_pulled_mass() -> None:

@@ -64,15 +64,9 @@ def test_plain_maxwell_slip_is_the_play_operator():
         weights=weights,
     )
     ramps = [
-        (0, 0.4),
-        (2, 0.4),
-        (2.001, -0.4),
-        (3.5, -0.4),
-        (3.501, 0.4),
-        (4, 0.4),
-        (4.001, -0.4),
+        (0, 0.4), (2, 0.4), (2.001, -0.4), (3.5, -0.4), (3.501, 0.4), (4, 0.4), (4.001, -0.4),
         (7, -0.4),
-    ]
+    ]  # fmt: skip
     times = np.linspace(0, 7, 14001)
     trace = simulate(
         GMS(parameters, law="signed"), Prescribed(ramps), 7.0, t_eval=times, rtol=1e-8, atol=1e-11

@@ -108,11 +108,7 @@ def in_a_child(engine: str, transitions: int) -> Figures:
     """Run in a separate process and query the operating system for its resources."""
     code = f"from {__name__} import measured; measured({engine!r}, {transitions})"
     done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-        check=True,
+        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True
     )
     count, seconds, most = done.stdout.split()
     return Figures(int(count), float(seconds), int(most))

@@ -23,8 +23,9 @@ def last_row(trace):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [0.31, 0.5, 0.77])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    ("case", "share"), [*zip(CASES, [0.31, 0.5, 0.77, 0.31, 0.77], strict=True)]
+)
 def test_continued(case, share):
     """z, x, v, states and the joined log equal those of the whole run."""
     model, rig, T = CASES[case]

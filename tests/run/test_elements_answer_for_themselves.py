@@ -11,9 +11,7 @@ import pytest
 from gms_fsm import ChartModel, Prescribed, Stribeck, simulate
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ChartError
-from gms_fsm.language import (
-    parse_condition,
-)
+from gms_fsm.language import parse_condition
 from gms_fsm.run.machines import Element, ElementMachines, Guard
 from tests.helpers import pulled_mass, stick_slip
 
@@ -35,6 +33,12 @@ def test_a_guard_shows_its_text_and_accepts_an_event_or_an_element() -> None:
         assert guard.holds(element) is guard(SimpleNamespace(model=element)) is truth
 
 
+def _with_condition(machine: Any, *, target: bool) -> None:
+    """Give an edge a condition of one's own."""
+    (edge,) = machine.get_transitions("arrest", "slip", "stick")
+    edge.conditions.append(type(edge.conditions[0])(lambda event: False, target=target))
+
+
 def test_a_machine_that_was_changed_is_refused() -> None:
     model = stick_slip("signed")
     leaving = model.chart.leaving("stick")[0][1].name
@@ -50,6 +54,8 @@ def test_a_machine_that_was_changed_is_refused() -> None:
         ),
         lambda m: m.remove_transition("arrest", "slip", "stick"),
         lambda m: m.get_transitions("arrest", "slip")[0].conditions.clear(),
+        lambda m: _with_condition(m, target=True),
+        lambda m: _with_condition(m, target=False),
         lambda m: setattr(m.get_transitions("arrest", "slip")[0], "dest", "slip"),
         lambda m: setattr(m.get_transitions(leaving, "stick")[0], "dest", "stick"),
     ]

@@ -29,10 +29,7 @@ def _system(chart: Chart, n: int = 1) -> System:
             Body("a", inertia=1.0, force="0.5", x="x1", v="v1"),
             Body("b", inertia=1.0, force="1", x="x2", v="v2"),
         ),
-        contacts=(
-            Contact("pad", STICTION, DRY, v="v1"),
-            Contact("loop", chart, v="v2", n=n),
-        ),
+        contacts=(Contact("pad", STICTION, DRY, v="v1"), Contact("loop", chart, v="v2", n=n)),
     )
 
 

@@ -280,8 +280,7 @@ def _one_nursery() -> Iterator[None]:
 
 
 @pytest.mark.parametrize(
-    ("name", "share"),
-    [(name, share) for i, name in enumerate(WRITERS) for share in SHARES[i % 2]],
+    ("name", "share"), [(name, share) for i, name in enumerate(WRITERS) for share in SHARES[i % 2]]
 )
 def test_killed_at_some_moment(name: str, share: float, tmp_path: Path) -> None:
     if name == "run":

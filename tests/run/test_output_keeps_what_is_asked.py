@@ -14,7 +14,7 @@ from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from tests.helpers import open_loop, pulled_mass, same_bits, stick_slip
+from tests.helpers import FASTEST, open_loop, pulled_mass, same_bits, stick_slip
 
 JUMPS = [(0, 0.1), (1, 0.2), (1, -0.3), (6, -0.3), (6, 0.4), (9, 0.4)]
 CASES: dict[str, tuple[Model, Rig, float]] = {
@@ -24,19 +24,11 @@ CASES: dict[str, tuple[Model, Rig, float]] = {
 }
 
 
-@pytest.fixture(params=["machines", "ifelse", "compiled"])
-def engine(request: pytest.FixtureRequest) -> str:
-    """Each engine; the compiled one only if its extra is installed."""
-    if request.param == "compiled":
-        pytest.importorskip("llvmlite", reason="needs the extra fast")
-    return str(request.param)
-
-
-def test_the_default_output_depends_on_t_eval(engine: str) -> None:
+def test_the_default_output_depends_on_t_eval() -> None:
     model, rig, t_end = CASES["open loop"]
 
     def shapes(**options: Any) -> tuple[int, int, int]:
-        trace = simulate(model, rig, t_end, engine=engine, **options)
+        trace = simulate(model, rig, t_end, engine=FASTEST, **options)
         return len(trace), len(trace.stops), len(trace.transitions)
 
     assert shapes() == shapes(output="all")
@@ -45,10 +37,10 @@ def test_the_default_output_depends_on_t_eval(engine: str) -> None:
     assert shapes(output="end")[0] == 1
 
 
-def test_both_sides_of_every_stop_are_recorded_with_requested_rows(engine: str) -> None:
+def test_both_sides_of_every_stop_are_recorded_with_requested_rows() -> None:
     """So that samples between distant rows do not cross a switch or a jump."""
     model, rig, t_end = CASES["jumps"]
-    trace = simulate(model, rig, t_end, t_eval=[0.0, t_end], engine=engine)
+    trace = simulate(model, rig, t_end, t_eval=[0.0, t_end], engine=FASTEST)
     stops = trace.stops
     assert stops.t[0] == 0.0
     assert (np.diff(stops.t) >= 0).all()
@@ -56,15 +48,15 @@ def test_both_sides_of_every_stop_are_recorded_with_requested_rows(engine: str) 
         assert (stops.t == t).sum() >= 2, "before and after"
     for jump in (1.0, 6.0):
         assert {np.nextafter(jump, 0.0), jump} <= set(stops.t.tolist())
-    whole = simulate(model, rig, t_end, engine=engine)
+    whole = simulate(model, rig, t_end, engine=FASTEST)
     times = np.linspace(0.0, t_end, 101)
     between, sampled = trace.sample(times), whole.sample(times)
     np.testing.assert_array_equal(between.states, sampled.states)
 
 
-def test_the_end_can_be_saved_and_sampled(engine: str, tmp_path: Any) -> None:
+def test_the_end_can_be_saved_and_sampled(tmp_path: Any) -> None:
     model, rig, t_end = CASES["open loop"]
-    end = simulate(model, rig, t_end, output="end", engine=engine)
+    end = simulate(model, rig, t_end, output="end", engine=FASTEST)
     for name in ("end.npz", "end.csv"):
         same_bits(end, Trace.load(end.save(tmp_path / name)))
     assert end.sample([t_end]).z.tolist() == end.z.tolist()
@@ -91,11 +83,9 @@ def test_the_end_can_be_saved_and_sampled(engine: str, tmp_path: Any) -> None:
         ({"output": "t_eval", "t_eval": []}, ("t_eval",)),
     ],
 )
-def test_contradictions_are_refused(
-    options: dict[str, Any], words: tuple[str, ...], engine: str
-) -> None:
+def test_contradictions_are_refused(options: dict[str, Any], words: tuple[str, ...]) -> None:
     with pytest.raises(ParameterError) as caught:
-        simulate(*CASES["open loop"][:2], 1.0, engine=engine, **options)
+        simulate(*CASES["open loop"][:2], 1.0, engine=FASTEST, **options)
     for word in words:
         assert word in str(caught.value)
 

@@ -43,24 +43,9 @@ def test_an_unchanged_file_is_read(arrays: dict[str, Any], tmp_path: Path) -> No
 
 
 NAMES = [
-    "t",
-    "x",
-    "v",
-    "F",
-    "z",
-    "outcome",
-    "message",
-    "states",
-    "times",
-    "rows_x",
-    "rows_v",
-    "rows_F",
-    "rows_z",
-    "parameter_F_c",
-    "parameter_k",
-    "transitions",
-    "edges",
-]
+    "t", "x", "v", "F", "z", "outcome", "message", "states", "times", "rows_x", "rows_v",
+    "rows_F", "rows_z", "parameter_F_c", "parameter_k", "transitions", "edges",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)

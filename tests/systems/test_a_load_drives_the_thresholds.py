@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -97,13 +96,6 @@ def test_a_load_below_the_least_one_counts_as_the_least_one() -> None:
 def test_what_the_contact_supplies_itself_is_refused(name: str) -> None:
     with pytest.raises(ParameterError, match=f"inputs has '{name}', which the contact supplies"):
         Contact("p", GMS(PAPER, law="signed"), inputs={name: "5"})
-
-
-def test_a_load_is_kept_in_a_file(tmp_path: Path) -> None:
-    system = moved(LUGRE, "0.2*sin(t)", "2 + 1.5*sin(3*t)")
-    again = System.load(system.save(tmp_path / "moved.toml"))
-    forces = [run(each, 2.0).contact("pad").F.tolist() for each in (system, again)]
-    assert forces[0] == forces[1]
 
 
 def test_a_load_without_a_curve_is_refused() -> None:

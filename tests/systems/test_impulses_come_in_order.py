@@ -30,10 +30,7 @@ HIT = Chart(
 def test_an_action_after_an_impulse_reads_the_new_velocity(engine: str) -> None:
     system = System(
         "two masses",
-        bodies=(
-            Body("a", inertia=2.0, x="x1", v="v1"),
-            Body("b", inertia=3.0, x="x2", v="v2"),
-        ),
+        bodies=(Body("a", inertia=2.0, x="x1", v="v1"), Body("b", inertia=3.0, x="x2", v="v2")),
         contacts=(Contact("stop", HIT, {"e": 0.5, "x_s": 1.0}, v="v1 - v2"),),
     )
     trace = simulate(system, 2.0, initial={"a.v": 1.0}, engine=engine)

@@ -7,10 +7,7 @@ from typing import Any
 import pytest
 
 from gms_fsm import Prescribed, Stribeck, simulate
-from gms_fsm.errors import (
-    ParameterError,
-    SignalError,
-)
+from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.signals import as_signal
 from tests.helpers import stick_slip

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import GMS, GMSParameters, Stribeck, Trace, simulate
+from gms_fsm import Trace, simulate
+from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems.system import Body, Contact, Sampled, System
-from tests.helpers import stick_slip
+from tests.helpers import ROOT, stick_slip
 
 ENGINES = ["ifelse", "machines", "compiled"]
 
@@ -68,40 +69,13 @@ def test_too_many_ticks_are_refused() -> None:
 
 
 # --------------------------------------------------------------------------- a servo
+
+
 def servo() -> System:
     """Two masses on a shaft, friction on the load, a PID controller on the motor's position."""
-    k, share = np.array([4e4, 3e4, 2e4, 1e4]), np.array([0.4, 0.3, 0.2, 0.1])
-    bank = GMSParameters(
-        k,
-        np.zeros(4),
-        20.0 * share / k,  # C = 20 N/s, written for the deflection
-        v_c=1e-6,
-        weights=share / k,
-        sigma_2=0.0,
-        stribeck=Stribeck(1.0, 1.5, 1e-3),
-    )
-    shaft = "k_s * (x_m - x_l) + d_s * (v_m - v_l)"
-    return System(
-        "servo",
-        bodies=(
-            Body("motor", inertia="m_m", force=f"u - ({shaft})", x="x_m", v="v_m"),
-            Body("load", inertia="m_l", force=shaft, x="x_l", v="v_l"),
-        ),
-        contacts=(Contact("friction", GMS(bank, law="signed"), v="v_l"),),
-        numbers={"m_m": 0.5, "m_l": 1.0, "k_s": 2e4, "d_s": 5.0, "ref": 2e-3},
-        sampled=(
-            Sampled(
-                "pid",
-                period=1e-3,
-                updates={
-                    "e": "ref - x_m",
-                    "u": "400 * e + I + 40 * (e - e_before) / period",
-                    "I": "I + 500 * period * e",
-                    "e_before": "e",
-                },
-            ),
-        ),
-    )
+    system = load_scenario(ROOT / "scenarios" / "servo.toml").system
+    assert system is not None
+    return system
 
 
 def test_the_servo_is_where_an_independent_loop_has_it() -> None:

@@ -20,13 +20,11 @@ from gms_fsm import (
     State,
     Stribeck,
     Transition,
-    simulate,
 )
 from gms_fsm.charts import LUGRE
 from gms_fsm.errors import OutputError
 from gms_fsm.lowering.program import lower
 from gms_fsm.systems.system import Body, Contact, Sampled, Spring, System
-from tests.helpers import same_bits
 
 STICTION = Chart(
     "stiction",
@@ -109,15 +107,6 @@ def test_any_system_has_the_same_program_and_numbers(
     assert other.knots == one.knots
     assert [each.title for each in again.contacts] == [each.title for each in system.contacts]
     assert (again.bodies, again.sampled, again.flow) == (system.bodies, system.sampled, system.flow)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("contact", CONTACTS)
-def test_it_runs_as_before(contact: str, tmp_path: Path) -> None:
-    system = system_with([contact])
-    again = System.load(system.save(tmp_path / "own.toml"))
-    one, other = (simulate(each, 3.0) for each in (system, again))
-    same_bits(one, other)
 
 
 def test_samplers_and_periods_are_kept(tmp_path: Path) -> None:

@@ -13,15 +13,7 @@ import numpy as np
 
 from gms_fsm import Trace
 from tests.hybrid_reference import Modes, Switch, Way, reference
-from tests.zoo.zoo_cases import (
-    CURVE,
-    ELASTO,
-    KARNOPP,
-    MODELICA,
-    elasto_plastic,
-    karnopp,
-    modelica,
-)
+from tests.zoo.zoo_cases import CURVE, ELASTO, KARNOPP, MODELICA, elasto_plastic, karnopp, modelica
 
 TIMES = 1e-7  # s
 ROUNDING = 1e-11  # N: an edge is not taken at the very point where the one back was

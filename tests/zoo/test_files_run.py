@@ -40,13 +40,7 @@ FILES = (
     ),
     ("dahl", DRIVEN, 6.0, "sigma_0 = 1e5\nF_c = 1.0", 0),
     ("lugre-sigma1", PULLED, 10.0, f"v_d = 0.05\n{BRISTLE}", 0),
-    (
-        "reset-integrator",
-        DRIVEN,
-        6.0,
-        "sigma_0 = 1e5\nsigma_1 = 30.0\na_0 = 0.5\nz_0 = 1e-5",
-        4,
-    ),
+    ("reset-integrator", DRIVEN, 6.0, "sigma_0 = 1e5\nsigma_1 = 30.0\na_0 = 0.5\nz_0 = 1e-5", 4),
     ("elasto-plastic", DRIVEN, 6.0, f"z_ba = 1e-5\n{BRISTLE}", 4),
     ("maxwell-slip", DRIVEN, 6.0, "k = [4e4, 1e4]\nF_c = [0.5, 0.5]", 4),
     ("prandtl-tomlinson", PULLED, 10.0, "F_0 = 1.0\na_0 = 0.2\nc = 4.0", 0),
@@ -55,13 +49,7 @@ FILES = (
 
 @pytest.mark.parametrize(("name", "rig", "t_end", "model", "least"), FILES)
 def test_a_scenario_file_runs(
-    name: str,
-    rig: str,
-    t_end: float,
-    model: str,
-    least: int,
-    gms_fsm: CommandLine,
-    tmp_path: Path,
+    name: str, rig: str, t_end: float, model: str, least: int, gms_fsm: CommandLine, tmp_path: Path
 ) -> None:
     text = SCENARIO.format(name=name, rig=rig, t_end=t_end, model=model)
     Path("zoo.toml").write_text(text)

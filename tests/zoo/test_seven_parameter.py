@@ -16,15 +16,7 @@ from tests.helpers import FASTEST
 from tests.hybrid_reference import Modes, Switch, Way, reference
 
 SEVEN = CHARTS["seven-parameter"]
-NUMBERS = {
-    "k_t": 2e3,
-    "F_c": 1.0,
-    "F_v": 0.4,
-    "F_s": 1.5,
-    "v_s": 0.02,
-    "tau_L": 5e-3,
-    "gamma": 1.0,
-}
+NUMBERS = {"k_t": 2e3, "F_c": 1.0, "F_v": 0.4, "F_s": 1.5, "v_s": 0.02, "tau_L": 5e-3, "gamma": 1.0}
 PULL = {"m": 1.0, "K": 2.0, "V": 0.1}
 T_END = 14.0
 
