@@ -1,17 +1,77 @@
-"""What an export needs in order to follow its numbers: tolerances, scales, initial values."""
+"""What an export that steps is made of: its block of memory, and the functions on it."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple
 
+from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._names import identifier
+from gms_fsm.exporters._quantities import Quantity
+from gms_fsm.exporters._subject import Subject
+from gms_fsm.language import names_in, spell
 from gms_fsm.lowering._compiled import functions
-from gms_fsm.lowering.adapting import FUNCTIONS, Adapting, bind, text_of
+from gms_fsm.lowering.adapting import FUNCTIONS, Adapting, adapt, bind, text_of
+from gms_fsm.run._stepper import arguments_of
 from gms_fsm.run.start import Start
+from integrators.compiled import is_known
+from integrators.machine_code.layout import Layout
+from integrators.machine_code.translate import Translator
+from integrators.stepping import step_to
 
-__all__ = ["ADAPTED", "adapting_of"]
+__all__ = [
+    "STEPS",
+    "StepArguments",
+    "adapting_of",
+    "check_first_call",
+    "step_arguments",
+    "translate",
+    "word_of",
+]
 
-# The arguments of `gms_fsm.lowering.adapting.adapt` in the block of an export that steps.
-ADAPTED = "functions buffers sample.seen buffers.sliding.live adapting"
+# The functions, and the parts of the block that are their arguments.
+STEPS: Mapping[str, tuple[Any, str]] = {
+    "step": (step_to, "functions machines buffers sample"),
+    "adapt": (adapt, "functions buffers sample.seen buffers.sliding.live adapting"),
+}
+PLACES: Mapping[str, str] = {
+    "y": "buffers.now.y",
+    "mode": "buffers.now.mode",
+    "seen": "sample.seen",
+    "shared": "functions.p.0",
+    "own": "functions.p.1",
+}
+
+
+class StepArguments(NamedTuple):
+    """The arguments of both functions."""
+
+    functions: Any
+    machines: Any
+    buffers: Any
+    sample: Any
+    adapting: Adapting
+
+
+def step_arguments(start: Start) -> tuple[StepArguments, Layout]:
+    """Return the contents of the block at a start, and where everything is in it."""
+    step: tuple[Any, Any, Any, Any] = arguments_of(start)
+    made = StepArguments(*step, adapting_of(start))
+    return made, Layout(made, is_known)
+
+
+def translate(
+    translator: Translator, layout: Layout, entries: Mapping[str, tuple[Any, str]], prefix: str = ""
+) -> list[str]:
+    """Translate functions on the block, and return their names."""
+    for name, (function, parts) in entries.items():
+        translator.entry(f"{prefix}{name}", function, [layout.part(each) for each in parts.split()])
+    return [*entries]
+
+
+def word_of(layout: Layout, each: Quantity) -> int:
+    """Return the first word of a quantity in the block."""
+    return layout.offset(PLACES[each.place]) + each.index
 
 
 def adapting_of(start: Start) -> Adapting:
@@ -40,3 +100,41 @@ def adapting_of(start: Start) -> Adapting:
         sizes=[0.0] * len(y),
         times=[0.0],
     )
+
+
+def check_first_call(subject: Subject, words: Collection[str]) -> None:
+    """Refuse inputs that the language cannot name, and initial values that depend on them.
+
+    Parameters
+    ----------
+    subject : Subject
+        What is exported.
+    words : collection of str
+        Of the language.
+
+    Raises
+    ------
+    ParameterError
+        Naming the contact and the variable.
+    """
+    start = subject.start
+    for contact in start.system.contacts:
+        chart = contact.chart
+        given = {*chart.inputs, *chart.velocities, *chart.declared} - {*chart.variables}
+        given -= {*chart.parameter_names}
+        for name, tree in chart.assignments["entry", chart.default_state.name].items():
+            read = set(names_in(tree))
+            while (
+                more := {u for each in read & {*chart.lets} for u in names_in(chart.lets[each])}
+                - read
+            ):
+                read |= more
+            if late := sorted(read & given):
+                raise ParameterError(
+                    f"its default state begins with {name} = {spell(tree)}, and {late[0]} is known "
+                    "only in the first call",
+                    place=f"contact {contact.name!r}",
+                    advice="give the initial value of the variable as a number",
+                )
+    for each in subject.inputs:
+        identifier(each, words, f"input {each!r}")

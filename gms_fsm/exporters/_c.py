@@ -10,35 +10,28 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from string import Template
-from typing import Any, NamedTuple
+from typing import Any
 
 from gms_fsm._version import __version__
-from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._adapting import ADAPTED, adapting_of
+from gms_fsm.exporters._adapting import STEPS, check_first_call, step_arguments, translate, word_of
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._plain_c import C_WORDS
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import names_in, spell
-from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run._joint import FAILURES
-from gms_fsm.run._stepper import MOST_SWITCHES, arguments_of
+from gms_fsm.run._stepper import MOST_SWITCHES
 from gms_fsm.run.start import LATEST, Start
-from integrators.compiled import INLINE, is_known
+from integrators.compiled import INLINE
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.layout import Block, Layout
 from integrators.machine_code.translate import Translator
-from integrators.stepping import FULL_LOG, step_to
+from integrators.stepping import FULL_LOG
 
 __all__ = [
-    "PLACES",
-    "STEPPED",
     "TAKES",
     "TEMPLATES",
     "WORDS",
     "CEngine",
-    "StepArguments",
-    "check_entries",
     "engine_of",
     "filled",
     "image_of",
@@ -50,17 +43,6 @@ TEMPLATES = Path(__file__).parent / "_templates"
 TAKES = ("initial", "t_start", "settings")  # what the engine uses
 WORDS = C_WORDS | {*FIELDS, "INFINITY", "NAN", "NULL"}
 BAD_ARGUMENT = -1
-STEPPED = "functions machines buffers sample"  # the arguments of a step, in the block
-
-
-class StepArguments(NamedTuple):
-    """The arguments of both entries."""
-
-    functions: Any
-    machines: Any
-    buffers: Any
-    sample: Any
-    adapting: Adapting
 
 
 @dataclass(frozen=True)
@@ -117,9 +99,7 @@ def engine_of(subject: Subject) -> CEngine:
         If a name cannot be one in C, or a default state is entered with what is not known yet.
     """
     start, alone = subject.start, subject.alone
-    check_entries(start)
-    for each in subject.inputs:
-        identifier(each, WORDS, f"input {each!r}")
+    check_first_call(subject, WORDS)
     states: dict[str, int] = {}
     edges: dict[str, str] = {}
     for bank in start.program.layout.banks:
@@ -137,47 +117,12 @@ def engine_of(subject: Subject) -> CEngine:
     return replace(made, header=text.header(), source=text.source())
 
 
-def check_entries(start: Start) -> None:
-    """Refuse initial values that depend on the inputs of the first call.
-
-    Parameters
-    ----------
-    start : Start
-        What is exported.
-
-    Raises
-    ------
-    ParameterError
-        Naming the contact and the variable.
-    """
-    for contact in start.system.contacts:
-        chart = contact.chart
-        given = {*chart.inputs, *chart.velocities, *chart.declared} - {*chart.variables}
-        given -= {*chart.parameter_names}
-        for name, tree in chart.assignments["entry", chart.default_state.name].items():
-            read = set(names_in(tree))
-            while (
-                more := {u for each in read & {*chart.lets} for u in names_in(chart.lets[each])}
-                - read
-            ):
-                read |= more
-            if late := sorted(read & given):
-                raise ParameterError(
-                    f"its default state begins with {name} = {spell(tree)}, and {late[0]} is known "
-                    "only in the first call",
-                    place=f"contact {contact.name!r}",
-                    advice="give the initial value of the variable as a number",
-                )
-
-
 class _Text:
     """Writes header and source."""
 
     def __init__(self, made: CEngine, start: Start, title: str) -> None:
         self.made, self.start, self.title, self.name = made, start, title, made.name
-        step: tuple[Any, Any, Any, Any] = arguments_of(start)
-        self.arguments = StepArguments(*step, adapting_of(start))
-        self.layout = Layout(self.arguments, is_known)
+        self.arguments, self.layout = step_arguments(start)
 
     def header(self) -> str:
         """Return the header."""
@@ -187,7 +132,7 @@ class _Text:
         ]
         codes = [f"    {name}_{kind} = {code}," for code, kind in _codes()]
         places = [
-            f"    {name}_parameter_{each.name} = {self._word(each)},{_comment(each)}"
+            f"    {name}_parameter_{each.name} = {word_of(self.layout, each)},{_comment(each)}"
             for each in made.parameters
         ]
         edges = [f"    {name}_edge_{each} = {k}," for k, each in enumerate(made.edges)]
@@ -263,20 +208,15 @@ class _Text:
     def _translated(self) -> str:
         """Return the functions of the integrator and of the system."""
         translator = Translator(INLINE)
-        for name, function, parts in (("step", step_to, STEPPED), ("adapt", adapt, ADAPTED)):
-            translator.entry(name, function, [self.layout.part(each) for each in parts.split()])
+        translate(translator, self.layout, STEPS)
         public = ("init", "advance", "advance_to", "get", "set", "switch", "edge", "message")
         own = [f"{self.name}_{each}" for each in (*public, "state", "word")]
         return c99_text(translator.module, [*own, "show", "is_number", "is_parameter"], hidden=True)
 
-    def _word(self, each: Quantity) -> int:
-        """Return the first word of a quantity."""
-        return self.layout.offset(PLACES[each.place]) + each.index
-
     def _shown(self) -> str:
         lines = []
         for each in self.made.outputs:
-            first, member = self._word(each), "i" if each.place == "mode" else "f"
+            first, member = word_of(self.layout, each), "i" if each.place == "mode" else "f"
             if each.length is None:
                 lines.append(f"    s->{each.name} = w[{first}].{member};")
             else:
@@ -287,7 +227,9 @@ class _Text:
     def _spans(self) -> list[tuple[int, int]]:
         """Return where parameters are: first word and length, joined where they touch."""
         spans: list[tuple[int, int]] = []
-        for first, length in sorted((self._word(p), p.length or 1) for p in self.made.parameters):
+        for first, length in sorted(
+            (word_of(self.layout, p), p.length or 1) for p in self.made.parameters
+        ):
             if spans and sum(spans[-1]) == first:
                 spans[-1] = spans[-1][0], spans[-1][1] + length
             else:
@@ -323,13 +265,6 @@ def image_of(layout: Layout, arguments: Any) -> str:
     return "\n".join(lines)
 
 
-PLACES: Mapping[str, str] = {
-    "y": "buffers.now.y",
-    "mode": "buffers.now.mode",
-    "seen": "sample.seen",
-    "shared": "functions.p.0",
-    "own": "functions.p.1",
-}
 _REASONS = {code: reason for code, (_, reason) in FAILURES.items()}
 _KINDS = {
     "LIVELOCK": "LivelockError",
@@ -375,8 +310,7 @@ def _field(each: Quantity, kind: str) -> str:
 
 
 def _comment(each: Quantity) -> str:
-    text = ", ".join(part for part in (each.unit, each.meaning) if part)
-    return f" /* {safe(text)} */" if text else ""
+    return f" /* {safe(each.about)} */" if each.about else ""
 
 
 def safe(text: str) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.language import Condition, Value, names_in
 from gms_fsm.run._steppable import other_inputs
@@ -14,7 +16,7 @@ from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.system import Body, Contact, System
 
-__all__ = ["check_moved_from_outside", "slow_velocity"]
+__all__ = ["check_moved_from_outside", "element_numbers", "fields_of", "one_line", "slow_velocity"]
 
 PERIOD, STEP = 25.0, 1e-3  # s: of a demonstration, as in the paper's first experiment
 AMPLITUDES = (0.15, 0.015, 1.5e-3, 1.5e-4, 1.5e-5)  # m/s; the first is the paper's
@@ -81,6 +83,23 @@ def check_moved_from_outside(chart: Chart, known: Iterable[str], title: str) -> 
                 place=f"{here}, {place}",
                 advice="write it with variables and inputs, or export a whole system as c99",
             )
+
+
+def one_line(text: str) -> str:
+    """Return a text without line breaks and control characters."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def fields_of(parameter: Parameter) -> dict[str, Any]:
+    """Return the fields of a parameter that differ from their defaults, besides its name."""
+    plain = vars(Parameter(parameter.name))
+    return {key: value for key, value in vars(parameter).items() if value != plain[key]}
+
+
+def element_numbers(contact: Contact) -> list[dict[str, float]]:
+    """Return the numbers of each element, by name."""
+    rows = {name: np.broadcast_to(given, contact.n) for name, given in contact.values.items()}
+    return [{name: float(row[i]) for name, row in rows.items()} for i in range(contact.n)]
 
 
 def slow_velocity(contact: Contact) -> str:

@@ -21,11 +21,11 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from gms_fsm._version import __version__
-from gms_fsm.exporters._c import WORDS, check_entries, filled
+from gms_fsm.exporters._adapting import check_first_call
+from gms_fsm.exporters._c import WORDS, filled
 from gms_fsm.exporters._fmu_model import FmuModel
 from gms_fsm.exporters._fmu_units import base_units
 from gms_fsm.exporters._fmu_variables import FmuVariable, types_of, variables_of
-from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
 
 __all__ = ["Described", "fmu", "tag", "units_of"]
@@ -160,9 +160,7 @@ def fmu(
         If it cannot be stepped, or a name cannot be one in C.
     """
     start = subject.start
-    check_entries(start)
-    for each in subject.inputs:
-        identifier(each, WORDS, f"input {each!r}")
+    check_first_call(subject, WORDS)
     exchange = "piecewise_slope(" not in start.program.source
     variables = variables_of(subject, exchange=exchange)
     model = FmuModel(subject, variables, exchange=exchange)

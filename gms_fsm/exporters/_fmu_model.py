@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from gms_fsm._version import __version__
-from gms_fsm.exporters._adapting import ADAPTED, adapting_of
-from gms_fsm.exporters._c import PLACES, STEPPED, TEMPLATES, filled, image_of, safe
+from gms_fsm.exporters._adapting import PLACES, STEPS, adapting_of, translate
+from gms_fsm.exporters._c import TEMPLATES, filled, image_of, safe
 from gms_fsm.exporters._fmu_variables import FmuVariable, indicators_of, nominals_of, types_of
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.lowering.adapting import Adapting, adapt
+from gms_fsm.lowering.adapting import Adapting
 from gms_fsm.run._joint import FAILURES
 from gms_fsm.run._stepper import arguments_of
 from integrators import exchange, stepping
@@ -28,8 +28,7 @@ from integrators.machine_code.translate import Translator
 __all__ = ["FmuArguments", "FmuModel", "both_of"]
 
 ENTRIES: Mapping[str, tuple[Any, str]] = {
-    "step": (stepping.step_to, STEPPED),
-    "adapt": (adapt, ADAPTED),
+    **STEPS,
     "restart": (stepping.restart, "buffers sample.clocks"),
     "settle": (exchange.settle, "functions machines buffers sample.clocks exchange"),
     "slope": (exchange.slope, "functions buffers exchange"),
@@ -106,10 +105,7 @@ class FmuModel:
     def engine(self) -> str:
         """Return the functions on the block of memory, and its contents at the start."""
         name, translator = self.subject.name, Translator(INLINE)
-        for each, (function, names) in ENTRIES.items():
-            translator.entry(
-                f"fmu_{each}", function, [self.layout.part(part) for part in names.split()]
-            )
+        translate(translator, self.layout, ENTRIES, "fmu_")
         taken = [f"{name}_{each}" for each in (*ENTRIES, "start", "derive")]
         return filled(
             "fmu_engine.c",

@@ -51,6 +51,16 @@ class Quantity:
     meaning: str
     values: tuple[float, ...] = ()
 
+    @property
+    def about(self) -> str:
+        """Unit and meaning, for a comment."""
+        return ", ".join(part for part in (self.unit, self.meaning) if part)
+
+    @property
+    def shown(self) -> str:
+        """A line of a README."""
+        return f"- `{self.name}` = {', '.join(map(repr, self.values))} {self.unit}".rstrip()
+
 
 def outputs_of(start: Start, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
     """Return what an export shows: states, forces and what else is observed.

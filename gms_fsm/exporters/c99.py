@@ -144,10 +144,7 @@ def _values(signal: Corners, t: FloatArray, after: NDArray[np.bool_]) -> FloatAr
 def _readme(subject: Subject, made: CEngine) -> str:
     name = made.name
     inputs = ", ".join(f"`{each}`" for each in made.inputs) or "none"
-    numbers = "\n".join(
-        f"- `{each.name}` = {', '.join(map(repr, each.values))} {each.unit}".rstrip()
-        for each in made.parameters
-    )
+    numbers = "\n".join(each.shown for each in made.parameters)
     settings = subject.settings
     return filled(
         "c99.md",

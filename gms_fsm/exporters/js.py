@@ -16,15 +16,15 @@ import numpy as np
 from gms_fsm._formats import Format, register
 from gms_fsm._version import __version__
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._adapting import ADAPTED, adapting_of
-from gms_fsm.exporters._c import (
-    PLACES,
-    STEPPED,
-    StepArguments,
-    check_entries,
-    filled,
+from gms_fsm.exporters._adapting import (
+    STEPS,
+    adapting_of,
+    check_first_call,
+    step_arguments,
+    translate,
+    word_of,
 )
-from gms_fsm.exporters._names import identifier
+from gms_fsm.exporters._c import filled
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering._compiled import packed
@@ -32,7 +32,6 @@ from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._compiled_run import example_of
 from gms_fsm.run._joint import FAILURES
-from gms_fsm.run._stepper import arguments_of
 from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems.signals import Function
 from integrators import columns, hybrid, loop
@@ -43,7 +42,7 @@ from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
 from integrators.machine_code.values import Number
 from integrators.observing import observe_rows
-from integrators.stepping import FULL_LOG, step_to
+from integrators.stepping import FULL_LOG
 
 __all__ = ["js"]
 
@@ -62,7 +61,7 @@ OBSERVED = (
     "functions machines.observe buffers.now.held buffers.sliding buffers.out.rows_t "
     "buffers.out.rows_y log.rows_mode log.seen table"
 )
-OF_A_RUN = "functions buffers log.seen buffers.sliding.live adapting"  # as ADAPTED
+OF_A_RUN = "functions buffers log.seen buffers.sliding.live adapting"  # as in STEPS
 
 
 class Whole(NamedTuple):
@@ -187,10 +186,7 @@ class _Module(ABC):
     def readme(self) -> str:
         """Return what a user reads first."""
         settings = self.subject.settings
-        shown = [
-            f"- `{each.name}` = {', '.join(map(repr, each.values))} {each.unit}".rstrip()
-            for each in self.numbers
-        ]
+        shown = [each.shown for each in self.numbers]
         return filled(
             "js.md",
             name=self.subject.name,
@@ -231,7 +227,7 @@ class _Module(ABC):
 
     def _number(self, each: Quantity) -> dict[str, Any]:
         value = each.values[0] if each.length is None else list(each.values)
-        place = self.layout.offset(PLACES[each.place]) + each.index
+        place = word_of(self.layout, each)
         known = {"place": place, "unit": each.unit, "meaning": each.meaning, "value": value}
         return known if each.length is None else {**known, "length": each.length}
 
@@ -383,22 +379,16 @@ class _Friction(_Module):
     face = "js_friction"
 
     def __init__(self, subject: Subject) -> None:
-        start = subject.start
-        check_entries(start)
-        for each in subject.inputs:
-            identifier(each, (), f"input {each!r}")
-        step: tuple[Any, Any, Any, Any] = arguments_of(start)
-        super().__init__(subject, start, StepArguments(*step, adapting_of(start)), alone=True)
+        check_first_call(subject, ())
+        super().__init__(subject, subject.start, step_arguments(subject.start)[0], alone=True)
 
     def entries(self, translator: Translator) -> list[str]:
         """Translate a step, and what follows from the numbers."""
-        for name, function, parts in (("step", step_to, STEPPED), ("adapt", adapt, ADAPTED)):
-            translator.entry(name, function, [self.layout.part(each) for each in parts.split()])
-        return ["step", "adapt"]
+        return translate(translator, self.layout, STEPS)
 
     def output(self, each: Quantity) -> dict[str, Any]:
         """Return the words of an output."""
-        known = {"place": self.layout.offset(PLACES[each.place]) + each.index}
+        known = {"place": word_of(self.layout, each)}
         return known if each.length is None else {**known, "length": each.length}
 
     def holes(self) -> dict[str, object]:
@@ -496,8 +486,7 @@ def _folded(parts: Iterable[str]) -> str:
 
 
 def _note(each: Quantity) -> str:
-    text = ", ".join(part for part in (each.unit, each.meaning) if part)
-    return f" // {text}" if text else ""
+    return f" // {each.about}" if each.about else ""
 
 
 register(

@@ -12,16 +12,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-import numpy as np
-
 from gms_fsm._formats import Format, register
 from gms_fsm._version import __version__
 from gms_fsm.charts._reader import AGE
 from gms_fsm.charts._scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._charts import check_moved_from_outside
+from gms_fsm.exporters._charts import (
+    check_moved_from_outside,
+    element_numbers,
+    fields_of,
+    one_line,
+)
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.systems.system import LEAST_LOAD, Contact, loaded
@@ -47,7 +49,7 @@ def _write(subject: Subject) -> dict[str, str]:
         identifier(each, WORDS, f"chart {chart.name!r}, name {each!r}")
     _check_characters(chart)
     contact = subject.numbers
-    numbers = _numbers(contact)
+    numbers = [{}] if contact is None else element_numbers(contact)
     files = {
         f"{name}_{i}.scxml" if len(numbers) > 1 else f"{name}.scxml": _document(name, chart, row)
         for i, row in enumerate(numbers, start=1)
@@ -74,14 +76,6 @@ def _check_characters(chart: Chart) -> None:
                 place=f"chart {chart.name!r}: {place}",
                 advice="leave it out",
             )
-
-
-def _numbers(contact: Contact | None) -> list[dict[str, float]]:
-    """Return the numbers of each element that is written; none for a chart without numbers."""
-    if contact is None:
-        return [{}]
-    rows = {name: np.broadcast_to(given, contact.n) for name, given in contact.values.items()}
-    return [{name: float(row[i]) for name, row in rows.items()} for i in range(contact.n)]
 
 
 # --------------------------------------------------------------------------- the document
@@ -126,9 +120,8 @@ def _own_parts(root: ET.Element, chart: Chart) -> None:
             more = {"unit": unit} if unit else {}
             ET.SubElement(own, "gms:quantity", {"kind": kind, "name": name, **more})
     for each in chart.parameters:
-        plain = vars(Parameter(each.name))
-        told = {key: value for key, value in vars(each).items() if value != plain[key]}
-        fields = {key: "false" if value is False else str(value) for key, value in told.items()}
+        told = fields_of(each).items()
+        fields = {key: "false" if value is False else str(value) for key, value in told}
         ET.SubElement(own, "gms:parameter", {"name": each.name, **fields})
     for tag, texts in (
         ("let", chart.let),
@@ -189,7 +182,7 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
     numbers = (
         "The chart has no numbers: set every <data> without expr before the first step."
         if contact is None
-        else f"Numbers: those of {_one_line(contact.title)}, one document for each element."
+        else f"Numbers: those of {one_line(contact.title)}, one document for each element."
     )
     curve = ""
     if contact is not None and contact.stribeck is not None:
@@ -204,7 +197,7 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
         f"\n- python-statemachine keeps the names {', '.join(kept)} for itself." if kept else ""
     )
     return f"""\
-# {_one_line(chart.name)} as SCXML
+# {one_line(chart.name)} as SCXML
 
 Written by gms-fsm {__version__}, format scxml.
 
@@ -241,10 +234,6 @@ What it does not express
 - Several transitions in a row at one time need several events "step".
 - Locked contacts, impulses, forces and accelerations in guards cannot be written.{warning}
 """
-
-
-def _one_line(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)
 
 
 register(

@@ -15,15 +15,19 @@ from collections.abc import Iterator, Mapping
 from pprint import pformat
 from typing import Any
 
-import numpy as np
-
 from gms_fsm._formats import Format, register
 from gms_fsm._version import __version__
 from gms_fsm.charts._reader import AGE
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._charts import check_moved_from_outside, slow_velocity
+from gms_fsm.exporters._charts import (
+    check_moved_from_outside,
+    element_numbers,
+    fields_of,
+    one_line,
+    slow_velocity,
+)
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import ELEMENTARY, NAMESPACE, Condition, Node, Value, parse_value, sgn, spell
 from gms_fsm.language._normal import renamed
@@ -57,7 +61,7 @@ def _write(subject: Subject) -> dict[str, str]:
 
 def _head(chart: Chart) -> str:
     return (
-        f"# {_one_line(chart.name)}: elements as models of one transitions.Machine.\n"
+        f"# {one_line(chart.name)}: elements as models of one transitions.Machine.\n"
         f"# Written by gms-fsm {__version__}; needs only the package transitions.\n"
     )
 
@@ -110,8 +114,7 @@ def _data(chart: Chart) -> dict[str, Any]:
 
 def _parameter(given: Parameter) -> str | dict[str, Any]:
     """Return a plain name, or the fields that differ from their defaults."""
-    plain = Parameter(given.name)
-    told = {key: each for key, each in vars(given).items() if each != getattr(plain, key)}
+    told = fields_of(given)
     return {"name": given.name, **told} if told else given.name
 
 
@@ -123,11 +126,8 @@ def _numbers(contact: Contact | None) -> dict[str, Any]:
     """Return the numbers of the elements, and of what they share."""
     if contact is None:
         return {"VALUES": None, "WEIGHTS": None}
-    rows = {name: np.broadcast_to(row, contact.n) for name, row in contact.values.items()}
     found: dict[str, Any] = {
-        "VALUES": tuple(
-            {name: float(row[i]) for name, row in rows.items()} for i in range(contact.n)
-        ),
+        "VALUES": tuple(element_numbers(contact)),
         "WEIGHTS": tuple(float(each) for each in contact.weights),
     }
     if contact.stribeck is not None:
@@ -370,10 +370,10 @@ def _readme(name: str, chart: Chart, contact: Contact | None) -> str:
     numbers = (
         "none: fill in VALUES, one mapping for each element"
         if contact is None
-        else f"those of {_one_line(contact.title)}, {contact.n} element{'s' * (contact.n != 1)}"
+        else f"those of {one_line(contact.title)}, {contact.n} element{'s' * (contact.n != 1)}"
     )
     return f"""\
-# {_one_line(chart.name)} as a transitions machine
+# {one_line(chart.name)} as a transitions machine
 
 Written by gms-fsm {__version__}, format transitions.
 
@@ -415,10 +415,6 @@ What it does not do
 - The rules of parameters (see PARAMETERS) are not checked.
 - Locked contacts, impulses, accelerations and several velocities cannot be written.
 """
-
-
-def _one_line(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)
 
 
 register(

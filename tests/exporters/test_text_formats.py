@@ -12,7 +12,7 @@ from gms_fsm import Chart, ChartModel, FrictionState, State, export
 from gms_fsm.charts.registry import entry
 from gms_fsm.exporters import Subject, formats
 from gms_fsm.systems.models import demonstration
-from tests.exporters.text_cases import case
+from tests.exporters.text_cases import case, loaded
 
 
 def test_blark_parses_structured_text() -> None:
@@ -43,6 +43,18 @@ def test_rumoca_takes_the_switches() -> None:
     switches, apart = compared("maxwell-slip", 0)
     assert switches == 12
     assert apart < 1e-6
+
+
+@pytest.mark.parametrize("form", ["matlab", "modelica", "st"])
+def test_a_friction_that_reads_everything(form: str) -> None:
+    """Time, position, a further input, actions, corners; one element, then several."""
+    chart = loaded().chart
+    for given in (loaded(), ChartModel(chart, {"mu": [0.3, 0.5]}, n=2, inputs={"N": "1 + t"})):
+        files = formats()[form].write(Subject.of(given, form, name="friction"))
+        text, readme = files.values()
+        assert all(re.search(rf"\b{each}\b", text) for each in ("v", "x", "big", "rel", "mu"))
+        assert "## How to run it" in readme
+        assert "## What it does not do" in readme
 
 
 def test_names_of_structured_text_give_way_to_each_other(tmp_path: Path) -> None:

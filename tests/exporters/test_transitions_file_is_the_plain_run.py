@@ -18,7 +18,6 @@ from gms_fsm import (
     ChartModel,
     Contact,
     Parameter,
-    Prescribed,
     State,
     System,
     Transition,
@@ -30,57 +29,7 @@ from gms_fsm.language import evaluate, parse_value
 from tests.exporters.charts_to_export import MODELS, SLOW, imported, model
 from tests.helpers import stick_slip
 
-T_END, STEP = 7.5, 1e-3
-
-
-def run_of(file: Any, text: str, t_end: float, step: float) -> tuple[list[Any], list[Any]]:
-    """Return the switches and the rows of a file."""
-    tree = parse_value(text, ["t"])
-    rows = list(file.run(lambda t: {"v": evaluate(tree, {"t": t})}, t_end, step))
-    switches = [
-        (t, i, edge, states[i])
-        for t, _, _, states, edges in rows
-        for i, edge in enumerate(edges)
-        if edge is not None
-    ]
-    return switches, rows
-
-
-def log_of(trace: Any) -> list[Any]:
-    return [
-        (float(each.t), int(each.element), str(each.edge), str(each.target))
-        for each in trace.transitions
-    ]
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        name
-        if name in ("gms-signed", "seven-parameter", "backlash")
-        else pytest.param(name, marks=pytest.mark.matrix)
-        for name in MODELS
-    ],
-)
-def test_every_switch_and_the_force_are_equal(name: str, tmp_path: Path) -> None:
-    velocity = "0.15 * sin(2 * pi * t / 25)" if name.startswith("gms") else SLOW
-    t_end, step = (25.0, 5e-3) if name.startswith("gms") else (T_END, STEP)
-    path, *_ = export(model(name), "transitions", tmp_path, name="file")
-    switches, rows = run_of(imported(path), velocity, t_end, step)
-    trace = simulate(
-        model(name),
-        Prescribed(velocity),
-        t_end,
-        method="euler",
-        step=step,
-        events="step",
-        engine="ifelse",
-    )
-    assert switches == log_of(trace)
-    assert len(switches) > 2 or not CHARTS[name].transitions or name == "backlash"
-    assert rows[-1][2] == trace.F[-1]
-
-
+SINE = "0.15 * sin(2 * pi * t / 25)"
 FORCE = Chart(
     "reads what it gives",
     inputs=("t", "v", "N", "x"),
@@ -98,58 +47,64 @@ FORCE = Chart(
     let={"unused": "k * 2"},
     contact_outputs={"F": "F + 0.5 * v"},
 )
+SEVERAL = ChartModel(
+    FORCE, {"k": [1.0, 2.0, 0.5], "mu": 0.3}, n=3, inputs={"N": "1 + 0.5 * sin(t) + v"}
+)
+LOADED = Contact("pad", FORCE, {"k": 1.0, "mu": 0.3}, inputs={"N": "2 * load"})
+PRESSED = Contact("pad", stick_slip("signed"), inputs={"N": "1 + 0.5 * sin(t)"})
+LOAD = {"load": "0.5 + 0.2 * cos(t)"}
+Case = tuple[Any, dict[str, str], float, float, int]  # friction, record, end, step, switches
+FEW = ("gms-signed", "seven-parameter", "backlash")
+CASES: dict[str, Case] = {
+    "forces in guards, inputs, several elements": (SEVERAL, {"v": "sin(2 * t)"}, 20.0, 1e-2, 20),
+    "a load from outside": (LOADED, {"v": "sin(2 * t)", **LOAD}, 20.0, 1e-2, 10),
+    "a load on the thresholds of a model": (PRESSED, {"v": SINE}, 25.0, 5e-3, 2),
+}
 
 
-def test_forces_in_guards_inputs_and_several_elements(tmp_path: Path) -> None:
-    given = ChartModel(
-        FORCE, {"k": [1.0, 2.0, 0.5], "mu": 0.3}, n=3, inputs={"N": "1 + 0.5 * sin(t) + v"}
-    )
+def case(name: str) -> Case:
+    """Return a friction, its record, end and step, and what it switches more often than."""
+    if name in CASES:
+        return CASES[name]
+    switches = -1 if not CHARTS[name].transitions or name == "backlash" else 2
+    if name.startswith("gms"):
+        return model(name), {"v": SINE}, 25.0, 5e-3, switches
+    return model(name), {"v": SLOW}, 7.5, 1e-3, switches
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *CASES,
+        *(pytest.param(e, marks=[pytest.mark.matrix] * (e not in FEW)) for e in MODELS),
+    ],
+)
+def test_every_switch_and_the_force_are_equal(name: str, tmp_path: Path) -> None:
+    given, record, t_end, step, least = case(name)
     path, *_ = export(given, "transitions", tmp_path, name="file")
-    switches, rows = run_of(imported(path), "sin(2 * t)", 20.0, 1e-2)
-    trace = simulate(
-        given, Prescribed("sin(2 * t)"), 20.0, method="euler", step=1e-2, events="step"
-    )
-    assert len(switches) > 20
-    assert switches == log_of(trace)
-    assert rows[-1][2] == trace.F[-1]
-
-
-def test_a_contact_whose_load_comes_from_outside(tmp_path: Path) -> None:
-    contact = Contact("pad", FORCE, {"k": 1.0, "mu": 0.3}, inputs={"N": "2 * load"})
-    system = System(
-        "brake",
-        bodies=(Body("body", velocity="v"),),
-        contacts=(contact,),
-        signals={"v": "sin(2 * t)", "load": "0.5 + 0.2 * cos(t)"},
-    )
-    path, *_ = export(contact, "transitions", tmp_path, name="file")
-    file = imported(path)
-    v, load = parse_value("sin(2 * t)", ["t"]), parse_value("0.5 + 0.2 * cos(t)", ["t"])
+    trees = {each: parse_value(text, ["t"]) for each, text in record.items()}
     rows = list(
-        file.run(
-            lambda t: {"v": evaluate(v, {"t": t}), "load": evaluate(load, {"t": t})}, 20.0, 1e-2
+        imported(path).run(
+            lambda t: {each: evaluate(tree, {"t": t}) for each, tree in trees.items()}, t_end, step
         )
     )
-    trace = simulate(system, 20.0, method="euler", step=1e-2, events="step")
-    taken = [(t, edge) for t, _, _, _, (edge,) in rows if edge is not None]
-    assert len(taken) > 10
-    assert taken == [(float(each.t), str(each.edge)) for each in trace.transitions]
-
-
-def test_a_load_on_the_thresholds_of_a_model(tmp_path: Path) -> None:
-    contact = Contact("pad", stick_slip("signed"), inputs={"N": "1 + 0.5 * sin(t)"})
-    system = System(
-        "brake",
-        bodies=(Body("body", velocity="v"),),
-        contacts=(contact,),
-        signals={"v": "0.15 * sin(2 * pi * t / 25)"},
-    )
-    path, *_ = export(contact, "transitions", tmp_path, name="file")
-    switches, rows = run_of(imported(path), "0.15 * sin(2 * pi * t / 25)", 25.0, 5e-3)
-    trace = simulate(system, 25.0, method="euler", step=5e-3, events="step", engine="ifelse")
-    assert len(switches) > 2
-    assert switches == log_of(trace)
-    assert rows[-1][2] == trace.contact("pad").F[-1]
+    contact = given if isinstance(given, Contact) else Contact("friction", given)
+    body = Body("body", velocity="v")
+    system = System("moved", bodies=(body,), contacts=(contact,), signals=record)
+    how: dict[str, Any] = {"method": "euler", "step": step, "events": "step", "engine": "ifelse"}
+    trace = simulate(system, t_end, **how)
+    switches = [
+        (t, i, edge, states[i])
+        for t, _, _, states, edges in rows
+        for i, edge in enumerate(edges)
+        if edge is not None
+    ]
+    assert switches == [
+        (float(each.t), int(each.element), str(each.edge), str(each.target))
+        for each in trace.transitions
+    ]
+    assert len(switches) > least
+    assert rows[-1][2] == trace.contact(contact.name).F[-1]
 
 
 # --------------------------------------------------------------------------- by itself

@@ -48,6 +48,9 @@ PUSH = f"{Path(__file__).name}:{push.__code__.co_firstlineno}, push)"
 KARNOPP = ChartModel(CHARTS["karnopp"], {"F_c": 1.0, "F_s": 1.5, "sigma_2": 0.4, "D": 1e-4})
 READS_F, READS_A = chart("F > 1"), chart("a > 1")
 ENTERED = chart(let={"twice": "2 * v"}, states=(State("a", entry={"z": "twice"}),), transitions=())
+EDGES = Chart(
+    "own", variables=("edges",), states=(State("a", flow={"edges": "v"}),), outputs={"F": "edges"}
+)
 CASES = chart(states=(State("a"), State("A")), transitions=())
 ROWS: list[tuple[str, Any, str, str]] = [  # formats, what is given, place, word of the reason
     # locks, forces and accelerations in guards
@@ -75,6 +78,7 @@ ROWS: list[tuple[str, Any, str, str]] = [  # formats, what is given, place, word
     ("st", model(parameters=("k__1",), outputs={"F": "k__1 * z"}), "name 'k__1'", "underscores"),
     ("st", model(flow="v - tanh(z)"), "chart 'own'", "'tanh'"),
     ("st modelica", model(flow="v - asinh(z)"), "chart 'own'", "'asinh'"),
+    ("matlab", ChartModel(EDGES, {}), "variable 'edges'", "field"),
     # numbers, first values, signals
     ("c99 fmu3 js matlab", chart(), "chart 'own'", "numbers"),
     ("c99 fmu2", ChartModel(ENTERED, {}), "contact 'friction'", "v is known"),
@@ -122,3 +126,10 @@ def test_a_name_of_files_that_the_language_cannot_have(
         export(model(), form, tmp_path / "out", name=name)
     assert caught.value.place == f"name {name!r}"
     assert not (tmp_path / "out").exists()
+
+
+def test_an_engine_without_a_plain_form_says_why(tmp_path: Path) -> None:
+    files = export(ChartModel(READS_F, {}), "c99", tmp_path, name="it")
+    assert not [each for each in files if "plain" in each.name]
+    text = (tmp_path / "README-it-c99.md").read_text(encoding="utf-8")
+    assert "There is no plain form: chart 'own', edge 'go': it reads 'F'" in text
