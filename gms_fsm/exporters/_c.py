@@ -27,7 +27,7 @@ from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems.system import System
 from integrators.compiled import INLINE, is_known
 from integrators.machine_code.c99 import c99_text, number_text
-from integrators.machine_code.layout import Block, Layout
+from integrators.machine_code.layout import BlockLayout, MemoryBlock
 from integrators.machine_code.translate import Translator
 from integrators.stepping import FULL_LOG, step_to
 
@@ -178,7 +178,7 @@ class _Text:
         self.made, self.start, self.title, self.name = made, start, title, made.name
         step: tuple[Any, Any, Any, Any] = arguments_of(start)
         self.arguments = Stepped(*step, adapting_of(start))
-        self.layout = Layout(self.arguments, is_known)
+        self.layout = BlockLayout(self.arguments, is_known)
 
     def header(self) -> str:
         """Return the header."""
@@ -296,12 +296,12 @@ class _Text:
         return spans
 
 
-def image_of(layout: Layout, arguments: Any) -> str:
+def image_of(layout: BlockLayout, arguments: Any) -> str:
     """Return C text that sets all words of a block that are not zero at the start.
 
     Parameters
     ----------
-    layout : Layout
+    layout : BlockLayout
         Of the block, which the text calls ``w``.
     arguments : named tuple
         Its contents.
@@ -313,7 +313,7 @@ def image_of(layout: Layout, arguments: Any) -> str:
     """
     names = {offset: name for name, offset in layout.offsets.items()}
     lines = []
-    for k, value in Block(layout, arguments).set_words():
+    for k, value in MemoryBlock(layout, arguments).set_words():
         note = f" /* {names[k]} */" if k in names else ""
         if isinstance(value, float):
             lines.append(f"    w[{k}].f = {number_text(value)};{note}")

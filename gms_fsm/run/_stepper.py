@@ -23,7 +23,7 @@ from integrators.sliding import Functions
 from integrators.stepping import Clocks, Sample, restart, step_to
 
 if TYPE_CHECKING:
-    from integrators.compiled import Stepper as MachineCode
+    from integrators.compiled import CompiledStepper as MachineCode
 
 __all__ = [
     "Machine",
@@ -232,11 +232,13 @@ class Machine:
     def __init__(
         self, start: Start, memory: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
     ) -> None:
-        from integrators.machine_code.layout import Block
+        from integrators.machine_code.layout import MemoryBlock
 
         self.code = machine_code(start)
         arguments = arguments_of(start)
-        self.block = Block(self.code.layout, arguments, words=None if memory is None else memory[0])
+        self.block = MemoryBlock(
+            self.code.layout, arguments, words=None if memory is None else memory[0]
+        )
         self.block.update(self.block.contents)  # numbers; there are no columns
         contents = self.block.contents
         self.buffers, self.sample = contents.buffers, contents.sample
@@ -288,7 +290,7 @@ def machine_code(start: Start) -> MachineCode:
 
     Returns
     -------
-    integrators.compiled.Stepper
+    integrators.compiled.CompiledStepper
         The same one for systems that differ in numbers only.
 
     Raises
@@ -322,14 +324,14 @@ def arguments_of(start: Start) -> Any:
 
     Returns
     -------
-    integrators.compiled.Step
-        An example for `integrators.machine_code.layout.Layout`.
+    integrators.compiled.StepArguments
+        An example for `integrators.machine_code.layout.BlockLayout`.
     """
-    from integrators.compiled import Step
+    from integrators.compiled import StepArguments
 
     made = compiled.functions(start.program)
     p: Any = compiled.packed(start.program.p)
-    return Step(
+    return StepArguments(
         Functions(made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p),
         Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
         *prepared(start),
