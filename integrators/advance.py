@@ -29,9 +29,9 @@ from integrators.step_size import (
     root_of,
 )
 from integrators.steps import (
+    ArcMotion,
     Coefficients,
     Dense,
-    Motion,
     Now,
     Scratch,
     Vector,
@@ -41,7 +41,7 @@ from integrators.steps import (
     weighted_sum,
 )
 
-__all__ = ["Output", "Plan", "advance"]
+__all__ = ["Output", "RunPlan", "advance"]
 
 # Reasons for returning from the kernel.
 REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE = 0, 1, 2, 3, 4
@@ -61,7 +61,7 @@ QUIET = 0.55  # what the controller remembers of a step with hardly an error
 TICK = 4.0 * 2.0**-52
 
 
-class Plan(NamedTuple):
+class RunPlan(NamedTuple):
     """The settings of a run."""
 
     method: Coefficients
@@ -131,7 +131,7 @@ def next_on_grid(control: Control, t: float) -> float:
     return t_new
 
 
-def knot_after(plan: Plan, now: Now, out: Output) -> float:
+def knot_after(plan: RunPlan, now: Now, out: Output) -> float:
     """Return the next knot; infinity if there is none."""
     knots = plan.knots
     while out.next_knot < len(knots) and knots[out.next_knot] <= now.t:
@@ -139,12 +139,12 @@ def knot_after(plan: Plan, now: Now, out: Output) -> float:
     return knots[out.next_knot] if out.next_knot < len(knots) else INFINITY
 
 
-def limit_after(plan: Plan, now: Now, out: Output) -> float:
+def limit_after(plan: RunPlan, now: Now, out: Output) -> float:
     """Return the end of the next step at the latest: the next stop or knot."""
     return min(now.t_stop, knot_after(plan, now, out))
 
 
-def calm_step(plan: Plan, mode: list[int]) -> float:
+def calm_step(plan: RunPlan, mode: list[int]) -> float:
     """Return the length of steps before a crossing; infinity if nothing relaxes in these modes."""
     fastest, relaxing = INFINITY, plan.relaxing
     if len(relaxing) > 0:
@@ -165,8 +165,8 @@ def _is_ahead(w: Watched, steps: float) -> bool:
 
 # Long because a step is judged, searched and stored in one order, and calls cost time.
 def advance(
-    motion: Motion,
-    plan: Plan,
+    motion: ArcMotion,
+    plan: RunPlan,
     now: Now,
     w: Watched,
     out: Output,
@@ -177,9 +177,9 @@ def advance(
 
     Parameters
     ----------
-    motion : Motion
+    motion : ArcMotion
         The flow and what is watched.
-    plan : Plan
+    plan : RunPlan
         The method and the step-size settings.
     now : Now
         The state of the run. The slope is not valid after a crossing.
@@ -283,7 +283,7 @@ def advance(
             return CROSSED
 
 
-def _next_end(plan: Plan, now: Now, out: Output) -> tuple[float, float, float]:
+def _next_end(plan: RunPlan, now: Now, out: Output) -> tuple[float, float, float]:
     """Return the end of the next step, when it is seen, and the significant difference of times.
 
     It follows the grid or the controller, but not past a stop, and avoids a sliver before one.
@@ -301,7 +301,7 @@ def _next_end(plan: Plan, now: Now, out: Output) -> tuple[float, float, float]:
 
 
 def _assess_step(
-    plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, rejected: bool
+    plan: RunPlan, now: Now, h: float, tick: float, scratch: Scratch, rejected: bool
 ) -> int:
     """Return the outcome of the attempted step of length h, and choose the next step's length."""
     control, method = plan.control, plan.method
@@ -331,7 +331,7 @@ def _assess_step(
 
 
 def _put_wanted(
-    motion: Motion, now: Now, out: Output, dense: Dense, h: float, t_new: float
+    motion: ArcMotion, now: Now, out: Output, dense: Dense, h: float, t_new: float
 ) -> None:
     """Write the rows requested before t_new, from the step of length h that begins now.
 

@@ -23,9 +23,9 @@ from integrators.loop import (
     run_to_event,
 )
 from integrators.sliding import Functions, Held, flow_on, follow_on, look, margins_on
-from integrators.steps import Motion, Now, Vector
+from integrators.steps import ArcMotion, Now, Vector
 
-__all__ = ["Log", "Recorded", "record"]
+__all__ = ["LogColumns", "Recorded", "record"]
 
 
 class Recorded(NamedTuple):
@@ -36,7 +36,7 @@ class Recorded(NamedTuple):
 
 
 @dataclass(slots=True, eq=False)
-class Log:
+class LogColumns:
     """Columns that `record` fills: one entry per firing, and both sides of every stop."""
 
     firings: int
@@ -58,7 +58,7 @@ def record(
     functions: Functions,
     machines: Machines,
     b: Buffers,
-    log: Log,
+    log: LogColumns,
     recorded: Recorded,
     most_steps: int,
     pause: bool,
@@ -71,7 +71,7 @@ def record(
         The system. ``observe(t, y, mode, signs, p, seen)`` fills the observed values of a state.
     b : Buffers
         The state of the run, changed in place.
-    log : Log
+    log : LogColumns
         Filled; if it has room in ``stops_t``, stops are stored too.
     recorded : Recorded
         Where the numbers are that the log stores.
@@ -90,7 +90,7 @@ def record(
     memory, out = b.memory, b.out
     seen_at = float("nan")  # the time at which log.seen was computed
     on = Held(functions, now.held, b.sliding)
-    motion = Motion(flow_on, margins_on, on, follow_on)
+    motion = ArcMotion(flow_on, margins_on, on, follow_on)
     left = most_steps
     while True:
         left -= 1
@@ -127,7 +127,7 @@ def record(
             return DONE
 
 
-def _is_full(out: Output, log: Log) -> bool:
+def _is_full(out: Output, log: LogColumns) -> bool:
     """Return whether a column has no room for the next event."""
     if out.every_step and out.row + 1 >= len(out.rows_t):
         return True
@@ -136,7 +136,7 @@ def _is_full(out: Output, log: Log) -> bool:
     return 0 < len(log.stops_t) <= log.stops
 
 
-def _put_firing(now: Now, memory: Memory, log: Log, recorded: Recorded) -> None:
+def _put_firing(now: Now, memory: Memory, log: LogColumns, recorded: Recorded) -> None:
     """Write the values known before a firing."""
     i, row = memory.machine, log.firings
     numbers = log.numbers[row]
@@ -151,7 +151,7 @@ def _put_firing(now: Now, memory: Memory, log: Log, recorded: Recorded) -> None:
 
 
 def _put_stop(
-    now: Now, memory: Memory, out: Output, flags: list[int], log: Log, switched: bool
+    now: Now, memory: Memory, out: Output, flags: list[int], log: LogColumns, switched: bool
 ) -> None:
     """Write the state and the modes from here on."""
     t = now.t if switched else min(now.t, now.seen)

@@ -34,7 +34,7 @@ from integrators import (
     stepping,
     steps,
 )
-from integrators.columns import Log, Recorded
+from integrators.columns import LogColumns, Recorded
 from integrators.loop import Buffers, Machines
 from integrators.machine_code import (
     bindings,
@@ -51,23 +51,23 @@ from integrators.machine_code import (
     work,
 )
 from integrators.machine_code import layout as layouts
-from integrators.machine_code.layout import Block, Column, Layout, parts_of
+from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
-from integrators.machine_code.values import Number
+from integrators.machine_code.values import NumberValue
 from integrators.sliding import Functions, Held, Sliding
 from integrators.stepping import Sample
 from integrators.steps import Coefficients
 
 __all__ = [
     "INLINE",
-    "Engine",
-    "Run",
-    "Step",
-    "Stepper",
-    "Store",
+    "CodeStore",
+    "CompiledFunction",
+    "CompiledStepper",
+    "RecordArguments",
+    "StepArguments",
     "digest",
     "edition",
     "engine",
@@ -103,17 +103,17 @@ NOT_INLINE = [
 INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", "flow_on"), True)
 
 
-class Run(NamedTuple):
+class RecordArguments(NamedTuple):
     """The arguments of `integrators.columns.record`, without the last two."""
 
     functions: Functions
     machines: Machines
     buffers: Buffers
-    log: Log
+    log: LogColumns
     recorded: Recorded
 
 
-class Step(NamedTuple):
+class StepArguments(NamedTuple):
     """The arguments of `integrators.stepping.step_to`."""
 
     functions: Functions
@@ -122,7 +122,7 @@ class Step(NamedTuple):
     sample: Sample
 
 
-class Rows(NamedTuple):
+class ObserveArguments(NamedTuple):
     """The arguments of `integrators.observing.observe_rows`, without the last two."""
 
     functions: Functions
@@ -136,7 +136,7 @@ class Rows(NamedTuple):
     table: Any
 
 
-class Store(Protocol):
+class CodeStore(Protocol):
     """A cache for machine code. It must return exactly what was stored: wrong bits crash."""
 
     def get(self, name: str) -> bytes | None:
@@ -224,18 +224,18 @@ def _is_table(value: Any) -> bool:
 class _Call:
     """A call of machine code, and the first error in a function that it calls."""
 
-    block: Block
+    block: MemoryBlock
     error: BaseException | None = None
     copy: list[Any] = field(default_factory=list)  # the block's contents then
 
 
 @dataclass(eq=False)
-class Engine:
+class CompiledFunction:
     """Machine code with the layout of its arguments.
 
     Parameters
     ----------
-    layout : Layout
+    layout : BlockLayout
         Of the block.
     library : Library
         Contains `entry`.
@@ -245,7 +245,7 @@ class Engine:
         Number of integers that are passed besides the block.
     """
 
-    layout: Layout
+    layout: BlockLayout
     library: Library
     calls: Sequence[Callable[[float], float]]
     extra: int
@@ -278,12 +278,12 @@ class Engine:
 
         return value
 
-    def __call__(self, block: Block, *integers: int) -> int:
+    def __call__(self, block: MemoryBlock, *integers: int) -> int:
         """Call the machine code; this releases the GIL.
 
         Parameters
         ----------
-        block : Block
+        block : MemoryBlock
             Up to date.
         *integers : int
             Further arguments.
@@ -332,22 +332,22 @@ def _made(
     arguments: Any,
     extra: Sequence[str],
     calls: Sequence[Callable[[float], float]],
-    store: Store | None,
+    store: CodeStore | None,
     notify: Callable[[str], None],
-) -> Engine:
+) -> CompiledFunction:
     """Return an engine from the store, or compile it."""
-    layout = Layout(arguments, is_known, inside=_longest(arguments) <= LONGEST_INSIDE)
+    layout = BlockLayout(arguments, is_known, inside=_longest(arguments) <= LONGEST_INSIDE)
     library = _library(text, function, arguments, layout, extra, store, notify)
-    return Engine(layout, library, calls, len(extra))
+    return CompiledFunction(layout, library, calls, len(extra))
 
 
 def _library(
     text: str,
     function: Callable[..., Any],
     arguments: Any,
-    layout: Layout,
+    layout: BlockLayout,
     extra: Sequence[str],
-    store: Store | None,
+    store: CodeStore | None,
     notify: Callable[[str], None],
     *,
     each: bool = False,
@@ -365,7 +365,7 @@ def _library(
         notify("compiling, once for each chart and method ...")
         fields = layout.value.fields.values()
         translator = Translator(INLINE)
-        numbers = [Number(Local("i", each)) for each in extra]
+        numbers = [NumberValue(Local("i", each)) for each in extra]
         made = translator.entry("entry", function, [*fields, *numbers])
         if each:
             translator.for_each("each", made, layout.words)
@@ -391,47 +391,47 @@ def _longest(arguments: Any) -> int:
 
 def engine(
     text: str,
-    arguments: Run,
+    arguments: RecordArguments,
     calls: Sequence[Callable[[float], float]],
-    store: Store | None,
+    store: CodeStore | None,
     notify: Callable[[str], None],
-) -> Engine:
+) -> CompiledFunction:
     """Return `integrators.columns.record` as machine code for one system.
 
     Parameters
     ----------
     text : str
         Changes with the system's functions.
-    arguments : Run
+    arguments : RecordArguments
         From `example`, with those functions.
     calls : sequence of callable
         The functions that `integrators.machine_code.translate.HostFunction` stands for.
-    store : Store, optional
+    store : CodeStore, optional
         The cache for machine code.
     notify : callable
         Called with a text before the system is compiled, which takes a while, and afterwards.
 
     Returns
     -------
-    Engine
+    CompiledFunction
         To be called with a block, the largest number of steps, and whether to pause.
     """
     return _made(text, columns.record, arguments, ("steps", "pause"), calls, store, notify)
 
 
 @dataclass(eq=False)
-class Stepper:
+class CompiledStepper:
     """Machine code that advances one block by a sample, or many of them.
 
     Parameters
     ----------
-    layout : Layout
+    layout : BlockLayout
         Of a block, which contains all its arrays.
     library : Library
         Contains `entry` and `each`.
     """
 
-    layout: Layout
+    layout: BlockLayout
     library: Library
 
     def __post_init__(self) -> None:
@@ -443,30 +443,32 @@ class Stepper:
 
 
 def stepper(
-    text: str, arguments: Step, store: Store | None, notify: Callable[[str], None]
-) -> Stepper:
+    text: str, arguments: StepArguments, store: CodeStore | None, notify: Callable[[str], None]
+) -> CompiledStepper:
     """Return `integrators.stepping.step_to` as machine code for one system.
 
     Parameters
     ----------
     text, store, notify
         As in `engine`.
-    arguments : Step
+    arguments : StepArguments
         Made of lists, with the system's functions; these call no functions of the host program.
 
     Returns
     -------
-    Stepper
+    CompiledStepper
         ``one(address)`` returns what `step_to` returns; ``each(address, count)`` calls it for many
         blocks, one after the other in memory, and returns the sum of what it returns.
     """
-    layout = Layout(arguments, is_known)
+    layout = BlockLayout(arguments, is_known)
     step_to = stepping.step_to
-    return Stepper(layout, _library(text, step_to, arguments, layout, (), store, notify, each=True))
+    return CompiledStepper(
+        layout, _library(text, step_to, arguments, layout, (), store, notify, each=True)
+    )
 
 
 def example(functions: Functions, machines: Machines, b: Buffers, observed: int, recorded: Recorded,
-            modes: int) -> Run:  # fmt: skip
+            modes: int) -> RecordArguments:  # fmt: skip
     """Return the arguments of `integrators.columns.record`, with columns that may grow.
 
     Parameters
@@ -484,14 +486,14 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
 
     Returns
     -------
-    Run
-        An example for `integrators.machine_code.layout.Layout`.
+    RecordArguments
+        An example for `integrators.machine_code.layout.BlockLayout`.
     """
     size = len(b.now.y)
-    column: Any = Column
+    column: Any = OuterArray
     plan = b.plan._replace(jumps=column(), before_jumps=column(), ticks=column("i"), knots=column())
     out = replace(b.out, times=column(), rows_t=column(), rows_y=column("f", size))
-    log = Log(
+    log = LogColumns(
         firings=0,
         stops=0,
         t=column(),
@@ -508,8 +510,8 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
     )
     p: Any = functions.p
     shared, own, _ = p
-    functions = functions._replace(p=(shared, own, Column(table=True)))
-    return Run(functions, machines, b._replace(plan=plan, out=out), log, recorded)
+    functions = functions._replace(p=(shared, own, OuterArray(table=True)))
+    return RecordArguments(functions, machines, b._replace(plan=plan, out=out), log, recorded)
 
 
 def observer(
@@ -518,9 +520,9 @@ def observer(
     on: Held,
     widths: tuple[int, int, int],
     calls: Sequence[Callable[[float], float]],
-    store: Store | None,
+    store: CodeStore | None,
     notify: Callable[[str], None],
-) -> tuple[Engine, Rows]:
+) -> tuple[CompiledFunction, ObserveArguments]:
     """Return `integrators.observing.observe_rows` as machine code for one system.
 
     Parameters
@@ -536,24 +538,24 @@ def observer(
 
     Returns
     -------
-    Engine
+    CompiledFunction
         To be called with a block, the place of the first observed value that is kept, and the
         number of rows.
-    Rows
+    ObserveArguments
         The example that its block begins with.
     """
     p: Any = on.functions.p
     shared, own, _ = p
     size, modes, seen = widths
-    table: Any = Column(table=True)
-    rows = Rows(
+    table: Any = OuterArray(table=True)
+    rows = ObserveArguments(
         functions=on.functions._replace(p=(shared, own, table)),
         observe=observe,
         held=on.held,
         sliding=on.sliding,
-        t=Column(),
-        y=Column("f", size),
-        mode=Column("i", modes),
+        t=OuterArray(),
+        y=OuterArray("f", size),
+        mode=OuterArray("i", modes),
         seen=[0.0] * seen,
         table=table,
     )

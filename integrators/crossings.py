@@ -23,7 +23,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from integrators.step_size import INFINITY
-from integrators.steps import Motion, Now, Scratch, Vector
+from integrators.steps import ArcMotion, Now, Scratch, Vector
 
 __all__ = [
     "DEEPEST",
@@ -84,7 +84,7 @@ class Watched(NamedTuple):
 class Path(NamedTuple):
     """The last step in the form that the search uses."""
 
-    motion: Motion
+    motion: ArcMotion
     mode: list[int]
     interpolate: Callable[..., Any]  # interpolate(dense, theta, out) -> None, fills out
     dense: Any
@@ -163,7 +163,7 @@ def copy_margins(w: Watched, source: Vector, target: Vector) -> None:
         target[r] = source[r]
 
 
-def is_quiet_step(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> bool:
+def is_quiet_step(motion: ArcMotion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> bool:
     """Return whether a whole step is quiet: most are, and then no dense output is needed.
 
     Expects ``w.start`` to contain the margins at its start; fills ``w.end`` with those at its end.
@@ -171,7 +171,7 @@ def is_quiet_step(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: W
 
     Parameters
     ----------
-    motion : Motion
+    motion : ArcMotion
         ``margins(t, y, mode, p, watch, out)`` fills the margins.
     now : Now
         The step's start.
@@ -202,7 +202,7 @@ def is_quiet_step(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: W
     return _is_quiet(w, w.start, probe, w.end)
 
 
-def longest_next(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> float:
+def longest_next(motion: ArcMotion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> float:
     """Return how long the next step may be, from how waiting margins bend in this one.
 
     Where nothing moves, the error of a step is zero, and steps would grow over whole periods of

@@ -31,7 +31,7 @@ from integrators.loop import (
 from integrators.sliding import Functions, Held, flow_on, follow_on, look, margins_on
 from integrators.step_size import INFINITY
 from integrators.stepping import Clocks, next_tick
-from integrators.steps import Motion, Vector
+from integrators.steps import ArcMotion, Vector
 
 __all__ = ["Exchange", "changed", "indicate", "observe", "settle", "slope"]
 
@@ -106,7 +106,7 @@ def _quiet(
 ) -> int:
     """Run the loop until a solver would have to go on."""
     now, memory, plan = b.now, b.memory, b.plan
-    motion = Motion(flow_on, margins_on, Held(functions, now.held, b.sliding), follow_on)
+    motion = ArcMotion(flow_on, margins_on, Held(functions, now.held, b.sliding), follow_on)
     event = ROWS
     while event != ADVANCE:
         event = run_to_event(functions, machines, motion, b, 1)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from integrators import loop
-from integrators.advance import Output, Plan
+from integrators.advance import Output, RunPlan
 from integrators.crossings import watched
 from integrators.failures import (
     Entangled,
@@ -27,7 +27,7 @@ from integrators.failures import (
     failure,
     modes_of,
 )
-from integrators.loop import MOST_SWITCHES, Buffers, Memory, Switch
+from integrators.loop import MOST_SWITCHES, Buffers, Memory, Switching
 from integrators.sliding import (
     LIVE,
     MOST_SLIDING,
@@ -42,10 +42,10 @@ from integrators.sliding import (
 from integrators.states import COUNTS, CURSOR, beginning
 from integrators.step_size import Control
 from integrators.steps import (
+    ArcMotion,
     Dense,
     Flow,
     Margins,
-    Motion,
     Now,
     Scratch,
     Vector,
@@ -66,13 +66,13 @@ __all__ = [
     "Firing",
     "HybridError",
     "Livelock",
+    "LoopOptions",
     "NotFinite",
-    "Options",
     "Refused",
     "Slide",
     "StepTooSmall",
     "Stop",
-    "Switch",
+    "Switching",
     "TooManySteps",
     "buffers",
     "events",
@@ -164,7 +164,7 @@ class Equations:
 
 
 @dataclass(frozen=True)
-class Options:
+class LoopOptions:
     """How to integrate.
 
     Parameters
@@ -261,12 +261,12 @@ Event = Arc | Stop | Slide | Firing
 # --------------------------------------------------------------------------- the loop
 def run(
     equations: Equations,
-    switch: Switch,
+    switch: Switching,
     t: float,
     y: Vector,
     mode: list[int],
     t_end: float,
-    options: Options,
+    options: LoopOptions,
 ) -> Iterator[Event]:
     """Integrate from t to t_end and yield arcs, stops and firings in order.
 
@@ -274,7 +274,7 @@ def run(
     ----------
     equations : Equations
         The system.
-    switch : Switch
+    switch : Switching
         The machines; their guards are evaluated at the start and after every stop.
     t : float
         Start.
@@ -282,7 +282,7 @@ def run(
         State and modes at t; copies are taken.
     t_end : float
         End, > t.
-    options : Options
+    options : LoopOptions
         Method, tolerances, rows.
 
     Yields
@@ -299,7 +299,9 @@ def run(
     return events(equations, switch, buffers(equations, t, y, mode, t_end, options), options)
 
 
-def events(equations: Equations, switch: Switch, b: Buffers, options: Options) -> Iterator[Event]:
+def events(
+    equations: Equations, switch: Switching, b: Buffers, options: LoopOptions
+) -> Iterator[Event]:
     """Continue from the state in some buffers; see `run`.
 
     Between two events the buffers contain the complete state of the run (`integrators.states`).
@@ -323,8 +325,8 @@ def events(equations: Equations, switch: Switch, b: Buffers, options: Options) -
         from integrators.scipy_arcs import SciPyStepper
 
         solver = SciPyStepper(on, b, options)
-    plainly = Motion(functions.flow, functions.margins, functions.p, functions.follow)
-    along = Motion(flow_on, margins_on, on, follow_on)
+    plainly = ArcMotion(functions.flow, functions.margins, functions.p, functions.follow)
+    along = ArcMotion(flow_on, margins_on, on, follow_on)
     now, memory, out = b.now, b.memory, b.out
     before: tuple[Vector, tuple[int, ...]] = [], ()
     while True:
@@ -364,7 +366,7 @@ def buffers(
     y: Vector,
     mode: list[int],
     t_end: float,
-    options: Options,
+    options: LoopOptions,
     capacity: int | None = None,
 ) -> Buffers:
     """Create the buffers of a run, as lists.
@@ -447,7 +449,9 @@ def _as_list(numbers: Sequence[float] | Any) -> list[Any]:
     return numbers.tolist() if hasattr(numbers, "tolist") else list(numbers)
 
 
-def plan_of(equations: Equations, t: float, t_end: float, options: Options, machines: int) -> Plan:
+def plan_of(
+    equations: Equations, t: float, t_end: float, options: LoopOptions, machines: int
+) -> RunPlan:
     """Return the settings of a run in the form that the kernel uses.
 
     Parameters
@@ -459,7 +463,7 @@ def plan_of(equations: Equations, t: float, t_end: float, options: Options, mach
 
     Returns
     -------
-    Plan
+    RunPlan
         Made of lists, except for the jumps and ticks, of which there may be many: arrays.
     """
     # A SciPy solver needs no coefficients, but the loop's signature requires them.
@@ -478,7 +482,7 @@ def plan_of(equations: Equations, t: float, t_end: float, options: Options, mach
         max_step=options.max_step,
         time_scale=options.time_scale,
     )
-    return Plan(
+    return RunPlan(
         method=coefficients(tableau),
         control=control,
         t_end=t_end,
@@ -496,12 +500,12 @@ def plan_of(equations: Equations, t: float, t_end: float, options: Options, mach
     )
 
 
-def relaxation_times(options: Options) -> Vector:
+def relaxation_times(options: LoopOptions) -> Vector:
     """Return the relaxation times of the modes of each machine, one machine after another.
 
     Parameters
     ----------
-    options : Options
+    options : LoopOptions
         Contains them by machine.
 
     Returns

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from integrators.advance import Plan, tick_at
+from integrators.advance import RunPlan, tick_at
 from integrators.steps import Now, Vector, time_of
 
 __all__ = ["JUMPED", "LET_GO", "arrived", "forget", "jolted", "moves_a_lock", "only_let_go"]
@@ -48,7 +48,7 @@ def jolted(switch: Any, now: Now, was: Vector, jolt: list[int], p: Any) -> None:
 
 
 def arrived(
-    switch: Any, plan: Plan, now: Now, was: Vector, jolt: list[int], crossed: bool, p: Any
+    switch: Any, plan: RunPlan, now: Now, was: Vector, jolt: list[int], crossed: bool, p: Any
 ) -> None:
     """Store velocities at the end of an arc; mark those that jump there without an edge."""
     t = time_of(now)

@@ -18,7 +18,7 @@ from integrators.advance import (
     REACHED,
     TOO_SMALL,
     Output,
-    Plan,
+    RunPlan,
     advance,
     knot_after,
     put_row,
@@ -35,7 +35,7 @@ from integrators.jolts import (
     moves_a_lock,
     only_let_go,
 )
-from integrators.machines import Machines, Switch
+from integrators.machines import Machines, Switching
 from integrators.seizing import (
     crossed,
     entangled,
@@ -49,14 +49,14 @@ from integrators.seizing import (
 )
 from integrators.sliding import Functions, Held, Sliding, arm_on, margins_on, other_mode
 from integrators.step_size import INFINITY, error_norm, starting_step
-from integrators.steps import Motion, Now, Scratch, Vector, time_of
+from integrators.steps import ArcMotion, Now, Scratch, Vector, time_of
 
 __all__ = [
     "MOST_SWITCHES",
     "Buffers",
     "Machines",
     "Memory",
-    "Switch",
+    "Switching",
     "run_to_event",
 ]
 
@@ -107,7 +107,7 @@ class Memory:
 class Buffers(NamedTuple):
     """Everything that one run needs besides the system's functions; changed in place."""
 
-    plan: Plan
+    plan: RunPlan
     now: Now
     memory: Memory
     relations: Watched
@@ -118,7 +118,7 @@ class Buffers(NamedTuple):
 
 # Long because each phase is one branch: the sequence is read in one place.
 def run_to_event(
-    functions: Functions, switch: Switch, motion: Motion, b: Buffers, most_steps: int
+    functions: Functions, switch: Switching, motion: ArcMotion, b: Buffers, most_steps: int
 ) -> int:
     """Run until the next event.
 
@@ -126,9 +126,9 @@ def run_to_event(
     ----------
     functions : Functions
         The system.
-    switch : Switch
+    switch : Switching
         Its machines.
-    motion : Motion
+    motion : ArcMotion
         The flow and what is watched: `flow_on`, `margins_on` and a `Held`. While nothing slides,
         the functions of the system itself do the same in less time.
     b : Buffers
@@ -233,7 +233,7 @@ def run_to_event(
 
 # --------------------------------------------------------------------------- one helper per phase
 # They take only what they need, not all the buffers: every array is passed separately in a call.
-def _start(plan: Plan, now: Now, memory: Memory, out: Output) -> None:
+def _start(plan: RunPlan, now: Now, memory: Memory, out: Output) -> None:
     memory.phase = ASK
     memory.fresh = True
     raise_floor(plan.control, now)
@@ -241,7 +241,7 @@ def _start(plan: Plan, now: Now, memory: Memory, out: Output) -> None:
         put_row(out, now.t, now.y)
 
 
-def _ask(switch: Switch, now: Now, memory: Memory, sliding: Sliding, p: Any) -> int:
+def _ask(switch: Switching, now: Now, memory: Memory, sliding: Sliding, p: Any) -> int:
     """Fill the enabled edges; return the surface of a machine whose other mode has one, or -1."""
     surfaces, which, edges = sliding.surfaces, sliding.which, memory.edges
     t, y, mode = time_of(now), now.y, now.mode
@@ -279,7 +279,7 @@ def _refuse(memory: Memory, machine: int, edge: int) -> None:
 
 
 def _act(
-    switch: Switch, on: Held, plan: Plan, now: Now, memory: Memory, relations: Watched
+    switch: Switching, on: Held, plan: RunPlan, now: Now, memory: Memory, relations: Watched
 ) -> None:
     """Take an edge; after some, the others are asked again."""
     edge, machine, p = memory.edge, memory.machine, on.functions.p
@@ -294,7 +294,7 @@ def _act(
             forget(memory.edges, -1)
 
 
-def _pick(plan: Plan, memory: Memory) -> int:
+def _pick(plan: RunPlan, memory: Memory) -> int:
     """Find the next machine with an enabled edge."""
     edges = memory.edges
     i = memory.machine + 1
@@ -310,7 +310,7 @@ def _pick(plan: Plan, memory: Memory) -> int:
     return NOTHING
 
 
-def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
+def _fired(plan: RunPlan, now: Now, memory: Memory, scratch: Scratch) -> int:
     """Count the edge that was just taken."""
     i = memory.machine
     memory.microstep += 1
@@ -327,7 +327,7 @@ def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
     return FIRED
 
 
-def _choose_stop(plan: Plan, now: Now, memory: Memory) -> None:
+def _choose_stop(plan: RunPlan, now: Now, memory: Memory) -> None:
     """Choose the next stop once no edge is enabled: the next jump, or the end."""
     t, jumps = now.t, plan.jumps
     if t >= plan.t_end:
@@ -346,7 +346,7 @@ def _choose_stop(plan: Plan, now: Now, memory: Memory) -> None:
     memory.phase = BEGIN
 
 
-def _rearm(plan: Plan, on: Held, now: Now, relations: Watched, memory: Memory) -> int:
+def _rearm(plan: RunPlan, on: Held, now: Now, relations: Watched, memory: Memory) -> int:
     """Freeze signs, choose what to watch and to slide on, store the truth values watched."""
     functions, sliding = on.functions, on.sliding
     surfaces, watch, p = sliding.surfaces, relations.watch, functions.p
@@ -425,7 +425,7 @@ def _undefined(w: Watched) -> bool:
 
 
 def _begin_arc(
-    motion: Motion, plan: Plan, now: Now, out: Output, scratch: Scratch, memory: Memory
+    motion: ArcMotion, plan: RunPlan, now: Now, out: Output, scratch: Scratch, memory: Memory
 ) -> int:
     """Compute the slope and choose the first step after a switch or a jump."""
     control = plan.control
@@ -445,13 +445,13 @@ def _begin_arc(
     return ADVANCE if plan.foreign else NOTHING
 
 
-def _steps_ahead(plan: Plan, out: Output, most_steps: int) -> int:
+def _steps_ahead(plan: RunPlan, out: Output, most_steps: int) -> int:
     """Return how many steps may be taken in one call."""
     left = plan.max_steps - out.steps
     return min(most_steps, left) if plan.located else min(1, left)
 
 
-def _flowed(plan: Plan, memory: Memory, steps: int) -> int:
+def _flowed(plan: RunPlan, memory: Memory, steps: int) -> int:
     """Return whether the arc continues; a foreign solver has already taken its steps."""
     memory.microstep = 0
     if steps <= 0:
@@ -462,7 +462,7 @@ def _flowed(plan: Plan, memory: Memory, steps: int) -> int:
     return ADVANCE if plan.foreign else ROWS
 
 
-def _end_arc(plan: Plan, now: Now, memory: Memory, often: bool) -> int:
+def _end_arc(plan: RunPlan, now: Now, memory: Memory, often: bool) -> int:
     """Return the reason for the end of the arc."""
     status = memory.status
     if status in (TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, REFUSED, ENTANGLED):
@@ -478,7 +478,7 @@ def _end_arc(plan: Plan, now: Now, memory: Memory, often: bool) -> int:
     return NOTHING
 
 
-def _only_due(plan: Plan, memory: Memory) -> None:
+def _only_due(plan: RunPlan, memory: Memory) -> None:
     """Forget the edges of discrete machines between their ticks; each is asked once at a tick."""
     edges, due = memory.edges, memory.due
     for i in range(len(edges)):
@@ -488,7 +488,7 @@ def _only_due(plan: Plan, memory: Memory) -> None:
             due[i] = 0
 
 
-def _make_due(plan: Plan, memory: Memory) -> None:
+def _make_due(plan: RunPlan, memory: Memory) -> None:
     """Let discrete machines be asked at the tick that has just come."""
     bits = plan.ticks[memory.jump]
     for i in range(len(memory.due)):
@@ -543,7 +543,7 @@ def _reset_counts(now: Now, memory: Memory) -> None:
         memory.changes[r] = 0
 
 
-def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool:
+def _no_progress(plan: RunPlan, now: Now, memory: Memory, scratch: Scratch) -> bool:
     """Return whether the counted switches made no progress; otherwise restart the count here."""
     y, anchor, moved = now.y, memory.anchor, scratch.error
     t, elapsed = now.t, now.t - now.anchor
@@ -559,8 +559,8 @@ def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool
 
 
 def _often_changed(
-    motion: Motion,
-    plan: Plan,
+    motion: ArcMotion,
+    plan: RunPlan,
     now: Now,
     w: Watched,
     sliding: Sliding,

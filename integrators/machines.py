@@ -7,10 +7,10 @@ from typing import Any, NamedTuple, Protocol
 
 from integrators.steps import Vector
 
-__all__ = ["Machines", "Switch"]
+__all__ = ["Machines", "Switching"]
 
 
-class Switch(Protocol):
+class Switching(Protocol):
     """The interface of the machines to the loop."""
 
     def ask(
@@ -42,7 +42,7 @@ class Switch(Protocol):
 
 
 class Machines(NamedTuple):
-    """A `Switch` made of functions, and a function that observes firings."""
+    """A `Switching` made of functions, and a function that observes firings."""
 
     ask: Callable[..., Any]
     act: Callable[..., Any]

@@ -90,13 +90,13 @@ def _library(function: Callable[..., float], count: int) -> tuple[Any, Callable[
     from integrators.machine_code.objects import Library, compiled
     from integrators.machine_code.translate import Translator
     from integrators.machine_code.tree import Local
-    from integrators.machine_code.values import Array, Fixed, Number
+    from integrators.machine_code.values import ArrayValue, FixedValue, NumberValue
 
     n = Local("i", "n")
-    rows = [Array("f", (n,), Local("p", f"row{k}")) for k in range(count + 1)]
+    rows = [ArrayValue("f", (n,), Local("p", f"row{k}")) for k in range(count + 1)]
     translator = Translator()
-    translator.entry("scalar", function, [Number(Local("f", f"x{k}")) for k in range(count)])
-    translator.entry("loop", _of_one if count == 1 else _of_two, [Fixed(function), *rows])
+    translator.entry("scalar", function, [NumberValue(Local("f", f"x{k}")) for k in range(count)])
+    translator.entry("loop", _of_one if count == 1 else _of_two, [FixedValue(function), *rows])
     library = Library(compiled(llvm_text(translator.module)))
     kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64, *[ctypes.c_void_p] * count)
     return library, kind(library.address("loop"))

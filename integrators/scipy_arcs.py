@@ -27,10 +27,10 @@ from integrators.advance import (
 )
 from integrators.crossings import NO_CHANGE, Path, copy_margins, first_change, listed
 from integrators.sliding import Held, flow_on, follow_on, margins_on
-from integrators.steps import Motion
+from integrators.steps import ArcMotion
 
 if TYPE_CHECKING:
-    from integrators.hybrid import Buffers, Options
+    from integrators.hybrid import Buffers, LoopOptions
     from integrators.steps import Vector
 
 __all__ = ["SciPyStepper"]
@@ -46,7 +46,7 @@ class SciPyStepper:
         point to grid point (it keeps its error control, so it may take several steps to each).
     """
 
-    def __init__(self, on: Held, buffers: Buffers, options: Options) -> None:
+    def __init__(self, on: Held, buffers: Buffers, options: LoopOptions) -> None:
         if not (isinstance(options.method, type) and issubclass(options.method, OdeSolver)):
             raise TypeError(f"method {options.method!r} is not a scipy.integrate.OdeSolver class")
         self.on, self.buffers, self.options = on, buffers, options
@@ -92,7 +92,7 @@ class SciPyStepper:
     def _advance(self, most_steps: int) -> int:
         b, now, out = self.buffers, self.buffers.now, self.buffers.out
         y, w = now.y, listed(b.relations, b.memory.active)
-        motion = Motion(flow_on, margins_on, self.on, follow_on)
+        motion = ArcMotion(flow_on, margins_on, self.on, follow_on)
         redone, ahead = False, math.inf
         while True:
             t = now.t

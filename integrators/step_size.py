@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from integrators.elementary import power
-from integrators.steps import Motion, Now, Scratch, Vector
+from integrators.steps import ArcMotion, Now, Scratch, Vector
 
 __all__ = [
     "Control",
@@ -205,7 +205,7 @@ def retry_factor(error: float, order: int) -> float:
 
 
 def starting_step(
-    motion: Motion, order: int, control: Control, now: Now, knot: float, scratch: Scratch
+    motion: ArcMotion, order: int, control: Control, now: Now, knot: float, scratch: Scratch
 ) -> float:
     """Return the usual starting step, from the size of y, y' and y''.
 
@@ -213,7 +213,7 @@ def starting_step(
 
     Parameters
     ----------
-    motion : Motion
+    motion : ArcMotion
         The flow.
     order : int
         Exponent of the step's error.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from integrators.advance import Plan
+from integrators.advance import RunPlan
 from integrators.loop import (
     ARC,
     ASK,
@@ -36,7 +36,7 @@ from integrators.sliding import (
     margins_on,
 )
 from integrators.step_size import INFINITY
-from integrators.steps import Motion, Vector
+from integrators.steps import ArcMotion, Vector
 
 __all__ = ["FULL_LOG", "Clocks", "Sample", "next_tick", "restart", "step_to"]
 
@@ -101,7 +101,7 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
     """
     now, memory, observe, end = b.now, b.memory, machines.observe, sample.end
     on = Held(functions, now.held, b.sliding)
-    motion = Motion(flow_on, margins_on, on, follow_on)
+    motion = ArcMotion(flow_on, margins_on, on, follow_on)
     if not sample.resumed:
         _begin(functions, b, sample)
     sample.code = 0
@@ -133,12 +133,12 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
     return 0
 
 
-def next_tick(plan: Plan, clocks: Clocks) -> None:
+def next_tick(plan: RunPlan, clocks: Clocks) -> None:
     """Put a further tick into the plan, which has two: the last one, and the next one.
 
     Parameters
     ----------
-    plan : Plan
+    plan : RunPlan
         Its jumps are these ticks.
     clocks : Clocks
         What ticks, at least one.
@@ -218,7 +218,7 @@ def _begin(functions: Functions, b: Buffers, sample: Sample) -> None:
     sample.impulse = 0.0
 
 
-def _impulse(machines: Machines, motion: Motion, b: Buffers, sample: Sample, t: float) -> float:
+def _impulse(machines: Machines, motion: ArcMotion, b: Buffers, sample: Sample, t: float) -> float:
     """Return the integral of the force over the step from t, with the signs held in it (Simpson).
 
     The state in the middle is on the cubic through both ends.

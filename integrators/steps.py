@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 from integrators.tableaux import Row, Tableau
 
 __all__ = [
+    "ArcMotion",
     "Coefficients",
     "Dense",
-    "Motion",
     "Now",
     "Scratch",
     "Vector",
@@ -56,7 +56,7 @@ def stays(t: float, y: Vector, mode: list[int], held: Vector, p: Any) -> None:
     """Set no component: none is determined by others."""
 
 
-class Motion(NamedTuple):
+class ArcMotion(NamedTuple):
     """The flow on an arc, what is watched, and what follows, with the parameters of all."""
 
     flow: Flow
@@ -119,13 +119,13 @@ def coefficients(tableau: Tableau) -> Coefficients:
 
 
 def take_step(
-    motion: Motion, method: Coefficients, now: Now, t_new: float, scratch: Scratch
+    motion: ArcMotion, method: Coefficients, now: Now, t_new: float, scratch: Scratch
 ) -> None:
     """Step from the present state to t_new.
 
     Parameters
     ----------
-    motion : Motion
+    motion : ArcMotion
         ``flow(t, y, mode, held, p, dy)`` fills dy.
     method : Coefficients
         The tableau.

@@ -42,7 +42,7 @@ from integrators import compiled
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
-from integrators.machine_code.values import Number
+from integrators.machine_code.values import NumberValue
 from tests.helpers import ROOT, bits
 from tests.random_systems import T_END, trial
 
@@ -152,7 +152,7 @@ def in_c(compiler: str, level: str, warnings: Sequence[str] = ("-w",)) -> Iterat
             text: str, function: Any, arguments: Any, layout: Any, extra: Sequence[str], *_: Any
         ) -> CLibrary:
             translator = Translator(compiled.INLINE)
-            more = [Number(Local("i", each)) for each in extra]
+            more = [NumberValue(Local("i", each)) for each in extra]
             translator.entry("entry", function, [*layout.value.fields.values(), *more])
             texts.append(c99_text(translator.module))
             source = Path(folder) / f"{function.__name__}{len(texts)}.c"

@@ -113,7 +113,7 @@ class Located:
     ) -> None:
         self.program.ieee["observe"](t, self._full(y), mode, signs, p, out)
 
-    # ------------------------------------------------------------------ as integrators.Switch
+    # ------------------------------------------------------------------ as integrators.Switching
     def ask(
         self, t: float, y: list[float], mode: list[int], p: Any, jolt: list[int], edges: list[int]
     ) -> None:
@@ -128,7 +128,7 @@ class Located:
 
     # ------------------------------------------------------------------ running
     def solution(
-        self, y0: FloatArray, start: float, end: float, options: integrators.Options
+        self, y0: FloatArray, start: float, end: float, options: integrators.LoopOptions
     ) -> Solution:
         """Run, and collect rows and switches."""
         t: list[float] = []

@@ -149,7 +149,7 @@ def solve_ivp(
     caller = Caller(fun, _velocities(velocity, len(y), carried), carried.several, len(y))
     caller.check(start, y, len(carried.names))
     driven = carried.driven
-    options = integrators.Options(
+    options = integrators.LoopOptions(
         method=solver,
         step=None,
         rtol=rtol,

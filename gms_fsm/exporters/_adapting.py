@@ -15,7 +15,7 @@ from gms_fsm.lowering.adapting import FUNCTIONS, Adapting, adapt, bind, text_of
 from gms_fsm.run._stepper import arguments_of
 from gms_fsm.run.start import Start
 from integrators.compiled import is_known
-from integrators.machine_code.layout import Layout
+from integrators.machine_code.layout import BlockLayout
 from integrators.machine_code.translate import Translator
 from integrators.stepping import step_to
 
@@ -53,15 +53,15 @@ class StepArguments(NamedTuple):
     adapting: Adapting
 
 
-def step_arguments(start: Start) -> tuple[StepArguments, Layout]:
+def step_arguments(start: Start) -> tuple[StepArguments, BlockLayout]:
     """Return the contents of the block at a start, and where everything is in it."""
     step: tuple[Any, Any, Any, Any] = arguments_of(start)
     made = StepArguments(*step, adapting_of(start))
-    return made, Layout(made, is_known)
+    return made, BlockLayout(made, is_known)
 
 
 def translate(
-    translator: Translator, layout: Layout, entries: Mapping[str, tuple[Any, str]], prefix: str = ""
+    translator: Translator, layout: BlockLayout, entries: Mapping[str, tuple[Any, str]], prefix: str = ""
 ) -> list[str]:
     """Translate functions on the block, and return their names."""
     for name, (function, parts) in entries.items():
@@ -69,7 +69,7 @@ def translate(
     return [*entries]
 
 
-def word_of(layout: Layout, each: Quantity) -> int:
+def word_of(layout: BlockLayout, each: Quantity) -> int:
     """Return the first word of a quantity in the block."""
     return layout.offset(PLACES[each.place]) + each.index
 

@@ -23,7 +23,7 @@ from gms_fsm.run._stepper import MOST_SWITCHES
 from gms_fsm.run.start import LATEST, Start
 from integrators.compiled import INLINE
 from integrators.machine_code.c99 import c99_text, number_text
-from integrators.machine_code.layout import Block, Layout
+from integrators.machine_code.layout import BlockLayout, MemoryBlock
 from integrators.machine_code.translate import Translator
 from integrators.stepping import FULL_LOG
 
@@ -237,12 +237,12 @@ class _Text:
         return spans
 
 
-def image_of(layout: Layout, arguments: Any) -> str:
+def image_of(layout: BlockLayout, arguments: Any) -> str:
     """Return C text that sets all words of a block that are not zero at the start.
 
     Parameters
     ----------
-    layout : Layout
+    layout : BlockLayout
         Of the block, which the text calls ``w``.
     arguments : named tuple
         Its contents.
@@ -254,7 +254,7 @@ def image_of(layout: Layout, arguments: Any) -> str:
     """
     names = {offset: name for name, offset in layout.offsets.items()}
     lines = []
-    for k, value in Block(layout, arguments).set_words():
+    for k, value in MemoryBlock(layout, arguments).set_words():
         note = f" /* {names[k]} */" if k in names else ""
         if isinstance(value, float):
             lines.append(f"    w[{k}].f = {number_text(value)};{note}")

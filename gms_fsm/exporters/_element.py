@@ -35,7 +35,7 @@ from gms_fsm.language import (
     renamed,
 )
 from gms_fsm.language._normal import renamed_in
-from gms_fsm.lowering._plan import Computed, Plan, RoughCall, both_sides, plan_of
+from gms_fsm.lowering._plan import Computed, ProgramPlan, RoughCall, both_sides, plan_of
 from gms_fsm.systems._assembly import CURVE_LOAD, Assembly, Bank, Edge, assembled, of
 
 __all__ = ["NamedFriction"]
@@ -377,7 +377,7 @@ class PlanReader:
     ) -> None:
         self.words = words
         self.subject, self.read, self.bank, self.time = subject, read, bank, time
-        self.plan: Plan = plan_of(read)
+        self.plan: ProgramPlan = plan_of(read)
         self.names = {**names}
         self.force = of(bank.name, "F")
         self.names[self.force] = SUM

@@ -22,7 +22,7 @@ from integrators import exchange, stepping
 from integrators.compiled import INLINE, is_known
 from integrators.exchange import Exchange
 from integrators.machine_code.c99 import c99_text, number_text
-from integrators.machine_code.layout import Layout
+from integrators.machine_code.layout import BlockLayout
 from integrators.machine_code.translate import Translator
 
 __all__ = ["FmuArguments", "FmuModel", "both_of"]
@@ -69,7 +69,7 @@ class FmuModel:
     ) -> None:
         self.subject, self.variables, self.exchange = subject, variables, exchange
         self.arguments = both_of(subject)
-        self.layout = Layout(self.arguments, is_known)
+        self.layout = BlockLayout(self.arguments, is_known)
 
     @property
     def nominals(self) -> dict[int, float]:

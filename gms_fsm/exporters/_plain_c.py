@@ -16,7 +16,7 @@ from gms_fsm.language import C99, ELEMENTARY, FUNCTIONS, NAMESPACE
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
-from integrators.machine_code.values import Number
+from integrators.machine_code.values import NumberValue
 
 __all__ = ["C_WORDS", "plain_c", "plain_c_notes"]
 
@@ -243,7 +243,7 @@ class PlainC:
         """Return the functions that are the same on every platform."""
         translator = Translator()
         for name in names:
-            numbers = [Number(Local("f", each)) for each in "xy"[: OWN[name]]]
+            numbers = [NumberValue(Local("f", each)) for each in "xy"[: OWN[name]]]
             translator.entry(f"{self.name}_{name}", NAMESPACE[name], numbers)
         return c99_text(translator.module, [self.name, *self.element.names], hidden=True)
 

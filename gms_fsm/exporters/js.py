@@ -37,10 +37,10 @@ from gms_fsm.systems.signals import Function
 from integrators import columns, hybrid, loop
 from integrators.compiled import INLINE, is_known
 from integrators.machine_code.javascript import javascript_text, script_number, tables_of
-from integrators.machine_code.layout import Block, Column, Layout
+from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
-from integrators.machine_code.values import Number
+from integrators.machine_code.values import NumberValue
 from integrators.observing import observe_rows
 from integrators.stepping import FULL_LOG
 
@@ -108,7 +108,7 @@ class _Module(ABC):
 
     def __init__(self, subject: Subject, start: Start, arguments: Any, alone: bool) -> None:
         self.subject, self.start, self.arguments = subject, start, arguments
-        self.layout = Layout(arguments, is_known)
+        self.layout = BlockLayout(arguments, is_known)
         self.outputs = outputs_of(start, alone, ())
         self.numbers = parameters_of(start, alone, ())
 
@@ -140,7 +140,7 @@ class _Module(ABC):
         entries = self.entries(translator)
         code = javascript_text(translator.module)
         _, tables = tables_of(translator.module)
-        image, true = _image(Block(self.layout, self.arguments))
+        image, true = _image(MemoryBlock(self.layout, self.arguments))
         return filled(
             "js.mjs",
             name=self.subject.name,
@@ -288,7 +288,7 @@ class _Run(_Module):
                 advice='leave method and output out, or choose method="dp45"',
             )
         run = example_of(start)
-        table: Any = Column("f", start.program.layout.observed.size)
+        table: Any = OuterArray("f", start.program.layout.observed.size)
         whole = Whole(
             run.functions, run.machines, run.buffers, run.log, run.recorded,
             adapting_of(start), table,
@@ -299,7 +299,7 @@ class _Run(_Module):
         """Translate the run, what follows from its numbers, and what is observed of its rows."""
         part = self.layout.part
         run = [part(each) for each in ("functions", "machines", "buffers", "log", "recorded")]
-        steps, start = ([Number(Local("i", each)) for each in pair] for pair in (
+        steps, start = ([NumberValue(Local("i", each)) for each in pair] for pair in (
             ("steps", "pause"), ("start", "count")))  # fmt: skip
         translator.entry("record", columns.record, [*run, *steps])
         translator.entry("adapt", adapt, [part(each) for each in OF_A_RUN.split()])
@@ -439,7 +439,7 @@ def _home(call: Any) -> str:
     return f" ({name})" if code is None else f" ({code.co_filename}:{code.co_firstlineno}, {name})"
 
 
-def _image(block: Block) -> tuple[list[tuple[int, str]], list[int]]:
+def _image(block: MemoryBlock) -> tuple[list[tuple[int, str]], list[int]]:
     """Return the words that are not zero, and the bytes that are true."""
     words, true = list[tuple[int, str]](), list[int]()
     for k, value in block.set_words():

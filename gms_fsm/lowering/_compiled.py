@@ -20,13 +20,13 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.language._functions import sgn
 from gms_fsm.lowering._generated import SIGNALS, load
 from gms_fsm.lowering._observing import on_surfaces
-from gms_fsm.lowering._store import Store
+from gms_fsm.lowering._store import CodeFolder
 from gms_fsm.lowering.program import Arguments, Program, guarded
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
 if TYPE_CHECKING:
-    from integrators.compiled import Engine, Run
-    from integrators.machine_code.layout import Block
+    from integrators.compiled import CompiledFunction, RecordArguments
+    from integrators.machine_code.layout import MemoryBlock
 
 __all__ = [
     "Prepared",
@@ -89,19 +89,19 @@ def _table(rows: list[list[float]]) -> FloatArray:
     return np.array(padded, dtype=np.float64).reshape(len(rows), length)
 
 
-def engine(program: Program, run: Run) -> Engine:
+def engine(program: Program, run: RecordArguments) -> CompiledFunction:
     """Return the loop of a program as machine code.
 
     Parameters
     ----------
     program : Program
         From `gms_fsm.lowering.program.lower`.
-    run : Run
+    run : RecordArguments
         From `integrators.compiled.example`, with the functions from `functions`.
 
     Returns
     -------
-    Engine
+    CompiledFunction
         To be called with a block.
 
     Raises
@@ -165,20 +165,20 @@ def _loaded(source: str, callables: tuple[str, ...]) -> dict[str, Any]:
 
 
 @functools.cache
-def store() -> Store | None:
+def store() -> CodeFolder | None:
     """Return the cache for machine code, or None if no cache can be used.
 
     It is in the platform's folder for caches, or in GMS_FSM_CACHE.
 
     Returns
     -------
-    Store or None
+    CodeFolder or None
         Ready for use.
     """
     from platformdirs import user_cache_path
 
     given = os.environ.get("GMS_FSM_CACHE")
-    return Store.at((Path(given) if given else user_cache_path("gms-fsm")) / "machine-code")
+    return CodeFolder.at((Path(given) if given else user_cache_path("gms-fsm")) / "machine-code")
 
 
 def notify(text: str) -> None:
@@ -237,7 +237,7 @@ class Prepared:
 
     Parameters
     ----------
-    engine : Engine
+    engine : CompiledFunction
         The machine code.
     example : named tuple
         Of its arguments.
@@ -245,29 +245,29 @@ class Prepared:
         Of the program; kept, so that their `id` stays theirs.
     """
 
-    engine: Engine
+    engine: CompiledFunction
     example: Any
     functions: Any
-    _spare: list[Block] = field(default_factory=list)  # of calls that have ended
+    _spare: list[MemoryBlock] = field(default_factory=list)  # of calls that have ended
 
     @functools.cached_property
-    def _first(self) -> Block:
-        from integrators.machine_code.layout import Block
+    def _first(self) -> MemoryBlock:
+        from integrators.machine_code.layout import MemoryBlock
 
-        first = Block(self.engine.layout, self.example)
+        first = MemoryBlock(self.engine.layout, self.example)
         first.update(first.contents)
         return first
 
-    def block(self) -> Block:
+    def block(self) -> MemoryBlock:
         """Return a block of its own for a call."""
-        from integrators.machine_code.layout import Block
+        from integrators.machine_code.layout import MemoryBlock
 
         try:
             return self._spare.pop()
         except IndexError:
-            return Block(self.engine.layout, self.example, self._first)
+            return MemoryBlock(self.engine.layout, self.example, self._first)
 
-    def take_back(self, block: Block) -> None:
+    def take_back(self, block: MemoryBlock) -> None:
         """Keep a block that nothing refers to any more for the next call."""
         if len(self._spare) < MOST_SPARE:
             block.become(self._first)  # and refer to no columns

@@ -5,34 +5,34 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from gms_fsm.language import Name, names_in
-from gms_fsm.lowering._lines import TABLES, Line, Signs, Writer
+from gms_fsm.lowering._lines import TABLES, CodeLine, ProgramWriter, Signs
 from gms_fsm.lowering._locks import Locks
 from gms_fsm.lowering._names import computed_names
-from gms_fsm.lowering._plan import BankPlan, Computed, Gradient, Plan, gradient_of
+from gms_fsm.lowering._plan import BankPlan, Computed, Gradient, ProgramPlan, gradient_of
 from gms_fsm.systems._assembly import Bank, of
 
-__all__ = ["Forces"]
+__all__ = ["ForceWriter"]
 
 
-class Forces(Writer):
+class ForceWriter(ProgramWriter):
     """Writes what contacts give out.
 
     Parameters
     ----------
-    plan : Plan
+    plan : ProgramPlan
         Of the program.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: ProgramPlan) -> None:
         super().__init__(plan)
         self.locks = Locks(self)
         self.locking = any(bank.chart.locks for bank in self.read.banks)
 
-    def followed(self) -> list[Line]:
+    def followed(self) -> list[CodeLine]:
         """Write the velocities that locks determine."""
         return self.locks.following() if self.locking else []
 
-    def rounded(self, name: str) -> list[Line]:
+    def rounded(self, name: str) -> list[CodeLine]:
         """Write that the velocity of a contact is zero where locks leave only rounding of it."""
         rows = {
             velocity: row
@@ -43,7 +43,7 @@ class Forces(Writer):
 
     def forces(
         self, signs: Signs, *, wanted: bool, rates: bool = False, observed: bool = False
-    ) -> list[Line]:
+    ) -> list[CodeLine]:
         """Write the rates and the forces of all contacts, and the accelerations.
 
         Parameters
@@ -57,7 +57,7 @@ class Forces(Writer):
         observed : bool
             Store what is observed of the elements into out.
         """
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         for bank in self.plan.banks:
             lines += self.bank_forces(bank, signs, wanted, rates=rates, observed=observed)
         if wanted and (rates or self.locking):
@@ -79,7 +79,7 @@ class Forces(Writer):
         rates: bool = False,
         observed: bool = False,
         held: bool = False,
-    ) -> list[Line]:
+    ) -> list[CodeLine]:
         """Write the loop over the elements of a contact, and its force; `held` stores both."""
         bank, y = plan.bank, self.layout.y
         if bank.periodic and not held:
@@ -98,9 +98,9 @@ class Forces(Writer):
         }
         # Only a contact with several velocities has several forces.
         several = {force: f"F_i{'' if q == 0 else f'_{q}'}" for q, force in enumerate(bank.forces)}
-        branches: dict[str, list[Line]] = {}
+        branches: dict[str, list[CodeLine]] = {}
         for each in plan.states:
-            branch: list[Line] = []
+            branch: list[CodeLine] = []
             for name in bank.variables:
                 if name in needed:
                     branch += self.computed(self.local(bank.rate(name)), each.rates[name], signs)
@@ -108,21 +108,23 @@ class Forces(Writer):
                 if force in plan.common:
                     continue
                 if each.locked:
-                    branch.append(Line(f"{several[force]} = 0.0"))
+                    branch.append(CodeLine(f"{several[force]} = 0.0"))
                 else:
                     branch += self.computed(several[force], each.forces[force], signs, "  # (3)")
             branches[each.state] = branch
-        after: list[Line] = []
+        after: list[CodeLine] = []
         for force in bank.forces if forces else ():
             total = self.local(force)
             if force not in plan.common:
-                after.append(Line(f"{total} += {several[force]}"))
+                after.append(CodeLine(f"{total} += {several[force]}"))
             elif observed or held:
                 after.append(self.put(several[force], plan.common[force], "  # (3)"))
-                after.append(Line(f"{total} += {several[force]}"))
+                after.append(CodeLine(f"{total} += {several[force]}"))
             else:
                 tree = plan.common[force]
-                after.append(Line(f"{total} += {self.spell(tree)}  # (3)", computed_names(tree)))
+                after.append(
+                    CodeLine(f"{total} += {self.spell(tree)}  # (3)", computed_names(tree))
+                )
         if observed:
             after += self.elements_seen(plan, several)
         if rates:
@@ -136,35 +138,37 @@ class Forces(Writer):
                 self.store("y", y, bank.held(f"{force}_elements"), several[force])
                 for force in bank.forces
             ]
-        lines = [Line(f"{self.local(force)} = 0.0") for force in bank.forces if forces]
+        lines = [CodeLine(f"{self.local(force)} = 0.0") for force in bank.forces if forces]
         lines += self.loop(bank.index, signs, (), branches, after)
         for force, value in plan.totals.items() if forces else ():
             lines += self.computed(self.local(force), value, signs, "  # (4)")
         if held:
             lines += [
-                Line(f"y[{y.text(bank.held(force))}] = {self.local(force)}")
+                CodeLine(f"y[{y.text(bank.held(force))}] = {self.local(force)}")
                 for force in bank.forces
             ]
         return lines
 
-    def held_forces(self, bank: Bank, wanted: bool, *, rates: bool, observed: bool) -> list[Line]:
+    def held_forces(
+        self, bank: Bank, wanted: bool, *, rates: bool, observed: bool
+    ) -> list[CodeLine]:
         """Write the force of a contact with a period, and its rates: what is held of them."""
-        y, seen, lines = self.layout.y, self.layout.observed, list[Line]()
+        y, seen, lines = self.layout.y, self.layout.observed, list[CodeLine]()
         for force in bank.forces if wanted else ():
             held = bank.held(force)
-            lines.append(Line(f"{self.local(force)} = {self.local(held)}", frozenset({held})))
+            lines.append(CodeLine(f"{self.local(force)} = {self.local(held)}", frozenset({held})))
             if rates:
-                lines.append(Line(f"dy[{y.text(held)}] = 0.0"))
-        after: list[Line] = []
+                lines.append(CodeLine(f"dy[{y.text(held)}] = 0.0"))
+        after: list[CodeLine] = []
         pairs = [(bank.rate(v), bank.held(bank.rate(v))) for v in bank.variables]
         for v, (rate, held) in zip(bank.variables, pairs, strict=True):
             place, sizes = self.at("y", y, held)
             if rates:
                 line = self.store("dy", y, v, place)
-                after += [Line(line.text, line.reads | sizes), self.store("dy", y, held, "0.0")]
+                after += [CodeLine(line.text, line.reads | sizes), self.store("dy", y, held, "0.0")]
             if observed:
                 line = self.store("out", seen, rate, place)
-                after.append(Line(line.text, line.reads | sizes))
+                after.append(CodeLine(line.text, line.reads | sizes))
         for force in bank.forces:
             held = bank.held(f"{force}_elements")
             place, sizes = self.at("y", y, held)
@@ -172,7 +176,7 @@ class Forces(Writer):
                 after.append(self.store("dy", y, held, "0.0"))
             if observed:
                 line = self.store("out", seen, f"{force}_elements", place)
-                after.append(Line(line.text, line.reads | sizes))
+                after.append(CodeLine(line.text, line.reads | sizes))
         if observed:
             after.append(self.threshold_seen(bank))
         return [*lines, *self.loop(bank.index, "live", (), None, after)]
@@ -183,7 +187,7 @@ class Forces(Writer):
         found = computed_names(value.tree)
         return found.union(*(computed_names(call.call) for call in value.calls))
 
-    def elements_seen(self, plan: BankPlan, several: Mapping[str, str]) -> list[Line]:
+    def elements_seen(self, plan: BankPlan, several: Mapping[str, str]) -> list[CodeLine]:
         """Store what is observed of an element."""
         bank, seen = plan.bank, self.layout.observed
         lines = [self.threshold_seen(bank)]
@@ -194,7 +198,7 @@ class Forces(Writer):
             self.store("out", seen, bank.rate(v), self.local(bank.rate(v))) for v in bank.variables
         ]
 
-    def threshold_seen(self, bank: Bank) -> Line:
+    def threshold_seen(self, bank: Bank) -> CodeLine:
         """Store the threshold of an element: that of its model, or what s means in its chart."""
         seen, s = self.layout.observed, of(bank.name, "s")
         means = Name(bank.threshold) if bank.threshold else bank.means.get("s")
@@ -202,9 +206,9 @@ class Forces(Writer):
             return self.store("out", seen, s, "nan")
         place, sizes = self.at("out", seen, s)
         line = self.put(place, means)
-        return Line(line.text, line.reads | sizes)
+        return CodeLine(line.text, line.reads | sizes)
 
-    def driven_accelerations(self) -> list[Line]:
+    def driven_accelerations(self) -> list[CodeLine]:
         """Write the accelerations of driven bodies that locks refer to."""
         wanted = {name for row in self.locks.rows for name in row.row}
         lines = []
@@ -213,13 +217,13 @@ class Forces(Writer):
                 lines.append(self.rate_in_time(self.local(f"{body.name} a"), body.v))
         return lines
 
-    def rate_in_time(self, target: str, name: str) -> Line:
+    def rate_in_time(self, target: str, name: str) -> CodeLine:
         """Write the rate of a quantity that depends on time only."""
         gradient = gradient_of(Name(name), self.read)
         terms, reads = self.time_terms(gradient)
-        return Line(f"{target} = {' + '.join(terms) or '0.0'}", reads)
+        return CodeLine(f"{target} = {' + '.join(terms) or '0.0'}", reads)
 
-    def before_guards(self, names: Iterable[frozenset[str]]) -> list[Line]:
+    def before_guards(self, names: Iterable[frozenset[str]]) -> list[CodeLine]:
         """Write the forces, and the accelerations, where guards or actions read them."""
         read = frozenset[str]().union(*names)
         if not read & self.late:

@@ -12,12 +12,12 @@ from typing import Literal, NamedTuple
 from gms_fsm.language import Binary, Call, Name, Node, Value, spell
 from gms_fsm.language._tree import walk
 from gms_fsm.lowering._names import computed_names
-from gms_fsm.lowering._plan import Computed, Plan, RoughCall
+from gms_fsm.lowering._plan import Computed, ProgramPlan, RoughCall
 from gms_fsm.lowering.places import Places, total
 from gms_fsm.systems._assembly import of
 from integrators import LIVE
 
-__all__ = ["Line", "Signs", "Writer", "indented", "one_line", "reads_of"]
+__all__ = ["CodeLine", "ProgramWriter", "Signs", "indented", "one_line", "reads_of"]
 
 # Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
 # may be marked as live.
@@ -26,7 +26,7 @@ QUICK = ("abs", "min", "max", "sgn", "sqrt")  # functions that need no library
 TABLES = "the tables"  # what a signal that is a table reads
 
 
-class Line(NamedTuple):
+class CodeLine(NamedTuple):
     """A line of text, and the names from the trees that it reads.
 
     A lazy line stands for: compute this name here, unless it has been computed.
@@ -37,31 +37,31 @@ class Line(NamedTuple):
     lazy: str = ""
 
 
-def reads_of(lines: Iterable[Line]) -> frozenset[str]:
+def reads_of(lines: Iterable[CodeLine]) -> frozenset[str]:
     """Return what lines read."""
     return frozenset[str]().union(*(line.reads for line in lines))
 
 
-def _does_something(lines: Iterable[Line]) -> bool:
+def _does_something(lines: Iterable[CodeLine]) -> bool:
     """Return whether lines are more than comments."""
     return any(not line.text.lstrip().startswith("#") for line in lines)
 
 
-def indented(lines: Iterable[Line]) -> list[Line]:
+def indented(lines: Iterable[CodeLine]) -> list[CodeLine]:
     """Return lines one level deeper."""
     return [line._replace(text="    " + line.text) for line in lines]
 
 
-class Writer:
+class ProgramWriter:
     """Writes values, loops over elements and functions of a plan.
 
     Parameters
     ----------
-    plan : Plan
+    plan : ProgramPlan
         Of the program.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: ProgramPlan) -> None:
         self.plan, self.read = plan, plan.read
         self.names, self.layout = plan.names, plan.layout
         self.sizes = [block.size for block in plan.layout.y.blocks]
@@ -79,34 +79,36 @@ class Writer:
         """Return the name in the text."""
         return self.names.local[name]
 
-    def put(self, target: str, tree: Value, note: str = "") -> Line:
+    def put(self, target: str, tree: Value, note: str = "") -> CodeLine:
         """Write an assignment to a name or a place of the text."""
-        return Line(f"{target} = {self.spell(tree)}{note}", computed_names(tree))
+        return CodeLine(f"{target} = {self.spell(tree)}{note}", computed_names(tree))
 
     def at(self, array: str, places: Places[str], name: str) -> tuple[str, frozenset[str]]:
         """Spell a place of an array, and say which sizes it reads."""
         sizes = frozenset(f"#{size}" for size in places.sizes(name))
         return f"{array}[{places.text(name)}]", sizes
 
-    def store(self, array: str, places: Places[str], name: str, text: str) -> Line:
+    def store(self, array: str, places: Places[str], name: str, text: str) -> CodeLine:
         """Write an assignment to a place of an array."""
         place, sizes = self.at(array, places, name)
-        return Line(f"{place} = {text}", sizes)
+        return CodeLine(f"{place} = {text}", sizes)
 
     # ------------------------------------------------------------------ corners and jumps
-    def computed(self, target: str, value: Computed, signs: Signs, note: str = "") -> list[Line]:
+    def computed(
+        self, target: str, value: Computed, signs: Signs, note: str = ""
+    ) -> list[CodeLine]:
         """Write an assignment of a value, after its rough calls."""
         return [*self.calls(value.calls, signs), self.put(target, value.tree, note)]
 
-    def calls(self, calls: Iterable[RoughCall], signs: Signs) -> list[Line]:
+    def calls(self, calls: Iterable[RoughCall], signs: Signs) -> list[CodeLine]:
         """Assign rough calls, each once."""
         return [self.call(each, signs) for each in dict.fromkeys(calls)]
 
-    def call(self, rough: RoughCall, signs: Signs) -> Line:
+    def call(self, rough: RoughCall, signs: Signs) -> CodeLine:
         """Assign a rough call, whose sign is held, live or given."""
         call, live = rough.call, self.spell(rough.call)
         if signs == "live":
-            return Line(f"{rough.name} = {live}", computed_names(call))
+            return CodeLine(f"{rough.name} = {live}", computed_names(call))
         held = self.plan.held
         sizes = frozenset(f"#{size}" for size in held.sizes(rough.turning))
         sign = f"held[{held.text(rough.turning)}]"
@@ -123,11 +125,11 @@ class Writer:
         if signs == "given":
             value = f"{live} if {sign} == {LIVE} else {value}"
         elif call.function == "sgn":
-            return Line(f"{rough.name} = {value}", sizes)
-        return Line(f"{rough.name} = {value}", sizes | computed_names(call))
+            return CodeLine(f"{rough.name} = {value}", sizes)
+        return CodeLine(f"{rough.name} = {value}", sizes | computed_names(call))
 
     # ------------------------------------------------------------------ what elements read first
-    def element(self, bank: int, reads: frozenset[str], signs: Signs) -> list[Line]:
+    def element(self, bank: int, reads: frozenset[str], signs: Signs) -> list[CodeLine]:
         """Assign what lines read of an element: its variables, and what is computed from them."""
         needed = self.closure(reads)
         owner, y = self.read.owner, self.layout.y
@@ -135,7 +137,7 @@ class Writer:
         for name in self.read.banks[bank].variables:
             if name in needed:
                 place, sizes = self.at("y", y, name)
-                lines.append(Line(f"{self.local(name)} = {place}", sizes))
+                lines.append(CodeLine(f"{self.local(name)} = {place}", sizes))
         for name, value in self.plan.definitions.items():
             if name in needed and owner.get(name) == bank:
                 lines += self.computed(self.local(name), value, signs)
@@ -157,10 +159,10 @@ class Writer:
         self,
         bank: int,
         signs: Signs,
-        before: Sequence[Line] = (),
-        branches: Mapping[str, list[Line]] | None = None,
-        after: Sequence[Line] = (),
-    ) -> list[Line]:
+        before: Sequence[CodeLine] = (),
+        branches: Mapping[str, list[CodeLine]] | None = None,
+        after: Sequence[CodeLine] = (),
+    ) -> list[CodeLine]:
         """Write a loop over the elements of a contact: lines, an if-else over states, lines.
 
         What is computed from the variables is computed where it is read: before the if-else if it
@@ -191,10 +193,10 @@ class Writer:
             return []
         text = f"for i in range({self.sizes[bank]}):"
         return self.outward(
-            bank, [Line(text, frozenset({f"#{self.sizes[bank]}"})), *indented(body)]
+            bank, [CodeLine(text, frozenset({f"#{self.sizes[bank]}"})), *indented(body)]
         )
 
-    def lazily(self, lines: list[Line]) -> list[Line]:
+    def lazily(self, lines: list[CodeLine]) -> list[CodeLine]:
         """Let what takes long be computed in these lines, which may not be reached."""
         names = [
             name
@@ -204,7 +206,7 @@ class Writer:
         if not names:
             return lines
         without = [line._replace(reads=line.reads - {*names}) for line in lines]
-        return [*(Line("", lazy=name) for name in names), *without]
+        return [*(CodeLine("", lazy=name) for name in names), *without]
 
     def takes_long(self, name: str) -> bool:
         """Return whether a shared quantity contains a function such as exp or a power."""
@@ -228,7 +230,7 @@ class Writer:
             if owner.get(name) == bank and name not in parameters and name not in rates
         )
 
-    def outward(self, bank: int, lines: list[Line]) -> list[Line]:
+    def outward(self, bank: int, lines: list[CodeLine]) -> list[CodeLine]:
         """Forget what lines read of an element; its parameters stay, as arrays."""
         inside = {
             name
@@ -237,11 +239,11 @@ class Writer:
         }
         return [line._replace(reads=line.reads - inside) for line in lines]
 
-    def by_state(self, bank: int, branches: Mapping[str, list[Line]]) -> list[Line]:
+    def by_state(self, bank: int, branches: Mapping[str, list[CodeLine]]) -> list[CodeLine]:
         """Write an if-else over the element's state."""
         states = self.names.states[bank]
         filled = [
-            (states[state], body if _does_something(body) else [*body, Line("pass")])
+            (states[state], body if _does_something(body) else [*body, CodeLine("pass")])
             for state, body in branches.items()
         ]
         if not any(_does_something(body) for body in branches.values()):
@@ -254,7 +256,7 @@ class Writer:
             word = "if" if number == 0 else "elif"
             last = number == len(filled) - 1
             head = f"else:  # {constant}" if last else f"{word} {mode} == {constant}:"
-            lines += [Line(head), *indented(body)]
+            lines += [CodeLine(head), *indented(body)]
         return lines
 
     def mode(self, bank: int, element: str = "i") -> str:
@@ -267,7 +269,7 @@ class Writer:
 
     # ------------------------------------------------------------------ functions
     def function(
-        self, signature: str, doc: str, body: list[Line], signs: Signs, *, within: bool = False
+        self, signature: str, doc: str, body: list[CodeLine], signs: Signs, *, within: bool = False
     ) -> list[str]:
         """Assemble a function: signature, the values its body reads, then the body.
 
@@ -276,34 +278,36 @@ class Writer:
         at_once = self.closure(reads_of(body))
         lazy = dict.fromkeys(line.lazy for line in body if line.lazy and line.lazy not in at_once)
         found = {name: self.defined(name, signs) for name in lazy}
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         for line in body:
             if not line.lazy:
                 lines.append(line)
             elif line.lazy in found:
                 name = self.local(line.lazy)
-                made = [Line(f"if {name} != {name}:"), *indented(found[line.lazy])]
+                made = [CodeLine(f"if {name} != {name}:"), *indented(found[line.lazy])]
                 lines += [each._replace(text=line.text + each.text) for each in made]
-        first = [Line(f"{self.local(name)} = nan  # computed where it is read") for name in lazy]
+        first = [
+            CodeLine(f"{self.local(name)} = nan  # computed where it is read") for name in lazy
+        ]
         head = self.head(reads_of(lines) - {*lazy}, signs, self.followed() if within else [])
-        lines = [*head, *first, *lines] or [Line("pass")]
+        lines = [*head, *first, *lines] or [CodeLine("pass")]
         return [f"def {signature}:", f'    """{doc}"""', *(f"    {line.text}" for line in lines)]
 
-    def followed(self) -> list[Line]:
+    def followed(self) -> list[CodeLine]:
         """Write the velocities that locks determine."""
         return []
 
-    def rounded(self, name: str) -> list[Line]:
+    def rounded(self, name: str) -> list[CodeLine]:
         """Write that a value is zero if it is so but for rounding."""
         del name
         return []
 
     def head(
-        self, reads: frozenset[str], signs: Signs, followed: list[Line] | None = None
-    ) -> list[Line]:
+        self, reads: frozenset[str], signs: Signs, followed: list[CodeLine] | None = None
+    ) -> list[CodeLine]:
         """Write what is read before a body: numbers, states, and what is computed from them."""
         needed = self.closure(reads | reads_of(followed or ())) - self.late
-        values: list[Line] = []
+        values: list[CodeLine] = []
         for name in self.read.defined:
             if followed and "." in name:  # the first one of a contact
                 values, followed = values + followed, None
@@ -317,20 +321,22 @@ class Writer:
         sizes = [size for size in self.sizes if f"#{size}" in needed and len(self.sizes) == 1]
         lines = []
         if shared or own or sizes or TABLES in needed:
-            lines.append(Line("shared, own, tables = p"))
-        lines += [Line(f"{self.local(name)} = shared[{j}]") for name, j in shared]
-        lines += [Line(f"{self.local(name)} = own[{j}]") for name, j in own]
+            lines.append(CodeLine("shared, own, tables = p"))
+        lines += [CodeLine(f"{self.local(name)} = shared[{j}]") for name, j in shared]
+        lines += [CodeLine(f"{self.local(name)} = own[{j}]") for name, j in own]
         for size in sizes:
             # After the elements' modes come those of the surfaces: len(mode) says nothing.
             weight = self.names.own.index(self.read.banks[0].weight)
-            lines.append(Line(f"{size} = len(own[{weight}])"))
+            lines.append(CodeLine(f"{size} = len(own[{weight}])"))
         y = self.layout.y
         lines += [
-            Line(f"{self.local(name)} = y[{y.text(name)}]") for name in y.shared if name in needed
+            CodeLine(f"{self.local(name)} = y[{y.text(name)}]")
+            for name in y.shared
+            if name in needed
         ]
         return lines + values
 
-    def defined(self, name: str, signs: Signs) -> list[Line]:
+    def defined(self, name: str, signs: Signs) -> list[CodeLine]:
         """Assign a shared quantity that is computed from others."""
         target = self.local(name)
         value = self.plan.definitions.get(name)
@@ -340,23 +346,23 @@ class Writer:
             return [*self.computed(target, value, signs), *self.rounded(name)]
         if (name, "times") in self.plan.tables.shared:
             return [
-                Line(f"{target} = piecewise_linear(t, {self.table(name)})", frozenset({TABLES}))
+                CodeLine(f"{target} = piecewise_linear(t, {self.table(name)})", frozenset({TABLES}))
             ]
-        return [Line(f"{target} = {name}_signal(t)")]
+        return [CodeLine(f"{target} = {name}_signal(t)")]
 
-    def curve(self, name: str, value: Computed, signs: Signs) -> list[Line]:
+    def curve(self, name: str, value: Computed, signs: Signs) -> list[CodeLine]:
         """Assign a Stribeck curve; where it is flat to the last bit, exp would be lost."""
         contact = name.removesuffix("curve S")
         (bank,) = [each for each in self.read.banks if of(each.name, "") == contact]
         v, F_c, flat = bank.velocities[0], f"{contact}curve F_c", f"{contact}curve v flat"
         *calls, line = self.computed(self.local(name), value, signs, "  # (2)")
         test = f"if abs({self.local(v)}) > {self.local(flat)}:"
-        constant = Line(f"{self.local(name)} = {self.local(F_c)}", frozenset({F_c}))
+        constant = CodeLine(f"{self.local(name)} = {self.local(F_c)}", frozenset({F_c}))
         return [
             *calls,
-            Line(test, frozenset({v, flat})),
+            CodeLine(test, frozenset({v, flat})),
             *indented([constant]),
-            Line("else:"),
+            CodeLine("else:"),
             *indented([line]),
         ]
 

@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
-from gms_fsm.lowering._forces import Forces
-from gms_fsm.lowering._lines import Line
+from gms_fsm.lowering._forces import ForceWriter
+from gms_fsm.lowering._lines import CodeLine
 from gms_fsm.lowering._locks import ENDLESS
 from integrators import LET_GO
 
 __all__ = ["LockFunctions"]
 
 
-class LockFunctions(Forces):
+class LockFunctions(ForceWriter):
     """Writes these functions; without locks they are empty."""
 
-    def moved_locks(self) -> list[Line]:
+    def moved_locks(self) -> list[CodeLine]:
         """Write that the force on a locked contact that an impulse has moved has no limit."""
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         for bank in self.read.banks if self.locking else ():
             if bank.locked:
-                lines.append(Line(f"if jolt[{self.machine(bank.index, '0')}] == {LET_GO}:"))
+                lines.append(CodeLine(f"if jolt[{self.machine(bank.index, '0')}] == {LET_GO}:"))
                 for force, v in zip(bank.forces, bank.velocities, strict=True):
                     text = f"    {self.local(force)} = {self.local(v)} * {ENDLESS}"
-                    lines.append(Line(text, frozenset({v})))
+                    lines.append(CodeLine(text, frozenset({v})))
         return lines
 
     def follow(self) -> list[str]:
-        y, lines = self.layout.y, list[Line]()
+        y, lines = self.layout.y, list[CodeLine]()
         if self.locking:
             lines = self.locks.following()
             for each in self.locks.followers():
                 v = self.locks.velocity(self.locks.bodies[each])
-                lines.append(Line(f"y[{y.text(v)}] = {self.local(v)}", frozenset({v})))
+                lines.append(CodeLine(f"y[{y.text(v)}] = {self.local(v)}", frozenset({v})))
         return self.function(
             "follow(t, y, mode, held, p)",
             "y = the velocities that locked contacts determine.",

@@ -24,7 +24,7 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
 from gms_fsm.language import Binary, Name, Negative, Number, Value, names_in, spell
-from gms_fsm.lowering._lines import Line, Writer, indented
+from gms_fsm.lowering._lines import CodeLine, ProgramWriter, indented
 from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import times
 from gms_fsm.systems.system import Body
@@ -66,11 +66,11 @@ class Locks:
 
     Parameters
     ----------
-    writer : Writer
+    writer : ProgramWriter
         Of its program.
     """
 
-    def __init__(self, writer: Writer) -> None:
+    def __init__(self, writer: ProgramWriter) -> None:
         self.writer, self.read = writer, writer.read
         self.bodies = {body.name: body for body in self.read.system.bodies}
         self.rows = [
@@ -113,7 +113,7 @@ class Locks:
         return total
 
     # ------------------------------------------------------------------ the equations
-    def solve(self, right: Mapping[int, Value]) -> list[Line]:
+    def solve(self, right: Mapping[int, Value]) -> list[CodeLine]:
         """Write the solution hold_r of the equations, with flags l_r and right sides."""
         put, rows = self.writer.put, range(len(self.rows))
         entries = {
@@ -131,16 +131,16 @@ class Locks:
         for k in order:
             below = [r for r in order if (r, k) in lower]
             lower |= {(r, s) for r in below for s in below if place[r] > place[s]}
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         for s in order:
             diagonal = entries[s, s]
             lines.append(put(f"W_{s}", diagonal))
             less = "".join(f" - L_{s}_{k} * L_{s}_{k} * D_{k}" for k in order if (s, k) in lower)
             lines += [
-                Line(f"D_{s} = W_{s}{less}"),
-                Line(f"if l_{s} == 0.0 or D_{s} <= {DEPENDENT} * W_{s}:"),
-                Line(f"    l_{s} = 0.0"),
-                Line(f"    D_{s} = 1.0"),
+                CodeLine(f"D_{s} = W_{s}{less}"),
+                CodeLine(f"if l_{s} == 0.0 or D_{s} <= {DEPENDENT} * W_{s}:"),
+                CodeLine(f"    l_{s} = 0.0"),
+                CodeLine(f"    D_{s} = 1.0"),
             ]
             for r in order:
                 if (r, s) in lower:
@@ -152,16 +152,20 @@ class Locks:
                         for k in order
                         if (r, k) in lower and (s, k) in lower
                     )
-                    lines.append(Line(f"L_{r}_{s} = l_{r} * l_{s} * ({text}{less}) / D_{s}", reads))
+                    lines.append(
+                        CodeLine(f"L_{r}_{s} = l_{r} * l_{s} * ({text}{less}) / D_{s}", reads)
+                    )
         for r in order:
             value = right[r]
             less = "".join(f" - L_{r}_{k} * w_{k}" for k in order if (r, k) in lower)
             lines.append(
-                Line(f"w_{r} = l_{r} * ({self.writer.spell(value)}{less})", computed_names(value))
+                CodeLine(
+                    f"w_{r} = l_{r} * ({self.writer.spell(value)}{less})", computed_names(value)
+                )
             )
         for r in reversed(order):
             less = "".join(f" - L_{k}_{r} * hold_{k}" for k in order if (k, r) in lower)
-            lines.append(Line(f"hold_{r} = w_{r} / D_{r}{less}"))
+            lines.append(CodeLine(f"hold_{r} = w_{r} / D_{r}{less}"))
         return lines
 
     def order(self, links: Set[tuple[int, int]]) -> list[int]:
@@ -208,7 +212,7 @@ class Locks:
 
     def exact(
         self, name_of: Mapping[str, str], target: Mapping[int, str] | None = None
-    ) -> list[Line]:
+    ) -> list[CodeLine]:
         """Set the dependent accelerations, or velocities, exactly."""
         loops, leaves = self.sequence()
         goals = target or {}
@@ -222,7 +226,7 @@ class Locks:
                 text = f"({text}) / ({spelled})"
                 reads |= computed_names(coefficient)
             local = self.writer.local(name_of[body])
-            lines += [Line(f"if l_{r} > 0.0:"), Line(f"    {local} = {text}", reads)]
+            lines += [CodeLine(f"if l_{r} > 0.0:"), CodeLine(f"    {local} = {text}", reads)]
         return lines
 
     def rest(
@@ -240,21 +244,21 @@ class Locks:
 
     def eliminated(
         self, loops: list[int], name_of: Mapping[str, str], goals: Mapping[int, str]
-    ) -> list[Line]:
+    ) -> list[CodeLine]:
         """Set what rows determine that close loops: by Gauss and Jordan, the largest one first.
 
         The rows that hold are known only while it runs, so each has its pivot q found there.
         """
         bodies = [*dict.fromkeys(body for r in loops for body in self.free(self.rows[r].row))]
-        columns, lines = range(len(bodies)), list[Line]()
+        columns, lines = range(len(bodies)), list[CodeLine]()
 
-        def minus(r: int, s: int, pivot: int) -> list[Line]:
+        def minus(r: int, s: int, pivot: int) -> list[CodeLine]:
             others = [j for j in columns if j != pivot]
             return [
-                Line(f"u = e_{r}_{pivot}"),
-                *(Line(f"e_{r}_{j} = e_{r}_{j} - u * e_{s}_{j}") for j in others),
-                Line(f"e_{r}_{pivot} = 0.0"),
-                Line(f"g_{r} = g_{r} - u * g_{s}"),
+                CodeLine(f"u = e_{r}_{pivot}"),
+                *(CodeLine(f"e_{r}_{j} = e_{r}_{j} - u * e_{s}_{j}") for j in others),
+                CodeLine(f"e_{r}_{pivot} = 0.0"),
+                CodeLine(f"g_{r} = g_{r} - u * g_{s}"),
             ]
 
         for k, r in enumerate(loops):
@@ -264,24 +268,27 @@ class Locks:
                 lines.append(put(f"e_{r}_{j}", free.get(body, Number(0.0))))
             text, reads = self.rest(r, free.keys(), name_of, goals)
             size = " + ".join(f"abs(e_{r}_{j})" for j in columns)
-            lines += [Line(f"g_{r} = {text}", reads), Line(f"best = {DEPENDENT} * ({size})")]
+            lines += [
+                CodeLine(f"g_{r} = {text}", reads),
+                CodeLine(f"best = {DEPENDENT} * ({size})"),
+            ]
             for s in loops[:k]:
                 for j in columns:
-                    lines += [Line(f"if q_{s} == {j}:"), *indented(minus(r, s, j))]
-            lines.append(Line(f"q_{r} = -1"))
+                    lines += [CodeLine(f"if q_{s} == {j}:"), *indented(minus(r, s, j))]
+            lines.append(CodeLine(f"q_{r} = -1"))
             for j in columns:
                 lines += [
-                    Line(f"if l_{r} > 0.0 and abs(e_{r}_{j}) > best:"),
-                    Line(f"    best = abs(e_{r}_{j})"),
-                    Line(f"    q_{r} = {j}"),
+                    CodeLine(f"if l_{r} > 0.0 and abs(e_{r}_{j}) > best:"),
+                    CodeLine(f"    best = abs(e_{r}_{j})"),
+                    CodeLine(f"    q_{r} = {j}"),
                 ]
             for j in columns:
-                inside = [Line(f"u = e_{r}_{j}"), Line(f"g_{r} = g_{r} / u")]
-                inside += [Line(f"e_{r}_{i} = e_{r}_{i} / u") for i in columns if i != j]
-                inside += [Line(f"e_{r}_{j} = 1.0")]
+                inside = [CodeLine(f"u = e_{r}_{j}"), CodeLine(f"g_{r} = g_{r} / u")]
+                inside += [CodeLine(f"e_{r}_{i} = e_{r}_{i} / u") for i in columns if i != j]
+                inside += [CodeLine(f"e_{r}_{j} = 1.0")]
                 for s in loops[:k]:
                     inside += minus(s, r, j)
-                lines += [Line(f"if q_{r} == {j}:"), *indented(inside)]
+                lines += [CodeLine(f"if q_{r} == {j}:"), *indented(inside)]
         for r in loops:
             for j, body in enumerate(bodies):
                 local = self.writer.local(name_of[body])
@@ -291,8 +298,8 @@ class Locks:
                     if i != j
                 ]
                 reads = frozenset(name_of[other] for other in bodies)
-                inside = [Line(f"{local} = g_{r}{''.join(terms)}", reads)]
-                lines += [Line(f"if q_{r} == {j}:"), *indented(inside)]
+                inside = [CodeLine(f"{local} = g_{r}{''.join(terms)}", reads)]
+                lines += [CodeLine(f"if q_{r} == {j}:"), *indented(inside)]
         return lines
 
     def sequence(self) -> tuple[list[int], list[tuple[int, str]]]:
@@ -328,10 +335,10 @@ class Locks:
         place, states = self.writer.mode(bank.index, "0"), self.writer.names.states[bank.index]
         return " or ".join(f"{place} == {states[each]}" for each in bank.locked) or "False"
 
-    def flags(self) -> list[Line]:
+    def flags(self) -> list[CodeLine]:
         """Write which locks hold in the present modes."""
         rows = range(len(self.rows))
-        return [Line(f"l_{r} = 1.0 if {self.locking(r)} else 0.0") for r in rows]
+        return [CodeLine(f"l_{r} = 1.0 if {self.locking(r)} else 0.0") for r in rows]
 
     def speed(self, body: str, coefficient: Value) -> str:
         """Spell the size of a term of a relative velocity."""
@@ -340,36 +347,36 @@ class Locks:
             return size
         return f"abs({self.writer.spell(coefficient)}) * {size}"
 
-    def rounded(self, name: str, row: Mapping[str, Value]) -> list[Line]:
+    def rounded(self, name: str, row: Mapping[str, Value]) -> list[CodeLine]:
         """Write that a relative velocity is zero if it is so but for rounding."""
         local = self.writer.local(name)
         size = " + ".join(self.speed(body, coefficient) for body, coefficient in row.items())
         reads = frozenset(self.velocity(self.bodies[body]) for body in row)
         reads = reads.union(*(computed_names(coefficient) for coefficient in row.values()))
         return [
-            Line(f"if abs({local}) <= {LAST_PLACES} * ({size}):", reads),
-            Line(f"    {local} = 0.0"),
+            CodeLine(f"if abs({local}) <= {LAST_PLACES} * ({size}):", reads),
+            CodeLine(f"    {local} = 0.0"),
         ]
 
-    def following(self) -> list[Line]:
+    def following(self) -> list[CodeLine]:
         """Write the velocities that locks determine."""
         names = {name: self.velocity(body) for name, body in self.bodies.items()}
         return [*self.flags(), *self.exact(names)]
 
-    def forces(self) -> list[Line]:
+    def forces(self) -> list[CodeLine]:
         """Write the forces of locked contacts, and the accelerations with them."""
         names = {name: f"{name} a" for name in self.bodies}
         lines = self.flags()
         lines += self.solve({r: self.relative(each.row, names) for r, each in enumerate(self.rows)})
         for r, each in enumerate(self.rows):
             force = self.writer.local(self.read.banks[each.bank].forces[each.velocity])
-            inside = [Line(f"{force} = {force} + hold_{r}"), *self.shares(r, names)]
-            lines += [Line(f"if l_{r} > 0.0:"), *indented(inside)]
+            inside = [CodeLine(f"{force} = {force} + hold_{r}"), *self.shares(r, names)]
+            lines += [CodeLine(f"if l_{r} > 0.0:"), *indented(inside)]
         return [*lines, *self.exact(names), *self.contradicted(names)]
 
-    def contradicted(self, names: Mapping[str, str]) -> list[Line]:
+    def contradicted(self, names: Mapping[str, str]) -> list[CodeLine]:
         """Write that no force holds a contact where other locks, or what is driven, move it."""
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         for r, each in enumerate(self.rows):
             bank = self.read.banks[each.bank]
             if not bank.locked or self.always_holds(r):
@@ -382,10 +389,10 @@ class Locks:
             force = self.writer.local(bank.forces[each.velocity])
             reads = computed_names(tree)
             lines += [
-                Line(f"if l_{r} == 0.0 and ({self.locking(r)}):"),
-                Line(f"    u = {self.writer.spell(tree)}", reads),
-                Line(f"    if abs(u) > {DEPENDENT} * ({size}):", reads),
-                Line(f"        {force} = {force} + u * {ENDLESS}"),
+                CodeLine(f"if l_{r} == 0.0 and ({self.locking(r)}):"),
+                CodeLine(f"    u = {self.writer.spell(tree)}", reads),
+                CodeLine(f"    if abs(u) > {DEPENDENT} * ({size}):", reads),
+                CodeLine(f"        {force} = {force} + u * {ENDLESS}"),
             ]
         return lines
 
@@ -393,7 +400,7 @@ class Locks:
         """Return whether a row is independent of the others, whichever of them hold."""
         return r not in self.sequence()[0] and self.joins_trees()
 
-    def shares(self, r: int, names: Mapping[str, str]) -> list[Line]:
+    def shares(self, r: int, names: Mapping[str, str]) -> list[CodeLine]:
         """Write what the force, or impulse, of a row does to the bodies."""
         lines = []
         for body, coefficient in self.free(self.rows[r].row).items():
@@ -401,63 +408,70 @@ class Locks:
             share = "" if coefficient == Number(1.0) else f"({self.writer.spell(coefficient)}) * "
             text = f"{local} = {local} - {share}hold_{r} / ({self.writer.spell(inertia)})"
             own = frozenset() if names[body].endswith(" a") else frozenset({names[body]})
-            lines.append(Line(text, computed_names(coefficient) | computed_names(inertia) | own))
+            lines.append(
+                CodeLine(text, computed_names(coefficient) | computed_names(inertia) | own)
+            )
         return lines
 
     # ------------------------------------------------------------------ impulses
-    def no_impulse(self) -> list[Line]:
+    def no_impulse(self) -> list[CodeLine]:
         """Write that no velocity is to be set."""
         rows = range(len(self.rows))
         return [
-            Line("hit = 0"),
-            *(Line(f"{name}_{r} = 0.0") for r in rows for name in ("goal", "set")),
+            CodeLine("hit = 0"),
+            *(CodeLine(f"{name}_{r} = 0.0") for r in rows for name in ("goal", "set")),
         ]
 
-    def hit(self, bank: int, targets: Mapping[int, Line], *, impulse: bool) -> list[Line]:
+    def hit(self, bank: int, targets: Mapping[int, CodeLine], *, impulse: bool) -> list[CodeLine]:
         """Write that velocities of a contact are set next.
 
         Parameters
         ----------
         bank : int
             The contact.
-        targets : mapping of int to Line
+        targets : mapping of int to CodeLine
             By velocity, its new value.
         impulse : bool
             Whether they may be far from it; else they have passed it by rounding only.
         """
-        lines = [Line(f"hit = {2 if impulse else 1}")]
+        lines = [CodeLine(f"hit = {2 if impulse else 1}")]
         for q, goal in targets.items():
             r = self.number(bank, q)
-            lines += [Line(f"set_{r} = 1.0"), Line(f"goal_{r} = {goal.text}", goal.reads)]
+            lines += [CodeLine(f"set_{r} = 1.0"), CodeLine(f"goal_{r} = {goal.text}", goal.reads)]
         return lines
 
-    def impulse(self) -> list[Line]:
+    def impulse(self) -> list[CodeLine]:
         """Write the impulse that sets the velocities asked for and keeps those of held locks."""
         names = {name: self.velocity(body) for name, body in self.bodies.items()}
         rows = range(len(self.rows))
-        keep = [Line(f"keep_{r} = 1.0 if {self.locking(r)} else set_{r}") for r in rows]
+        keep = [CodeLine(f"keep_{r} = 1.0 if {self.locking(r)} else set_{r}") for r in rows]
         right: dict[int, Value] = {}
         for r, each in enumerate(self.rows):
             right[r] = Binary("-", self.relative(each.row, names), Name(f"goal_{r}"))
-        solved = [*(Line(f"l_{r} = keep_{r}") for r in rows), *self.solve(right)]
+        solved = [*(CodeLine(f"l_{r} = keep_{r}") for r in rows), *self.solve(right)]
         if letting := self.letting():
-            inside = [Line("again = 0"), *solved]
-            solved = [Line("again = 1"), Line("while again == 1:"), *indented(inside + letting)]
+            inside = [CodeLine("again = 0"), *solved]
+            solved = [
+                CodeLine("again = 1"),
+                CodeLine("while again == 1:"),
+                *indented(inside + letting),
+            ]
         lines = [*keep, *solved]
         moved: dict[str, None] = {}
         for r, each in enumerate(self.rows):
             moved |= dict.fromkeys(self.free(each.row))
-            lines += [Line(f"if l_{r} > 0.0:"), *indented(self.shares(r, names))]
+            lines += [CodeLine(f"if l_{r} > 0.0:"), *indented(self.shares(r, names))]
         lines += self.exact(names, {r: f"goal_{r}" for r in rows})
         y = self.writer.layout.y
         lines += [
-            Line(f"y[{y.text(names[body])}] = {self.writer.local(names[body])}") for body in moved
+            CodeLine(f"y[{y.text(names[body])}] = {self.writer.local(names[body])}")
+            for body in moved
         ]
-        return [Line("if hit > 0:"), *indented(lines)]
+        return [CodeLine("if hit > 0:"), *indented(lines)]
 
-    def letting(self) -> list[Line]:
+    def letting(self) -> list[CodeLine]:
         """Write which lock lets go instead of carrying the impulse: the first one that does."""
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         for bank in self.read.banks:
             first = [r for r, each in enumerate(self.rows) if each.bank == bank.index]
             place = self.writer.mode(bank.index, "0")
@@ -473,23 +487,25 @@ class Locks:
                 word = "elif" if lines else "if"
                 free = f"hit == 2 and keep_{first[0]} > 0.0 and set_{first[0]} == 0.0"
                 reads = computed_names(edge.guard) - {*bank.forces}
-                lines.append(Line(f"{word} {free} and {place} == {state} and ({guard}):", reads))
-                lines += [Line(f"    keep_{r} = 0.0") for r in first]
-                lines.append(Line("    again = 1"))
+                lines.append(
+                    CodeLine(f"{word} {free} and {place} == {state} and ({guard}):", reads)
+                )
+                lines += [CodeLine(f"    keep_{r} = 0.0") for r in first]
+                lines.append(CodeLine("    again = 1"))
         return lines
 
-    def jolts(self) -> list[Line]:
+    def jolts(self) -> list[CodeLine]:
         """Write which contacts have been moved by more than the motion itself moves them."""
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         for bank in self.read.banks:
             first = [r for r, each in enumerate(self.rows) if each.bank == bank.index]
             if not bank.locked:
                 continue
-            lines += [Line("moved = 0"), Line("moves = 0")]
+            lines += [CodeLine("moved = 0"), CodeLine("moves = 0")]
             for r in first:
                 row = self.rows[r].row
                 v = bank.velocities[self.rows[r].velocity]
-                lines.append(Line("reach = 0.0"))
+                lines.append(CodeLine("reach = 0.0"))
                 for body, coefficient in row.items():
                     name = self.velocity(self.bodies[body])
                     size = f"{ROUNDING} * abs({self.writer.local(name)})"
@@ -499,22 +515,22 @@ class Locks:
                     if coefficient != Number(1.0):
                         size = f"abs({self.writer.spell(coefficient)}) * {size}"
                     reads = computed_names(coefficient) | {name}
-                    lines.append(Line(f"reach = reach + {size}", reads))
+                    lines.append(CodeLine(f"reach = reach + {size}", reads))
                 local = self.writer.local(v)
                 lines += [
-                    Line(f"if abs({local} - was[{r}]) > reach:", frozenset({v})),
-                    Line("    moved = 1"),
-                    Line(f"if abs({local}) > reach:"),
-                    Line("    moves = 1"),
-                    Line(f"was[{r}] = {local}"),
+                    CodeLine(f"if abs({local} - was[{r}]) > reach:", frozenset({v})),
+                    CodeLine("    moved = 1"),
+                    CodeLine(f"if abs({local}) > reach:"),
+                    CodeLine("    moves = 1"),
+                    CodeLine(f"was[{r}] = {local}"),
                 ]
             jolt = f"jolt[{self.writer.machine(bank.index, '0')}]"
             lines += [
-                Line("if mark > 0:"),
-                Line(f"    if {self.locking(first[0])}:"),
-                Line(f"        {jolt} = {LET_GO} * moves"),
-                Line("    elif moved + moves == 2:"),
-                Line(f"        {jolt} = {JUMPED}"),
+                CodeLine("if mark > 0:"),
+                CodeLine(f"    if {self.locking(first[0])}:"),
+                CodeLine(f"        {jolt} = {LET_GO} * moves"),
+                CodeLine("    elif moved + moves == 2:"),
+                CodeLine(f"        {jolt} = {JUMPED}"),
             ]
         return lines
 

@@ -10,7 +10,7 @@ from gms_fsm.language import Binary, Name, Node, product_power
 from gms_fsm.lowering.layout import sizes_of
 from gms_fsm.systems._assembly import Assembly, Bank
 
-__all__ = ["Names", "computed_names", "names_of"]
+__all__ = ["QuantityNames", "computed_names", "names_of"]
 
 # Names that the text uses itself. What a user calls like one of them is called otherwise there.
 TEXT = frozenset(
@@ -22,7 +22,7 @@ TEXT = frozenset(
 
 
 @dataclass(frozen=True, eq=False)
-class Names:
+class QuantityNames:
     """The names of quantities in the text.
 
     Parameters
@@ -83,7 +83,7 @@ def computed_names(node: Node) -> frozenset[str]:
     return frozenset[str]().union(*(computed_names(part) for part in node.parts))
 
 
-def names_of(read: Assembly) -> Names:
+def names_of(read: Assembly) -> QuantityNames:
     """Choose the names of a system's program.
 
     Parameters
@@ -93,7 +93,7 @@ def names_of(read: Assembly) -> Names:
 
     Returns
     -------
-    Names
+    QuantityNames
         Without clashes.
 
     Examples
@@ -144,7 +144,7 @@ def names_of(read: Assembly) -> Names:
                 for edge in bank.edges
             )
         )
-    return Names(
+    return QuantityNames(
         shared=tuple(read.shared),
         own=tuple(read.own),
         local=local,

@@ -28,13 +28,13 @@ from gms_fsm.language import (
     turning_inside,
 )
 from gms_fsm.language._functions import ROUGH
-from gms_fsm.lowering._names import Names, names_of
-from gms_fsm.lowering.layout import Layout, sizes_of
-from gms_fsm.lowering.places import Block, Places
+from gms_fsm.lowering._names import QuantityNames, names_of
+from gms_fsm.lowering.layout import SystemLayout, sizes_of
+from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.systems._assembly import ONE, Assembly, Bank, of
 from gms_fsm.systems.signals import Corners, Function
 
-__all__ = ["BankPlan", "Computed", "Gradient", "Pair", "Plan", "RoughCall", "StateFlow"]
+__all__ = ["BankPlan", "Computed", "Gradient", "Pair", "ProgramPlan", "RoughCall", "StateFlow"]
 __all__ += ["both_sides", "gradient_of", "plan_of", "times"]
 
 
@@ -177,7 +177,7 @@ class Gradient:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class ProgramPlan:
     """Everything that a program computes.
 
     Parameters
@@ -186,9 +186,9 @@ class Plan:
         Names the charts and the system.
     read : Assembly
         The system, read.
-    names : Names
+    names : QuantityNames
         The names in the text.
-    layout : Layout
+    layout : SystemLayout
         The layout of all arrays.
     tables : Places
         The places of the times and values of each table of corners.
@@ -217,8 +217,8 @@ class Plan:
 
     title: str
     read: Assembly
-    names: Names
-    layout: Layout
+    names: QuantityNames
+    layout: SystemLayout
     tables: Places[tuple[str, str]]
     definitions: Mapping[str, Computed]
     banks: tuple[BankPlan, ...]
@@ -232,7 +232,7 @@ class Plan:
     gradients: tuple[Gradient, ...]
 
 
-def plan_of(read: Assembly) -> Plan:
+def plan_of(read: Assembly) -> ProgramPlan:
     """Plan the program of a system.
 
     Parameters
@@ -242,7 +242,7 @@ def plan_of(read: Assembly) -> Plan:
 
     Returns
     -------
-    Plan
+    ProgramPlan
         For a printer.
 
     Examples
@@ -264,7 +264,7 @@ def plan_of(read: Assembly) -> Plan:
     surfaces: Places[Value | Pair] = Places(
         tuple(u for u in held.shared if _can_be_slid_on(u, read)),
         tuple(
-            Block(
+            ElementPlaces(
                 (*(u for u in block.names if _can_be_slid_on(u, read)), *_pairs(bank, read)),
                 block.n,
                 block.size,
@@ -276,11 +276,11 @@ def plan_of(read: Assembly) -> Plan:
     always = [relation for u in outer for relation in both_sides(u)] + landmarks
     smoothing = _Smoothing(held, names)
     charts = " and ".join(dict.fromkeys(bank.chart.name for bank in read.banks))
-    return Plan(
+    return ProgramPlan(
         title=f"{charts}, {read.system.name}",
         read=read,
         names=names,
-        layout=Layout.of(read, surfaces.size),
+        layout=SystemLayout.of(read, surfaces.size),
         tables=Places(
             tuple(
                 (name, column)
@@ -312,7 +312,7 @@ def plan_of(read: Assembly) -> Plan:
 class _Smoothing:
     """Removes rough calls from values."""
 
-    def __init__(self, held: Places[Value], names: Names) -> None:
+    def __init__(self, held: Places[Value], names: QuantityNames) -> None:
         self.taken, self.labels = names.taken, _labels(held, names)
         self.turning = {
             f"{function}_{label}": u for u, label in self.labels.items() for function in ROUGH
@@ -343,7 +343,7 @@ class _Smoothing:
         return self.named[call]
 
 
-def _labels(held: Places[Value], names: Names) -> dict[Value, str]:
+def _labels(held: Places[Value], names: QuantityNames) -> dict[Value, str]:
     """Return the label of each held sign, used in the names of its rough calls."""
     labels: dict[Value, str] = {}
     for number, u in enumerate([*held.shared, *held.own]):
@@ -416,7 +416,7 @@ def _parted(found: Iterable[Value], read: Assembly) -> Places[Value]:
     return Places(
         tuple(u for u in owners if owners[u] is None),
         tuple(
-            Block(tuple(u for u in owners if owners[u] == bank.index), bank.n, size)
+            ElementPlaces(tuple(u for u in owners if owners[u] == bank.index), bank.n, size)
             for bank, size in zip(read.banks, sizes, strict=True)
         ),
     )
@@ -529,7 +529,7 @@ def _relations(
     return Places(
         tuple(r for r in found if owners[r] is None),
         tuple(
-            Block(tuple(r for r in found if owners[r] == bank.index), bank.n, size)
+            ElementPlaces(tuple(r for r in found if owners[r] == bank.index), bank.n, size)
             for bank, size in zip(read.banks, sizes, strict=True)
         ),
     )

@@ -18,10 +18,10 @@ from gms_fsm.language import (
     names_in,
     split,
 )
-from gms_fsm.lowering._lines import Line, Signs, indented, one_line, reads_of
+from gms_fsm.lowering._lines import CodeLine, Signs, indented, one_line, reads_of
 from gms_fsm.lowering._lock_functions import LockFunctions
 from gms_fsm.lowering._names import computed_names
-from gms_fsm.lowering._plan import Gradient, Pair, Plan, both_sides
+from gms_fsm.lowering._plan import Gradient, Pair, ProgramPlan, both_sides
 from gms_fsm.lowering.places import total
 from gms_fsm.systems._assembly import Bank, Edge, of
 from integrators import FOR_A_GUARD, FOR_A_SIGN, JUMPED, LIVE, WAITING
@@ -50,22 +50,22 @@ class Phase:
 
     Parameters
     ----------
-    lines : list of Line
+    lines : list of CodeLine
         Assignments.
     hits : bool
         An impulse follows them, and the next phase starts with the velocities after it.
     """
 
-    lines: list[Line]
+    lines: list[CodeLine]
     hits: bool
 
 
-def python(plan: Plan) -> str:
+def python(plan: ProgramPlan) -> str:
     """Return a program as Python text.
 
     Parameters
     ----------
-    plan : Plan
+    plan : ProgramPlan
         Of the program.
 
     Returns
@@ -84,7 +84,7 @@ def python(plan: Plan) -> str:
     >>> print(python(plan).splitlines()[3])
     STICK, SLIP = 0, 1  # states
     """
-    printer = _Printer(plan)
+    printer = _PythonPrinter(plan)
     lines = [
         f"# {one_line(plan.title)}",
         "# Generated from the chart; parameters are arguments, so one text serves all values.",
@@ -113,7 +113,7 @@ def python(plan: Plan) -> str:
     return "\n".join(lines) + "\n"
 
 
-class _Printer(LockFunctions):
+class _PythonPrinter(LockFunctions):
     """Prints the functions of a plan."""
 
     # ------------------------------------------------------------------ the functions
@@ -127,10 +127,10 @@ class _Printer(LockFunctions):
             pairs = [u for u in self.plan.surfaces.own if isinstance(u, Pair)]
             skipped = {name for u in pairs if u.bank == bank.index for name in (u.rise, u.fall)}
             slides = slides or bool(skipped)
-            branches: dict[str, list[Line]] = {}
+            branches: dict[str, list[CodeLine]] = {}
             jolt = f"jolt[{self.machine(bank.index)}]"
             for state in bank.states:
-                rows: list[Line] = []
+                rows: list[CodeLine] = []
                 leaving = self.leaving(bank, state)
                 # Where the velocity has jumped, an arrest would take it: another edge, or none.
                 refused = [(edge, f"-2 - {constant}") for edge, constant in leaving if edge.arrests]
@@ -141,13 +141,13 @@ class _Printer(LockFunctions):
                     if edge.name in skipped:
                         guard = f"skip != {constant} and {guard}"
                     rows += [
-                        Line(f"{word} {guard}:", computed_names(edge.guard)),
-                        Line(f"    edge = {constant}  # {state} -> {edge.target}"),
+                        CodeLine(f"{word} {guard}:", computed_names(edge.guard)),
+                        CodeLine(f"    edge = {constant}  # {state} -> {edge.target}"),
                     ]
                 branches[state] = rows
             place = f"out[{self.machine(bank.index)}]"
-            before = [Line("edge = -1")] + [Line(f"skip = {place}")] * bool(skipped)
-            after = [Line(f"{place} = edge")]
+            before = [CodeLine("edge = -1")] + [CodeLine(f"skip = {place}")] * bool(skipped)
+            after = [CodeLine(f"{place} = edge")]
             lines += self.loop(bank.index, "live", before, branches if bank.edges else None, after)
         doc = "out[i] = the first edge of element i whose guard holds, or -1"
         return self.function(
@@ -204,28 +204,28 @@ class _Printer(LockFunctions):
             "live",
         )
 
-    def dispatched(self, phases: Sequence[Mapping[str, Phase]]) -> list[Line]:
+    def dispatched(self, phases: Sequence[Mapping[str, Phase]]) -> list[CodeLine]:
         """Write one phase of what the edges do, by contact and edge."""
-        lines, several, word = list[Line](), len(self.read.banks) > 1, "if"
+        lines, several, word = list[CodeLine](), len(self.read.banks) > 1, "if"
         for bank, found in zip(self.read.banks, phases, strict=True):
-            inner: list[Line] = []
+            inner: list[CodeLine] = []
             for edge, constant in zip(bank.edges, self.names.edges[bank.index], strict=True):
                 if edge.name in found:
                     test = f"{'elif' if inner else 'if'} edge == {constant}:"
-                    inner += [Line(test), *indented(found[edge.name].lines)]
+                    inner += [CodeLine(test), *indented(found[edge.name].lines)]
             first = self.element(bank.index, self.own(bank.index, reads_of(inner)), "live")
             body = self.outward(bank.index, [*first, *inner])
             if several and inner:
                 first_machine = total(self.sizes[: bank.index])
-                lines.append(Line(f"{word} edge <= {self.names.edges[bank.index][-1]}:"))
-                body = indented([Line(f"i = machine - {first_machine}"), *body])
+                lines.append(CodeLine(f"{word} edge <= {self.names.edges[bank.index][-1]}:"))
+                body = indented([CodeLine(f"i = machine - {first_machine}"), *body])
                 word = "elif"
             lines += body
         return lines
 
     def phases(self, bank: Bank, edge: Edge) -> list[Phase]:
         """Write what happens when an edge is taken; every impulse ends a phase."""
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         found: list[Phase] = []
         for name, value in edge.steps:
             # What is computed from variables is computed again from what they are now.
@@ -233,17 +233,17 @@ class _Printer(LockFunctions):
             if name in bank.variables:
                 lines.append(self.put(self.local(name), tree))
                 place, sizes = self.at("y", self.layout.y, name)
-                lines.append(Line(f"{place} = {self.local(name)}", sizes))
+                lines.append(CodeLine(f"{place} = {self.local(name)}", sizes))
             else:
-                goal = Line(self.spell(tree), computed_names(tree))
+                goal = CodeLine(self.spell(tree), computed_names(tree))
                 targets = {bank.velocities.index(name): goal}
                 hit = self.locks.hit(bank.index, targets, impulse=True)
                 found.append(Phase([*lines, *hit], hits=True))
                 lines = []
         target = self.names.states[bank.index][edge.target]
-        lines.append(Line(f"{self.mode(bank.index)} = {target}"))
+        lines.append(CodeLine(f"{self.mode(bank.index)} = {target}"))
         if edge.locks:
-            every = dict.fromkeys(range(len(bank.velocities)), Line("0.0"))
+            every = dict.fromkeys(range(len(bank.velocities)), CodeLine("0.0"))
             lines += self.locks.hit(bank.index, every, impulse=bank.is_impulse(edge))
         return [*found, Phase(lines, hits=edge.locks)]
 
@@ -257,7 +257,7 @@ class _Printer(LockFunctions):
             return value
         return self.read.expanded(value)
 
-    def velocities_again(self) -> list[Line]:
+    def velocities_again(self) -> list[CodeLine]:
         """Write the relative velocities anew, after an impulse."""
         return [
             line
@@ -275,17 +275,19 @@ class _Printer(LockFunctions):
         free = {body.name for body in self.read.free}
         lines = self.forces(signs, wanted=bool(free), rates=True)
         for body in self.read.system.bodies:
-            lines.append(Line(f"dy[{y.text(body.x)}] = {self.local(body.v)}", frozenset({body.v})))
+            lines.append(
+                CodeLine(f"dy[{y.text(body.x)}] = {self.local(body.v)}", frozenset({body.v}))
+            )
             if body.name in free:
                 place = f"dy[{y.text(body.v)}]"
                 if self.locking:
-                    lines.append(Line(f"{place} = {self.local(f'{body.name} a')}"))
+                    lines.append(CodeLine(f"{place} = {self.local(f'{body.name} a')}"))
                 else:
                     lines += self.computed(place, self.plan.accelerations[body.name], signs)
         for name, value in self.plan.flow.items():
             lines += self.computed(f"dy[{y.text(name)}]", value, signs)
         for each in self.read.system.sampled:
-            lines += [Line(f"dy[{y.text(name)}] = 0.0") for name in each.updates]
+            lines += [CodeLine(f"dy[{y.text(name)}] = 0.0") for name in each.updates]
         if signs == "live":
             return self.function(
                 "flow_live(t, y, mode, held, p, dy)",
@@ -308,13 +310,13 @@ class _Printer(LockFunctions):
         for bank in self.read.banks:
             for name, velocity in zip(bank.chart.velocities, bank.velocities, strict=True):
                 place = f"out[{seen.text(of(bank.name, name))}]"
-                lines.append(Line(f"{place} = {self.local(velocity)}", frozenset({velocity})))
+                lines.append(CodeLine(f"{place} = {self.local(velocity)}", frozenset({velocity})))
             for force in bank.forces:
-                lines.append(Line(f"out[{seen.text(force)}] = {self.local(force)}"))
+                lines.append(CodeLine(f"out[{seen.text(force)}] = {self.local(force)}"))
             if bank.position in seen.shared:
                 place = f"out[{seen.text(bank.position)}]"
                 text = f"{place} = {self.local(bank.position)}"
-                lines.append(Line(text, frozenset({bank.position})))
+                lines.append(CodeLine(text, frozenset({bank.position})))
             if bank.chart.locks:
                 lines += self.locks_seen(bank)
         return self.function(
@@ -324,7 +326,7 @@ class _Printer(LockFunctions):
             "given",
         )
 
-    def locks_seen(self, bank: Bank) -> list[Line]:
+    def locks_seen(self, bank: Bank) -> list[CodeLine]:
         """Store the force of a locked element, and whether others carry it."""
         seen, lines = self.layout.observed, []
         mode = self.mode(bank.index, "0")
@@ -336,37 +338,40 @@ class _Printer(LockFunctions):
             _, more = self.at("out", seen, f"{force}_elements")
             place = f"out[{seen.start_text(f'{force}_elements')}]"
             lines += [
-                Line(f"out[{seen.text(f'{force} shared')}] = 0.0"),
-                Line(f"if {states}:"),
-                Line(f"    {place} = {self.local(force)}", more),
-                Line(f"    out[{seen.text(f'{force} shared')}] = 1.0 - l_{r}"),
+                CodeLine(f"out[{seen.text(f'{force} shared')}] = 0.0"),
+                CodeLine(f"if {states}:"),
+                CodeLine(f"    {place} = {self.local(force)}", more),
+                CodeLine(f"    out[{seen.text(f'{force} shared')}] = 1.0 - l_{r}"),
             ]
         return lines
 
     def normal(self) -> list[str]:
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         for each in self.plan.gradients:
             word, inner = "elif" if lines else "if", self.gradient(each)
             surfaces, note = self.plan.surfaces, f"  # {self.spell(each.value)}"
             sizes = frozenset(f"#{size}" for size in surfaces.sizes(each.surface))
             if each.surface in surfaces.shared:
                 place = surfaces.text(each.surface)
-                lines.append(Line(f"{word} surface == {place}:{note}"))
+                lines.append(CodeLine(f"{word} surface == {place}:{note}"))
             else:
                 end, start = (surfaces.start_text(each.surface, k) for k in (1, 0))
                 u = each.surface
                 bank = u.bank if isinstance(u, Pair) else self.read.bank_of(each.value)
                 assert bank is not None
                 size = frozenset({f"#{self.sizes[bank]}"})
-                lines.append(Line(f"{word} surface < {end}:{note}", sizes | size))
+                lines.append(CodeLine(f"{word} surface < {end}:{note}", sizes | size))
                 first = self.element(bank, self.own(bank, reads_of(inner)), "live")
-                inner = [Line(f"i = surface - ({start})"), *self.outward(bank, [*first, *inner])]
-            lines += indented(inner or [Line("pass")])
+                inner = [
+                    CodeLine(f"i = surface - ({start})"),
+                    *self.outward(bank, [*first, *inner]),
+                ]
+            lines += indented(inner or [CodeLine("pass")])
         if lines:
             y = self.layout.y
             every = frozenset(f"#{block.size}" for block in y.blocks if block.names)
             text = f"for j in range({self.layout.y.size_text(1)}):"
-            lines = [Line(text, every), Line("    out[j] = 0.0"), *lines]
+            lines = [CodeLine(text, every), CodeLine("    out[j] = 0.0"), *lines]
         return self.function(
             "normal(surface, t, y, mode, p, out)",
             "out = the gradient of a surface's value over y, then its rate in t.",
@@ -374,18 +379,18 @@ class _Printer(LockFunctions):
             "live",
         )
 
-    def gradient(self, gradient: Gradient) -> list[Line]:
+    def gradient(self, gradient: Gradient) -> list[CodeLine]:
         """Write the gradient of a value over y, and its rate in t."""
         lines = []
         for name, value in gradient.by_state.items():
             place, sizes = self.at("out", self.layout.y, name)
             text = f"{place} = {self.spell(value)}"
-            lines.append(Line(text, sizes | computed_names(value)))
+            lines.append(CodeLine(text, sizes | computed_names(value)))
         terms, reads = self.time_terms(gradient)
         if terms:
             every = frozenset(f"#{b.size}" for b in self.layout.y.blocks if b.names)
             lines.append(
-                Line(f"out[{self.layout.y.size_text()}] = {' + '.join(terms)}", reads | every)
+                CodeLine(f"out[{self.layout.y.size_text()}] = {' + '.join(terms)}", reads | every)
             )
         return lines
 
@@ -404,13 +409,13 @@ class _Printer(LockFunctions):
         for bank, rough in zip(self.read.banks, self.plan.rough, strict=True):
             branches = {}
             for state in bank.states:
-                rows: list[Line] = []
+                rows: list[CodeLine] = []
                 for u in rough[state]:
                     if u in held.own:
                         rows.append(self.hold(u))
                     rows += [self.watch(relation) for relation in both_sides(u)]
                 for edge, _ in self.leaving(bank, state) if not bank.periodic else ():
-                    rows.append(Line(f"# {edge.name}: {self.spell(edge.guard)}"))
+                    rows.append(CodeLine(f"# {edge.name}: {self.spell(edge.guard)}"))
                     rows += self.witness(split(edge.guard), self.waits(bank, state, edge))
                 branches[state] = rows
             if any(branches.values()):
@@ -422,17 +427,17 @@ class _Printer(LockFunctions):
             "live",
         )
 
-    def hold(self, u: Value) -> Line:
+    def hold(self, u: Value) -> CodeLine:
         """Hold the sign of a value."""
         held = self.plan.held
         sizes = frozenset(f"#{size}" for size in held.sizes(u))
         text = f"held[{held.text(u)}] = sgn({self.spell(u)})"
-        return Line(text, sizes | computed_names(u))
+        return CodeLine(text, sizes | computed_names(u))
 
-    def watch(self, relation: Comparison, why: int = FOR_A_SIGN) -> Line:
+    def watch(self, relation: Comparison, why: int = FOR_A_SIGN) -> CodeLine:
         relations = self.plan.relations
         sizes = frozenset(f"#{size}" for size in relations.sizes(relation))
-        return Line(f"watch[{relations.text(relation)}] |= {why}", sizes)
+        return CodeLine(f"watch[{relations.text(relation)}] |= {why}", sizes)
 
     def waits(self, bank: Bank, state: str, edge: Edge) -> bool:
         """Return whether a guard can change while nothing that it reads moves.
@@ -449,24 +454,24 @@ class _Printer(LockFunctions):
         }
         return bool(inputs & self.read.closure(names_in(edge.guard)))
 
-    def witness(self, part: Split, waits: bool) -> list[Line]:
+    def witness(self, part: Split, waits: bool) -> list[CodeLine]:
         """Write: if this part is false, watch what keeps it false."""
         if isinstance(part, Requirement):
             # Not the opposite comparison: of NaN neither is true, and it has to be watched.
             reads = computed_names(part.relation)
             return [
-                Line(f"if not {self.spell(part.relation)}:", reads),
+                CodeLine(f"if not {self.spell(part.relation)}:", reads),
                 *indented([self.watch(part.comparison, FOR_A_GUARD | (WAITING if waits else 0))]),
             ]
         word, parts = part
         if word == "either":
             return [line for each in parts for line in self.witness(each, waits)]
-        lines: list[Line] = []
+        lines: list[CodeLine] = []
         for each in parts:
             other = "el" if lines else ""
             if isinstance(each, Requirement):
                 first, *rest = self.witness(each, waits)
-                lines += [Line(other + first.text, first.reads), *rest]
+                lines += [CodeLine(other + first.text, first.reads), *rest]
             else:
                 reads = frozenset(
                     name
@@ -474,8 +479,8 @@ class _Printer(LockFunctions):
                     for side in (r.left, r.right)
                     for name in computed_names(side)
                 )
-                inner = self.witness(each, waits) or [Line("pass")]
-                lines += [Line(f"{other}if not ({self.truth(each)}):", reads), *indented(inner)]
+                inner = self.witness(each, waits) or [CodeLine("pass")]
+                lines += [CodeLine(f"{other}if not ({self.truth(each)}):", reads), *indented(inner)]
         return lines
 
     def truth(self, part: Split) -> str:
@@ -510,7 +515,7 @@ class _Printer(LockFunctions):
             within=True,
         )
 
-    def margin(self, comparison: Comparison) -> list[Line]:
+    def margin(self, comparison: Comparison) -> list[CodeLine]:
         relations = self.plan.relations
         index = relations.text(comparison)
         sizes = frozenset(f"#{size}" for size in relations.sizes(comparison))
@@ -520,7 +525,7 @@ class _Printer(LockFunctions):
             simple = isinstance(comparison.right, Name | Number | Negative)
             margin = f"{margin} - {right if simple else f'({right})'}"
             reads |= computed_names(comparison.right)
-        inner = [Line(f"out[{index}] = {margin}", sizes | reads)]
+        inner = [CodeLine(f"out[{index}] = {margin}", sizes | reads)]
         bank = self.read.bank_of(Binary("-", comparison.left, comparison.right))
         if bank is not None:  # what takes long, and what is computed from it
             own = self.own(bank, reads)
@@ -531,7 +536,7 @@ class _Printer(LockFunctions):
             seen = {self.local(name) for name in self.closure(inside) & (own - inside)}
             inner = [line for line in made if line.text.split(" =")[0] not in seen] + inner
             inner = [line._replace(reads=line.reads - inside) for line in inner]
-        return [Line(f"if watch[{index}]:", sizes), *indented(self.lazily(inner))]
+        return [CodeLine(f"if watch[{index}]:", sizes), *indented(self.lazily(inner))]
 
     def values(self) -> list[str]:
         shown, late = self.layout.shown, []
@@ -549,10 +554,10 @@ class _Printer(LockFunctions):
                 place, sizes = self.at("out", shown, name)
                 means = bank.means.get(name.removeprefix(start))
                 if means is None:
-                    rows.append(Line(f"{place} = nan", sizes))
+                    rows.append(CodeLine(f"{place} = nan", sizes))
                 else:
                     line = self.put(place, means)
-                    rows.append(Line(line.text, line.reads | sizes))
+                    rows.append(CodeLine(line.text, line.reads | sizes))
             lines += self.loop(bank.index, "live", rows)
         return self.function(
             "values(t, y, mode, p, jolt, out)",
@@ -562,16 +567,16 @@ class _Printer(LockFunctions):
         )
 
     def tick(self) -> list[str]:
-        y, lines = self.layout.y, list[Line]()
+        y, lines = self.layout.y, list[CodeLine]()
         for k, each in enumerate(self.read.system.sampled):
-            inside: list[Line] = []
+            inside: list[CodeLine] = []
             for name, tree in self.read.updates[each.name].items():
                 inside.append(self.put(self.local(name), tree))
-                inside.append(Line(f"y[{y.text(name)}] = {self.local(name)}"))
-            lines += [Line(f"if bits & {1 << k}:  # {each.name}"), *indented(inside)]
+                inside.append(CodeLine(f"y[{y.text(name)}] = {self.local(name)}"))
+            lines += [CodeLine(f"if bits & {1 << k}:  # {each.name}"), *indented(inside)]
         for plan in self.plan.banks:
             if bit := self.read.bit(plan.bank):
-                lines += [Line(f"if bits & {bit}:  # {plan.bank.name}")]
+                lines += [CodeLine(f"if bits & {bit}:  # {plan.bank.name}")]
                 lines += indented(self.bank_forces(plan, "live", True, held=True))
         return self.function(
             "tick(bits, t, y, mode, p)",

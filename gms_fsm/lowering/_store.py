@@ -18,11 +18,11 @@ from pathlib import Path
 from gms_fsm._files import remove_leftovers, write_whole
 from gms_fsm.errors import OutputError
 
-__all__ = ["Store"]
+__all__ = ["CodeFolder"]
 
 
 @dataclass(frozen=True)
-class Store:
+class CodeFolder:
     """A folder of verified files; several processes and threads may use it at the same time.
 
     Parameters
@@ -33,7 +33,7 @@ class Store:
     Examples
     --------
     >>> import tempfile
-    >>> store = Store.at(Path(tempfile.mkdtemp()))
+    >>> store = CodeFolder.at(Path(tempfile.mkdtemp()))
     >>> store.put("flow-1", b"machine code")
     >>> store.get("flow-1"), store.get("flow-2")
     (b'machine code', None)
@@ -42,7 +42,7 @@ class Store:
     folder: Path
 
     @classmethod
-    def at(cls, folder: Path) -> Store | None:
+    def at(cls, folder: Path) -> CodeFolder | None:
         """Return the store in a folder, or None if the folder cannot be written.
 
         Parameters
@@ -52,7 +52,7 @@ class Store:
 
         Returns
         -------
-        Store or None
+        CodeFolder or None
             Ready for use.
         """
         try:

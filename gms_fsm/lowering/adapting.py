@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
 from gms_fsm.language import Number, Value, names_in, renamed, spell
 from gms_fsm.lowering._generated import SIGNALS, ieee, load, load_careful
-from gms_fsm.lowering._lines import Line, indented, one_line
+from gms_fsm.lowering._lines import CodeLine, indented, one_line
 from gms_fsm.lowering._lock_functions import LockFunctions
 from gms_fsm.lowering._locks import ENDLESS
 from gms_fsm.lowering._names import computed_names
-from gms_fsm.lowering._plan import Plan
+from gms_fsm.lowering._plan import ProgramPlan
 from gms_fsm.lowering._scale_text import HELPERS, scale_text
 from gms_fsm.systems._assembly import CURVE_LOAD, Bank, of
 from gms_fsm.systems.signals import Function
@@ -39,8 +39,8 @@ LIMIT = math.sqrt(ENDLESS)  # where locks contradict each other a force has no l
 
 
 # --------------------------------------------------------------------------- the text
-def _text(plan: Plan) -> str:
-    printer = _Printer(plan)
+def _text(plan: ProgramPlan) -> str:
+    printer = _AdaptingPrinter(plan)
     lines = [f"# What follows from the numbers of {one_line(plan.title)}"]
     for k, bank in enumerate(plan.read.banks):
         own = frozenset(n for n in bank.chart.parameter_names if of(bank.name, n) in plan.read.own)
@@ -51,10 +51,10 @@ def _text(plan: Plan) -> str:
     return "\n".join(lines) + "\n"
 
 
-class _Printer(LockFunctions):
+class _AdaptingPrinter(LockFunctions):
     """Prints these functions of a plan."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: ProgramPlan) -> None:
         super().__init__(plan)
         self.places = {name: f"shared[{k}]" for k, name in enumerate(self.names.shared)}
 
@@ -147,12 +147,12 @@ class _Printer(LockFunctions):
         ]
         lines = self.before_guards(computed_names(u) for _, found in steps for _, u in found)
         for bank, found in steps:
-            body: list[Line] = []
+            body: list[CodeLine] = []
             for name, tree in found:
                 place, sizes = self.at("y", self.layout.y, name)
                 test = f"if {self.mode(bank.index)} == 0 and {place.replace('y', 'given', 1)} == 0:"
-                put = [self.put(self.local(name), tree), Line(f"{place} = {self.local(name)}")]
-                body += [Line(test, sizes | {name}), *indented(put)]
+                put = [self.put(self.local(name), tree), CodeLine(f"{place} = {self.local(name)}")]
+                body += [CodeLine(test, sizes | {name}), *indented(put)]
             lines += self.loop(bank.index, "live", body)
         return self.function(
             "enter(t, y, mode, p, given)",
@@ -216,7 +216,7 @@ def larger(most: float, u: float) -> float:
 
 # --------------------------------------------------------------------------- the functions
 @functools.lru_cache(maxsize=64)
-def text_of(plan: Plan) -> str:
+def text_of(plan: ProgramPlan) -> str:
     """Return the text of a plan's functions, as named in `FUNCTIONS`."""
     return _text(plan)
 
@@ -238,7 +238,7 @@ class Adaptive:
     functions: Mapping[str, Callable[..., Any]]
 
 
-def adaptive(plan: Plan, functions: Mapping[str, Callable[..., Any]]) -> Adaptive:
+def adaptive(plan: ProgramPlan, functions: Mapping[str, Callable[..., Any]]) -> Adaptive:
     """Return the functions of a plan, with those of its program."""
     source, names = text_of(plan), _names(functions)
     fast = load("what follows from the numbers", source, names)

@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
 from gms_fsm.lowering.log_columns import LOG_TEXTS
-from gms_fsm.lowering.places import Block, Places
+from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.systems._assembly import Assembly, Bank, of
 
-__all__ = ["BankPlaces", "Layout", "held_of", "sizes_of"]
+__all__ = ["BankPlaces", "SystemLayout", "held_of", "sizes_of"]
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class BankPlaces:
 
 
 @dataclass(frozen=True)
-class Layout:
+class SystemLayout:
     """The layout of a system.
 
     Parameters
@@ -109,7 +109,7 @@ class Layout:
     >>> from gms_fsm.systems._assembly import assembled
     >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> layout = Layout.of(assembled(system_of(model, Prescribed("0.1*t"))), surfaces=0)
+    >>> layout = SystemLayout.of(assembled(system_of(model, Prescribed("0.1*t"))), surfaces=0)
     >>> layout.y.index("friction.z", 3), layout.observed.block("friction.s"), layout.modes
     (4, slice(2, 6, None), 4)
     """
@@ -123,7 +123,7 @@ class Layout:
     edges: tuple[tuple[str, str, str], ...]
 
     @classmethod
-    def of(cls, read: Assembly, surfaces: int) -> Layout:
+    def of(cls, read: Assembly, surfaces: int) -> SystemLayout:
         """Return the layout of a system.
 
         Parameters
@@ -135,7 +135,7 @@ class Layout:
 
         Returns
         -------
-        Layout
+        SystemLayout
             For its runs.
         """
         system, banks, first, edges = read.system, [], 0, 0
@@ -154,11 +154,11 @@ class Layout:
         updated = (name for each in system.sampled for name in each.updates)
         sizes = sizes_of(read.banks)
         blocks = tuple(
-            Block((*bank.variables, *held_of(bank)), bank.n, size)
+            ElementPlaces((*bank.variables, *held_of(bank)), bank.n, size)
             for bank, size in zip(read.banks, sizes, strict=True)
         )
         seen = tuple(
-            Block(
+            ElementPlaces(
                 (
                     of(bank.name, "s"),
                     *(f"{force}_elements" for force in bank.forces),
@@ -333,7 +333,7 @@ def observed_of(bank: Bank) -> tuple[str, ...]:
 def shown_of(read: Assembly) -> Places[str]:
     """Lay out what guards, and the machines' elements, can read."""
     shared: list[str] = []
-    blocks: list[Block[str]] = []
+    blocks: list[ElementPlaces[str]] = []
     for bank, size in zip(read.banks, sizes_of(read.banks), strict=True):
         guards = frozenset[str]().union(*(names_in(edge.guard) for edge in bank.edges))
         late = [name for name in (*bank.forces, *bank.rates) if name in guards]
@@ -343,5 +343,5 @@ def shown_of(read: Assembly) -> Places[str]:
         shared += [*late, *(name for name in lets if name not in read.owner)]
         own = [name for name in lets if name in read.owner]
         threshold = of(bank.name, "s")
-        blocks.append(Block(tuple(dict.fromkeys([threshold, *own])), bank.n, size))
+        blocks.append(ElementPlaces(tuple(dict.fromkeys([threshold, *own])), bank.n, size))
     return Places(tuple(shared), tuple(blocks))

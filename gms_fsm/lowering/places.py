@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, TypeVar
 
-__all__ = ["Block", "Places", "total"]
+__all__ = ["ElementPlaces", "Places", "total"]
 
 Name = TypeVar("Name", bound=Hashable)
 
 
 @dataclass(frozen=True)
-class Block(Generic[Name]):
+class ElementPlaces(Generic[Name]):
     """Names with one place per element each.
 
     Parameters
@@ -41,12 +41,12 @@ class Places(Generic[Name]):
     ----------
     shared : tuple
         Names with one place each.
-    blocks : tuple of Block
+    blocks : tuple of ElementPlaces
         Names with one place per element each.
 
     Examples
     --------
-    >>> y = Places(("x", "v"), (Block(("z", "w"), 3),))
+    >>> y = Places(("x", "v"), (ElementPlaces(("z", "w"), 3),))
     >>> y.size, y.index("v"), y.index("w", 2), y.block("z")
     (8, 1, 7, slice(2, 5, None))
     >>> y.text("v"), y.text("z"), y.text("w"), y.size_text()
@@ -56,7 +56,7 @@ class Places(Generic[Name]):
     """
 
     shared: tuple[Name, ...]
-    blocks: tuple[Block[Name], ...]
+    blocks: tuple[ElementPlaces[Name], ...]
 
     @cached_property
     def own(self) -> tuple[Name, ...]:

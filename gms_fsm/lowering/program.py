@@ -37,10 +37,10 @@ from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
 from gms_fsm.lowering._generated import SIGNALS, ieee, load, load_careful, quickened
-from gms_fsm.lowering._plan import Pair, Plan, both_sides, plan_of
+from gms_fsm.lowering._plan import Pair, ProgramPlan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
 from gms_fsm.lowering.adapting import Adaptive, adaptive
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.systems._numbers import numbers_of
 from gms_fsm.systems._texts import ByIdentity
 from gms_fsm.systems.models import Model
@@ -77,9 +77,9 @@ class Program:
     p : tuple
         (shared numbers, one list per own parameter, times and values of each corner table): an
         argument of all functions.
-    layout : Layout
+    layout : SystemLayout
         The layout of the state vector, of the output of ``observe`` and of the modes.
-    plan : Plan
+    plan : ProgramPlan
         What the text was printed from.
     held : int
         Number of frozen signs.
@@ -110,8 +110,8 @@ class Program:
     ieee: Mapping[str, Callable[..., Any]]
     callables: Mapping[str, Callable[[float], float]]
     p: Arguments
-    layout: Layout
-    plan: Plan = field(repr=False)
+    layout: SystemLayout
+    plan: ProgramPlan = field(repr=False)
     held: int
     strict: list[bool]
     relations: list[str]
@@ -164,7 +164,7 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
     True
     """
     system = mounted(system, rig).system
-    shape = _Shape(_key(system), system)
+    shape = _ProgramShape(_key(system), system)
     corners = [s for s in system.signals.values() if isinstance(s, Corners)]
     return dataclasses.replace(
         _lowered(shape),
@@ -208,7 +208,7 @@ def _spelling(signal: Signal | str) -> str | int | None:
 
 
 @dataclass(frozen=True)
-class _Shape:
+class _ProgramShape:
     """Everything that the text depends on, with a system of that shape."""
 
     key: tuple[Any, ...]
@@ -216,7 +216,7 @@ class _Shape:
 
 
 @functools.lru_cache(maxsize=64)
-def _lowered(shape: _Shape) -> Program:
+def _lowered(shape: _ProgramShape) -> Program:
     """Generate the text for all systems of one shape, without their numbers."""
     system = shape.system
     plan = plan_of(system.assembly)
@@ -249,7 +249,7 @@ def _lowered(shape: _Shape) -> Program:
 
 @functools.lru_cache(maxsize=64)
 def _adaptive(
-    plan: ByIdentity[Plan],
+    plan: ByIdentity[ProgramPlan],
     functions: ByIdentity[Mapping[str, Callable[..., Any]]],
     callables: ByIdentity[Mapping[str, Callable[[float], float]]],
 ) -> Adaptive:
@@ -262,7 +262,7 @@ def _names(callables: Mapping[str, Callable[[float], float]]) -> dict[str, Any]:
     return {**SIGNALS, **signals}
 
 
-def _jolts(plan: Plan) -> dict[str, Any]:
+def _jolts(plan: ProgramPlan) -> dict[str, Any]:
     """Return what a run has to know about impulses, and about velocities that jump."""
     read = plan.read
     impulses = [bank.changes_others(edge) for bank in read.banks for edge in bank.edges]
@@ -375,7 +375,7 @@ def guarded(name: str, call: Callable[[float], float]) -> Callable[[float], floa
 
 
 # --------------------------------------------------------------------------- from the plan
-def _relation_names(plan: Plan) -> list[str]:
+def _relation_names(plan: ProgramPlan) -> list[str]:
     """Return each relation in words."""
     return [
         spell(Requirement(relation, True).relation, rename=plan.names.plain)
@@ -384,7 +384,7 @@ def _relation_names(plan: Plan) -> list[str]:
     ]
 
 
-def _surface_names(plan: Plan) -> list[str]:
+def _surface_names(plan: ProgramPlan) -> list[str]:
     """Return the value that is zero on each surface, in words."""
     return [
         spell(u, rename=plan.names.plain) + _of_element(plan, u, i)
@@ -395,13 +395,13 @@ def _surface_names(plan: Plan) -> list[str]:
     ]
 
 
-def _of_element(plan: Plan, tree: Value, element: int | None) -> str:
+def _of_element(plan: ProgramPlan, tree: Value, element: int | None) -> str:
     """Name an element, counted from 1 in texts; nothing where there is only one value."""
     bank = plan.read.bank_of(tree)
     return "" if bank is None else _of_contact(plan, bank, element)
 
 
-def _of_contact(plan: Plan, bank: int, element: int | None) -> str:
+def _of_contact(plan: ProgramPlan, bank: int, element: int | None) -> str:
     """Name an element of a contact."""
     if element is None:
         return ""
@@ -409,7 +409,7 @@ def _of_contact(plan: Plan, bank: int, element: int | None) -> str:
     return f" of element {element + 1}{whose}"
 
 
-def _surface_table(plan: Plan) -> integrators.Surfaces:
+def _surface_table(plan: ProgramPlan) -> integrators.Surfaces:
     """Return the places of the surfaces' signs and relations, or of their machines."""
     table = integrators.Surfaces([], [], [], [], [], [], [], [])
     for u, i in plan.surfaces:

@@ -23,14 +23,14 @@ from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import hybrid, loop, states
-from integrators.columns import Log, Recorded
+from integrators.columns import LogColumns, Recorded
 from integrators.loop import Memory
 from integrators.machine_code.records import arrays_of, put_numbers
 from integrators.sliding import Functions, Sliding
 from integrators.steps import Now
 
 if TYPE_CHECKING:
-    from integrators.compiled import Run
+    from integrators.compiled import RecordArguments
 
 __all__ = ["CompiledRun", "example_of"]
 
@@ -164,7 +164,7 @@ class Columns:
         size, modes = layout.y.size, layout.modes
         self.prepared = _prepared(start)
         self.engine, self.block = self.prepared.engine, self.prepared.block()
-        self.run_of: Run = self.block.contents
+        self.run_of: RecordArguments = self.block.contents
         self.p = compiled.packed(start.program.p) if p is None else p
         few = max(16, min(1024, 4_000_000 // size))  # initial number of rows
         rows = {"all": few, "t_eval": 0, "end": 0}[start.output]
@@ -185,7 +185,7 @@ class Columns:
         out.times = np.asarray(() if out.every_step else start.options.times, float)
         out.rows_t, out.rows_y = rows_t, rows_y
         log: Any = self.run_of.log
-        self.log: Log = log
+        self.log: LogColumns = log
         log.t, log.machine, log.edge = floats(256), ints(256), ints(256)
         log.numbers = floats((256, len(LOG_NUMBERS)))
         log.rows_microstep, log.rows_mode = rows_microstep, rows_mode
@@ -273,7 +273,7 @@ class Columns:
     def state(self) -> dict[str, Any]:
         """Return the contents as arrays, for a checkpoint; 0 where nothing has been written."""
         out, log = self.buffers.out, self.log
-        found: dict[str, Any] = {name: getattr(log, name) for name in arrays_of(Log)}
+        found: dict[str, Any] = {name: getattr(log, name) for name in arrays_of(LogColumns)}
         found |= {"rows_t": out.rows_t, "rows_y": out.rows_y}
         taken = self.buffers.memory.taken  # the modes of further rows come later
         filled = dict.fromkeys(("rows_mode", "rows_microstep"), taken)
@@ -289,7 +289,7 @@ class Columns:
         log: Any = self.log
         log.firings, log.stops = map(int, state["counts"])
         log.seen[...] = state["seen"]  # a place in the block
-        for name in arrays_of(Log):
+        for name in arrays_of(LogColumns):
             if name != "seen":
                 setattr(log, name, state[name])
         out.rows_t, out.rows_y = state["rows_t"], state["rows_y"]
@@ -402,7 +402,7 @@ def _prepared(start: Start) -> compiled.Prepared:
     return _known[key]
 
 
-def example_of(start: Start) -> Run:
+def example_of(start: Start) -> RecordArguments:
     """Return the arguments of `integrators.columns.record`, with columns that may grow.
 
     Parameters
@@ -412,8 +412,8 @@ def example_of(start: Start) -> Run:
 
     Returns
     -------
-    integrators.compiled.Run
-        An example for `integrators.machine_code.layout.Layout`.
+    integrators.compiled.RecordArguments
+        An example for `integrators.machine_code.layout.BlockLayout`.
     """
     from integrators.compiled import example
 

@@ -15,7 +15,7 @@ import integrators
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.language import rough_points
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LogRecord
 from gms_fsm.run._moment import Place, Recording, scope_of
 from gms_fsm.run.machines import Interference
@@ -75,7 +75,7 @@ class _Columns:
         self.y.append(y)
         self.mode.append(mode)
 
-    def rows(self, layout: Layout) -> Rows:
+    def rows(self, layout: SystemLayout) -> Rows:
         count = min(map(len, vars(self).values()))  # Ctrl-C may arrive between two columns
         return Rows(
             np.array(self.t[:count], dtype=np.float64),

@@ -24,7 +24,7 @@ from integrators.sliding import Functions
 from integrators.stepping import Clocks, Sample, restart, step_to
 
 if TYPE_CHECKING:
-    from integrators.compiled import Stepper as MachineCode
+    from integrators.compiled import CompiledStepper as MachineCode
 
 __all__ = [
     "BlockMemory",
@@ -173,13 +173,13 @@ class BlockMemory:
     """
 
     def __init__(self, starts: Sequence[Start]) -> None:
-        from integrators.machine_code.layout import Block
+        from integrators.machine_code.layout import MemoryBlock
 
         code, count = machine_code(starts[0]), len(starts)
         self._words = np.zeros(count * code.layout.words, dtype=np.int64)
         each = []
         for start, words in zip(starts, self._words.reshape(count, -1), strict=True):
-            block = Block(code.layout, arguments_of(start), words=words)
+            block = MemoryBlock(code.layout, arguments_of(start), words=words)
             made = block.contents
             block.update(made)  # numbers; there are no columns
             run = functools.partial(code.one, block.address)
@@ -241,7 +241,7 @@ def machine_code(start: Start) -> MachineCode:
 
     Returns
     -------
-    integrators.compiled.Stepper
+    integrators.compiled.CompiledStepper
         The same one for systems that differ in numbers only.
 
     Raises
@@ -275,14 +275,14 @@ def arguments_of(start: Start) -> Any:
 
     Returns
     -------
-    integrators.compiled.Step
-        An example for `integrators.machine_code.layout.Layout`.
+    integrators.compiled.StepArguments
+        An example for `integrators.machine_code.layout.BlockLayout`.
     """
-    from integrators.compiled import Step
+    from integrators.compiled import StepArguments
 
     made = compiled.functions(start.program)
     p: Any = compiled.packed(start.program.p)
-    return Step(
+    return StepArguments(
         Functions(made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p),
         Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
         *prepared(start),

@@ -25,7 +25,7 @@ from gms_fsm.systems.system import Contact
 from integrators import hybrid
 from integrators.crossings import watched
 from integrators.loop import FIRED, FIRING, PAUSED, run_to_event
-from integrators.steps import Motion
+from integrators.steps import ArcMotion
 
 __all__ = ["FrictionEquations"]
 
@@ -253,7 +253,7 @@ class FrictionEquations:
         b.now.pause = t
         functions, switch = made.functions(located=True), IfElse(program)
         taken: list[ElementSwitch] = []
-        motion = Motion(functions.flow, functions.margins, functions.p, functions.follow)
+        motion = ArcMotion(functions.flow, functions.margins, functions.p, functions.follow)
         while (event := run_to_event(functions, switch, motion, b, 1)) != PAUSED:
             if event == FIRED:
                 machine, edge = b.memory.machine, b.memory.edge

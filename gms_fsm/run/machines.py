@@ -290,7 +290,7 @@ class MachineEngine:
         del p  # the program has the same values
         self.show(t, y, mode, jolt)
         for i, element in enumerate(self.elements):
-            skip = edges[i]  # see `integrators.Switch`
+            skip = edges[i]  # see `integrators.Switching`
             edges[i] = -1
             for edge, guard in self.tables[i][mode[i]]:
                 if edge == skip and edge in self.crossing:

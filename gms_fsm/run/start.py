@@ -16,7 +16,7 @@ from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, chec
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.lowering._floor import floor_of
 from gms_fsm.lowering._pulses import waking_times
-from gms_fsm.lowering.layout import BankPlaces, Layout
+from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.lowering.program import Program, arguments, lower
 from gms_fsm.lowering.scales import Setting, Tolerance, scales_of_system
@@ -30,7 +30,7 @@ from gms_fsm.systems.system import System
 from gms_fsm.traces._firings import Firings
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
-from integrators import Options
+from integrators import LoopOptions
 
 __all__ = ["STEPS_A_TICK", "Start"]
 
@@ -54,7 +54,7 @@ class Start:
         Initial state.
     mode : list of int, shape (n,)
         Initial states of the elements.
-    options : integrators.Options
+    options : integrators.LoopOptions
         Options of the integration.
     settings : mapping
         As recorded in the trace.
@@ -71,7 +71,7 @@ class Start:
     last: float
     y: list[float]
     mode: list[int]
-    options: Options
+    options: LoopOptions
     settings: Mapping[str, Setting]
     chosen: Settings
     initial: Mapping[str, Any]
@@ -217,7 +217,7 @@ class Start:
                 f"gives no scale for {', '.join(missing)}",
                 advice=f"give one far below the values that matter, for example atol={missing}",
             )
-        options = Options(
+        options = LoopOptions(
             integrators.METHODS[method] if isinstance(method, str) else method,
             None if chosen.events == "held" else chosen.step,
             chosen.rtol,
@@ -347,7 +347,7 @@ def _wanted(chosen: Settings, t_start: float, t_end: float) -> FloatArray | None
 
 
 def _tolerances(
-    layout: Layout, atol: Tolerance, default: Mapping[str, list[float]]
+    layout: SystemLayout, atol: Tolerance, default: Mapping[str, list[float]]
 ) -> tuple[list[float], float | dict[str, float | list[float]]]:
     """Return the absolute tolerance of each component, and how to record them in the settings."""
     places = layout.y
@@ -368,7 +368,7 @@ def _tolerances(
     return places.joined(found), used
 
 
-def _without_scale(layout: Layout, tolerances: list[float]) -> dict[str, float]:
+def _without_scale(layout: SystemLayout, tolerances: list[float]) -> dict[str, float]:
     """Return the components without an absolute tolerance, each with an example of one."""
     places = layout.y
     names = [*places.shared, *places.own]
@@ -379,7 +379,7 @@ def _without_scale(layout: Layout, tolerances: list[float]) -> dict[str, float]:
     }
 
 
-def _component(layout: Layout, key: object, owner: str) -> str:
+def _component(layout: SystemLayout, key: object, owner: str) -> str:
     """Return the name in the layout of what a user calls a component."""
     if not isinstance(key, str) or key not in layout.keys:
         known = [layout.label(name) for name in (*layout.y.shared, *layout.y.own)]
@@ -432,7 +432,7 @@ def _initial(
 
 
 def _given(
-    system: System, layout: Layout, initial: Mapping[str, Any]
+    system: System, layout: SystemLayout, initial: Mapping[str, Any]
 ) -> tuple[list[float], list[int], set[str]]:
     """Return the state vector and the modes before any entry, and what has been given."""
     if not isinstance(initial, Mapping):
@@ -567,7 +567,9 @@ def _entered(
     return new
 
 
-def _unknown_initial(system: System, layout: Layout, key: object, value: object) -> tuple[str, str]:
+def _unknown_initial(
+    system: System, layout: SystemLayout, key: object, value: object
+) -> tuple[str, str]:
     """Say what is wrong with a key of the initial values, and what to do."""
     for body in system.bodies:
         if body.driven and key in (body.v, f"{body.name}.v"):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.systems.numbers import column_name
 from gms_fsm.traces._parts import stored_names
 
@@ -18,12 +18,12 @@ __all__ = ["column_title", "columns_of"]
 FORCES = "_elements"  # how the names of the elements' forces end in a layout
 
 
-def column_title(layout: Layout, name: str, *, short: bool) -> str:
+def column_title(layout: SystemLayout, name: str, *, short: bool) -> str:
     """Return the title of the column of a quantity; without the number of its element.
 
     Parameters
     ----------
-    layout : Layout
+    layout : SystemLayout
         Of the run.
     name : str
         The quantity's name there.

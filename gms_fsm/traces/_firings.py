@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRecord
 from gms_fsm.traces._log import Log
 
@@ -32,7 +32,7 @@ class Firings:
         Counted over all contacts.
     numbers : ndarray, shape (firings, 5)
         In the order of `LOG_NUMBERS`.
-    layout : Layout
+    layout : SystemLayout
         Of the run. It has the names.
     named : bool
         Whether records name their contact.
@@ -51,7 +51,7 @@ class Firings:
     machine: Codes
     edge: Codes
     numbers: FloatArray
-    layout: Layout
+    layout: SystemLayout
     named: bool
 
     def __len__(self) -> int:
@@ -59,7 +59,7 @@ class Firings:
 
     @classmethod
     def copied(
-        cls, columns: Mapping[str, NDArray[Any]], layout: Layout, *, of_system: bool
+        cls, columns: Mapping[str, NDArray[Any]], layout: SystemLayout, *, of_system: bool
     ) -> Firings:
         """Return firings with their own copy of the four columns.
 
@@ -67,7 +67,7 @@ class Firings:
         ----------
         columns : mapping of str to ndarray
             ``t, machine, edge`` and ``numbers``.
-        layout : Layout
+        layout : SystemLayout
             Of the run.
         of_system : bool
             Whether a system ran, and not a model on a rig.
@@ -82,7 +82,7 @@ class Firings:
         )
 
     @classmethod
-    def of(cls, records: Iterable[LogRecord], layout: Layout, *, of_system: bool) -> Firings:
+    def of(cls, records: Iterable[LogRecord], layout: SystemLayout, *, of_system: bool) -> Firings:
         """Return the firings of a run from its records."""
         rows = list(records)
         values = zip(*rows, strict=True) if rows else ((),) * len(LogRecord._fields)
@@ -92,14 +92,14 @@ class Firings:
         return cls.coded(columns, layout, of_system=of_system)
 
     @classmethod
-    def coded(cls, columns: Mapping[str, Any], layout: Layout, *, of_system: bool) -> Firings:
+    def coded(cls, columns: Mapping[str, Any], layout: SystemLayout, *, of_system: bool) -> Firings:
         """Return the firings that columns with names describe.
 
         Parameters
         ----------
         columns : mapping of str to sequence
             The columns of the log; of a system, if it is not empty, also the contact.
-        layout : Layout
+        layout : SystemLayout
             Of the run.
         of_system : bool
             Whether a system ran, and not a model on a rig.

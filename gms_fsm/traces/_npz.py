@@ -15,7 +15,7 @@ import numpy as np
 
 from gms_fsm._files import write_whole
 from gms_fsm.errors import TraceFileError
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRecord
 from gms_fsm.traces._archives import member, write_arrays
 from gms_fsm.traces._firings import Firings
@@ -70,13 +70,13 @@ def read(path: Path) -> Parts:
     return Parts(header, ran, rows, stops, firings, stored)
 
 
-def _table(array: Member, kind: str, layout: Layout) -> Rows:
+def _table(array: Member, kind: str, layout: SystemLayout) -> Rows:
     t = array(f"{kind}_t")
     names = [f"{kind}_{name}" for name in ("microstep", "y", "mode")]
     return Rows(t, *(array(name, _width(layout) * t.size) for name in names))
 
 
-def _width(layout: Layout) -> int:
+def _width(layout: SystemLayout) -> int:
     """Return the largest number of bytes of an array per row."""
     return 8 * max(layout.y.size, layout.observed.size, layout.modes)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.lowering.program import lower
 from gms_fsm.systems.mounted import Mounted
@@ -37,7 +37,7 @@ class Ran:
     what: Mounted
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> SystemLayout:
         """Where everything is."""
         return lower(self.what.system).layout
 
@@ -47,14 +47,14 @@ class Ran:
         return stored_names(self.what, self.layout)
 
 
-def stored_names(what: Mounted, layout: Layout) -> dict[str, str]:
+def stored_names(what: Mounted, layout: SystemLayout) -> dict[str, str]:
     """Return for each observed quantity in a file its name in the layout.
 
     Parameters
     ----------
     what : Mounted
         What ran; the files of a model on a rig have short names.
-    layout : Layout
+    layout : SystemLayout
         Of the run.
 
     Returns
@@ -148,7 +148,7 @@ def checked(parts: Parts) -> Parts:
     return replace(parts, rows=rows, stops=tables.get("stops", rows), firings=firings)
 
 
-def _check_table(kind: str, table: Rows, layout: Layout, states: Any) -> None:
+def _check_table(kind: str, table: Rows, layout: SystemLayout, states: Any) -> None:
     count = table.t.size
     _expect(f"{kind} t", table.t, (count,), "f")
     _expect(f"{kind} microstep", table.microstep, (count,), "i")
@@ -181,7 +181,7 @@ def _checked_firings(firings: Firings) -> Firings:
     return replace(firings, machine=machine.astype(np.int32), edge=edge.astype(np.int32))
 
 
-def _with_slides(rows: Rows, layout: Layout) -> Rows:
+def _with_slides(rows: Rows, layout: SystemLayout) -> Rows:
     """Return rows with slide flags for the surfaces, which files of older versions lack."""
     if rows.mode.shape != (len(rows), layout.n) or not layout.surfaces:
         return rows

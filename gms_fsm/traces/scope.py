@@ -23,7 +23,7 @@ import numpy as np
 
 from gms_fsm.errors import SignalError
 from gms_fsm.lowering._observing import observe
-from gms_fsm.lowering.layout import BankPlaces, Layout
+from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.trace import Trace
@@ -127,7 +127,7 @@ class Scope:
     ----------
     model : Model
         The simulated model.
-    layout : Layout
+    layout : SystemLayout
         Places of the values.
     t : float or ndarray, shape (rows,)
         Time, s.
@@ -155,7 +155,7 @@ class Scope:
     """
 
     model: Model
-    layout: Layout
+    layout: SystemLayout
     t: Any
     y: Any
     seen: Mapping[str, Any]
@@ -443,11 +443,11 @@ class GuardValues:
 
     Parameters
     ----------
-    layout : Layout
+    layout : SystemLayout
         Places of the values.
     """
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: SystemLayout) -> None:
         y, shown = layout.y, layout.shown
         self._places: list[list[tuple[str, int]]] = []  # for each element, among those shown
         self._variables: list[list[tuple[str, int]]] = []  # and in the state vector

@@ -18,7 +18,7 @@ import numpy as np
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Owner, evaluate
 from gms_fsm.lowering._observing import observe
-from gms_fsm.lowering.layout import BankPlaces, Layout
+from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.signals import Corners, Function, piecewise_linear
 from gms_fsm.systems.system import Contact, System
@@ -128,7 +128,7 @@ class SystemScope:
     ----------
     system : System
         What runs.
-    layout : Layout
+    layout : SystemLayout
         Places of the values.
     t : float or ndarray, shape (rows,)
         Time, s.
@@ -151,7 +151,7 @@ class SystemScope:
     """
 
     system: System
-    layout: Layout
+    layout: SystemLayout
     t: Any
     y: Any
     given: Mapping[str, Any]

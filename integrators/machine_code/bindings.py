@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from integrators.machine_code.tree import AddressOf, Const, Expr, Local, Return
-from integrators.machine_code.values import Array, Fixed, Number, Record, Value
+from integrators.machine_code.values import ArrayValue, FixedValue, NumberValue, RecordValue, Value
 from integrators.machine_code.work import Again, Work, as_kind
 
 __all__ = ["bind", "give", "own"]
@@ -21,10 +21,10 @@ RESULT = "return"  # as a name; no variable can be called so
 def bind(work: Work, name: str, value: Value) -> None:
     """Assign a value to a name."""
     once = work.assigned.get(name, 0) == 1
-    if isinstance(value, Number):
+    if isinstance(value, NumberValue):
         if not (once and isinstance(value.expr, Const)):
-            value = Number(work.set(name, value.expr))
-    elif isinstance(value, Array) and not once:
+            value = NumberValue(work.set(name, value.expr))
+    elif isinstance(value, ArrayValue) and not once:
         value = _placed(work, name, value)
     else:
         value = own(work, name, value)
@@ -50,12 +50,12 @@ def own(work: Work, path: str, value: Value) -> Value:
         The same, now and later.
     """
     match value:
-        case Record(fields=fields):
+        case RecordValue(fields=fields):
             parts = {name: own(work, f"{path}.{name}", part) for name, part in fields.items()}
             return replace(value, fields=parts)
-        case Number(expr=expr) if _changes(work, path, expr):
-            return Number(work.set(path, expr))
-        case Array():
+        case NumberValue(expr=expr) if _changes(work, path, expr):
+            return NumberValue(work.set(path, expr))
+        case ArrayValue():
             place = [value.base] if value.index is None else [value.base, value.index]
             if any(_changes(work, path, each) for each in place):
                 return _placed(work, path, value)
@@ -67,13 +67,13 @@ def _changes(work: Work, path: str, expr: Expr) -> bool:
     return path in work.learnt.varying or not work.constant(expr)
 
 
-def _placed(work: Work, path: str, array: Array) -> Array:
+def _placed(work: Work, path: str, array: ArrayValue) -> ArrayValue:
     """Return a view whose beginning is in a local variable."""
     dims = _lengths(work, path, array)
-    return Array(array.kind, dims, work.set(path, AddressOf(array.address)))
+    return ArrayValue(array.kind, dims, work.set(path, AddressOf(array.address)))
 
 
-def _lengths(work: Work, path: str, array: Array) -> tuple[Expr, ...]:
+def _lengths(work: Work, path: str, array: ArrayValue) -> tuple[Expr, ...]:
     return tuple(
         work.set(f"{path}.{k}", each) if _changes(work, f"{path}.{k}", each) else each
         for k, each in enumerate(array.dims)
@@ -92,19 +92,19 @@ def _agree(work: Work, name: str, value: Value) -> None:
 def _differing(work: Work, path: str, a: Value, b: Value) -> Iterator[str]:
     """Yield the parts in which two values of a name differ."""
     match a, b:
-        case Number(), Number():
+        case NumberValue(), NumberValue():
             if a != b:
                 yield path
-        case Record(), Record() if a.cls is b.cls and a.fields.keys() == b.fields.keys():
+        case RecordValue(), RecordValue() if a.cls is b.cls and a.fields.keys() == b.fields.keys():
             for name, part in a.fields.items():
                 yield from _differing(work, f"{path}.{name}", part, b.fields[name])
-        case Array(), Array() if a.kind == b.kind and len(a.dims) == len(b.dims):
+        case ArrayValue(), ArrayValue() if a.kind == b.kind and len(a.dims) == len(b.dims):
             if replace(a, dims=b.dims) != b:
                 yield path
             for k, (one, other) in enumerate(zip(a.dims, b.dims, strict=True)):
                 if one != other:
                     yield f"{path}.{k}"
-        case Fixed(), Fixed() if a.value is b.value:
+        case FixedValue(), FixedValue() if a.value is b.value:
             pass
         case _:
             name = path.split(".")[0]
@@ -133,12 +133,12 @@ def _returned(work: Work, path: str, value: Value, passed: list[Expr]) -> Value:
         return local
 
     match value:
-        case Number(expr=expr):
-            return Number(slot(path, expr))
-        case Record(fields=fields):
+        case NumberValue(expr=expr):
+            return NumberValue(slot(path, expr))
+        case RecordValue(fields=fields):
             parts = {k: _returned(work, f"{path}.{k}", v, passed) for k, v in fields.items()}
             return replace(value, fields=parts)
-        case Array():
+        case ArrayValue():
             lengths = [
                 slot(f"{path}.{k}", each) if _changes(work, f"{path}.{k}", each) else each
                 for k, each in enumerate(value.dims)
@@ -146,6 +146,6 @@ def _returned(work: Work, path: str, value: Value, passed: list[Expr]) -> Value:
             dims = tuple(lengths)
             place = [value.base] if value.index is None else [value.base, value.index]
             if any(_changes(work, path, each) for each in place):
-                return Array(value.kind, dims, slot(path, AddressOf(value.address)))
+                return ArrayValue(value.kind, dims, slot(path, AddressOf(value.address)))
             return replace(value, dims=dims)
     return value

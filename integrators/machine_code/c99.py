@@ -13,16 +13,18 @@ from collections.abc import Iterable, Iterator, Sequence
 from integrators.machine_code.tree import (
     Address,
     AddressOf,
+    Assign,
+    AssignMany,
     Break,
     Callback,
     Choose,
     Const,
+    ConstantTable,
     Continue,
     Do,
     Expr,
     For,
     Foreign,
-    Function,
     Global,
     If,
     Invoke,
@@ -33,16 +35,14 @@ from integrators.machine_code.tree import (
     Op,
     Put,
     Return,
-    Set,
-    SetMany,
     Statement,
-    Table,
+    TypedFunction,
     While,
     may_write,
     parts_of,
 )
 
-__all__ = ["Fields", "Names", "Writer", "c99_text", "calls", "number_text"]
+__all__ = ["CFields", "CNames", "CWriter", "c99_text", "calls", "number_text"]
 
 _TYPES = {"f": "double", "i": "int64_t", "b": "bool", "p": "char *"}
 HEAD = """\
@@ -95,10 +95,10 @@ def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False)
     Examples
     --------
     >>> from integrators.machine_code.translate import Translator
-    >>> from integrators.machine_code.values import Number
+    >>> from integrators.machine_code.values import NumberValue
     >>> from integrators.step_size import memory_of
     >>> translator = Translator()
-    >>> _ = translator.entry("entry", memory_of, [Number(Local("f", "root"))])
+    >>> _ = translator.entry("entry", memory_of, [NumberValue(Local("f", "root"))])
     >>> print(c99_text(translator.module).partition("static double ")[2].strip())
     memory_of(double root_0)
     {
@@ -116,10 +116,10 @@ def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False)
         parts.append(f"double (*callbacks[{module.callbacks}])(double);")
     results = {f.name: f.results for f in module.functions}
     known = {*RESERVED.split(), *taken, *(table.name for table in module.tables)}
-    functions = Names(known - {f.name for f in module.functions if f.entry})
+    functions = CNames(known - {f.name for f in module.functions if f.entry})
     known |= {functions(f.name) for f in module.functions}
-    fields = Fields(known)
-    writers = [Writer(f, results, functions, Names(known), fields) for f in module.functions]
+    fields = CFields(known)
+    writers = [CWriter(f, results, functions, CNames(known), fields) for f in module.functions]
     parts += [each.text(static=hidden or not each.function.entry) for each in writers]
     if fields.offsets:
         parts.insert(0, fields.text())
@@ -133,7 +133,7 @@ def _structure(kinds: str) -> str:
     return f"typedef struct {{ {fields} }} many_{kinds};"
 
 
-def _table(table: Table) -> str:
+def _table(table: ConstantTable) -> str:
     entries = textwrap.fill(", ".join(map(number_text, table.values)), 92)
     return f"static const double {table.name}[] = {{\n{textwrap.indent(entries, '    ')}\n}};"
 
@@ -169,7 +169,7 @@ def _result(kinds: str) -> str:
     return _TYPES[kinds] if kinds else "void"
 
 
-class Names:
+class CNames:
     """Names of C, each for one name of the module."""
 
     def __init__(self, taken: Iterable[str]) -> None:
@@ -190,7 +190,7 @@ class Names:
         return self._found[name]
 
 
-class Fields:
+class CFields:
     """Constants for where the numbers of records are, in bytes from the beginning of a block."""
 
     def __init__(self, taken: Iterable[str]) -> None:
@@ -236,16 +236,16 @@ def _loops(body: Iterable[Statement]) -> Iterator[For]:
             yield from _loops(each.orelse)
 
 
-class Writer:
+class CWriter:
     """Writes one function."""
 
     def __init__(
         self,
-        function: Function,
+        function: TypedFunction,
         results: dict[str, str],
-        functions: Names,
-        locals_: Names,
-        fields: Fields,
+        functions: CNames,
+        locals_: CNames,
+        fields: CFields,
     ) -> None:
         self.function, self.results = function, results
         self.functions, self.name, self.field = functions, locals_, fields
@@ -298,12 +298,12 @@ class Writer:
         """Write a statement."""
         space = "    " * depth
         match statement:
-            case Set(target=target, value=value):
+            case Assign(target=target, value=value):
                 if target.name in self.unread:
                     kept = may_write(value) or any(isinstance(u, Callback) for u in parts_of(value))
                     return [f"{space}{self.value(value)};"] if kept else []
                 return [f"{space}{self.name(target.name)} = {self.value(value)};"]
-            case SetMany(targets=targets, call=call):
+            case AssignMany(targets=targets, call=call):
                 self.counter += 1
                 whole = self.name(f"many.{self.counter}")
                 made = f"{space}const many_{self.results[call.name]} {whole} = {self.value(call)};"

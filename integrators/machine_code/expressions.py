@@ -14,6 +14,8 @@ from typing import Any
 from integrators.machine_code.passing import passed_of
 from integrators.machine_code.tree import (
     AddressOf,
+    Assign,
+    AssignMany,
     Callback,
     Choose,
     Const,
@@ -25,16 +27,14 @@ from integrators.machine_code.tree import (
     Local,
     Logic,
     Op,
-    Set,
-    SetMany,
     may_write,
     parts_of,
 )
 from integrators.machine_code.values import (
-    Array,
-    Fixed,
-    Number,
-    Record,
+    ArrayValue,
+    FixedValue,
+    NumberValue,
+    RecordValue,
     Value,
     plus,
     substituted,
@@ -83,7 +83,7 @@ def value(work: Work, node: ast.expr) -> Value:
     """Translate an expression."""
     match node:
         case ast.Constant(value=bool() | int() | float() as given):
-            return Number(_constant(given))
+            return NumberValue(_constant(given))
         case ast.Name(id=name):
             return _named(work, name)
         case ast.Attribute(value=whole, attr=name):
@@ -97,27 +97,27 @@ def value(work: Work, node: ast.expr) -> Value:
             return made
         case ast.BinOp(left=left, op=op, right=right):
             a, b = _numbers(work, [left, right])
-            return Number(operation(work, op, a, b))
+            return NumberValue(operation(work, op, a, b))
         case ast.UnaryOp(op=ast.Not(), operand=operand):
-            return Number(negated(condition(work, operand)))
+            return NumberValue(negated(condition(work, operand)))
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return Number(_minus(work, number(work, operand)))
+            return NumberValue(_minus(work, number(work, operand)))
         case ast.Compare(left=left, ops=ops, comparators=others):
-            return Number(_comparison(work, left, ops, others))
+            return NumberValue(_comparison(work, left, ops, others))
         case ast.BoolOp():
-            return Number(condition(work, node))
+            return NumberValue(condition(work, node))
         case ast.IfExp(test=test, body=yes, orelse=no):
             return _choice(work, test, yes, no)
         case ast.Tuple(elts=parts):
             values = [steady(work, each) for each in in_order(work, parts)]
-            return Record(tuple, {str(k): each for k, each in enumerate(values)})
+            return RecordValue(tuple, {str(k): each for k, each in enumerate(values)})
     raise work.error("this expression is not part of the subset")
 
 
 def number(work: Work, node: ast.expr) -> Expr:
     """Translate an expression that is a number."""
     made = value(work, node)
-    if not isinstance(made, Number):
+    if not isinstance(made, NumberValue):
         raise work.error(f"{ast.unparse(node)} is not a number")
     return made.expr
 
@@ -135,8 +135,8 @@ def in_order(work: Work, nodes: Sequence[ast.expr]) -> list[Value]:
     made: list[Value] = []
     for k, node in enumerate(nodes):
         each = value(work, node)
-        if isinstance(each, Number) and may_write(each.expr):
-            touched = [isinstance(u, Number) and contains(u.expr, Load | Invoke) for u in made]
+        if isinstance(each, NumberValue) and may_write(each.expr):
+            touched = [isinstance(u, NumberValue) and contains(u.expr, Load | Invoke) for u in made]
             made = [steady(work, u) if old else u for u, old in zip(made, touched, strict=True)]
             if any(touched) or any(not isinstance(u, ast.Constant) for u in nodes[k + 1 :]):
                 each = steady(work, each)
@@ -146,7 +146,7 @@ def in_order(work: Work, nodes: Sequence[ast.expr]) -> list[Value]:
 
 def steady(work: Work, each: Value) -> Value:
     """Return a number with its present value, anything else as it is."""
-    return Number(work.kept(each.expr)) if isinstance(each, Number) else each
+    return NumberValue(work.kept(each.expr)) if isinstance(each, NumberValue) else each
 
 
 def contains(expr: Expr, kind: Any) -> bool:
@@ -158,9 +158,9 @@ def _numbers(work: Work, nodes: Sequence[ast.expr]) -> list[Expr]:
     """Translate several numbers, in order."""
     made = in_order(work, nodes)
     for node, each in zip(nodes, made, strict=True):
-        if not isinstance(each, Number):
+        if not isinstance(each, NumberValue):
             raise work.error(f"{ast.unparse(node)} is not a number")
-    return [each.expr for each in made if isinstance(each, Number)]
+    return [each.expr for each in made if isinstance(each, NumberValue)]
 
 
 # --------------------------------------------------------------------------- names and parts
@@ -173,25 +173,25 @@ def _named(work: Work, name: str) -> Value:
     if name in work.names:
         return _object(work, work.names[name])
     if hasattr(builtins, name):
-        return Fixed(getattr(builtins, name))
+        return FixedValue(getattr(builtins, name))
     raise work.error(f"{name} is not defined")
 
 
 def _object(work: Work, given: Any) -> Value:
     """Return a Python object as a value."""
     if isinstance(given, bool | int | float):
-        return Number(_constant(given))
+        return NumberValue(_constant(given))
     if isinstance(given, tuple) and not hasattr(given, "_fields"):
         return work.translator.table(given)
-    return Fixed(given)
+    return FixedValue(given)
 
 
 def _attribute(work: Work, whole: Value, name: str) -> Value:
     """Return a field of a tuple, or a member of a module."""
-    if isinstance(whole, Record) and name in whole.fields:
+    if isinstance(whole, RecordValue) and name in whole.fields:
         part = whole[name]
-        return _object(work, part.value) if isinstance(part, Fixed) else part
-    if isinstance(whole, Fixed) and isinstance(whole.value, types.ModuleType):
+        return _object(work, part.value) if isinstance(part, FixedValue) else part
+    if isinstance(whole, FixedValue) and isinstance(whole.value, types.ModuleType):
         return _object(work, getattr(whole.value, name))
     raise work.error(f"there is no {name}")
 
@@ -199,15 +199,15 @@ def _attribute(work: Work, whole: Value, name: str) -> Value:
 def subscript(work: Work, node: ast.Subscript) -> Value:
     """Return an entry, a row, or the first entries of an array."""
     whole = value(work, node.value)
-    if isinstance(whole, Record) and isinstance(node.slice, ast.Constant):
+    if isinstance(whole, RecordValue) and isinstance(node.slice, ast.Constant):
         return whole.fields[str(node.slice.value)]
-    if not isinstance(whole, Array):
+    if not isinstance(whole, ArrayValue):
         raise work.error(f"{ast.unparse(node.value)} is not an array")
     if isinstance(node.slice, ast.Slice):
         if node.slice.lower or node.slice.step or node.slice.upper is None:
             raise work.error("only the first entries of an array can be taken")
         dims = work.kept(integer(work, node.slice.upper)), *whole.dims[1:]
-        return Array(whole.kind, dims, whole.base, whole.offset, whole.index)
+        return ArrayValue(whole.kind, dims, whole.base, whole.offset, whole.index)
     place = integer(work, node.slice)
     if isinstance(place, Const) and place.value < 0:
         place = plus(whole.dims[0], place)
@@ -318,12 +318,12 @@ def _choice(work: Work, test: ast.expr, yes: ast.expr, no: ast.expr) -> Value:
     a, b = value(work, yes), value(work, no)
     if len(work.out) != before:
         raise work.error("the alternatives must be plain expressions")
-    if isinstance(a, Number) and isinstance(b, Number):
+    if isinstance(a, NumberValue) and isinstance(b, NumberValue):
         u, v = common(work, a.expr, b.expr)
-        return Number(Choose(u.kind, chosen, u, v))
+        return NumberValue(Choose(u.kind, chosen, u, v))
     if (
-        isinstance(a, Array)
-        and isinstance(b, Array)
+        isinstance(a, ArrayValue)
+        and isinstance(b, ArrayValue)
         and (a.kind, len(a.dims)) == (b.kind, len(b.dims))
     ):
         chosen = work.kept(chosen)
@@ -332,7 +332,7 @@ def _choice(work: Work, test: ast.expr, yes: ast.expr, no: ast.expr) -> Value:
             u if u == v else work.kept(Choose("i", chosen, u, v))
             for u, v in zip(a.dims, b.dims, strict=True)
         )
-        return Array(a.kind, dims, work.kept(place))
+        return ArrayValue(a.kind, dims, work.kept(place))
     raise work.error("the alternatives differ in kind")
 
 
@@ -340,7 +340,7 @@ def _choice(work: Work, test: ast.expr, yes: ast.expr, no: ast.expr) -> Value:
 def call(work: Work, node: ast.Call) -> Value | None:
     """Translate a call."""
     called = value(work, node.func)
-    if not isinstance(called, Fixed):
+    if not isinstance(called, FixedValue):
         raise work.error(f"{ast.unparse(node.func)} is not a function")
     function = called.value
     if isinstance(function, type) and hasattr(function, "_fields"):
@@ -348,16 +348,16 @@ def call(work: Work, node: ast.Call) -> Value | None:
     if node.keywords:
         raise work.error("arguments are given by place")
     if function is float and isinstance(node.args[0], ast.Constant):
-        return Number(Const("f", float(str(node.args[0].value))))
+        return NumberValue(Const("f", float(str(node.args[0].value))))
     arguments = in_order(work, node.args)
     if isinstance(function, types.FunctionType):
         return _own_call(work, function, arguments)
     if function is len:
         return _length(work, arguments[0])
-    parts = [each.expr for each in arguments if isinstance(each, Number)]
+    parts = [each.expr for each in arguments if isinstance(each, NumberValue)]
     if len(parts) != len(arguments):
         raise work.error("the function takes numbers")
-    return Number(_known_call(work, function, parts))
+    return NumberValue(_known_call(work, function, parts))
 
 
 def _known_call(work: Work, function: Any, parts: list[Expr]) -> Expr:
@@ -389,11 +389,11 @@ def _known_call(work: Work, function: Any, parts: list[Expr]) -> Expr:
 
 def _length(work: Work, whole: Value) -> Value:
     """Return the length of an array or a tuple."""
-    if isinstance(whole, Record):
-        return Number(Const("i", len(whole.fields)))
-    if not isinstance(whole, Array):
+    if isinstance(whole, RecordValue):
+        return NumberValue(Const("i", len(whole.fields)))
+    if not isinstance(whole, ArrayValue):
         raise work.error("a number has no length")
-    return Number(whole.dims[0])
+    return NumberValue(whole.dims[0])
 
 
 def _record(work: Work, cls: Any, node: ast.Call) -> Value:
@@ -406,30 +406,30 @@ def _record(work: Work, cls: Any, node: ast.Call) -> Value:
     for name, part in zip(names, nodes, strict=True):
         made = value(work, part)
         fields[name] = made if isinstance(part, ast.Attribute) else steady(work, made)
-    return Record(cls, {name: fields[name] for name in cls._fields})
+    return RecordValue(cls, {name: fields[name] for name in cls._fields})
 
 
 def _own_call(work: Work, function: Callable[..., Any], arguments: list[Value]) -> Value | None:
     """Return a call of another function of the subset."""
     done = work.translator.translated(function, arguments)
     name, result, slots = done.function.name, done.result, done.slots
-    if isinstance(result, Record | Array):  # it may contain what is passed
+    if isinstance(result, RecordValue | ArrayValue):  # it may contain what is passed
         arguments = [steady(work, each) for each in arguments]
     passed = tuple(passed_of(arguments)[0])
     if result is None:
         work.out.append(Do(Invoke("", name, passed)))
         return None
-    if isinstance(result, Number):
-        return Number(Invoke(slots[0].kind, name, passed))
+    if isinstance(result, NumberValue):
+        return NumberValue(Invoke(slots[0].kind, name, passed))
     given: dict[Local, Expr] = dict(zip(done.function.parameters, passed, strict=True))
     targets = [work.new(slot.kind) for slot in slots]
     given.update(zip(slots, targets, strict=True))
     if not slots:
         work.out.append(Do(Invoke("", name, passed)))
     elif len(slots) == 1:
-        work.out.append(Set(targets[0], Invoke(slots[0].kind, name, passed)))
+        work.out.append(Assign(targets[0], Invoke(slots[0].kind, name, passed)))
     else:
-        work.out.append(SetMany(tuple(targets), Invoke("", name, passed)))
+        work.out.append(AssignMany(tuple(targets), Invoke("", name, passed)))
     return substituted(result, given)  # type: ignore[no-any-return]
 
 

@@ -12,16 +12,16 @@ import math
 import re
 from collections.abc import Callable, Mapping
 
-from integrators.machine_code.c99 import Fields, Names, Writer, calls
+from integrators.machine_code.c99 import CFields, CNames, CWriter, calls
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import (
     Address,
+    AssignMany,
     Callback,
     Choose,
     Const,
     Expr,
     Foreign,
-    Function,
     Global,
     Load,
     Local,
@@ -29,10 +29,10 @@ from integrators.machine_code.tree import (
     Op,
     Put,
     Return,
-    SetMany,
     Statement,
+    TypedFunction,
 )
-from integrators.machine_code.values import Number
+from integrators.machine_code.values import NumberValue
 
 __all__ = ["javascript_text", "library_text", "script_number", "tables_of"]
 
@@ -110,10 +110,10 @@ def javascript_text(module: Module) -> str:
     --------
     >>> from integrators.machine_code.translate import Translator
     >>> from integrators.machine_code.tree import Local
-    >>> from integrators.machine_code.values import Number
+    >>> from integrators.machine_code.values import NumberValue
     >>> from integrators.step_size import memory_of
     >>> translator = Translator()
-    >>> _ = translator.entry("entry", memory_of, [Number(Local("f", "root"))])
+    >>> _ = translator.entry("entry", memory_of, [NumberValue(Local("f", "root"))])
     >>> print(javascript_text(translator.module).strip())
     function max(a, b) { return b > a ? b : a; }
     function memory_of(root_0) {
@@ -127,11 +127,11 @@ def javascript_text(module: Module) -> str:
     tables, _ = tables_of(module)
     entries = {each.name for each in module.functions if each.entry}
     taken = {*RESERVED.split(), *HELPERS, "bits"}
-    functions = Names(taken - entries)
+    functions = CNames(taken - entries)
     known = taken | {functions(each.name) for each in module.functions}
     results = {each.name: each.results for each in module.functions}
     text = "\n".join(
-        _Script(each, results, functions, Names(known), tables).text(static=True)
+        _Script(each, results, functions, CNames(known), tables).text(static=True)
         for each in module.functions
     )
     used = [each for name, each in HELPERS.items() if re.search(rf"\b{name}\(", text)]
@@ -147,19 +147,19 @@ def script_number(value: float) -> str:
     return repr(value)
 
 
-class _Script(Writer):
+class _Script(CWriter):
     """Writes one function."""
 
     def __init__(
         self,
-        function: Function,
+        function: TypedFunction,
         results: dict[str, str],
-        functions: Names,
-        locals_: Names,
+        functions: CNames,
+        locals_: CNames,
         tables: Mapping[str, int],
     ) -> None:
         self.tables = tables
-        super().__init__(function, results, functions, locals_, Fields(()))
+        super().__init__(function, results, functions, locals_, CFields(()))
 
     def text(self, *, static: bool) -> str:
         """Return its text."""
@@ -184,7 +184,7 @@ class _Script(Writer):
         """Write a statement."""
         space = "    " * depth
         match statement:
-            case SetMany(targets=targets, call=call):
+            case AssignMany(targets=targets, call=call):
                 kinds = self.results[call.name]
                 return [f"{space}{self.value(call)};"] + [
                     f"{space}{self.name(each.name)} = F[{k}]{' !== 0' if kinds[k] == 'b' else ''};"
@@ -303,7 +303,7 @@ def library_text(functions: Mapping[str, Callable[..., float]]) -> str:
     """
     translator = Translator()
     for name, function in functions.items():
-        numbers = [Number(Local("f", each)) for each in inspect.signature(function).parameters]
+        numbers = [NumberValue(Local("f", each)) for each in inspect.signature(function).parameters]
         translator.entry(name, function, numbers)
     _, words = tables_of(translator.module)
     text = javascript_text(translator.module)

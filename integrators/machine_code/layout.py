@@ -1,9 +1,9 @@
 """Blocks of memory that hold all arguments of a function, and what their fields are called.
 
-A block is described by an example: named tuples of numbers, of lists or arrays, and of `Column`.
-Lists become arrays inside the block, with constant lengths; a `Column` is an array elsewhere, of
-which the block holds the address and the lengths. Functions and what else is known while
-translating take no room.
+A block is described by an example: named tuples of numbers, of lists or arrays, and of
+`OuterArray`. Lists become arrays inside the block, with constant lengths; an `OuterArray` is an
+array elsewhere, of which the block holds the address and the lengths. Functions and what else is
+known while translating take no room.
 
 A dataclass is a record whose numbers can be assigned. They come first among its fields. In a block,
 its attributes read and write the block's words.
@@ -24,9 +24,9 @@ import numpy as np
 
 from integrators.machine_code.records import FIELDS, numbers_of
 from integrators.machine_code.tree import Address, Const, Expr, Load, Local
-from integrators.machine_code.values import Array, Fixed, Number, Record, Value
+from integrators.machine_code.values import ArrayValue, FixedValue, NumberValue, RecordValue, Value
 
-__all__ = ["Block", "Column", "Layout", "parts_of"]
+__all__ = ["BlockLayout", "MemoryBlock", "OuterArray", "parts_of"]
 
 _KINDS = {float: "f", int: "i", bool: "b"}
 _DTYPES = {"f": np.dtype(np.float64), "i": np.dtype(np.int64), "b": np.dtype(np.bool_)}
@@ -34,7 +34,7 @@ _WORDS: dict[str, Any] = {"f": ctypes.c_double, "i": ctypes.c_int64}
 
 
 @dataclass(frozen=True)
-class Column:
+class OuterArray:
     """An array outside the block.
 
     Parameters
@@ -74,7 +74,7 @@ class _Place:
         return np.zeros((0, self.width)[: 2 if self.width or self.lengths == 2 else 1], self.dtype)
 
 
-class Layout:
+class BlockLayout:
     """Where everything is in a block.
 
     Parameters
@@ -89,7 +89,7 @@ class Layout:
     Examples
     --------
     >>> from integrators.step_size import Control
-    >>> layout = Layout(Control(0.0, 0.0, 1e-6, [0.0, 0.0], 1.0, 0.0), lambda part: False)
+    >>> layout = BlockLayout(Control(0.0, 0.0, 1e-6, [0.0, 0.0], 1.0, 0.0), lambda part: False)
     >>> layout.words
     7
     """
@@ -139,7 +139,7 @@ class Layout:
         --------
         >>> from integrators.step_size import Control
         >>> control = Control(0.0, 0.0, 1e-6, [0.0, 0.0], 1.0, 0.0)
-        >>> Layout(control, lambda part: False).offset("rtol")
+        >>> BlockLayout(control, lambda part: False).offset("rtol")
         2
         """
         return self.offsets[name]
@@ -159,7 +159,7 @@ class Layout:
         """
         found: Value = self.value
         for each in name.split("."):
-            assert isinstance(found, Record)
+            assert isinstance(found, RecordValue)
             found = found[each]
         return found
 
@@ -187,7 +187,9 @@ class Layout:
             found[place.offset : place.offset + words] = [place.kind] * words
         return found
 
-    def _value(self, example: Any, way: tuple[int, ...], block: Expr, owner: str = "") -> Record:
+    def _value(
+        self, example: Any, way: tuple[int, ...], block: Expr, owner: str = ""
+    ) -> RecordValue:
         record: Any = type(example)
         names, hints = _names(example), _kinds(record)
         words = numbers_of(record) if dataclasses.is_dataclass(example) else {}
@@ -199,37 +201,37 @@ class Layout:
             elif name in words:
                 self.arrays.append(_Place(here, self.words, words[name], ()))
                 path = f"{owner}.{name}" if owner else name
-                fields[name] = Array(words[name], (), block, 8 * self.words, name=path)
+                fields[name] = ArrayValue(words[name], (), block, 8 * self.words, name=path)
                 self.words += 1
             elif isinstance(part, list | np.ndarray):
                 fields[name] = self._array(part, here, block, hints.get(name))
-            elif isinstance(part, Column):
+            elif isinstance(part, OuterArray):
                 fields[name] = self._column(part, here, block)
             elif _is_record(part):
                 fields[name] = self._value(part, here, block, name)
             else:
                 kind = hints.get(name) or ("f" if isinstance(part, float) else "i")
                 place = Address(block, 8 * self.words)
-                fields[name] = Number(Load(kind, place))
+                fields[name] = NumberValue(Load(kind, place))
                 self.numbers.append(_Place(here, self.words, kind, None))
                 self.words += 1
-        return Record(record, fields)
+        return RecordValue(record, fields)
 
-    def _array(self, part: Any, way: tuple[int, ...], block: Expr, kind: str | None) -> Array:
+    def _array(self, part: Any, way: tuple[int, ...], block: Expr, kind: str | None) -> ArrayValue:
         if isinstance(part, np.ndarray):
             kind, shape = part.dtype.kind, part.shape
         else:
             kind, shape = kind or "f", _shape(part)
         if not self.inside:
-            made = self._column(Column(kind, table=len(shape) == 2), way, block)
+            made = self._column(OuterArray(kind, table=len(shape) == 2), way, block)
             self.arrays.append(_Place(way, -1, kind, shape))
             return made
         start = self.words
         self.arrays.append(_Place(way, start, kind, shape))
         self.words += -(-_DTYPES[kind].itemsize * int(np.prod(shape)) // 8)
-        return Array(kind, tuple(Const("i", each) for each in shape), block, 8 * start)
+        return ArrayValue(kind, tuple(Const("i", each) for each in shape), block, 8 * start)
 
-    def _column(self, part: Column, way: tuple[int, ...], block: Expr) -> Array:
+    def _column(self, part: OuterArray, way: tuple[int, ...], block: Expr) -> ArrayValue:
         start = self.words
         variable = part.width is not None and not self.inside
         lengths = 2 if part.table or variable else 1
@@ -241,7 +243,7 @@ class Layout:
         width = 0 if variable else part.width or 0
         self.columns.append(_Place(way, start, part.kind, None, lengths, width))
         self.words += 1 + lengths
-        return Array(part.kind, dims, Load("p", Address(block, 8 * start)))
+        return ArrayValue(part.kind, dims, Load("p", Address(block, 8 * start)))
 
     def key(self) -> str:
         """Return a text that says where everything is."""
@@ -249,16 +251,16 @@ class Layout:
         return repr((self.words, self.numbers, inside, self.columns))
 
 
-class Block:
+class MemoryBlock:
     """The memory of one call.
 
     Parameters
     ----------
-    layout : Layout
+    layout : BlockLayout
         Where everything is.
     example : named tuple or tuple
         Its lists become arrays in memory.
-    like : Block, optional
+    like : MemoryBlock, optional
         A block whose present contents are copied, instead of those of the example.
     words : ndarray of int, optional
         The memory, ``layout.words`` long; the block's own if omitted.
@@ -276,13 +278,13 @@ class Block:
     --------
     >>> from integrators.step_size import Control
     >>> control = Control(0.0, 0.0, 1e-6, [0.0, 0.5], 1.0, 0.0)
-    >>> block = Block(Layout(control, lambda part: False), control)
+    >>> block = MemoryBlock(BlockLayout(control, lambda part: False), control)
     >>> block.contents.atol
     array([0. , 0.5])
     """
 
     def __init__(
-        self, layout: Layout, example: Any, like: Block | None = None, words: Any = None
+        self, layout: BlockLayout, example: Any, like: MemoryBlock | None = None, words: Any = None
     ) -> None:
         self.layout = layout
         self._words: Any = np.zeros(layout.words, dtype=np.int64) if words is None else words
@@ -307,12 +309,12 @@ class Block:
         """The memory."""
         return self._words
 
-    def become(self, like: Block) -> None:
+    def become(self, like: MemoryBlock) -> None:
         """Take over what another block contains.
 
         Parameters
         ----------
-        like : Block
+        like : MemoryBlock
             Of the same layout and example.
         """
         self._columns[:] = like._columns
@@ -454,7 +456,7 @@ def _found(contents: Any, way: tuple[int, ...]) -> Any:
 def _is_record(part: Any) -> bool:
     """Return whether a part of an example is a tuple or a dataclass, which has parts itself."""
     return isinstance(part, tuple) or (
-        dataclasses.is_dataclass(part) and not isinstance(part, Column)
+        dataclasses.is_dataclass(part) and not isinstance(part, OuterArray)
     )
 
 
@@ -479,9 +481,9 @@ def parts_of(record: Any, known: Callable[[Any], bool]) -> list[Any]:
     Parameters
     ----------
     record : named tuple, tuple or dataclass
-        As for a `Layout`; something else is its own only part.
+        As for a `BlockLayout`; something else is its own only part.
     known : callable
-        As for a `Layout`: what is known has no parts.
+        As for a `BlockLayout`: what is known has no parts.
 
     Returns
     -------
@@ -509,10 +511,10 @@ def _view(record: Any) -> Any:
 def _constant(part: Any) -> Value:
     if hasattr(part, "_fields"):
         names = zip(part._fields, part, strict=True)
-        return Record(type(part), {name: _constant(each) for name, each in names})
+        return RecordValue(type(part), {name: _constant(each) for name, each in names})
     if isinstance(part, bool | int | float):
-        return Number(Const(_KINDS[type(part)], part))
-    return Fixed(part)
+        return NumberValue(Const(_KINDS[type(part)], part))
+    return FixedValue(part)
 
 
 @functools.cache

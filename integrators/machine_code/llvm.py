@@ -13,16 +13,18 @@ from collections.abc import Sequence
 from integrators.machine_code.tree import (
     Address,
     AddressOf,
+    Assign,
+    AssignMany,
     Break,
     Callback,
     Choose,
     Const,
+    ConstantTable,
     Continue,
     Do,
     Expr,
     For,
     Foreign,
-    Function,
     Global,
     If,
     Invoke,
@@ -33,10 +35,8 @@ from integrators.machine_code.tree import (
     Op,
     Put,
     Return,
-    Set,
-    SetMany,
     Statement,
-    Table,
+    TypedFunction,
     While,
 )
 
@@ -67,10 +67,10 @@ def llvm_text(module: Module) -> str:
     Examples
     --------
     >>> from integrators.machine_code.translate import Translator
-    >>> from integrators.machine_code.values import Number
+    >>> from integrators.machine_code.values import NumberValue
     >>> from integrators.step_size import memory_of
     >>> translator = Translator()
-    >>> _ = translator.entry("entry", memory_of, [Number(Local("f", "root"))])
+    >>> _ = translator.entry("entry", memory_of, [NumberValue(Local("f", "root"))])
     >>> "define internal double @memory_of(" in llvm_text(translator.module)
     True
     """
@@ -97,7 +97,7 @@ def llvm_text(module: Module) -> str:
 _ALIAS = {"f": "!5", "i": "!6", "b": "!7", "p": "!8"}
 
 
-def _table(table: Table) -> str:
+def _table(table: ConstantTable) -> str:
     entries = ", ".join(f"double {_float(value)}" for value in table.values)
     return (
         f"@{table.name} = private unnamed_addr constant [{len(table.values)} x double] [{entries}]"
@@ -127,7 +127,7 @@ def _calls(body: Sequence[Statement]) -> bool:
 class _Writer:
     """Writes one function."""
 
-    def __init__(self, function: Function, module: Module, foreign: dict[str, int]) -> None:
+    def __init__(self, function: TypedFunction, module: Module, foreign: dict[str, int]) -> None:
         self.function, self.module, self.foreign = function, module, foreign
         self.results = {each.name: each.results for each in module.functions}
         self.lines: list[str] = []
@@ -199,10 +199,10 @@ class _Writer:
     def statement(self, statement: Statement) -> None:
         """Write a statement."""
         match statement:
-            case Set(target=target, value=value):
+            case Assign(target=target, value=value):
                 kind = _TYPES[target.kind]
                 self.lines.append(f"  store {kind} {self.value(value)}, ptr %{_name(target.name)}")
-            case SetMany(targets=targets, call=call):
+            case AssignMany(targets=targets, call=call):
                 made = self.call(call)
                 kinds = self.result(self.results[call.name])
                 for k, target in enumerate(targets):

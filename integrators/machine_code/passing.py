@@ -12,7 +12,14 @@ from typing import Any
 
 from integrators.machine_code.bindings import bind
 from integrators.machine_code.tree import AddressOf, Const, Expr, Local, locals_in
-from integrators.machine_code.values import Array, Fixed, Number, Record, Value, substituted
+from integrators.machine_code.values import (
+    ArrayValue,
+    FixedValue,
+    NumberValue,
+    RecordValue,
+    Value,
+    substituted,
+)
 from integrators.machine_code.work import Work
 
 __all__ = ["passed_of", "take"]
@@ -46,22 +53,22 @@ def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
 
     def shape(value: Value, direct: bool) -> Any:
         match value:
-            case Number(expr=expr) if direct and not isinstance(expr, Const):
+            case NumberValue(expr=expr) if direct and not isinstance(expr, Const):
                 passed.append(expr)
                 return "number", expr.kind, len(passed)
-            case Number(expr=expr):
+            case NumberValue(expr=expr):
                 return "number", known(expr)
-            case Array(kind=kind, dims=dims) if direct:
+            case ArrayValue(kind=kind, dims=dims) if direct:
                 passed.append(AddressOf(value.address))
                 return "array", kind, len(passed), tuple(map(known, dims))
-            case Array(kind=kind, dims=dims, base=base, offset=offset, index=index):
+            case ArrayValue(kind=kind, dims=dims, base=base, offset=offset, index=index):
                 lengths = tuple(map(known, dims))
                 at = None if index is None else known(index)
                 return "view", kind, lengths, known(base), offset, at
-            case Record(cls=cls, fields=fields):
+            case RecordValue(cls=cls, fields=fields):
                 parts = tuple((name, shape(part, False)) for name, part in fields.items())
                 return "record", id(cls), parts
-            case Fixed(value=fixed):
+            case FixedValue(value=fixed):
                 return "fixed", id(fixed)
 
     return passed, tuple([shape(argument, True) for argument in arguments])
@@ -100,18 +107,18 @@ def take(work: Work, arguments: Sequence[Value]) -> None:
 
     def bound(value: Value, name: str, direct: bool) -> Value:
         match value:
-            case Number(expr=expr) if direct and not isinstance(expr, Const):
-                return Number(parameter(name, expr.kind))
-            case Number(expr=expr):
-                return Number(own(expr, name))
-            case Array(kind=kind, dims=dims) if direct:
+            case NumberValue(expr=expr) if direct and not isinstance(expr, Const):
+                return NumberValue(parameter(name, expr.kind))
+            case NumberValue(expr=expr):
+                return NumberValue(own(expr, name))
+            case ArrayValue(kind=kind, dims=dims) if direct:
                 local = parameter(name, "p")
-                return Array(kind, tuple(own(each, name) for each in dims), local)
-            case Array(dims=dims, base=base, index=index):
+                return ArrayValue(kind, tuple(own(each, name) for each in dims), local)
+            case ArrayValue(dims=dims, base=base, index=index):
                 lengths = tuple(own(each, name) for each in dims)
                 at = None if index is None else own(index, name)
                 return replace(value, dims=lengths, base=own(base, name), index=at)
-            case Record(fields=fields):
+            case RecordValue(fields=fields):
                 return replace(value, fields={k: bound(v, k, False) for k, v in fields.items()})
         return value
 

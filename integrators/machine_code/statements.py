@@ -21,6 +21,7 @@ from integrators.machine_code.expressions import (
     value,
 )
 from integrators.machine_code.tree import (
+    Assign,
     Break,
     Const,
     Continue,
@@ -32,11 +33,10 @@ from integrators.machine_code.tree import (
     Local,
     Put,
     Return,
-    Set,
     Statement,
     While,
 )
-from integrators.machine_code.values import Array, Fixed, Number, Record, Value
+from integrators.machine_code.values import ArrayValue, FixedValue, NumberValue, RecordValue, Value
 from integrators.machine_code.work import Work, as_kind
 
 __all__ = ["body"]
@@ -100,12 +100,12 @@ def _statement(work: Work, node: ast.stmt) -> None:
             pass
         case ast.Expr(value=ast.Call() as called):
             made = translated_call(work, called)
-            if isinstance(made, Number) and not isinstance(made.expr, Local | Const):
+            if isinstance(made, NumberValue) and not isinstance(made.expr, Local | Const):
                 work.out.append(Do(made.expr))
         case ast.Assign(targets=[target], value=given):
             _assign(work, target, given)
         case ast.Assign(targets=targets, value=given):
-            common = Number(work.kept(number(work, given)))
+            common = NumberValue(work.kept(number(work, given)))
             for target in targets:
                 _store(work, target, common)
         case ast.AnnAssign(target=target, value=ast.expr() as given):
@@ -130,7 +130,7 @@ def _statement(work: Work, node: ast.stmt) -> None:
             give(work, None)
         case ast.Return(value=ast.Tuple(elts=parts)):
             values = in_order(work, parts)
-            give(work, Record(tuple, {str(k): each for k, each in enumerate(values)}))
+            give(work, RecordValue(tuple, {str(k): each for k, each in enumerate(values)}))
         case ast.Return(value=ast.expr() as given):
             give(work, value(work, given))
         case _:
@@ -156,13 +156,13 @@ def _for(work: Work, name: str, over: ast.expr, inside: list[ast.stmt]) -> None:
         for each in ast.walk(part)
     ):
         raise work.error(f"the loop changes its own variable {name}")
-    if isinstance(over, ast.Call) and value(work, over.func) == Fixed(range):
+    if isinstance(over, ast.Call) and value(work, over.func) == FixedValue(range):
         _over_range(work, name, over, inside)
         return
     whole = value(work, over)
-    if isinstance(whole, Record):
+    if isinstance(whole, RecordValue):
         _over_tuple(work, name, whole, inside)
-    elif isinstance(whole, Array) and len(whole.dims) == 1:
+    elif isinstance(whole, ArrayValue) and len(whole.dims) == 1:
         _over_array(work, name, whole, inside)
     else:
         raise work.error("a loop goes over a range or over an array of numbers")
@@ -175,7 +175,7 @@ def _over_range(work: Work, name: str, over: ast.Call, inside: Sequence[ast.stmt
     if not isinstance(step, Const) or step.value <= 0:
         raise work.error("the step of a range must be a positive constant")
     target = work.variable(name, "i")
-    bound = Number(target)
+    bound = NumberValue(target)
     work.scope[name] = work.first.setdefault(name, bound)
     if work.scope[name] != bound or target.kind != "i":
         raise work.error(f"{name} would be of two kinds")
@@ -184,7 +184,7 @@ def _over_range(work: Work, name: str, over: ast.Call, inside: Sequence[ast.stmt
         work.source.definition
     ):  # then it is the last one that the body had, not the limit
         place = work.new("i")
-        made: tuple[Statement, ...] = (Set(target, place), *_block(work, inside))
+        made: tuple[Statement, ...] = (Assign(target, place), *_block(work, inside))
     else:
         place, made = target, _block(work, inside)
     work.out.append(For(place, start, stop, step.value, made))
@@ -208,12 +208,12 @@ def _read_after(definition: ast.FunctionDef) -> frozenset[str]:
     return frozenset(found)
 
 
-def _over_array(work: Work, name: str, array: Array, inside: Sequence[ast.stmt]) -> None:
+def _over_array(work: Work, name: str, array: ArrayValue, inside: Sequence[ast.stmt]) -> None:
     work_array = own(work, work.fresh(), array)
-    assert isinstance(work_array, Array)
+    assert isinstance(work_array, ArrayValue)
     place = work.new("i")
     entry = work_array.at(place)
-    assert isinstance(entry, Number)
+    assert isinstance(entry, NumberValue)
     stop = work.kept(work_array.dims[0])
     before, work.out = work.out, []
     bind(work, name, entry)
@@ -221,12 +221,12 @@ def _over_array(work: Work, name: str, array: Array, inside: Sequence[ast.stmt])
     work.out.append(For(place, Const("i", 0), stop, 1, (*first, *_block(work, inside))))
 
 
-def _over_tuple(work: Work, name: str, whole: Record, inside: Sequence[ast.stmt]) -> None:
+def _over_tuple(work: Work, name: str, whole: RecordValue, inside: Sequence[ast.stmt]) -> None:
     """Repeat the body for each of a few values."""
     if any(isinstance(n, ast.Break | ast.Continue) for u in inside for n in ast.walk(u)):
         raise work.error("a loop over a tuple cannot be left")
     parts = own(work, work.fresh(), whole)
-    assert isinstance(parts, Record)
+    assert isinstance(parts, RecordValue)
     work.count_assignments(*inside)  # each of them is translated several times
     for part in parts.fields.values():
         work.scope[name] = part
@@ -247,12 +247,14 @@ def _assign(work: Work, target: ast.expr, given: ast.expr) -> None:
         read = {each.id for each in ast.walk(given) if isinstance(each, ast.Name)}
         if names & read or any(not isinstance(each, ast.Name) for each in target.elts):
             parts = [
-                steady(work, each) if isinstance(each, Number) else own(work, work.fresh(), each)
+                steady(work, each)
+                if isinstance(each, NumberValue)
+                else own(work, work.fresh(), each)
                 for each in parts
             ]
     else:
         whole = value(work, given)
-        if not isinstance(whole, Record):
+        if not isinstance(whole, RecordValue):
             raise work.error("only tuples can be unpacked")
         parts = list(whole.fields.values())
     if len(parts) != len(target.elts):
@@ -266,7 +268,7 @@ def _augment(work: Work, target: ast.expr, op: ast.operator, given: ast.expr) ->
     if isinstance(target, ast.Name):
         now = number(work, ast.Name(target.id, ast.Load()))
         more = number(work, given)
-        _store(work, target, Number(operation(work, op, now, more)))
+        _store(work, target, NumberValue(operation(work, op, now, more)))
         return
     entry = _entry(work, target)
     more = number(work, given)
@@ -281,7 +283,7 @@ def _store(work: Work, target: ast.expr, given: Value) -> None:
     if isinstance(target, ast.Name):
         bind(work, target.id, given)
         return
-    if not isinstance(given, Number):
+    if not isinstance(given, NumberValue):
         raise work.error("an entry or a field is a number")
     expr = work.kept(given.expr) if contains(given.expr, Invoke) else given.expr
     entry = _entry(work, target)
@@ -292,12 +294,12 @@ def _entry(work: Work, target: ast.expr) -> Load:
     match target:
         case ast.Subscript():
             entry = subscript(work, target)
-            if isinstance(entry, Number) and isinstance(entry.expr, Load):
+            if isinstance(entry, NumberValue) and isinstance(entry.expr, Load):
                 return entry.expr
         case ast.Attribute(value=owner, attr=name):
             whole = value(work, owner)
-            part = whole.fields.get(name) if isinstance(whole, Record) else None
-            if isinstance(part, Array) and not part.dims:
+            part = whole.fields.get(name) if isinstance(whole, RecordValue) else None
+            if isinstance(part, ArrayValue) and not part.dims:
                 return Load(part.kind, part.address)
     raise work.error("only names, entries of arrays and numbers of dataclasses can be assigned")
 

@@ -24,23 +24,23 @@ from integrators.machine_code.statements import body
 from integrators.machine_code.tree import (
     Address,
     AddressOf,
+    Assign,
     Const,
+    ConstantTable,
     Do,
     Expr,
     For,
-    Function,
     Global,
     Invoke,
     Local,
     Module,
     Op,
     Return,
-    Set,
     Statement,
-    Table,
+    TypedFunction,
     locals_in,
 )
-from integrators.machine_code.values import Array, Number, Value, leaves
+from integrators.machine_code.values import ArrayValue, NumberValue, Value, leaves
 from integrators.machine_code.work import Again, Learnt, Specialised, Work
 
 __all__ = ["HostFunction", "TranslationError", "Translator"]
@@ -62,10 +62,10 @@ class Translator:
 
     Examples
     --------
-    >>> from integrators.machine_code.values import Number
+    >>> from integrators.machine_code.values import NumberValue
     >>> from integrators.step_size import root_of
     >>> translator = Translator()
-    >>> arguments = [Number(Local("f", "error")), Number(Local("i", "order"))]
+    >>> arguments = [NumberValue(Local("f", "error")), NumberValue(Local("i", "order"))]
     >>> translator.entry("root", root_of, arguments).results
     'f'
     >>> [function.name for function in translator.module.functions]
@@ -77,13 +77,13 @@ class Translator:
         self.module = Module()
         self._done: dict[Any, Specialised] = {}
         self._kept: list[Any] = []  # objects whose `id` is part of a key
-        self._made: dict[Any, list[Function]] = {}
+        self._made: dict[Any, list[TypedFunction]] = {}
         self._names = {*FOREIGN.values(), "callbacks"}
-        self._tables: dict[str, Array] = {}
+        self._tables: dict[str, ArrayValue] = {}
 
     def entry(
         self, name: str, function: Callable[..., Any], arguments: Sequence[Value]
-    ) -> Function:
+    ) -> TypedFunction:
         """Add a function that can be called from outside.
 
         Parameters
@@ -97,7 +97,7 @@ class Translator:
 
         Returns
         -------
-        Function
+        TypedFunction
             The entry; it returns what the function returns, which must be one number or nothing.
 
         Raises
@@ -111,28 +111,28 @@ class Translator:
         for argument in arguments:
             for expr in _expressions(argument):
                 parameters.update(dict.fromkeys(locals_in(expr)))
-        kind = done.slots[0].kind if isinstance(done.result, Number) else ""
+        kind = done.slots[0].kind if isinstance(done.result, NumberValue) else ""
         call = Invoke(kind, done.function.name, tuple(passed_of(arguments)[0]))
         made: tuple[Statement, ...] = (Return((call,)),) if kind else (Do(call), Return(()))
-        entry = Function(name, tuple(parameters), kind, (), made, entry=True)
+        entry = TypedFunction(name, tuple(parameters), kind, (), made, entry=True)
         self.module.functions.append(entry)
         return entry
 
-    def for_each(self, name: str, entry: Function, words: int) -> Function:
+    def for_each(self, name: str, entry: TypedFunction, words: int) -> TypedFunction:
         """Add a function that calls an entry for many blocks, one after the other in memory.
 
         Parameters
         ----------
         name : str
             Its name outside.
-        entry : Function
+        entry : TypedFunction
             Its only parameter is the address of a block; it returns an integer.
         words : int
             Length of a block.
 
         Returns
         -------
-        Function
+        TypedFunction
             With the address of the first block and their number as parameters. It returns the sum
             of what the entry returned.
         """
@@ -141,10 +141,10 @@ class Translator:
         count, i, total = (Local("i", each) for each in ("count", "i", "total"))
         here = Address(block, 0, Op("i", "*", (i, Const("i", words))))
         result = Invoke("i", entry.name, (AddressOf(here),))
-        add = Set(total, Op("i", "+", (total, result)))
+        add = Assign(total, Op("i", "+", (total, result)))
         loop = For(i, Const("i", 0), count, 1, (add,))
-        body = (Set(total, Const("i", 0)), loop, Return((total,)))
-        made = Function(name, (block, count), "i", (i, total), body, entry=True)
+        body = (Assign(total, Const("i", 0)), loop, Return((total,)))
+        made = TypedFunction(name, (block, count), "i", (i, total), body, entry=True)
         self.module.functions.append(made)
         return made
 
@@ -169,7 +169,7 @@ class Translator:
             self._done[key] = self._specialised(function, arguments)
         return self._done[key]
 
-    def table(self, values: tuple[Any, ...]) -> Array:
+    def table(self, values: tuple[Any, ...]) -> ArrayValue:
         """Return constants as an array in memory; ragged rows are padded with zeros.
 
         Parameters
@@ -179,7 +179,7 @@ class Translator:
 
         Returns
         -------
-        Array
+        ArrayValue
             The same one for the same values.
         """
         key = repr(values)
@@ -188,9 +188,9 @@ class Translator:
             width = max(map(len, rows)) if rows else len(values)
             flat = [v for row in rows or (values,) for v in (*row, *[0.0] * (width - len(row)))]
             name = f"table{len(self._tables)}"
-            self.module.tables.append(Table(name, "f", tuple(map(float, flat))))
+            self.module.tables.append(ConstantTable(name, "f", tuple(map(float, flat))))
             dims = (Const("i", len(rows)), Const("i", width)) if rows else (Const("i", width),)
-            self._tables[key] = Array("f", dims, Global(name))
+            self._tables[key] = ArrayValue("f", dims, Global(name))
         return self._tables[key]
 
     def _specialised(self, function: Callable[..., Any], arguments: Sequence[Value]) -> Specialised:
@@ -208,7 +208,9 @@ class Translator:
         kinds = "".join(slot.kind for slot in slots)
         name = function.__name__.strip("_")
         inline = self.inline.get(function.__name__)
-        made = Function(name, tuple(work.parameters), kinds, variables, statements, inline=inline)
+        made = TypedFunction(
+            name, tuple(work.parameters), kinds, variables, statements, inline=inline
+        )
         # Other types may have led to the same statements.
         alike = self._made.setdefault((id(function), replace(made, body=())), [])
         for other in alike:
@@ -233,8 +235,8 @@ def _expressions(value: Value) -> list[Expr]:
     """Return the expressions of a value."""
     found: list[Expr] = []
     for leaf in leaves(value):
-        if isinstance(leaf, Number):
+        if isinstance(leaf, NumberValue):
             found.append(leaf.expr)
-        elif isinstance(leaf, Array):
+        elif isinstance(leaf, ArrayValue):
             found += [leaf.base, *([] if leaf.index is None else [leaf.index]), *leaf.dims]
     return found

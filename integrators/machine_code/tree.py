@@ -14,16 +14,18 @@ __all__ = [
     "SIZES",
     "Address",
     "AddressOf",
+    "Assign",
+    "AssignMany",
     "Break",
     "Callback",
     "Choose",
     "Const",
+    "ConstantTable",
     "Continue",
     "Do",
     "Expr",
     "For",
     "Foreign",
-    "Function",
     "Global",
     "If",
     "Invoke",
@@ -34,10 +36,8 @@ __all__ = [
     "Op",
     "Put",
     "Return",
-    "Set",
-    "SetMany",
     "Statement",
-    "Table",
+    "TypedFunction",
     "While",
     "locals_in",
     "may_write",
@@ -257,7 +257,7 @@ def locals_in(expr: Expr) -> Iterator[Local]:
 
 # --------------------------------------------------------------------------- statements
 @dataclass(frozen=True)
-class Set:
+class Assign:
     """Assign to a local."""
 
     target: Local
@@ -265,7 +265,7 @@ class Set:
 
 
 @dataclass(frozen=True)
-class SetMany:
+class AssignMany:
     """Assign several results of a call to locals."""
 
     targets: tuple[Local, ...]
@@ -333,12 +333,12 @@ class Return:
     values: tuple[Expr, ...]
 
 
-Statement = Set | SetMany | Put | Do | If | While | For | Break | Continue | Return
+Statement = Assign | AssignMany | Put | Do | If | While | For | Break | Continue | Return
 
 
 # --------------------------------------------------------------------------- modules
 @dataclass(frozen=True)
-class Function:
+class TypedFunction:
     """A function; entries can be called from outside.
 
     Parameters
@@ -369,7 +369,7 @@ class Function:
 
 
 @dataclass(frozen=True)
-class Table:
+class ConstantTable:
     """Constants in memory."""
 
     name: str
@@ -381,6 +381,6 @@ class Table:
 class Module:
     """Functions in the order in which they are needed, and tables."""
 
-    functions: list[Function] = field(default_factory=list)
-    tables: list[Table] = field(default_factory=list)
+    functions: list[TypedFunction] = field(default_factory=list)
+    tables: list[ConstantTable] = field(default_factory=list)
     callbacks: int = 0

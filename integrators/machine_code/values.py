@@ -18,18 +18,28 @@ from integrators.machine_code.tree import (
     Op,
 )
 
-__all__ = ["Array", "Fixed", "Number", "Record", "Value", "leaves", "plus", "substituted", "times"]
+__all__ = [
+    "ArrayValue",
+    "FixedValue",
+    "NumberValue",
+    "RecordValue",
+    "Value",
+    "leaves",
+    "plus",
+    "substituted",
+    "times",
+]
 
 
 @dataclass(frozen=True)
-class Number:
+class NumberValue:
     """A number."""
 
     expr: Expr
 
 
 @dataclass(frozen=True)
-class Array:
+class ArrayValue:
     """A view of memory, row by row.
 
     Parameters
@@ -60,7 +70,7 @@ class Array:
         """Where it begins."""
         return Address(self.base, self.offset, self.index, SIZES[self.kind], self.name)
 
-    def at(self, place: Expr) -> Array | Number:
+    def at(self, place: Expr) -> ArrayValue | NumberValue:
         """Return an entry, or a row of a table."""
         step = place
         for length in self.dims[1:]:
@@ -71,11 +81,11 @@ class Array:
         else:
             index = step if index is None else plus(index, step)
         row = replace(self, dims=self.dims[1:], offset=offset, index=index)
-        return row if row.dims else Number(Load(self.kind, row.address))
+        return row if row.dims else NumberValue(Load(self.kind, row.address))
 
 
 @dataclass(frozen=True)
-class Record:
+class RecordValue:
     """A named tuple, a tuple whose names are its places, or a dataclass.
 
     The numbers of a dataclass can be assigned: they are arrays without lengths.
@@ -87,19 +97,19 @@ class Record:
     def __getitem__(self, name: str) -> Value:
         """Return a field."""
         part = self.fields[name]
-        if isinstance(part, Array) and not part.dims:
-            return Number(Load(part.kind, part.address))
+        if isinstance(part, ArrayValue) and not part.dims:
+            return NumberValue(Load(part.kind, part.address))
         return part
 
 
 @dataclass(frozen=True)
-class Fixed:
+class FixedValue:
     """A Python object known while translating: a function, a class, a module."""
 
     value: Any
 
 
-Value = Number | Array | Record | Fixed
+Value = NumberValue | ArrayValue | RecordValue | FixedValue
 
 
 def plus(a: Expr, b: Expr) -> Expr:
@@ -136,7 +146,7 @@ def times(a: Expr, b: Expr) -> Expr:
     return Op("i", "*", (a, b))
 
 
-def leaves(value: Value) -> Iterator[Number | Array | Fixed]:
+def leaves(value: Value) -> Iterator[NumberValue | ArrayValue | FixedValue]:
     """Yield the numbers, arrays and objects that a value is made of, in order.
 
     Parameters
@@ -146,16 +156,16 @@ def leaves(value: Value) -> Iterator[Number | Array | Fixed]:
 
     Yields
     ------
-    Number, Array or Fixed
+    NumberValue, ArrayValue or FixedValue
         At least one, unless it is an empty record.
 
     Examples
     --------
-    >>> one, two = (Number(Const("i", each)) for each in (1, 2))
-    >>> [each.expr.value for each in leaves(Record(tuple, {"0": one, "1": two}))]
+    >>> one, two = (NumberValue(Const("i", each)) for each in (1, 2))
+    >>> [each.expr.value for each in leaves(RecordValue(tuple, {"0": one, "1": two}))]
     [1, 2]
     """
-    if isinstance(value, Record):
+    if isinstance(value, RecordValue):
         for part in value.fields.values():
             yield from leaves(part)
     else:
@@ -179,7 +189,7 @@ def substituted(part: Any, given: Mapping[Local, Expr]) -> Any:
 
     Examples
     --------
-    >>> substituted(Number(Local("i", "n")), {Local("i", "n"): Const("i", 5)}).expr.value
+    >>> substituted(NumberValue(Local("i", "n")), {Local("i", "n"): Const("i", 5)}).expr.value
     5
     """
     if not given:
@@ -191,18 +201,18 @@ def substituted(part: Any, given: Mapping[Local, Expr]) -> Any:
             return replace(part, operands=tuple(substituted(each, given) for each in parts))
         case Load(address=address) | AddressOf(address=address):
             return replace(part, address=substituted(address, given))
-        case Address(base=base, index=index) | Array(base=base, index=index):
+        case Address(base=base, index=index) | ArrayValue(base=base, index=index):
             index = None if index is None else substituted(index, given)
             moved = replace(part, base=substituted(base, given), index=index)
-            if isinstance(moved, Array):
+            if isinstance(moved, ArrayValue):
                 dims = tuple(substituted(each, given) for each in moved.dims)
                 return replace(moved, dims=dims)
             return moved
-        case Number(expr=inner):
-            return Number(substituted(inner, given))
-        case Record(fields=fields):
+        case NumberValue(expr=inner):
+            return NumberValue(substituted(inner, given))
+        case RecordValue(fields=fields):
             changed = {name: substituted(each, given) for name, each in fields.items()}
             return replace(part, fields=changed)
-        case Const() | Global() | Fixed():
+        case Const() | Global() | FixedValue():
             return part
     raise AssertionError(part)  # anything else would have been assigned to a local before

@@ -9,18 +9,18 @@ from typing import Any, Protocol
 
 from integrators.machine_code.sources import TranslationError, source_of
 from integrators.machine_code.tree import (
+    Assign,
     Const,
     Expr,
-    Function,
     Global,
     Local,
     Module,
     Op,
-    Set,
     Statement,
+    TypedFunction,
     locals_in,
 )
-from integrators.machine_code.values import Array, Value
+from integrators.machine_code.values import ArrayValue, Value
 
 __all__ = ["Again", "Learnt", "Specialised", "Translating", "Work", "as_kind", "common"]
 
@@ -56,7 +56,7 @@ class Specialised:
 
     Parameters
     ----------
-    function : Function
+    function : TypedFunction
         The translated function.
     result : Value or None
         What it returns.
@@ -64,7 +64,7 @@ class Specialised:
         The locals in `result` that stand for returned numbers.
     """
 
-    function: Function
+    function: TypedFunction
     result: Value | None
     slots: tuple[Local, ...]
 
@@ -77,7 +77,7 @@ class Translating(Protocol):
     def translated(self, function: Callable[..., Any], arguments: Sequence[Value]) -> Specialised:
         """Return a function for some arguments."""
 
-    def table(self, values: tuple[Any, ...]) -> Array:
+    def table(self, values: tuple[Any, ...]) -> ArrayValue:
         """Return constants as an array."""
 
 
@@ -142,7 +142,7 @@ class Work:
     def set(self, name: str, expr: Expr) -> Local:
         """Assign a number or an address to a local variable."""
         local = self.variable(name, expr.kind)
-        self.out.append(Set(local, as_kind(self, expr, local.kind)))
+        self.out.append(Assign(local, as_kind(self, expr, local.kind)))
         return local
 
     def fresh(self) -> str:
@@ -159,7 +159,7 @@ class Work:
         if isinstance(expr, Const | Global) or expr in self.parameters:
             return expr
         local = self.new(expr.kind)
-        self.out.append(Set(local, expr))
+        self.out.append(Assign(local, expr))
         return local
 
     def constant(self, expr: Expr) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, SignalError
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.traces._views import picked
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
@@ -108,7 +108,7 @@ def page_rows(trace: Trace, window: tuple[float, float] | None = None) -> PageRo
     return found if kept.all() else found.at(kept)
 
 
-def _seen(y: NDArray[np.float64], layout: Layout) -> NDArray[np.int64]:
+def _seen(y: NDArray[np.float64], layout: SystemLayout) -> NDArray[np.int64]:
     """Return the rows with the lowest and highest values of components in short intervals.
 
     Of many elements only what they share is asked; their variables turn where it does.

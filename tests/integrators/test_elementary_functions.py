@@ -15,7 +15,7 @@ import pytest
 from integrators import elementary
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
-from integrators.machine_code.values import Number
+from integrators.machine_code.values import NumberValue
 
 TWO = ("atan2", "power")
 ODD = ("asin", "asinh", "atan", "sin", "sinh", "tan", "tanh")
@@ -131,7 +131,7 @@ def compiled() -> Callable[[str], Callable[..., float]]:
 
     translator, many = Translator(), {}
     for name in elementary.__all__:
-        many[name] = [Number(Local("f", each)) for each in ("x", "y")[: 1 + (name in TWO)]]
+        many[name] = [NumberValue(Local("f", each)) for each in ("x", "y")[: 1 + (name in TWO)]]
         translator.entry(f"own_{name}", getattr(elementary, name), many[name])
     library = Library(made(llvm_text(translator.module)))
 

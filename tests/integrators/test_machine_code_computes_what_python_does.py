@@ -33,11 +33,11 @@ from integrators.compiled import INLINE
 from integrators.elementary import asinh, atan, atan2, cos, exp, log, power
 from integrators.machine_code import llvm, objects
 from integrators.machine_code.c99 import c99_text
-from integrators.machine_code.layout import Block, Column, Layout
+from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.translate import HostFunction, TranslationError, Translator
 from integrators.machine_code.tree import Const, Local
-from integrators.machine_code.values import Array, Number
+from integrators.machine_code.values import ArrayValue, NumberValue
 from integrators.step_size import retry_factor
 
 SIZE = 5
@@ -392,7 +392,7 @@ def bits(arguments: Given) -> list[bytes]:
 
 
 def module_of(function, inside: bool):
-    layout = Layout(given(0), callable, inside=inside)
+    layout = BlockLayout(given(0), callable, inside=inside)
     translator = Translator()
     translator.entry("entry", function, [layout.value])
     return layout, translator.module
@@ -425,7 +425,7 @@ def test_same_bits(function, printer, inside, tmp_path):
     for seed in range(40):
         expected = given(seed)
         result = plainly(function, expected)
-        block = Block(layout, given(seed))
+        block = MemoryBlock(layout, given(seed))
         block.update(block.contents)
         assert call(block.address) == result, f"given({seed})"
         assert bits(block.contents) == bits(expected), f"given({seed})"
@@ -447,7 +447,7 @@ def test_a_host_function_is_called():
     thunk = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda t: 3.0 * t)
     place = ctypes.c_void_p.from_address(library.variable("callbacks"))
     place.value = ctypes.cast(thunk, ctypes.c_void_p).value
-    block = Block(layout, given(1))
+    block = MemoryBlock(layout, given(1))
     block.update(block.contents)
     ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)(block.address)
     assert block.contents.out.tolist() == [3.0 * u + 1.0 for u in given(1).x]
@@ -459,12 +459,12 @@ def test_a_text_that_has_changed_since_it_was_loaded_is_refused(new, tmp_path, m
     path.write_text("def function(u):\n    return u + 1.0\n")
     names = {}
     exec(compile(path.read_text(), str(path), "exec"), names)
-    assert Translator().translated(names["function"], [Number(Local("f", "u"))]).slots
+    assert Translator().translated(names["function"], [NumberValue(Local("f", "u"))]).slots
     path.write_text(f"def function(u):\n    return {new}\n")
     linecache.checkcache()
     linecache.cache.pop(str(path), None)
     with pytest.raises(TranslationError, match="has changed since it was loaded"):
-        Translator().translated(names["function"], [Number(Local("f", "u"))])
+        Translator().translated(names["function"], [NumberValue(Local("f", "u"))])
 
 
 def columns_of(column, factor):
@@ -476,13 +476,13 @@ def columns_of(column, factor):
 
 
 def test_a_column_may_change_between_calls():
-    example = (Column(), 2.0)
-    layout = Layout(example, callable)
+    example = (OuterArray(), 2.0)
+    layout = BlockLayout(example, callable)
     translator = Translator()
     translator.entry("entry", columns_of, list(layout.value.fields.values()))
     library = objects.Library(objects.compiled(llvm_text(translator.module)))
     call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(library.address("entry"))
-    block = Block(layout, example)
+    block = MemoryBlock(layout, example)
     for length in (3, 10):
         column = np.arange(1.0, length + 1.0)
         total = 2.0 * column.sum()
@@ -492,28 +492,28 @@ def test_a_column_may_change_between_calls():
 
 
 def test_numbers_of_a_dataclass_are_words_of_the_block():
-    layout, arguments = Layout(given(0), callable), given(1)
-    block = Block(layout, arguments)
+    layout, arguments = BlockLayout(given(0), callable), given(1)
+    block = MemoryBlock(layout, arguments)
     state = block.contents.state
     assert [state.t, state.count, state.on] == [arguments.state.t, 7, arguments.state.on]
     state.t, state.count = 0.5, 8
     k = layout.offset("state.t")
     assert (block.words[k : k + 1].view(float)[0], block.words[k + 1]) == (0.5, 8)
     assert dict(block.set_words())[k] == 0.5
-    copy = Block(layout, arguments, block)
+    copy = MemoryBlock(layout, arguments, block)
     copy.contents.state.t = 1.5
     assert (state.t, copy.contents.state.count) == (0.5, 8)
 
 
 def test_a_column_of_a_dataclass_is_replaced():
-    example = (State(0.0, 0, False, Column()),)
-    block = Block(Layout(example, callable), example)
+    example = (State(0.0, 0, False, OuterArray()),)
+    block = MemoryBlock(BlockLayout(example, callable), example)
     (state,) = block.contents
     state.x = np.arange(3.0)
     block.update(block.contents)
-    other = Block(block.layout, example, block)
+    other = MemoryBlock(block.layout, example, block)
     assert other.contents[0].x is state.x
-    other.become(Block(block.layout, example))
+    other.become(MemoryBlock(block.layout, example))
     assert other.contents[0].x.size == 0
 
 
@@ -607,7 +607,9 @@ def test_what_is_said_about_putting_inline_is_said_about_functions_that_exist():
 @pytest.mark.parametrize(("inline", "mark"), [(True, "alwaysinline"), (False, "noinline")])
 def test_functions_are_put_inline_as_said(inline, mark):
     translator = Translator({"retry_factor": inline})
-    translator.entry("entry", retry_factor, [Number(Local("f", "e")), Number(Local("i", "order"))])
+    translator.entry(
+        "entry", retry_factor, [NumberValue(Local("f", "e")), NumberValue(Local("i", "order"))]
+    )
     text = llvm_text(translator.module)
     assert text.count(mark) == 1
     assert "@retry_factor(double" in text[: text.index(mark)].splitlines()[-1]
@@ -616,7 +618,9 @@ def test_functions_are_put_inline_as_said(inline, mark):
 def test_long_functions_are_not_put_inline(monkeypatch):
     monkeypatch.setattr(llvm, "LONGEST", 3)
     translator = Translator({"retry_factor": True})
-    translator.entry("entry", retry_factor, [Number(Local("f", "e")), Number(Local("i", "order"))])
+    translator.entry(
+        "entry", retry_factor, [NumberValue(Local("f", "e")), NumberValue(Local("i", "order"))]
+    )
     assert "inline" not in llvm_text(translator.module)
 
 
@@ -631,5 +635,5 @@ def halves(a):
 def test_equal_statements_are_compiled_once():
     """The types of arguments may differ where the statements do not depend on them."""
     translator = Translator()
-    translator.entry("entry", halves, [Array("f", (Const("i", 2),), Local("p", "a"))])
+    translator.entry("entry", halves, [ArrayValue("f", (Const("i", 2),), Local("p", "a"))])
     assert [each.name for each in translator.module.functions] == ["half", "halves", "entry"]

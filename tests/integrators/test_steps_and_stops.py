@@ -9,10 +9,10 @@ from collections.abc import Callable
 import pytest
 
 from integrators import advance as kernel
-from integrators.hybrid import Buffers, Equations, Options, buffers
+from integrators.hybrid import Buffers, Equations, LoopOptions, buffers
 from integrators.sliding import Surfaces
 from integrators.step_size import LEAST_ROOT, memory_of, next_factor, root_of
-from integrators.steps import Motion
+from integrators.steps import ArcMotion
 from integrators.tableaux import DP45, RK4
 
 
@@ -61,9 +61,11 @@ class _Run:
             knots=list(knots),
         )
         method = RK4 if step else DP45
-        options = Options(method, step, tolerance, [tolerance], max_step, 0.0, 10**6, True, times)
+        options = LoopOptions(
+            method, step, tolerance, [tolerance], max_step, 0.0, 10**6, True, times
+        )
         self.b: Buffers = buffers(equations, origin, [1.0], [], 100.0, options, capacity)
-        self.motion, self.y = Motion(flow, margins, None, nothing_follows), self.b.now.y
+        self.motion, self.y = ArcMotion(flow, margins, None, nothing_follows), self.b.now.y
         self.b.now.t, self.b.now.f[0] = t, slope(t, 1.0)
         if margin is not None:
             w = self.b.relations

@@ -9,7 +9,7 @@ import pytest
 
 from integrators.crossings import NO_CHANGE, Path, first_change, is_quiet_step, watched
 from integrators.states import beginning
-from integrators.steps import Dense, Motion, Now, Scratch
+from integrators.steps import ArcMotion, Dense, Now, Scratch
 
 Margin = Callable[[float], float]
 
@@ -33,7 +33,7 @@ def _first(*margins: Margin, strict: bool = False, resolution: float = 1e-12) ->
     def interpolate(_: None, theta: float, out: list[float]) -> None:
         out[0] = theta
 
-    path = Path(Motion(fill, fill, None, None), [], interpolate, None, 0.0, 1.0, 1.0, [1.0])
+    path = Path(ArcMotion(fill, fill, None, None), [], interpolate, None, 0.0, 1.0, 1.0, [1.0])
     place = first_change(path, w, resolution)
     looks.clear()
     # Whatever the scratch space contained before the search.
@@ -140,7 +140,7 @@ def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
     w.start[0] = 1.0 - 100.0
     now = Now(**beginning(1.0, 9.0), y=[1.0], f=[3.0], mode=[], held=[], floor=[])
     scratch = Scratch([], y_new=[27.0], f_new=[27.0], error=[], dense=Dense([], [], [], [], []))
-    assert is_quiet_step(Motion(fill, fill, None, None), now, 3.0, scratch, w)
+    assert is_quiet_step(ArcMotion(fill, fill, None, None), now, 3.0, scratch, w)
     assert seen == [(3.0, 27.0), (2.0, 8.0)]
 
 
@@ -184,7 +184,7 @@ def _of_a_step(t: float, h: float, resolution: float) -> tuple[float, int]:
     w.watch[0] = 1
     w.active.append(0)
     w.start[0] = -0.3
-    path = Path(Motion(fill, fill, None, None), [], interpolate, None, t, t + h, t + h, [1.0])
+    path = Path(ArcMotion(fill, fill, None, None), [], interpolate, None, t, t + h, t + h, [1.0])
     return first_change(path, w, resolution), len(looks)
 
 

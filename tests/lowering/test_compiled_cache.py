@@ -23,13 +23,13 @@ import pytest
 
 from gms_fsm import ChartModel, Prescribed, simulate
 from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering._store import Store
+from gms_fsm.lowering._store import CodeFolder
 from gms_fsm.lowering.program import lower
 from gms_fsm.run import _compiled_run
 from integrators import columns, elementary, loop, step_size
 from integrators import compiled as machine
 from integrators.machine_code import statements
-from integrators.machine_code.layout import Layout
+from integrators.machine_code.layout import BlockLayout
 from tests.helpers import CURVE, ROOT, open_loop, stick_slip
 
 pytestmark = pytest.mark.slow
@@ -161,7 +161,7 @@ def test_a_wrong_bit_anywhere_is_detected_before_the_code_is_loaded(warm: tuple[
     out, err = _ended(_start(RUN, GMS_FSM_CACHE=str(folder)))
     assert (out, err.count(NOTE)) == ("equal 24\n", 2)
     assert _kept(folder) == whole
-    assert all(Store(path.parent).get(path.name) for path in whole), "all are recreated"
+    assert all(CodeFolder(path.parent).get(path.name) for path in whole), "all are recreated"
 
 
 # --------------------------------------------------------------------------- damage of every kind
@@ -169,7 +169,7 @@ def test_a_wrong_bit_anywhere_is_detected_before_the_code_is_loaded(warm: tuple[
 def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
     """Return a function that uses one function of a program, and says whether it was compiled."""
     said: list[str] = []
-    monkeypatch.setattr(compiled, "store", lambda: Store.at(tmp_path))
+    monkeypatch.setattr(compiled, "store", lambda: CodeFolder.at(tmp_path))
     monkeypatch.setattr(compiled, "notify", said.append)
     program = lower(stick_slip("signed"), Prescribed("0.1*t"))
     y, mode = [0.1, 0.2, 0.3, 0.2, 0.1], [0, 1, 0, 1]
@@ -217,7 +217,7 @@ def _another_kind(path: Path) -> None:
 
 def _another_name(path: Path) -> None:
     """A complete file that was stored for another function."""
-    Store(path.parent).put("other", b"content")
+    CodeFolder(path.parent).put("other", b"content")
     path.write_bytes((path.parent / "other").read_bytes())
     (path.parent / "other").unlink()
 
@@ -243,7 +243,7 @@ def test_a_folder_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None
     in_the_way = tmp_path / "file"
     in_the_way.write_text("not a folder")
     for folder in (in_the_way, in_the_way / "below", Path("/proc/no such place")):
-        assert Store.at(folder) is None
+        assert CodeFolder.at(folder) is None
     assert "Traceback" not in _rows(in_the_way / "below", "0.1*t")
     assert in_the_way.read_text() == "not a folder"
     assert list(tmp_path.iterdir()) == [in_the_way]
@@ -279,14 +279,14 @@ def _of(module: str) -> Any:
 
 
 _other_norm, _other_loop = _of(step_size.__name__), _of(columns.__name__)
-_other_key, _other_body = _of(Layout.__module__), _of(statements.__name__)
+_other_key, _other_body = _of(BlockLayout.__module__), _of(statements.__name__)
 
 
 def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
     return {
         "a function of a step": lambda: patch.setattr(step_size, "error_norm", _other_norm),
         "the loop": lambda: patch.setattr(columns, "record", _other_loop),
-        "a method of the front end": lambda: patch.setattr(Layout, "key", _other_key),
+        "a method of the front end": lambda: patch.setattr(BlockLayout, "key", _other_key),
         "how a statement is translated": lambda: patch.setattr(statements, "body", _other_body),
         "a number": lambda: patch.setattr(step_size, "SAFETY", 0.8),
         "a table": lambda: patch.setattr(elementary, "LOW", (1.0, *elementary.LOW[1:])),
@@ -298,7 +298,7 @@ def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
 def test_the_edition_covers_every_module_whose_functions_are_translated() -> None:
     named = [each for module in machine.LOOPS for each in vars(module).values()]
     functions = [each for each in named if isinstance(each, types.FunctionType)]
-    modules = {each.__module__ for each in functions} - {"typing"}  # NamedTuple
+    modules = {each.__module__ for each in functions} - {"typing", "dataclasses"}  # of records
     assert modules == {module.__name__ for module in machine.LOOPS}
 
 

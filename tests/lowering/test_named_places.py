@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import ChartModel, Prescribed, Slider
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRecord
-from gms_fsm.lowering.places import Block, Places
+from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.lowering.program import lower
 from gms_fsm.systems._assembly import assembled
 from gms_fsm.systems.system import system_of
@@ -190,7 +190,7 @@ def two_variables(n: int) -> ChartModel:
 @pytest.mark.parametrize("n", [1, 2, 5])
 @pytest.mark.parametrize("rig", [Prescribed("0.1"), Slider(1.0, "1")])
 def test_every_place_has_one_name(rig: Prescribed | Slider, n: int) -> None:
-    layout = Layout.of(assembled(system_of(two_variables(n), rig)), surfaces=3)
+    layout = SystemLayout.of(assembled(system_of(two_variables(n), rig)), surfaces=3)
     for places in (layout.y, layout.observed):
         numbers = [places.index(name, i or 0) for name, i in places]
         assert numbers == list(range(places.size))
@@ -207,13 +207,13 @@ def test_every_place_has_one_name(rig: Prescribed | Slider, n: int) -> None:
 @pytest.mark.parametrize("shared", [(), ("x",), ("x", "v")])
 @pytest.mark.parametrize("others", [None, 1, 4])
 def test_texts_name_the_same_places(shared: tuple[str, ...], n: int, others: int | None) -> None:
-    blocks = [Block(("z", "w", "u"), n)]
+    blocks = [ElementPlaces(("z", "w", "u"), n)]
     if others is not None:
         blocks = [
-            Block(("a",), others, "m"),
-            Block[str]((), 2, "k"),
+            ElementPlaces(("a",), others, "m"),
+            ElementPlaces[str]((), 2, "k"),
             *blocks,
-            Block(("b",), 3, "l"),
+            ElementPlaces(("b",), 3, "l"),
         ]
     places = Places(shared, tuple(blocks))
     sizes = {block.size: block.n for block in blocks}

@@ -12,20 +12,20 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm.lowering._store import Store
+from gms_fsm.lowering._store import CodeFolder
 
 CONTENT = random.Random(1).randbytes(300)
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Store:
-    made = Store.at(tmp_path / "new" / "folder")
+def store(tmp_path: Path) -> CodeFolder:
+    made = CodeFolder.at(tmp_path / "new" / "folder")
     assert made is not None
     return made
 
 
 @pytest.mark.slow
-def test_every_single_bit_is_checked(store: Store) -> None:
+def test_every_single_bit_is_checked(store: CodeFolder) -> None:
     store.put("one", CONTENT)
     path = store.folder / "one"
     whole = path.read_bytes()
@@ -40,27 +40,27 @@ def test_every_single_bit_is_checked(store: Store) -> None:
 
 
 @pytest.mark.parametrize("length", [0, 1, 31, 32, 33, 331])
-def test_a_truncated_file_is_refused(store: Store, length: int) -> None:
+def test_a_truncated_file_is_refused(store: CodeFolder, length: int) -> None:
     store.put("one", CONTENT)
     path = store.folder / "one"
     path.write_bytes(path.read_bytes()[:length])
     assert store.get("one") is None
 
 
-def test_empty_content_can_be_stored(store: Store) -> None:
+def test_empty_content_can_be_stored(store: CodeFolder) -> None:
     assert store.get("none") is None
     store.put("none", b"")
     assert store.get("none") == b""
 
 
-def test_a_file_cannot_replace_another(store: Store) -> None:
+def test_a_file_cannot_replace_another(store: CodeFolder) -> None:
     store.put("one", CONTENT)
     (store.folder / "one").rename(store.folder / "two")
     assert store.get("two") is None
 
 
 def test_on_a_full_disk_nothing_is_stored_or_raised(
-    store: Store, monkeypatch: pytest.MonkeyPatch
+    store: CodeFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -72,7 +72,7 @@ def test_on_a_full_disk_nothing_is_stored_or_raised(
 
 
 @pytest.mark.slow
-def test_concurrent_readers_see_only_complete_content(store: Store) -> None:
+def test_concurrent_readers_see_only_complete_content(store: CodeFolder) -> None:
     contents = [bytes([number]) * 100_000 for number in range(3)]
     store.put("one", contents[0])
     wrong: list[int] = []

@@ -75,7 +75,7 @@ def test_the_flow_sees_one_mode_per_step(case, method):
         surfaces=program.surfaces,
     )
     switch = IfElse(program)
-    options = integrators.Options(
+    options = integrators.LoopOptions(
         integrators.METHODS[method],
         0.0501 if method == "rk4" else None,
         1e-6,

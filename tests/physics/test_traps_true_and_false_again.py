@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from gms_fsm import Prescribed, simulate
 from integrators.crossings import NO_CHANGE, Path, first_change, watched
-from integrators.steps import Motion
+from integrators.steps import ArcMotion
 from tests.helpers import event_sequence, one_element
 
 RESOLUTION = 1e-15
@@ -35,7 +35,7 @@ def located(*functions, t=0.0, h=1.0, strict=None):
     for j in range(r):
         w.watch[j], w.truth[j], w.start[j] = 1, truth[j], low[j]
         w.active.append(j)
-    path = Path(Motion(None, margins, None, None), [], interpolate, None, t, t + h, t + h, [1.0])
+    path = Path(ArcMotion(None, margins, None, None), [], interpolate, None, t, t + h, t + h, [1.0])
     return first_change(path, w, RESOLUTION * h)
 
 

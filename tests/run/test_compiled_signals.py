@@ -28,7 +28,7 @@ from gms_fsm import (
     sweep,
 )
 from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering._store import Store
+from gms_fsm.lowering._store import CodeFolder
 from gms_fsm.traces.failures import NotFiniteError, SimulationError
 from tests.helpers import same_bits, stick_slip
 
@@ -132,7 +132,7 @@ def test_functions_with_the_same_text_are_not_confused() -> None:
 def test_machine_code_depends_on_no_function(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(compiled, "store", lambda: Store.at(tmp_path))
+    monkeypatch.setattr(compiled, "store", lambda: CodeFolder.at(tmp_path))
     model = stick_slip("signed")
     for factor in (0.1, 0.2):
         rig = Prescribed(functools.partial(lambda factor, t: factor * t, factor))

@@ -20,7 +20,7 @@ from gms_fsm.traces import _observed
 from gms_fsm.traces.failures import LivelockError
 from integrators import columns
 from integrators.loop import Machines
-from integrators.machine_code.layout import Layout
+from integrators.machine_code.layout import BlockLayout
 from integrators.observing import observe_rows as rows_observed
 from integrators.sliding import Functions
 from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
@@ -36,7 +36,9 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def engine(program, run):
         inside = integrators.compiled._longest(run) <= integrators.compiled.LONGEST_INSIDE
-        return SimpleNamespace(layout=Layout(run, integrators.compiled.is_known, inside=inside))
+        return SimpleNamespace(
+            layout=BlockLayout(run, integrators.compiled.is_known, inside=inside)
+        )
 
     def run(self, most_steps, *, pause):
         code = self.start.program.ieee

@@ -28,7 +28,7 @@ from gms_fsm import (
 )
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import names_in, parse_value
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.systems._assembly import assembled
 from gms_fsm.systems.system import system_of
 from gms_fsm.traces.monitors import examine
@@ -191,4 +191,4 @@ def test_a_layout_needs_no_program() -> None:
     """It depends only on names; the program only adds the number of surfaces."""
     for model, rig in CASES.values():
         layout = simulate(model, rig, 0.1).program.layout
-        assert layout == Layout.of(assembled(system_of(model, rig)), layout.surfaces)
+        assert layout == SystemLayout.of(assembled(system_of(model, rig)), layout.surfaces)
