@@ -81,6 +81,8 @@ static status unsupported(instance *it, text name)
     return told(failed(it, "%s is not supported", name));
 }
 
+#define DOES(name, arguments, call)                                                                \
+    EXPORT status FMI(name) arguments { return told(call); }
 #define UNSUPPORTED(name, arguments)                                                               \
     EXPORT status FMI(name) arguments { return unsupported(c, TEXT(NAME(name))); }
 #define NOTHING_IN(name, arguments)                                                                \
@@ -193,8 +195,8 @@ ABSENT(Boolean, truth)
 ABSENT(String, text)
 
 /* ---------------------------------------------------------------- saved states */
-EXPORT status FMI(GetSaved)(C, void **saved) { return told(save(c, saved)); }
-EXPORT status FMI(SetSaved)(C, void *saved) { return told(restore(c, saved)); }
+DOES(GetSaved, (C, void **saved), save(c, saved))
+DOES(SetSaved, (C, void *saved), restore(c, saved))
 
 EXPORT status FMI(FreeSaved)(C, void **saved)
 {
@@ -211,19 +213,13 @@ EXPORT status FMI(SavedSize)(C, void *saved, size_t *size)
     return DONE;
 }
 
-EXPORT status FMI(SerializeSaved)(C, void *saved, char bytes[], size_t size)
-{
-    return told(serialize(c, saved, bytes, size));
-}
-
-EXPORT status FMI(DeserializeSaved)(C, const char bytes[], size_t size, void **saved)
-{
-    return told(deserialize(c, bytes, size, saved));
-}
+DOES(SerializeSaved, (C, void *saved, char bytes[], size_t size), serialize(c, saved, bytes, size))
+DOES(DeserializeSaved, (C, const char bytes[], size_t size, void **saved),
+     deserialize(c, bytes, size, saved))
 
 /* ---------------------------------------------------------------- Model Exchange */
-EXPORT status FMI(EnterEventMode)(C) { return told(enter(c, EVENTS, true)); }
-EXPORT status FMI(EnterContinuousTimeMode)(C) { return told(enter(c, CONTINUOUS, true)); }
+DOES(EnterEventMode, (C), enter(c, EVENTS, true))
+DOES(EnterContinuousTimeMode, (C), enter(c, CONTINUOUS, true))
 
 EXPORT status FMI(CompletedIntegratorStep)(C, truth final, truth *event, truth *terminate)
 {
@@ -232,29 +228,12 @@ EXPORT status FMI(CompletedIntegratorStep)(C, truth final, truth *event, truth *
     return DONE;
 }
 
-EXPORT status FMI(SetTime)(C, double t) { return told(set_time(c, t)); }
-
-EXPORT status FMI(SetContinuousStates)(C, const double x[], size_t n)
-{
-    return told(set_states(c, x, n));
-}
-
-EXPORT status FMI(GetContinuousStates)(C, double x[], size_t n)
-{
-    return told(get_states(c, x, n));
-}
-
-EXPORT status FMI(GetSlopes)(C, double dx[], size_t n) { return told(get_slopes(c, dx, n)); }
-
-EXPORT status FMI(GetEventIndicators)(C, double z[], size_t n)
-{
-    return told(get_indicators(c, z, n));
-}
-
-EXPORT status FMI(GetNominalsOfContinuousStates)(C, double x[], size_t n)
-{
-    return told(get_nominals(c, x, n));
-}
+DOES(SetTime, (C, double t), set_time(c, t))
+DOES(SetContinuousStates, (C, const double x[], size_t n), set_states(c, x, n))
+DOES(GetContinuousStates, (C, double x[], size_t n), get_states(c, x, n))
+DOES(GetSlopes, (C, double dx[], size_t n), get_slopes(c, dx, n))
+DOES(GetEventIndicators, (C, double z[], size_t n), get_indicators(c, z, n))
+DOES(GetNominalsOfContinuousStates, (C, double x[], size_t n), get_nominals(c, x, n))
 
 /* ---------------------------------------------------------------- Co-Simulation */
 static bool is_stepping(instance *it)
@@ -405,11 +384,8 @@ EXPORT void *FMI(InstantiateScheduledExecution)(SHARED, void *environment, Logge
     return NULL;
 }
 
-EXPORT status FMI(EnterInitializationMode)(C, bool tolerant, double tolerance, double start,
-                                           bool ends, double stop)
-{
-    return told(begin(c, start));
-}
+DOES(EnterInitializationMode, (C, bool tolerant, double tolerance, double start, bool ends,
+                               double stop), begin(c, start))
 
 EXPORT status FMI(EvaluateDiscreteStates)(C)
 {
@@ -441,7 +417,7 @@ EXPORT status FMI(GetNumberOfContinuousStates)(C, size_t *n)
     return DONE;
 }
 
-EXPORT status FMI(EnterStepMode)(C) { return told(enter(c, STEPPING, false)); }
+DOES(EnterStepMode, (C), enter(c, STEPPING, false))
 
 /* The importer may set the inputs at the end of the step while it is asked here, before the step:
  * then they are straight lines during it. Otherwise they keep their values. */
