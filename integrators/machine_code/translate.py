@@ -8,7 +8,7 @@ does, operation by operation, except that nothing raises: a division by zero giv
 
 A named tuple is never built in memory. Its fields are known while translating; a function that
 takes one is translated once for each kind of it, and receives the few addresses that its fields are
-found from.
+found from. So is a dataclass, whose numbers are in memory and can be assigned (`records`).
 """
 
 from __future__ import annotations
