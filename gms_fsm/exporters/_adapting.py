@@ -61,7 +61,10 @@ def step_arguments(start: Start) -> tuple[StepArguments, BlockLayout]:
 
 
 def translate(
-    translator: Translator, layout: BlockLayout, entries: Mapping[str, tuple[Any, str]], prefix: str = ""
+    translator: Translator,
+    layout: BlockLayout,
+    entries: Mapping[str, tuple[Any, str]],
+    prefix: str = "",
 ) -> list[str]:
     """Translate functions on the block, and return their names."""
     for name, (function, parts) in entries.items():
