@@ -7,7 +7,7 @@ import importlib.util
 collect_ignore = []
 # The classes of the full-screen debugger derive from those of Textual (extra: tui).
 if not importlib.util.find_spec("textual"):
-    collect_ignore += [f"gms_fsm/app/debugger/tui/{name}.py" for name in ("_app", "_widgets")]
+    collect_ignore += [f"gms_fsm/debugger/tui/{name}.py" for name in ("_app", "_widgets")]
 # The examples compile (extra: fast).
 if not importlib.util.find_spec("llvmlite"):
     collect_ignore += ["integrators/machine_code/objects.py"]

@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
-from plots.animation import animate
-from plots.live_chart import LiveChart
+from plots.charts.live_chart import LiveChart
+from plots.film.animation import animate
 
 FRAMES = 500
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from playwright.sync_api import Page, sync_playwright
 
 from gms_fsm import Trace, simulate
-from plots.replay import write_replay
+from plots.page.replay import write_replay
 from tests.helpers import FIG4_SINE, Prescribed, bank, pulled_mass, stick_slip
 
 SECONDS = 4.0

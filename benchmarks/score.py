@@ -26,9 +26,9 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.app.reportcard.card import Row
-from gms_fsm.app.reportcard.datasets import data_set, held_rows, score
-from gms_fsm.app.reportcard.pages import table
+from gms_fsm.app.benchmark.card import Row
+from gms_fsm.app.benchmark.datasets import data_set, held_rows, score
+from gms_fsm.app.benchmark.pages import table
 from gms_fsm.errors import GMSError, RecordError, cut, shown
 from gms_fsm.records.record import Record
 

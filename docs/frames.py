@@ -25,7 +25,7 @@ from PIL import Image
 
 from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Stribeck, Trace, simulate
 from plots import LiveChart, panels
-from plots.replay import replay_html
+from plots.page.replay import replay_html
 from plots.style import INK, LINE_GREY, RC
 
 DPI = 120

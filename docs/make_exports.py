@@ -9,8 +9,8 @@ import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from gms_fsm._files import write_whole
 from gms_fsm.exporters import formats
+from gms_fsm.foundation.files import write_whole
 
 HERE = Path(__file__).parent
 PAGE = HERE / "howto" / "exports.md"

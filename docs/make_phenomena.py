@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gms_fsm import measure_phenomena
-from gms_fsm._files import write_whole
+from gms_fsm.foundation.files import write_whole
 from plots import figures
 
 HERE = Path(__file__).parent

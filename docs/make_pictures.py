@@ -31,17 +31,17 @@ from gms_fsm import (
     simulate,
     sweep,
 )
-from gms_fsm._files import write_whole
-from gms_fsm.app.lessons.notebooks import cells_of
+from gms_fsm.app.lessons.engine.notebooks import cells_of
 from gms_fsm.app.paper import FIG4_END, FORCE, VELOCITY
 from gms_fsm.app.paper.experiments import experiments, run_one
 from gms_fsm.app.paper.writing import held_figure
 from gms_fsm.app.scenario import load_scenario, load_system
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
+from gms_fsm.foundation.files import write_whole
 from plots import figures, panels
-from plots.mechanism import schematic_figure
 from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY, ramp
+from plots.systems.mechanism import schematic_figure
 
 FOLDER = Path(__file__).parent / "images"
 SCENARIOS = Path(__file__).parents[1] / "scenarios"

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from rich.console import Console, Group
 
-from gms_fsm._files import write_whole
-from gms_fsm.app.debugger.tui._app import FullScreen
 from gms_fsm.app.live import LiveView
 from gms_fsm.app.scenario import load_scenario, scenario_to_debug, session_of
+from gms_fsm.debugger.tui._app import FullScreen
+from gms_fsm.foundation.files import write_whole
 from gms_fsm.run.simulate import Moment
 
 FOLDER = Path(__file__).parent / "images"

@@ -25,13 +25,13 @@ from matplotlib.figure import Figure
 import gms_fsm.charts
 import plots
 from gms_fsm import Chart, Trace, prove
-from gms_fsm._files import write_whole
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts.parameters import ANY, Parameter, with_shared
 from gms_fsm.charts.registry import Demonstration, Entry
 from gms_fsm.charts.stribeck import Stribeck
-from gms_fsm.inspection._findings import Report, Status
+from gms_fsm.foundation.files import write_whole
 from gms_fsm.traces.failures import StepLimitError
+from gms_fsm.verification.findings import Report, Status
 from plots import figures
 from plots.style import INK, LINE_GREY, RC
 

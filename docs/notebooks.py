@@ -1,7 +1,7 @@
 """Notebooks of the lessons: written to the repository, executed, and written as pages of the site.
 
-`gms_fsm.app.lessons.notebooks` composes them. They are executed with warnings as errors, and again
-only when a source has changed.
+`gms_fsm.app.lessons.engine.notebooks` composes them. They are executed with warnings as errors, and
+again only when a source has changed.
 
     python docs/notebooks.py    # writes docs/lessons/*.ipynb, which are in the repository
 """
@@ -26,7 +26,7 @@ from nbclient import NotebookClient
 from traitlets import Type
 
 from gms_fsm.app.lessons import LESSONS
-from gms_fsm.app.lessons.notebooks import cells_of, composed, notebook
+from gms_fsm.app.lessons.engine.notebooks import cells_of, composed, notebook
 
 logging.getLogger("traitlets").setLevel(logging.WARNING)  # no line per notebook
 

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from gms_fsm.charts.chart import Transition as Transition
     from gms_fsm.charts.parameters import Parameter as Parameter
     from gms_fsm.charts.stribeck import Stribeck as Stribeck
+    from gms_fsm.coupling.bank import FrictionBank as FrictionBank
+    from gms_fsm.coupling.equations import FrictionEquations as FrictionEquations
+    from gms_fsm.coupling.stepping import FrictionState as FrictionState
     from gms_fsm.errors import ChartError as ChartError
     from gms_fsm.errors import CheckpointError as CheckpointError
     from gms_fsm.errors import ExpressionError as ExpressionError
@@ -44,23 +47,17 @@ if TYPE_CHECKING:
     from gms_fsm.identification.excite import excite as excite
     from gms_fsm.identification.fit import fit as fit
     from gms_fsm.identification.result import Fit as Fit
-    from gms_fsm.inspection.prove import Finding as Finding
-    from gms_fsm.inspection.prove import Report as Report
-    from gms_fsm.inspection.prove import prove as prove
-    from gms_fsm.inspection.session import Session as Session
     from gms_fsm.phenomena.measure import Bench as Bench
     from gms_fsm.phenomena.measure import PhenomenaTable as PhenomenaTable
     from gms_fsm.phenomena.measure import measure_phenomena as measure_phenomena
     from gms_fsm.records.record import Record as Record
-    from gms_fsm.run.bank import FrictionBank as FrictionBank
-    from gms_fsm.run.equations import FrictionEquations as FrictionEquations
     from gms_fsm.run.machines import Element as Element
     from gms_fsm.run.machines import ElementMachines as ElementMachines
     from gms_fsm.run.settings import Settings as Settings
     from gms_fsm.run.simulate import simulate as simulate
-    from gms_fsm.run.stepping import FrictionState as FrictionState
     from gms_fsm.run.sweep import Sweep as Sweep
     from gms_fsm.run.sweep import sweep as sweep
+    from gms_fsm.session.session import Session as Session
     from gms_fsm.systems.gms_parameters import GMSParameters as GMSParameters
     from gms_fsm.systems.models import GMS as GMS
     from gms_fsm.systems.models import ChartModel as ChartModel
@@ -86,6 +83,9 @@ if TYPE_CHECKING:
     from gms_fsm.traces.failures import StepLimitError as StepLimitError
     from gms_fsm.traces.failures import StepSizeError as StepSizeError
     from gms_fsm.traces.trace import Trace as Trace
+    from gms_fsm.verification.prove import Finding as Finding
+    from gms_fsm.verification.prove import Report as Report
+    from gms_fsm.verification.prove import prove as prove
 
 # The same names again, for run time; type checkers read those above. A test keeps the two in step.
 _HOMES = {
@@ -100,16 +100,16 @@ _HOMES = {
     "identification.excite": "excite",
     "identification.fit": "fit",
     "identification.result": "Fit",
-    "inspection.prove": "Finding Report prove",
-    "inspection.session": "Session",
+    "verification.prove": "Finding Report prove",
+    "session.session": "Session",
     "phenomena.measure": "Bench PhenomenaTable measure_phenomena",
     "records.record": "Record",
-    "run.bank": "FrictionBank",
-    "run.equations": "FrictionEquations",
+    "coupling.bank": "FrictionBank",
+    "coupling.equations": "FrictionEquations",
     "run.machines": "Element ElementMachines",
     "run.settings": "Settings",
     "run.simulate": "simulate",
-    "run.stepping": "FrictionState",
+    "coupling.stepping": "FrictionState",
     "run.sweep": "Sweep sweep",
     "systems.gms_parameters": "GMSParameters",
     "systems.models": "ChartModel GMS LuGre Model",
@@ -125,7 +125,7 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 __all__ = sorted(_HOME)
 
 if "IPython" in sys.modules:  # else this is no notebook
-    from gms_fsm._display import register_figures
+    from gms_fsm.foundation.display import register_figures
 
     register_figures()
 

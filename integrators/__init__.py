@@ -25,7 +25,7 @@ from integrators.hybrid import (
     TooManySteps,
     run,
 )
-from integrators.jolts import JUMPED, LET_GO
+from integrators.runners.ticks import Ticks
 from integrators.sliding import (
     LIVE,
     Functions,
@@ -36,8 +36,8 @@ from integrators.sliding import (
     sliding_scratch,
     slope_on,
 )
+from integrators.switching.jolts import JUMPED, LET_GO
 from integrators.tableaux import BS23, DP45, EULER, HEUN, METHODS, RK4, Tableau
-from integrators.ticks import Ticks
 
 __all__ = [
     "BS23",

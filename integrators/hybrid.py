@@ -28,6 +28,8 @@ from integrators.failures import (
     modes_of,
 )
 from integrators.loop import MOST_SWITCHES, Buffers, Memory, Switching
+from integrators.runners.states import COUNTS, CURSOR, beginning
+from integrators.runners.ticks import Ticks
 from integrators.sliding import (
     LIVE,
     MOST_SLIDING,
@@ -39,7 +41,6 @@ from integrators.sliding import (
     margins_on,
     sliding_scratch,
 )
-from integrators.states import COUNTS, CURSOR, beginning
 from integrators.step_size import Control
 from integrators.steps import (
     ArcMotion,
@@ -53,7 +54,6 @@ from integrators.steps import (
     stays,
 )
 from integrators.tableaux import EULER, Tableau
-from integrators.ticks import Ticks
 
 __all__ = [
     "MOST_SWITCHES",
@@ -125,7 +125,7 @@ class Equations:
     discrete : list of int
         For each machine the bit at whose ticks alone it is asked; 0 for one that may fire any time.
     seen : int
-        Number of values that `integrators.columns.record` observes.
+        Number of values that `integrators.runners.columns.record` observes.
     follow : callable
         ``follow(t, y, mode, held, p)`` sets the components of y that others determine.
     impulses : list of int
@@ -304,7 +304,8 @@ def events(
 ) -> Iterator[Event]:
     """Continue from the state in some buffers; see `run`.
 
-    Between two events the buffers contain the complete state of the run (`integrators.states`).
+    Between two events the buffers contain the complete state of the run
+    (`integrators.runners.states`).
 
     Parameters
     ----------
@@ -322,7 +323,7 @@ def events(
     on = Held(functions, b.now.held, b.sliding)
     solver = None
     if b.plan.foreign:
-        from integrators.scipy_arcs import SciPyStepper
+        from integrators.runners.scipy_arcs import SciPyStepper
 
         solver = SciPyStepper(on, b, options)
     plainly = ArcMotion(functions.flow, functions.margins, functions.p, functions.follow)

@@ -26,7 +26,10 @@ from integrators.advance import (
     tick_at,
 )
 from integrators.crossings import FOR_A_GUARD, FOR_A_SIGN, JUST_BELOW, Watched, listed
-from integrators.jolts import (
+from integrators.sliding import Functions, Held, Sliding, arm_on, margins_on, other_mode
+from integrators.step_size import INFINITY, error_norm, starting_step
+from integrators.steps import ArcMotion, Now, Scratch, Vector, time_of
+from integrators.switching.jolts import (
     JUMPED,
     LET_GO,
     arrived,
@@ -35,8 +38,8 @@ from integrators.jolts import (
     moves_a_lock,
     only_let_go,
 )
-from integrators.machines import Machines, Switching
-from integrators.seizing import (
+from integrators.switching.machines import Machines, Switching
+from integrators.switching.sliding_bounds import (
     crossed,
     entangled,
     leave,
@@ -47,9 +50,6 @@ from integrators.seizing import (
     repels,
     seize,
 )
-from integrators.sliding import Functions, Held, Sliding, arm_on, margins_on, other_mode
-from integrators.step_size import INFINITY, error_norm, starting_step
-from integrators.steps import ArcMotion, Now, Scratch, Vector, time_of
 
 __all__ = [
     "MOST_SWITCHES",

@@ -11,25 +11,25 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gms_fsm._extras import require
-from plots.block_diagram import block_diagram
-from plots.live_chart import LiveChart, live_statechart
-from plots.mechanism import schematic
-from plots.mermaid import mermaid
-from plots.presets import preset
-from plots.render import render
-from plots.replay import replay, write_replay
-from plots.statechart import statechart
+from gms_fsm.foundation.extras import require
+from plots.charts.live_chart import LiveChart, live_statechart
+from plots.charts.statechart import statechart
+from plots.output.mermaid import mermaid
+from plots.output.render import render
+from plots.page.replay import replay, write_replay
+from plots.style.presets import preset
+from plots.systems.block_diagram import block_diagram
+from plots.systems.mechanism import schematic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from gms_fsm.inspection.prove import Report
     from gms_fsm.systems.models import Model
     from gms_fsm.systems.rigs import Rig
     from gms_fsm.systems.system import System
     from gms_fsm.traces.trace import Trace
-    from plots.widget._explorer import Explorer
+    from gms_fsm.verification.prove import Report
+    from plots.widget.explorer import Explorer
 
 __all__ = [
     "LiveChart",
@@ -53,7 +53,7 @@ __all__ = [
 
 
 def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
-    """Make a film of a run, slowed at transitions; see `plots.animation.animate`.
+    """Make a film of a run, slowed at transitions; see `plots.film.animation.animate`.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
     path : str or Path
         Its file ending selects the format, for example ``.gif``.
     **options
-        Options of `plots.animation.animate`: elements, frames, t_start, t_end, fps, notation,
+        Options of `plots.film.animation.animate`: elements, frames, t_start, t_end, fps, notation,
         theme.
 
     Returns
@@ -75,7 +75,7 @@ def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
     MissingExtraError
         If matplotlib or Pillow is not installed.
     """
-    from plots import animation
+    from plots.film import animation
 
     return animation.animate(trace, path, **options)
 
@@ -136,7 +136,7 @@ def explore(
       largest difference: z 0.876 m, F 0.537 N
     """
     require("anywidget", "jupyter")
-    from plots.widget._explorer import Explorer
+    from plots.widget.explorer import Explorer
 
     return Explorer(model, rig, t_end, sliders=sliders, height=height, **options)
 
@@ -167,9 +167,9 @@ def handout(model: Model, path: str | Path, **options: Any) -> Path:
     MissingExtraError
         If matplotlib or Graphviz is not installed.
     """
-    from plots import _handout
+    from plots.handouts import page
 
-    return _handout.handout(model, path, **options)
+    return page.handout(model, path, **options)
 
 
 def overview(trace: Trace, title: str = "") -> Figure:

@@ -35,7 +35,6 @@ from gms_fsm.errors import (
     ScenarioError,
     TraceFileError,
 )
-from gms_fsm.inspection.explain import explain
 from gms_fsm.language import (
     FUNCTIONS,
     MATLAB_LIKE,
@@ -48,10 +47,11 @@ from gms_fsm.language import (
     spell,
     split,
 )
-from gms_fsm.lowering._generated import load
+from gms_fsm.lowering.generated import load
+from gms_fsm.run.problem import Start
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import Run
-from gms_fsm.run.start import Start
+from gms_fsm.session.explain import explain
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import dwell_times
 from tests.helpers import ROOT, pulled_mass, stick_slip

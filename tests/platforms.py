@@ -32,17 +32,17 @@ from gms_fsm import Settings, System, Trace, export, simulate
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import GMSError
 from gms_fsm.exporters._quantities import outputs_of
-from gms_fsm.lowering import _compiled
-from gms_fsm.run import _compiled_run
-from gms_fsm.run.start import Start
+from gms_fsm.lowering import compiling
+from gms_fsm.run.problem import Start
+from gms_fsm.run.recording import compiled_run
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import system_of
 from gms_fsm.traces.failures import SimulationError
-from integrators import compiled
 from integrators.machine_code.c99 import c99_text
-from integrators.machine_code.translate import Translator
+from integrators.machine_code.front_end.translate import Translator
+from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.tree import Local
-from integrators.machine_code.values import NumberValue
+from integrators.runners import compiled
 from tests.helpers import ROOT, bits
 from tests.random_systems import T_END, trial
 
@@ -164,8 +164,8 @@ def in_c(compiler: str, level: str, warnings: Sequence[str] = ("-w",)) -> Iterat
 
         with (
             mock.patch.object(compiled, "_library", library),
-            mock.patch.object(_compiled_run, "_known", {}),
-            mock.patch.object(_compiled, "_observers", {}),
+            mock.patch.object(compiled_run, "_known", {}),
+            mock.patch.object(compiling, "_observers", {}),
         ):
             yield texts
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.coupling.bank import FrictionBank
+from gms_fsm.coupling.driven import Driven
+from gms_fsm.coupling.stepping import FrictionState, Snapshot
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.run._driven import Driven
-from gms_fsm.run.bank import FrictionBank
-from gms_fsm.run.stepping import FrictionState, Snapshot
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from gms_fsm.adapters._scipy_parts import Caller, ContactSwitch, Solution, SteppedFriction
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.coupling.bank import FrictionBank
+from gms_fsm.coupling.stepping import FrictionState
 from gms_fsm.errors import ParameterError
-from gms_fsm.run.bank import FrictionBank
-from gms_fsm.run.stepping import FrictionState
 from gms_fsm.traces.failures import SimulationError
 
 __all__ = ["Solver", "sampled", "samples"]

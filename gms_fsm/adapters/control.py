@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm._extras import require
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
+from gms_fsm.coupling.stepping import FrictionState
 from gms_fsm.errors import ParameterError
-from gms_fsm.run.stepping import FrictionState
+from gms_fsm.foundation.extras import require
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._arguments import checked_integer
-from gms_fsm._extras import require
 from gms_fsm.charts.parameters import checked_array, checked_scalar
+from gms_fsm.coupling.stepping import ElementSwitch, FrictionState
 from gms_fsm.errors import ParameterError
-from gms_fsm.run.stepping import ElementSwitch, FrictionState
+from gms_fsm.foundation.arguments import checked_integer
+from gms_fsm.foundation.extras import require
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 

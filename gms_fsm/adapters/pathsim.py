@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm._extras import require
 from gms_fsm.charts.parameters import checked_scalar
-from gms_fsm.run.stepping import ElementSwitch, FrictionState
+from gms_fsm.coupling.stepping import ElementSwitch, FrictionState
+from gms_fsm.foundation.extras import require
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._arguments import checked_integer
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import checked_integer
 
 __all__ = ["SampledRun", "run_sampled"]
 

@@ -22,12 +22,12 @@ from gms_fsm.adapters._scipy_parts import (
 )
 from gms_fsm.adapters._scipy_sampled import Solver, sampled, samples
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
+from gms_fsm.coupling.bank import FrictionBank
+from gms_fsm.coupling.driven import Driven
+from gms_fsm.coupling.stepping import FrictionState
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.lowering.scales import scales_of
-from gms_fsm.run._driven import Driven
-from gms_fsm.run.bank import FrictionBank
 from gms_fsm.run.settings import MOST_STEPS
-from gms_fsm.run.stepping import FrictionState
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 from integrators import Tableau

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gms_fsm._toml import parsed
 from gms_fsm.app.scenario import kind_of, load_scenario, load_system
 from gms_fsm.charts.chart import SUPPLIED, Chart
 from gms_fsm.charts.parameters import Parameter, checked_values
 from gms_fsm.charts.registry import registered
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.foundation.toml import parsed
 from gms_fsm.systems.models import ChartModel, Model
 from gms_fsm.systems.system import System, system_of
 

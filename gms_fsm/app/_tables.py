@@ -20,12 +20,12 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticKnownError
 from pydantic_core.core_schema import literal_schema
 
-from gms_fsm._records import LIST, ONE, TABLE, TEXT, Numbers, Table
-from gms_fsm.identification._task import Options
+from gms_fsm.foundation.tables import LIST, ONE, TABLE, TEXT, Numbers, Table
+from gms_fsm.identification.problem.task import Options
 from gms_fsm.records.record import Column, Record
 from gms_fsm.run.settings import ENGINES, EVENTS, Settings
-from gms_fsm.systems._file import SystemFile
-from gms_fsm.systems._model_tables import ModelTable
+from gms_fsm.systems.files.model_tables import ModelTable
+from gms_fsm.systems.files.toml import SystemFile
 from gms_fsm.systems.rigs import PulledSlider
 from integrators import METHODS
 
@@ -235,7 +235,7 @@ class InitialTable(Table):
 
 
 def _figure_ending(value: str) -> str:
-    from plots import formats
+    from plots.output import formats
 
     known = [ending.removeprefix(".") for ending in formats.endings("figure")]
     if value not in known:
@@ -246,7 +246,7 @@ def _figure_ending(value: str) -> str:
 
 def _with_figure_endings(schema: dict[str, Any]) -> None:
     """Add the file endings to a schema; they are only known when it is generated."""
-    from plots import formats
+    from plots.output import formats
 
     endings = [ending.removeprefix(".") for ending in formats.endings("figure")]
     schema["anyOf"][0]["items"]["enum"] = endings

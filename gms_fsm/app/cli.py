@@ -16,18 +16,18 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 import gms_fsm
-from gms_fsm.app._card_verb import reportcard_command
-from gms_fsm.app._chart_verbs import (
+from gms_fsm.app.verbs.card import reportcard_command
+from gms_fsm.app.verbs.charts import (
     blocks_command,
     chart_command,
     check_command,
     code_command,
     handout_command,
 )
-from gms_fsm.app._console import error_line, note
-from gms_fsm.app._export_verb import export_command
-from gms_fsm.app._fit_verb import fit_command
-from gms_fsm.app._run_verbs import (
+from gms_fsm.app.verbs.console import error_line, note
+from gms_fsm.app.verbs.export import export_command
+from gms_fsm.app.verbs.fit import fit_command
+from gms_fsm.app.verbs.runs import (
     debug_command,
     lesson_command,
     paper_command,
@@ -36,7 +36,7 @@ from gms_fsm.app._run_verbs import (
     schema_command,
     sweep_command,
 )
-from gms_fsm.app._trace_verbs import animate_command, plot_command, replay_command
+from gms_fsm.app.verbs.traces import animate_command, plot_command, replay_command
 from gms_fsm.errors import GMSError
 
 __all__ = ["app", "main"]
@@ -70,7 +70,7 @@ class _Drawing(TyperCommand):
     """A verb whose help lists file endings: ``{chart}`` stands for those of charts, and so on."""
 
     def get_params(self, ctx: Any) -> Any:
-        from plots import formats
+        from plots.output import formats
 
         params = super().get_params(ctx)
         listed: dict[str, str] = {each: formats.listed(each) for each in get_args(formats.Written)}

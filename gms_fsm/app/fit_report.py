@@ -12,11 +12,11 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._arguments import checked_kind, checked_path
-from gms_fsm._files import output_folder, refuse_input, write_whole
-from gms_fsm._markdown import plain, table_lines
 from gms_fsm.errors import MissingExtraError, OutputError
-from gms_fsm.identification._profile import LIMIT, Profile
+from gms_fsm.foundation.arguments import checked_kind, checked_path
+from gms_fsm.foundation.files import output_folder, refuse_input, write_whole
+from gms_fsm.foundation.markdown import plain, table_lines
+from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
 
 __all__ = ["report_files", "report_folder", "write_report"]
@@ -50,7 +50,7 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
         If the folder is not writable, or a file would replace one that was not written by gms-fsm
         or that is an input.
     """
-    from plots import formats
+    from plots.output import formats
 
     checked_kind("fit", fit, Fit, "a Fit, from gms_fsm.fit")
     inputs = [each.path for each in fit.records if each.path is not None]
@@ -105,7 +105,7 @@ def report_folder(folder: str | Path, inputs: Sequence[Path] = ()) -> Path:
 
 def report_files() -> list[str]:
     """Return the names of the files of a report, ``report.md`` first."""
-    from plots import formats
+    from plots.output import formats
 
     drawn = [name for stem in ("fit", PROFILES) for name in formats.files(stem, "figure")]
     return [PAGE, *drawn, PARAMETERS, RESIDUALS, FITTED, MOTION]
@@ -113,7 +113,8 @@ def report_files() -> list[str]:
 
 def _draw(fit: Fit, folder: Path) -> list[str]:
     """Write the figures in the usual formats; return their names."""
-    from plots import figures, formats
+    from plots import figures
+    from plots.output import formats
 
     drawn = {"fit": figures.fit_figure(fit)}
     if fit.open_profiles:

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from gms_fsm._toml import parsed
 from gms_fsm.app._tables import FitTable, RecordTable, Scenario, SystemScenario
 from gms_fsm.app.scenario import find_file, kind_of, load_scenario, read_system
 from gms_fsm.errors import GMSError, RecordError, ScenarioError
-from gms_fsm.identification._task import Task
+from gms_fsm.foundation.toml import parsed
 from gms_fsm.identification.fit import task_of
+from gms_fsm.identification.problem.task import Task
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
-from gms_fsm.app._quantities import quantity, sparkline
+from gms_fsm.foundation.quantities import quantity, sparkline
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.run.simulate import Moment
 

@@ -6,10 +6,10 @@ import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from gms_fsm._files import output_folder, write_whole
 from gms_fsm.app._own_files import OwnFile, own_file
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
+from gms_fsm.foundation.files import output_folder, write_whole
 from gms_fsm.phenomena.measure import Bench, Progress, chosen_phenomena, measure_phenomena
 from gms_fsm.phenomena.results import MARKS, PhenomenaTable
 from gms_fsm.systems.models import ChartModel, Model
@@ -47,7 +47,7 @@ def write(
     OutputError
         If the folder is not writable (checked before the runs).
     """
-    from plots import formats
+    from plots.output import formats
 
     chosen = [each.name for each in chosen_phenomena(phenomena)]
     drawn = [file for name in ("matrix", *chosen) for file in formats.files(name, "figure")]
@@ -64,7 +64,7 @@ def write_table(table: PhenomenaTable, folder: Path) -> list[Path]:
     table : PhenomenaTable
         The results.
     folder : Path
-        From `gms_fsm._files.output_folder`.
+        From `gms_fsm.foundation.files.output_folder`.
 
     Returns
     -------
@@ -84,7 +84,8 @@ def write_table(table: PhenomenaTable, folder: Path) -> list[Path]:
 
 
 def _draw(table: PhenomenaTable, folder: Path) -> list[Path]:
-    from plots import figures, formats
+    from plots import figures
+    from plots.output import formats
 
     pictures = {each.name: figures.phenomenon_figure(table, each.name) for each in table.phenomena}
     pictures = {"matrix": figures.phenomena_matrix(table), **pictures}

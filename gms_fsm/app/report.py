@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm._files import output_folder, refuse_input, write_whole
-from gms_fsm._markdown import plain, table_lines
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
-from gms_fsm.inspection.notes import notes_on
+from gms_fsm.foundation.files import output_folder, refuse_input, write_whole
+from gms_fsm.foundation.markdown import plain, table_lines
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import Moment
+from gms_fsm.session.notes import notes_on
 from gms_fsm.systems.models import GMS
 from gms_fsm.systems.system import Contact, System, loaded
 from gms_fsm.traces.failures import SimulationError
@@ -194,7 +194,7 @@ def _figure_files(loaded: Loaded, contact: str = "") -> list[str]:
     wanted = loaded.scenario.output.figures
     if wanted is not None:
         return [f"{stem}.{ending}" for ending in wanted]
-    from plots import formats
+    from plots.output import formats
 
     return formats.files(stem, "figure")
 

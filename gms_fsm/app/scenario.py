@@ -15,9 +15,6 @@ from typing import Any, TextIO
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from gms_fsm._files import inside
-from gms_fsm._records import explained, read_file
-from gms_fsm._toml import override, parsed
 from gms_fsm.app._tables import (
     PrescribedTable,
     PulledTable,
@@ -29,10 +26,13 @@ from gms_fsm.app._tables import (
 )
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
-from gms_fsm.inspection.session import Session
+from gms_fsm.foundation.files import inside
+from gms_fsm.foundation.tables import explained, read_file
+from gms_fsm.foundation.toml import override, parsed
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import simulate
+from gms_fsm.session.session import Session
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import mounted, mounted_alone
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
@@ -510,6 +510,6 @@ def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | N
     ScenarioError
         If the run of the scenario cannot be set up.
     """
-    from gms_fsm.app.debugger import Debugger
+    from gms_fsm.debugger import Debugger
 
     return Debugger(session_of(loaded), loaded.title, stdin, stdout).run()

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm._files import output_folder, refuse_input, write_whole
-from gms_fsm._markdown import plain
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import ParameterError, cut
+from gms_fsm.foundation.files import output_folder, refuse_input, write_whole
+from gms_fsm.foundation.markdown import plain
 from gms_fsm.run.sweep import Sweep, sweep
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from gms_fsm.charts.gms import GMS_ELEMENT, LAWS, SLIP_LAWS, gms_element
-from gms_fsm.charts.lugre import LUGRE
+from gms_fsm.charts.zoo.bristles.lugre import LUGRE
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart

@@ -13,16 +13,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from gms_fsm._arguments import checked_kind, checked_path
-from gms_fsm._display import displayed
-from gms_fsm.charts._parts import State, Transition, texts_of
-from gms_fsm.charts._reader import Reader
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
+from gms_fsm.charts.parts import State, Transition, texts_of
+from gms_fsm.charts.reader import Reader
 from gms_fsm.errors import ChartError, cut, shown
+from gms_fsm.foundation.arguments import checked_kind, checked_path
+from gms_fsm.foundation.display import displayed
 from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, Condition, Value, spell
 
 if TYPE_CHECKING:
-    from gms_fsm.charts._imported import GivenTexts
+    from gms_fsm.charts.files.imported import GivenTexts
 
 __all__ = ["Chart", "State", "Transition"]
 
@@ -311,7 +311,7 @@ class Chart:
         ...     Chart.load(LUGRE.save(f"{folder}/lugre.toml")) == LUGRE
         True
         """
-        from gms_fsm.charts._file import load
+        from gms_fsm.charts.files.tables import load
 
         return load(checked_path("path", path), cls)
 
@@ -358,11 +358,11 @@ class Chart:
         >>> chart.guard_text("slips")
         '|z| >= z_s'
         """
-        from gms_fsm.charts import _from_transitions, _imported
+        from gms_fsm.charts.files import from_transitions, imported
 
-        given = _imported.Texts.of(texts, _from_transitions.HERE)
-        states, edges = _from_transitions.read(machine)
-        return _imported.built(cls, states, edges, given, _from_transitions.HERE)
+        given = imported.Texts.of(texts, from_transitions.HERE)
+        states, edges = from_transitions.read(machine)
+        return imported.built(cls, states, edges, given, from_transitions.HERE)
 
     @classmethod
     def from_scxml(cls, path: str | Path, **texts: Unpack[GivenTexts]) -> Chart:
@@ -402,9 +402,9 @@ class Chart:
         ...     Chart.from_scxml(f"{folder}/gms.scxml") == GMS_ELEMENT["signed"]
         True
         """
-        from gms_fsm.charts import _from_scxml
+        from gms_fsm.charts.files import from_scxml
 
-        return _from_scxml.load(cls, checked_path("path", path), texts)
+        return from_scxml.load(cls, checked_path("path", path), texts)
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
@@ -425,7 +425,7 @@ class Chart:
         OutputError
             If it cannot be written, has another ending, or exists and is not as gms-fsm wrote it.
         """
-        from gms_fsm.charts._file import save
+        from gms_fsm.charts.files.tables import save
 
         return save(self, checked_path("path", path))
 

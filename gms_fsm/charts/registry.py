@@ -76,7 +76,7 @@ class Entry:
     wrong : str, optional
         What is wrong with it, for a chart that demonstrates a fault.
     domain : sequence of str, optional
-        What a proof assumes; `gms_fsm.inspection.prove.default_domain` if omitted.
+        What a proof assumes; `gms_fsm.verification.prove.default_domain` if omitted.
 
     Raises
     ------
@@ -223,9 +223,9 @@ def registered() -> Mapping[str, Entry]:
     'Generalized Maxwell Slip element'
     """
     found: dict[str, tuple[Entry, str]] = {}
-    for module in pkgutil.iter_modules(sys.modules["gms_fsm.charts"].__path__):
-        place = f"gms_fsm/charts/{module.name}.py"
-        for each in _entries(f"gms_fsm.charts.{module.name}", place):
+    for module in _pages():
+        place = f"{module.replace('.', '/')}.py"
+        for each in _entries(module, place):
             if each.name in found:
                 raise ChartError(
                     f"the name {each.name!r} is already used by {found[each.name][1]}",
@@ -256,6 +256,12 @@ def charts() -> Mapping[str, Chart]:
         if not each.wrong
         for law in each.laws or ("",)
     }
+
+
+def _pages() -> list[str]:
+    """Return the modules of this folder and of those in it, by the last part of their names."""
+    found = pkgutil.walk_packages(sys.modules["gms_fsm.charts"].__path__, "gms_fsm.charts.")
+    return sorted((each.name for each in found), key=lambda name: name.rpartition(".")[2])
 
 
 def _entries(module: str, place: str) -> tuple[Entry, ...]:

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
+from gms_fsm.coupling.memory import arguments_of
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._quantities import Quantity
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import names_in, spell
-from gms_fsm.lowering._compiled import functions
 from gms_fsm.lowering.adapting import FUNCTIONS, Adapting, adapt, bind, text_of
-from gms_fsm.run._stepper import arguments_of
-from gms_fsm.run.start import Start
-from integrators.compiled import is_known
+from gms_fsm.lowering.compiling import functions
+from gms_fsm.run.problem import Start
+from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout
-from integrators.machine_code.translate import Translator
-from integrators.stepping import step_to
+from integrators.runners.compiled import is_known
+from integrators.runners.stepping import step_to
 
 __all__ = [
     "STEPS",

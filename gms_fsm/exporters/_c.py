@@ -1,6 +1,6 @@
 """The engine as C99: header and source of one friction, or of a system.
 
-The steps are `integrators.stepping.step_to`, translated; there is no rule in this module.
+The steps are `integrators.runners.stepping.step_to`, translated; there is no rule in this module.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from string import Template
 from typing import Any
 
 from gms_fsm._version import __version__
+from gms_fsm.coupling.joint import FAILURES
+from gms_fsm.coupling.memory import MOST_SWITCHES
 from gms_fsm.exporters._adapting import STEPS, check_first_call, step_arguments, translate, word_of
 from gms_fsm.exporters._names import identifier
-from gms_fsm.exporters._plain_c import C_WORDS
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.run._joint import FAILURES
-from gms_fsm.run._stepper import MOST_SWITCHES
-from gms_fsm.run.start import LATEST, Start
-from integrators.compiled import INLINE
+from gms_fsm.exporters.plain.c import C_WORDS
+from gms_fsm.run.problem import LATEST, Start
 from integrators.machine_code.c99 import c99_text, number_text
+from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout, MemoryBlock
-from integrators.machine_code.translate import Translator
-from integrators.stepping import FULL_LOG
+from integrators.runners.compiled import INLINE
+from integrators.runners.stepping import FULL_LOG
 
 __all__ = [
     "TAKES",

@@ -10,8 +10,8 @@ from typing import Any
 from gms_fsm.charts.parameters import QUANTITIES, SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
-from gms_fsm.run.start import Start
-from gms_fsm.systems._numbers import numbers_of
+from gms_fsm.run.problem import Start
+from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.system import Contact, System
 
 __all__ = ["Quantity", "outputs_of", "parameters_of"]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from gms_fsm.exporters._element import NamedFriction
-from gms_fsm.exporters._element_parts import Constant
+from gms_fsm.exporters.plain.element import NamedFriction
+from gms_fsm.exporters.plain.parts import Constant
 
 __all__ = ["about_friction"]
 

@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
-from gms_fsm._arguments import checked_path
-from gms_fsm._display import asked
-from gms_fsm._files import output_folder, write_together
-from gms_fsm._formats import Format, of
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
+from gms_fsm.formats import Format, of
+from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.foundation.display import asked
+from gms_fsm.foundation.files import output_folder, write_together
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact, System

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.chart import Chart
+from gms_fsm.coupling.steppable import alone, begin, start_of, start_of_system
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import slug
-from gms_fsm.run._steppable import alone, begin, start_of, start_of_system
+from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.run.problem import Start
 from gms_fsm.run.settings import Settings
-from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners
 from gms_fsm.systems.system import Contact, System

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gms_fsm._files import output_folder, write_whole
-from gms_fsm._records import Table
-from gms_fsm.systems._file import FileTable, SystemFile, save_as
-from gms_fsm.systems._record import SignalField, signal_table
+from gms_fsm.foundation.files import output_folder, write_whole
+from gms_fsm.foundation.tables import Table
+from gms_fsm.systems.files.tables import SignalField, signal_table
+from gms_fsm.systems.files.toml import FileTable, SystemFile, save_as
 from gms_fsm.systems.signals import Corners, Signal
 
 if TYPE_CHECKING:

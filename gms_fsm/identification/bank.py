@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
-from gms_fsm._arguments import checked_integer, checked_kind, listed
 from gms_fsm.charts.gms import Law, check_law
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, RecordError
+from gms_fsm.foundation.arguments import checked_integer, checked_kind, listed
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.systems.gms_parameters import GMSParameters

@@ -15,8 +15,8 @@ from functools import partial
 import numpy as np
 
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.charts.maxwell_slip import MAXWELL_SLIP
 from gms_fsm.charts.parameters import FloatArray, Parameter
+from gms_fsm.charts.zoo.bristles.maxwell_slip import MAXWELL_SLIP
 from gms_fsm.identification.bank import initial_bank
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import GMS, ChartModel, Model

@@ -16,19 +16,26 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gms_fsm._arguments import checked_kind, listed
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
-from gms_fsm.identification._experiment import Point
-from gms_fsm.identification._runs import Pool
-from gms_fsm.identification._search import Best, refine
-from gms_fsm.identification._statistics import correlation_time
-from gms_fsm.identification._task import Options, Task, at_all_rows, bar, stretches, training_rows
-from gms_fsm.identification._unknowns import unknowns_of
+from gms_fsm.foundation.arguments import checked_kind, listed
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, Start
+from gms_fsm.identification.certainty.statistics import correlation_time
 from gms_fsm.identification.fit import fitted, options_of, task_of, window_of
+from gms_fsm.identification.problem.experiment import Point
+from gms_fsm.identification.problem.runs import Pool
+from gms_fsm.identification.problem.search import Best, refine
+from gms_fsm.identification.problem.task import (
+    Options,
+    Task,
+    at_all_rows,
+    bar,
+    stretches,
+    training_rows,
+)
+from gms_fsm.identification.problem.unknowns import unknowns_of
 from gms_fsm.identification.result import Choice, ChoiceRow, Fit
-from gms_fsm.records._parts import only, thinned
+from gms_fsm.records.parts import only, thinned
 from gms_fsm.records.record import Record
 from gms_fsm.systems.mounted import mounted_alone
 

@@ -15,22 +15,22 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm._arguments import checked_integer, checked_kind, listed
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
-from gms_fsm.identification._assess import (
+from gms_fsm.foundation.arguments import checked_integer, checked_kind, listed
+from gms_fsm.identification.certainty.assess import (
     NO_INFLUENCE,
     Assessed,
     assessed,
     sorted_elements,
     unassessed,
 )
-from gms_fsm.identification._experiment import MASS, NUISANCE, Point, value_of
-from gms_fsm.identification._linear import linear_names
-from gms_fsm.identification._runs import BEGINS, Pool
-from gms_fsm.identification._search import SEARCHES, Best
-from gms_fsm.identification._task import Options, Task, bar, inside, training_rows
-from gms_fsm.identification._unknowns import values_by_key
+from gms_fsm.identification.problem.experiment import MASS, NUISANCE, Point, value_of
+from gms_fsm.identification.problem.linear import linear_names
+from gms_fsm.identification.problem.runs import BEGINS, Pool
+from gms_fsm.identification.problem.search import SEARCHES, Best
+from gms_fsm.identification.problem.task import Options, Task, bar, inside, training_rows
+from gms_fsm.identification.problem.unknowns import values_by_key
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model

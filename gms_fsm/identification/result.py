@@ -12,19 +12,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._arguments import checked_integer, checked_kind, checked_path, listed
-from gms_fsm._display import asked, displayed
-from gms_fsm._extras import missing
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError, RecordError, shown
-from gms_fsm.identification._assess import Assessed, Estimate
-from gms_fsm.identification._certainty import Bootstrap, bootstrapped, profiled
-from gms_fsm.identification._compared import Choice, ChoiceRow, Comparison, score_of
-from gms_fsm.identification._experiment import Point
-from gms_fsm.identification._profile import Profile
-from gms_fsm.identification._runs import Course
-from gms_fsm.identification._statistics import phase_floor
-from gms_fsm.identification._task import Task, at_all_rows, inside, training_rows
+from gms_fsm.foundation.arguments import checked_integer, checked_kind, checked_path, listed
+from gms_fsm.foundation.display import asked, displayed
+from gms_fsm.foundation.extras import missing
+from gms_fsm.identification.certainty.assess import Assessed, Estimate
+from gms_fsm.identification.certainty.compared import Choice, ChoiceRow, Comparison, score_of
+from gms_fsm.identification.certainty.intervals import Bootstrap, bootstrapped, profiled
+from gms_fsm.identification.certainty.profile import Profile
+from gms_fsm.identification.certainty.statistics import phase_floor
+from gms_fsm.identification.problem.experiment import Point
+from gms_fsm.identification.problem.runs import Course
+from gms_fsm.identification.problem.task import Task, at_all_rows, inside, training_rows
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System

@@ -33,7 +33,11 @@ from gms_fsm.language._dialects import (
 )
 from gms_fsm.language._evaluate import evaluate
 from gms_fsm.language._fold import Algebra, ValueAlgebra, fold
-from gms_fsm.language._functions import (
+from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, integer_power, product_power
+from gms_fsm.language._print import spell
+from gms_fsm.language._read import Owner, parse_condition, parse_value
+from gms_fsm.language._vectors import truths, values_of
+from gms_fsm.language.functions import (
     COMPARISONS,
     CONSTANTS,
     ELEMENTARY,
@@ -43,7 +47,7 @@ from gms_fsm.language._functions import (
     SEVERAL,
     sgn,
 )
-from gms_fsm.language._normal import (
+from gms_fsm.language.normal import (
     Comparison,
     Requirement,
     Split,
@@ -55,10 +59,7 @@ from gms_fsm.language._normal import (
     substitute,
     turning_inside,
 )
-from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, integer_power, product_power
-from gms_fsm.language._print import spell
-from gms_fsm.language._read import Owner, parse_condition, parse_value
-from gms_fsm.language._tree import (
+from gms_fsm.language.tree import (
     Binary,
     Both,
     Call,
@@ -75,7 +76,6 @@ from gms_fsm.language._tree import (
     names_in,
     states_in,
 )
-from gms_fsm.language._vectors import truths, values_of
 
 __all__ = [
     "C99",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gms_fsm.language._fold import fold
-from gms_fsm.language._functions import SEVERAL
-from gms_fsm.language._tree import Binary, Call, Negative, Number, Value, names_in
+from gms_fsm.language.functions import SEVERAL
+from gms_fsm.language.tree import Binary, Call, Negative, Number, Value, names_in
 
 __all__ = ["derivative"]
 

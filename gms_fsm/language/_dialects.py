@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from gms_fsm.language._functions import COMPARISONS, FUNCTIONS, OPERATIONS
+from gms_fsm.language.functions import COMPARISONS, FUNCTIONS, OPERATIONS
 
 __all__ = [
     "ATOM",

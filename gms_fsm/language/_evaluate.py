@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gms_fsm.language._fold import fold
-from gms_fsm.language._functions import COMPARISONS, FUNCTIONS, NAMESPACE, OPERATIONS
 from gms_fsm.language._powers import product_power
-from gms_fsm.language._tree import Binary, Both, Call, Either, Negative, Node, Not, Relation
+from gms_fsm.language.functions import COMPARISONS, FUNCTIONS, NAMESPACE, OPERATIONS
+from gms_fsm.language.tree import Binary, Both, Call, Either, Negative, Node, Not, Relation
 
 __all__ = ["evaluate"]
 

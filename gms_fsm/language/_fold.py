@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Protocol, TypeVar, overload
 
-from gms_fsm.language._tree import (
+from gms_fsm.language.tree import (
     Binary,
     Both,
     Call,

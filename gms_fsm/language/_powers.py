@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gms_fsm.language._tree import Binary, Name, Negative, Number, Value
+from gms_fsm.language.tree import Binary, Name, Negative, Number, Value
 
 __all__ = ["LARGEST_PRODUCT_POWER", "integer_power", "product_power"]
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from gms_fsm.language._dialects import ATOM, LEVELS, PYTHON, Dialect, Printed
 from gms_fsm.language._fold import fold
 from gms_fsm.language._powers import product_power
-from gms_fsm.language._tree import Binary, Both, Call, Either, Name, Negative, Node, Not, Relation
+from gms_fsm.language.tree import Binary, Both, Call, Either, Name, Negative, Node, Not, Relation
 
 __all__ = ["spell"]
 

@@ -16,9 +16,9 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from gms_fsm.errors import ExpressionError, shown
-from gms_fsm.language._functions import CONSTANTS, FUNCTIONS, NAMESPACE, SEVERAL
-from gms_fsm.language._parser import PARSER
-from gms_fsm.language._tree import (
+from gms_fsm.foundation.parser import PARSER
+from gms_fsm.language.functions import CONSTANTS, FUNCTIONS, NAMESPACE, SEVERAL
+from gms_fsm.language.tree import (
     Binary,
     Both,
     Call,

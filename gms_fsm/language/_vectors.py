@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.language._evaluate import evaluate
 from gms_fsm.language._fold import fold
-from gms_fsm.language._functions import COMPARISONS, FUNCTIONS, NAMESPACE, OPERATIONS
 from gms_fsm.language._powers import product_power
-from gms_fsm.language._tree import (
+from gms_fsm.language.functions import COMPARISONS, FUNCTIONS, NAMESPACE, OPERATIONS
+from gms_fsm.language.tree import (
     Binary,
     Both,
     Call,
@@ -28,7 +28,7 @@ from gms_fsm.language._tree import (
     Relation,
     Value,
 )
-from integrators import quick
+from integrators.runners import quick
 
 __all__ = ["truths", "values_of"]
 
@@ -53,7 +53,7 @@ def truths(
     Returns
     -------
     ndarray of bool
-        Equal, element by element, to `gms_fsm.inspection.explain.holds`.
+        Equal, element by element, to `gms_fsm.session.explain.holds`.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """What follows from the numbers of a system, as text: printed from its plan, as a program is.
 
 Bends of its curves, scales, entries of default states, and tolerances where no scale is known. An
-export runs this text when a number changes; `gms_fsm.run.start` runs the same text.
+export runs this text when a number changes; `gms_fsm.run.problem` runs the same text.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 
 from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
 from gms_fsm.language import Number, Value, names_in, renamed, spell
-from gms_fsm.lowering._generated import SIGNALS, ieee, load, load_careful
-from gms_fsm.lowering._lines import CodeLine, indented, one_line
-from gms_fsm.lowering._lock_functions import LockFunctions
-from gms_fsm.lowering._locks import ENDLESS
-from gms_fsm.lowering._names import computed_names
-from gms_fsm.lowering._plan import ProgramPlan
-from gms_fsm.lowering._scale_text import HELPERS, scale_text
-from gms_fsm.systems._assembly import CURVE_LOAD, Bank, of
+from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful
+from gms_fsm.lowering.printing.lines import CodeLine, indented, one_line
+from gms_fsm.lowering.printing.lock_functions import LockFunctions
+from gms_fsm.lowering.printing.locks import ENDLESS
+from gms_fsm.lowering.printing.names import computed_names
+from gms_fsm.lowering.printing.plan import ProgramPlan
+from gms_fsm.lowering.printing.scale_text import HELPERS, scale_text
+from gms_fsm.systems.reading.assembly import CURVE_LOAD, Bank, of
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import LEAST_LOAD
 from integrators.loop import START, Buffers

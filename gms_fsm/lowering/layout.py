@@ -1,8 +1,8 @@
 """The layout of the state vector y, of a run's observed quantities, of the modes and of the log.
 
 No other module computes such a position, neither as a number nor as text: it looks it up by name.
-Names are those of the trees (`gms_fsm.systems._assembly`): what belongs to a contact is called
-``contact.name``.
+Names are those of the trees (`gms_fsm.systems.reading.assembly`): what belongs to a contact is
+called ``contact.name``.
 
 y            position and, unless it is driven, velocity of each body; further states; sampled
              values; then for each contact each variable of its chart, one per element
@@ -27,7 +27,7 @@ from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
 from gms_fsm.lowering.log_columns import LOG_TEXTS
 from gms_fsm.lowering.places import ElementPlaces, Places
-from gms_fsm.systems._assembly import Assembly, Bank, of
+from gms_fsm.systems.reading.assembly import Assembly, Bank, of
 
 __all__ = ["BankPlaces", "SystemLayout", "held_of", "sizes_of"]
 
@@ -106,7 +106,7 @@ class SystemLayout:
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
-    >>> from gms_fsm.systems._assembly import assembled
+    >>> from gms_fsm.systems.reading.assembly import assembled
     >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> layout = SystemLayout.of(assembled(system_of(model, Prescribed("0.1*t"))), surfaces=0)

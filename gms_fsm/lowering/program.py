@@ -36,15 +36,15 @@ import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
-from gms_fsm.lowering._generated import SIGNALS, ieee, load, load_careful, quickened
-from gms_fsm.lowering._plan import Pair, ProgramPlan, both_sides, plan_of
-from gms_fsm.lowering._python import FUNCTIONS, python
 from gms_fsm.lowering.adapting import Adaptive, adaptive
+from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful, quickened
 from gms_fsm.lowering.layout import SystemLayout
-from gms_fsm.systems._numbers import numbers_of
-from gms_fsm.systems._texts import ByIdentity
+from gms_fsm.lowering.printing.plan import Pair, ProgramPlan, both_sides, plan_of
+from gms_fsm.lowering.printing.python import FUNCTIONS, python
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import mounted
+from gms_fsm.systems.reading.texts import ByIdentity
+from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (
     Corners,

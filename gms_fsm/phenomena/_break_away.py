@@ -15,7 +15,7 @@ from gms_fsm.phenomena.limits import LIMITS
 from gms_fsm.phenomena.results import Curve, Measured, Number, Phenomenon, Verdict
 
 if TYPE_CHECKING:
-    from gms_fsm.phenomena._specimens import Specimen
+    from gms_fsm.phenomena.specimens import Specimen
 
 __all__ = ["PHENOMENA", "RATES", "pulled"]
 

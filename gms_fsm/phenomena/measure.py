@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from gms_fsm._arguments import checked_kind, listed
 from gms_fsm.errors import GMSError, ParameterError, shown
-from gms_fsm.phenomena import _break_away, _presliding, _sliding
+from gms_fsm.foundation.arguments import checked_kind, listed
+from gms_fsm.phenomena import _break_away, _sliding, presliding
 from gms_fsm.phenomena._bench import Bench
-from gms_fsm.phenomena._specimens import Specimen, specimens_of
 from gms_fsm.phenomena.results import Cell, Measured, PhenomenaTable, Phenomenon
+from gms_fsm.phenomena.specimens import Specimen, specimens_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
 __all__ = ["PHENOMENA", "Bench", "PhenomenaTable", "chosen_phenomena", "measure_phenomena"]
 
-_EVERY = (*_break_away.PHENOMENA, *_presliding.PHENOMENA, *_sliding.PHENOMENA)
+_EVERY = (*_break_away.PHENOMENA, *presliding.PHENOMENA, *_sliding.PHENOMENA)
 PHENOMENA: Mapping[str, Phenomenon] = {each.name: each for each in _EVERY}
 Progress = Callable[[str, float], None]
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gms_fsm._arguments import checked_path
-from gms_fsm._files import output_folder, write_whole
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.foundation.files import output_folder, write_whole
 
 __all__ = ["HEADINGS", "write_csv"]
 

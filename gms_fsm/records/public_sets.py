@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from gms_fsm._arguments import checked_path
 from gms_fsm.errors import RecordError
+from gms_fsm.foundation.arguments import checked_path
 from gms_fsm.records.record import Record
 
 __all__ = ["damper", "tribometer"]

@@ -15,15 +15,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import RecordError, cut, shown
+from gms_fsm.foundation.arguments import checked_kind, checked_path
 from gms_fsm.records._columns import QUANTITIES, Column, ColumnLike, columns_of
-from gms_fsm.records._parts import some_rows
 from gms_fsm.records._selection import FEWEST, Origin, selected
 from gms_fsm.records._table import TextFormat, read_cells
 from gms_fsm.records._written import write_csv
 from gms_fsm.records.motion import Motion, motion_of
+from gms_fsm.records.parts import some_rows
 
 __all__ = ["Column", "Record"]
 

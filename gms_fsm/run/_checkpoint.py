@@ -16,16 +16,17 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._files import write_whole
 from gms_fsm.errors import CheckpointError, ParameterError, SignalError, cut, shown, why
+from gms_fsm.foundation.files import write_whole
 from gms_fsm.lowering.log_columns import CONTACT, LOG_TEXTS
 from gms_fsm.run._identity import identity
-from gms_fsm.run._plausible import check_ranges, check_state, last_edges, last_states
-from gms_fsm.run.start import Start
+from gms_fsm.run.plausible import check_ranges, check_state, last_edges, last_states
+from gms_fsm.run.problem import Start
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import Contact
-from gms_fsm.traces._archives import member
-from integrators import hybrid, states
+from gms_fsm.traces.files.archives import member
+from integrators import hybrid
+from integrators.runners import states
 
 __all__ = ["Checkpointer"]
 
@@ -151,14 +152,14 @@ class Checkpointer:
 def _program() -> str:
     """Identify the program: another version might compute other bits or use another layout."""
     from gms_fsm._version import __version__
-    from integrators.compiled import edition
+    from integrators.runners.compiled import edition
 
     return f"gms-fsm {__version__} ({edition()[:8]}) on Python {platform.python_version()}"
 
 
 def _identity(start: Start) -> str:
     """Return a hash of everything that determines a run."""
-    from gms_fsm.traces._header import Header  # only files need pydantic
+    from gms_fsm.traces.files.header import Header  # only files need pydantic
 
     header = Header.of(start.what, start.settings)
     head = header.model_dump_json()

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._arguments import checked_path
-from gms_fsm._extras import require
-from gms_fsm._files import write_whole
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError, cut, shown, why
+from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.foundation.extras import require
+from gms_fsm.foundation.files import write_whole
+from gms_fsm.foundation.logs import Log
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.systems.numbers import column_name
-from gms_fsm.traces._archives import member, write_arrays
-from gms_fsm.traces._log import Log
+from gms_fsm.traces.files.archives import member, write_arrays
 
 if TYPE_CHECKING:
     import pandas

@@ -12,11 +12,11 @@ from typing import Any
 
 from transitions import Machine, MachineError
 
-from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ChartError, ParameterError, shown
+from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.language import PYTHON, Condition, names_in, spell
-from gms_fsm.lowering._generated import ieee, load, load_careful
+from gms_fsm.lowering.generated import ieee, load, load_careful
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.scope import GuardValues, parameter_values

@@ -7,18 +7,18 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import integrators
-from gms_fsm._arguments import checked_path
 from gms_fsm.errors import ParameterError, SignalError
+from gms_fsm.foundation.arguments import checked_path
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._checkpoint import Checkpointer
-from gms_fsm.run._compiled_run import CompiledRun
-from gms_fsm.run._moment import Moment
-from gms_fsm.run._own_machines import engine_of, own_machines
-from gms_fsm.run._pace import LATER, PATIENCE, check_pace
-from gms_fsm.run._recording import Recorder, check_end, explained, interference_error
 from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
+from gms_fsm.run.problem import Start
+from gms_fsm.run.recording.compiled_run import CompiledRun
+from gms_fsm.run.recording.moment import Moment
+from gms_fsm.run.recording.own_machines import engine_of, own_machines
+from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
+from gms_fsm.run.recording.recording import Recorder, check_end, explained, interference_error
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
-from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import arguments_of
 from gms_fsm.systems.rigs import Rig

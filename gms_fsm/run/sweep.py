@@ -15,25 +15,25 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut
-from gms_fsm.lowering._compiled import check_llvmlite
-from gms_fsm.lowering._observing import observe
+from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.logs import Log
+from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
+from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program, same_text
-from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
+from gms_fsm.run.problem import Start
+from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
-from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted, mounted, shifted
 from gms_fsm.systems.numbers import column_name, known_in, varied
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
-from gms_fsm.traces._firings import Firings
-from gms_fsm.traces._log import Log
+from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm._display import displayed, short_repr
 from gms_fsm.charts.gms import PARAMETERS, TABLE_I
 from gms_fsm.charts.parameters import (
     SIGMA_2,
@@ -21,6 +20,7 @@ from gms_fsm.charts.parameters import (
 )
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.display import displayed, short_repr
 
 __all__ = ["GMSParameters"]
 

@@ -13,10 +13,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm._display import displayed, short_repr
 from gms_fsm.charts.chart import SUPPLIED, Chart
 from gms_fsm.charts.gms import GMS_ELEMENT, Law, check_law
-from gms_fsm.charts.lugre import LUGRE
 from gms_fsm.charts.parameters import (
     SIGMA_2,
     STRIBECK,
@@ -30,8 +28,10 @@ from gms_fsm.charts.parameters import (
 )
 from gms_fsm.charts.registry import Entry
 from gms_fsm.charts.stribeck import Stribeck
+from gms_fsm.charts.zoo.bristles.lugre import LUGRE
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.systems._given import Text, texts_of
+from gms_fsm.foundation.display import displayed, short_repr
+from gms_fsm.systems.given import Text, texts_of
 from gms_fsm.systems.gms_parameters import GMSParameters
 
 __all__ = [

@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from gms_fsm.charts.gms import GMS_ELEMENT
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.systems._parts import Contact
 from gms_fsm.systems.models import GMS, ChartModel, Model, parameters_of
 from gms_fsm.systems.mounted import Mounted, mounted
+from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.rigs import with_numbers as with_numbers_of_rig
 
 __all__ = ["Number", "column_name", "joined", "known_in", "law_of", "number_of", "numbers_of"]

@@ -12,8 +12,8 @@ from typing import Any, ClassVar, Protocol
 
 from numpy.typing import ArrayLike
 
-from gms_fsm._display import short_repr
 from gms_fsm.charts.parameters import Parameter, checked_scalar
+from gms_fsm.foundation.display import short_repr
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring
 

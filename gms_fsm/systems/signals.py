@@ -15,9 +15,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm._display import short_repr
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, SignalError, shown
+from gms_fsm.foundation.display import short_repr
 from gms_fsm.language import Value, parse_value
 
 __all__ = ["Corners", "Formula", "Function", "Signal", "SignalLike", "as_signal", "piecewise_slope"]

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
 from gms_fsm.language import Binary, Name, Negative, Number, Value, parse_value
-from gms_fsm.systems._given import Text, check_name, check_text, constant
-from gms_fsm.systems._parts import Body
+from gms_fsm.systems.given import Text, check_name, check_text, constant
+from gms_fsm.systems.parts import Body
 
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from gms_fsm._arguments import checked_path
-from gms_fsm._display import displayed
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, cut, shown
+from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.foundation.display import displayed
 from gms_fsm.language import (
     Binary,
     Name,
@@ -32,21 +32,21 @@ from gms_fsm.language import (
     renamed,
     spell,
 )
-from gms_fsm.systems._given import (
+from gms_fsm.systems.given import (
     check_name,
     mapping_of,
     several,
     texts_of,
 )
-from gms_fsm.systems._parts import LEAST_LOAD, LOAD, Body, Contact, Sampled, loaded
-from gms_fsm.systems._texts import texts_of_system
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.parts import LEAST_LOAD, LOAD, Body, Contact, Sampled, loaded
+from gms_fsm.systems.reading.texts import texts_of_system
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
 from gms_fsm.systems.springs import Spring, on_ground
 
 if TYPE_CHECKING:
-    from gms_fsm.systems._assembly import Assembly
+    from gms_fsm.systems.reading.assembly import Assembly
 
 __all__ = [
     "LEAST_LOAD",
@@ -204,7 +204,7 @@ class System:
     def _read(self) -> None:
         """Read the texts, unless another system with the same texts has been read."""
         # Imported here: the reader itself needs the classes of this module.
-        from gms_fsm.systems._renumbered import check_numbers
+        from gms_fsm.systems.reading.renumbered import check_numbers
 
         key = texts_of_system(self)
         like = _read_before.get(key)
@@ -230,8 +230,8 @@ class System:
     @functools.cached_property
     def assembly(self) -> Assembly:
         """Its texts, read."""
-        from gms_fsm.systems._assembly import assembled
-        from gms_fsm.systems._renumbered import renumbered
+        from gms_fsm.systems.reading.assembly import assembled
+        from gms_fsm.systems.reading.renumbered import renumbered
 
         return assembled(self) if self.shape is self else renumbered(self.shape.assembly, self)
 
@@ -260,7 +260,7 @@ class System:
         ScenarioError, ParameterError, SignalError, ChartError, ExpressionError
             If the file is no system; the message names file, line, key and text.
         """
-        from gms_fsm.systems._file import load
+        from gms_fsm.systems.files.toml import load
 
         return load(checked_path("path", path), cls)
 
@@ -285,7 +285,7 @@ class System:
             If a signal is a Python function, or the file cannot be written, has another ending, or
             exists and is not as gms-fsm wrote it.
         """
-        from gms_fsm.systems._file import save
+        from gms_fsm.systems.files.toml import save
 
         return save(self, checked_path("path", path))
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._display import short_repr
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.foundation.display import short_repr
 
 __all__ = ["Rows", "merged"]
 

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.errors import SignalError
-from gms_fsm.lowering._observing import observe
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
+from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.trace import Trace

@@ -17,8 +17,8 @@ import numpy as np
 
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Owner, evaluate
-from gms_fsm.lowering._observing import observe
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
+from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.signals import Corners, Function, piecewise_linear
 from gms_fsm.systems.system import Contact, System

@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm._arguments import checked_integer, checked_path
-from gms_fsm._display import displayed
-from gms_fsm._extras import require
 from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import (
     ParameterError,
     shown,
 )
+from gms_fsm.foundation.arguments import checked_integer, checked_path
+from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.extras import require
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
@@ -32,12 +32,14 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
-from gms_fsm.traces._between import between
-from gms_fsm.traces._columns import columns_of
-from gms_fsm.traces._firings import Firings
-from gms_fsm.traces._impulses import impulses_of
-from gms_fsm.traces._observed import Observed
-from gms_fsm.traces._views import (
+from gms_fsm.traces.between import between
+from gms_fsm.traces.files.columns import columns_of
+from gms_fsm.traces.firings import Firings
+from gms_fsm.traces.impulses import impulses_of
+from gms_fsm.traces.observed import Observed
+from gms_fsm.traces.rows import Rows, merged
+from gms_fsm.traces.verdicts import Verdict
+from gms_fsm.traces.views import (
     BodyTrace,
     driven_velocity,
     dwell_times,
@@ -46,8 +48,6 @@ from gms_fsm.traces._views import (
     sliding_of,
     write_trace,
 )
-from gms_fsm.traces.rows import Rows, merged
-from gms_fsm.traces.verdicts import Verdict
 
 if TYPE_CHECKING:
     import pandas
@@ -579,13 +579,13 @@ class Trace:
         str
             With a header line.
         """
-        from gms_fsm.traces._csv import log_texts
+        from gms_fsm.traces.files.csv_files import log_texts
 
         return "".join(log_texts(self.firings))
 
 
 def files_of(path: Path) -> list[Path]:
     """Return the files of a trace: one, or for ``.csv`` also that of its log."""
-    from gms_fsm.traces._csv import log_path
+    from gms_fsm.traces.files.csv_files import log_path
 
     return [path, log_path(path)] if path.suffix == ".csv" else [path]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from gms_fsm._display import displayed, short_repr
+from gms_fsm.foundation.display import displayed, short_repr
 
 __all__ = [
     "ChatteringVerdict",

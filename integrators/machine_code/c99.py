@@ -81,7 +81,7 @@ def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False)
     Parameters
     ----------
     module : Module
-        From `integrators.machine_code.translate.Translator`.
+        From `integrators.machine_code.front_end.translate.Translator`.
     taken : iterable of str
         Names that the text must not define.
     hidden : bool
@@ -94,8 +94,8 @@ def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False)
 
     Examples
     --------
-    >>> from integrators.machine_code.translate import Translator
-    >>> from integrators.machine_code.values import NumberValue
+    >>> from integrators.machine_code.front_end.translate import Translator
+    >>> from integrators.machine_code.front_end.values import NumberValue
     >>> from integrators.step_size import memory_of
     >>> translator = Translator()
     >>> _ = translator.entry("entry", memory_of, [NumberValue(Local("f", "root"))])

@@ -13,7 +13,8 @@ import re
 from collections.abc import Callable, Mapping
 
 from integrators.machine_code.c99 import CFields, CNames, CWriter, calls
-from integrators.machine_code.translate import Translator
+from integrators.machine_code.front_end.translate import Translator
+from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.tree import (
     Address,
     AssignMany,
@@ -32,7 +33,6 @@ from integrators.machine_code.tree import (
     Statement,
     TypedFunction,
 )
-from integrators.machine_code.values import NumberValue
 
 __all__ = ["javascript_text", "library_text", "script_number", "tables_of"]
 
@@ -73,7 +73,7 @@ def tables_of(module: Module) -> tuple[Mapping[str, int], list[float]]:
     Parameters
     ----------
     module : Module
-        From `integrators.machine_code.translate.Translator`.
+        From `integrators.machine_code.front_end.translate.Translator`.
 
     Returns
     -------
@@ -93,8 +93,8 @@ def javascript_text(module: Module) -> str:
     Parameters
     ----------
     module : Module
-        From `integrators.machine_code.translate.Translator`. Functions of the host program cannot
-        be called.
+        From `integrators.machine_code.front_end.translate.Translator`. Functions of the host
+        program cannot be called.
 
     Returns
     -------
@@ -108,9 +108,9 @@ def javascript_text(module: Module) -> str:
 
     Examples
     --------
-    >>> from integrators.machine_code.translate import Translator
+    >>> from integrators.machine_code.front_end.translate import Translator
     >>> from integrators.machine_code.tree import Local
-    >>> from integrators.machine_code.values import NumberValue
+    >>> from integrators.machine_code.front_end.values import NumberValue
     >>> from integrators.step_size import memory_of
     >>> translator = Translator()
     >>> _ = translator.entry("entry", memory_of, [NumberValue(Local("f", "root"))])

@@ -22,9 +22,15 @@ from typing import Any
 
 import numpy as np
 
+from integrators.machine_code.front_end.values import (
+    ArrayValue,
+    FixedValue,
+    NumberValue,
+    RecordValue,
+    Value,
+)
 from integrators.machine_code.records import FIELDS, numbers_of
 from integrators.machine_code.tree import Address, Const, Expr, Load, Local
-from integrators.machine_code.values import ArrayValue, FixedValue, NumberValue, RecordValue, Value
 
 __all__ = ["BlockLayout", "MemoryBlock", "OuterArray", "parts_of"]
 

@@ -57,7 +57,7 @@ def llvm_text(module: Module) -> str:
     Parameters
     ----------
     module : Module
-        From `integrators.machine_code.translate.Translator`.
+        From `integrators.machine_code.front_end.translate.Translator`.
 
     Returns
     -------
@@ -66,8 +66,8 @@ def llvm_text(module: Module) -> str:
 
     Examples
     --------
-    >>> from integrators.machine_code.translate import Translator
-    >>> from integrators.machine_code.values import NumberValue
+    >>> from integrators.machine_code.front_end.translate import Translator
+    >>> from integrators.machine_code.front_end.values import NumberValue
     >>> from integrators.step_size import memory_of
     >>> translator = Translator()
     >>> _ = translator.entry("entry", memory_of, [NumberValue(Local("f", "root"))])

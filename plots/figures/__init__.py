@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from plots import formats
-from plots._matplotlib import Figure
 from plots.figures._fit import fit_figure
 from plots.figures._landscapes import landscape
 from plots.figures._paper import (
@@ -24,7 +22,9 @@ from plots.figures._phenomena import phenomena_matrix, phenomenon_figure
 from plots.figures._profiles import profiles_figure
 from plots.figures._runs import Measured, cascade_figure, overview, ribbons_figure
 from plots.figures._unfold import unfold
-from plots.panels._shown import SMOOTH
+from plots.output import formats
+from plots.panels.selection import SMOOTH
+from plots.style.matplotlib import Figure
 
 __all__ = [
     "FIG3_PHASES",
@@ -57,7 +57,7 @@ def save(figure: Figure, path: str | Path) -> Path:
     figure : Figure
         What.
     path : str or Path
-        Its ending must be that of a figure format in `plots.formats.FORMATS`.
+        Its ending must be that of a figure format in `plots.output.formats.FORMATS`.
 
     Returns
     -------

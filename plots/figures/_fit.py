@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._arguments import checked_kind
 from gms_fsm.errors import ParameterError
-from plots._matplotlib import Axes, Figure, rc_context
-from plots._window import Window
+from gms_fsm.foundation.arguments import checked_kind
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import last_cycles, letter_panels
-from plots.panels._axes import VECTOR_ROWS, draw_curve, time_axis
-from plots.panels._shown import is_number, is_whole, scaled
-from plots.presets import font, pt, settings, to_scale
+from plots.panels.axes import VECTOR_ROWS, draw_curve, time_axis
+from plots.panels.selection import is_number, is_whole, scaled
+from plots.panels.window import Window
 from plots.style import INK, LINE_GREY, PALE_GREY, REPORTED, TEXT_GREY, colour
+from plots.style.matplotlib import Axes, Figure, rc_context
+from plots.style.presets import font, pt, settings, to_scale
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Estimate, Fit, Residuals

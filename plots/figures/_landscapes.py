@@ -6,19 +6,19 @@ from textwrap import wrap
 from typing import Any
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.inspection._findings import Report
 from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.verification.findings import Report
 from plots import panels
-from plots._matplotlib import Axes, Figure, Line2D, rc_context
-from plots._plane import Plane
-from plots._window import Window
 from plots.figures._layout import fitted, low, sheet
 from plots.figures._parts import head
-from plots.panels._landscapes import DASHED, acceleration, pinned, quantity
-from plots.panels._race import rows_of
-from plots.panels._shown import checked_row, one_element
-from plots.presets import current, font, inches, pt, room, settings
+from plots.panels.guards.landscapes import DASHED, acceleration, pinned, quantity
+from plots.panels.guards.plane import Plane
+from plots.panels.guards.racing import rows_of
+from plots.panels.selection import checked_row, one_element
+from plots.panels.window import Window
 from plots.style import INK, LINE_GREY
+from plots.style.matplotlib import Axes, Figure, Line2D, rc_context
+from plots.style.presets import current, font, inches, pt, room, settings
 
 __all__ = ["landscape"]
 

@@ -8,7 +8,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from plots._matplotlib import (
+from plots.panels.titles import lettered
+from plots.style.matplotlib import (
     Artist,
     AutoLocator,
     Axes,
@@ -22,8 +23,7 @@ from plots._matplotlib import (
     Text,
     rc_context,
 )
-from plots.panels._titles import lettered
-from plots.presets import SCREEN, current, inches, pt, room, settings
+from plots.style.presets import SCREEN, current, inches, pt, room, settings
 
 __all__ = ["fitted", "legend_above", "legend_below", "low", "narrow", "sheet"]
 

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace
 from plots import panels
-from plots._matplotlib import Axes, Figure, rc_context
-from plots._window import Window
 from plots.figures._layout import fitted, legend_below, low, narrow, sheet
 from plots.figures._parts import element_legend, lanes_height, letter_panels
-from plots.panels._axes import MANY, first_variable
-from plots.panels._held import Lag
-from plots.panels._shown import checked_elements, checked_window, scaled, shown
-from plots.presets import font, pt, settings, to_scale
+from plots.panels.axes import MANY, first_variable
+from plots.panels.held_outputs import Lag
+from plots.panels.selection import checked_elements, checked_window, scaled, shown
+from plots.panels.window import Window
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
+from plots.style.matplotlib import Axes, Figure, rc_context
+from plots.style.presets import font, pt, settings, to_scale
 
 __all__ = [
     "FIG3_PHASES",

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
 from plots import panels
-from plots._matplotlib import Annotation, Axes, Figure
-from plots._window import Window
 from plots.figures._layout import legend_below
-from plots.panels._axes import MANY
-from plots.panels._shown import checked_elements
-from plots.presets import pt
+from plots.panels.axes import MANY
+from plots.panels.selection import checked_elements
+from plots.panels.window import Window
+from plots.style.matplotlib import Annotation, Axes, Figure
+from plots.style.presets import pt
 
 LANE = 0.15  # inches: a row of one element, with its label
 

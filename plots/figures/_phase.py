@@ -11,14 +11,14 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
-from plots._matplotlib import Axes, Figure, LineCollection, rc_context
-from plots._window import Window
 from plots.figures._layout import fitted, narrow, sheet
 from plots.figures._parts import head, letter_panels
-from plots.panels._axes import Artists
-from plots.panels._shown import checked_elements, checked_row, checked_window, scaled, shown
-from plots.presets import pt, settings
+from plots.panels.axes import Artists
+from plots.panels.selection import checked_elements, checked_row, checked_window, scaled, shown
+from plots.panels.window import Window
 from plots.style import PAPER, VERMILION
+from plots.style.matplotlib import Axes, Figure, LineCollection, rc_context
+from plots.style.presets import pt, settings
 
 __all__ = ["phase"]
 

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.phenomena.results import MARKS, VERDICTS, Measured, PhenomenaTable, Phenomenon
-from plots._matplotlib import Axes, Figure, Rectangle, rc_context
 from plots.figures._layout import fitted, sheet
-from plots.presets import font, inches, pt, room, settings, to_scale
 from plots.style import (
     INK,
     LINE_GREY,
@@ -19,6 +17,8 @@ from plots.style import (
     colour,
     compared_look,
 )
+from plots.style.matplotlib import Axes, Figure, Rectangle, rc_context
+from plots.style.presets import font, inches, pt, room, settings, to_scale
 
 __all__ = ["phenomena_matrix", "phenomenon_figure"]
 

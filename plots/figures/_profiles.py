@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._arguments import checked_kind
 from gms_fsm.errors import ParameterError
-from gms_fsm.identification._profile import LIMIT, Profile
-from plots._matplotlib import Axes, Figure, MaxNLocator, NullLocator, rc_context
+from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from plots.figures._layout import fitted, legend_below, sheet
 from plots.figures._parts import letter_panels
-from plots.presets import font, pt, room, settings, to_scale
 from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY
+from plots.style.matplotlib import Axes, Figure, MaxNLocator, NullLocator, rc_context
+from plots.style.presets import font, pt, room, settings, to_scale
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit

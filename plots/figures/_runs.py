@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
-from plots._matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
-from plots._window import Window
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import (
     element_legend,
@@ -23,11 +21,13 @@ from plots.figures._parts import (
     one_time_axis,
     over_threshold,
 )
-from plots.panels._axes import MANY, VECTOR_ROWS
-from plots.panels._cascades import CASCADE
-from plots.panels._shown import checked_elements, checked_window, scaled, shown
-from plots.presets import pt, settings
+from plots.panels.axes import MANY, VECTOR_ROWS
+from plots.panels.micro_steps.cascades import CASCADE
+from plots.panels.selection import checked_elements, checked_window, scaled, shown
+from plots.panels.window import Window
 from plots.style import LINE_GREY, PALE_GREY
+from plots.style.matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
+from plots.style.presets import pt, settings
 
 __all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
 

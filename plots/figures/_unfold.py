@@ -8,13 +8,20 @@ import numpy as np
 
 from gms_fsm.traces.trace import Trace
 from plots import panels
-from plots._matplotlib import Figure, Rectangle, rc_context
 from plots.figures._layout import fitted, low, sheet
 from plots.figures._parts import head
-from plots.panels._shown import scaled
-from plots.panels._unfolded import FEW, LETTER, LINE, column_width, edge_texts, time_texts
-from plots.presets import inches, room, settings, to_scale
+from plots.panels.micro_steps.unfolding import (
+    FEW,
+    LETTER,
+    LINE,
+    column_width,
+    edge_texts,
+    time_texts,
+)
+from plots.panels.selection import scaled
 from plots.style import state_look
+from plots.style.matplotlib import Figure, Rectangle, rc_context
+from plots.style.presets import inches, room, settings, to_scale
 
 __all__ = ["unfold"]
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.traces.trace import Trace
-from plots._matplotlib import Artist, Axes, Line2D, LineCollection, Rectangle, patches
 from plots.film._pace import Frame
-from plots.panels._shown import has_threshold, scaled
+from plots.panels.selection import has_threshold, scaled
 from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme, ramp
+from plots.style.matplotlib import Artist, Axes, Line2D, LineCollection, Rectangle, patches
 
 __all__ = ["Bristles", "panel_height"]
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.inspection.explain import values_at
-from plots._graphviz import picture as rendered
-from plots._matplotlib import to_hex, to_rgb
+from gms_fsm.session.explain import values_at
+from plots.charts.live_chart import ElementParts, LiveChart, Marks, marks_of, plain_tree
+from plots.charts.statechart import Sheet, chosen
 from plots.film._pace import Frame, Pace
-from plots.live_chart import ElementParts, LiveChart, Marks, marks_of, plain_tree
-from plots.statechart import Sheet, chosen
+from plots.output.graphviz import picture as rendered
 from plots.style import CHART_THEMES
+from plots.style.matplotlib import to_hex, to_rgb
 
 __all__ = ["FilmChart", "blend"]
 
@@ -39,7 +39,7 @@ class FilmChart:
     elements : int or sequence of int, optional
         How many elements, or which ones, counted from 0; by default all.
     notation : {"stateflow", "math"}
-        See `plots.statechart.statechart`.
+        See `plots.charts.statechart.statechart`.
     theme : {"light", "dark"}
         Colours.
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from plots._matplotlib import Image
 from plots.film._chart import blend
 from plots.film._pace import FADE
 from plots.film._picture import FilmPicture
+from plots.style.matplotlib import Image
 
 __all__ = ["Movie"]
 

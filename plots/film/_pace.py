@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.trace import Trace
-from plots._window import Window
+from gms_fsm.traces.views import steps_of
+from plots.panels.window import Window
 
 __all__ = ["FADE", "Frame", "Pace", "paced"]
 

@@ -13,14 +13,14 @@ from typing import Any, cast
 import numpy as np
 
 from gms_fsm.traces.trace import Trace
-from plots._matplotlib import Artist, Axes, Figure, FigureCanvasAgg, Image
-from plots._svg_artists import drawn
-from plots._window import Window
 from plots.film._bristles import Bristles, panel_height
 from plots.film._chart import FilmChart
 from plots.film._pace import Frame, Pace
-from plots.panels._states import spans
+from plots.output.svg_artists import drawn
+from plots.panels.active_states import spans
+from plots.panels.window import Window
 from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme
+from plots.style.matplotlib import Artist, Axes, Figure, FigureCanvasAgg, Image
 
 __all__ = ["FilmPicture"]
 

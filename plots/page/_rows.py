@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.lowering.layout import SystemLayout
-from gms_fsm.traces._views import picked
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.views import picked
 
 __all__ = ["PageRows", "page_rows"]
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import TraceFileError
-from gms_fsm.inspection.explain import clause_unit
-from gms_fsm.inspection.prove import Report
 from gms_fsm.language import (
     MATLAB_LIKE,
     Condition,
@@ -21,15 +19,17 @@ from gms_fsm.language import (
     spell,
     values_of,
 )
+from gms_fsm.session.explain import clause_unit
 from gms_fsm.systems.system import loaded
-from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.scope import Scope, guard_columns, watch_names
 from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
-from plots._plane import Plane, linear_threshold, plane_axes
+from gms_fsm.traces.views import steps_of
+from gms_fsm.verification.prove import Report
 from plots.page._columns import Pool, packed
 from plots.page._rows import PageRows
 from plots.page._trees import Stored, tree_of
+from plots.panels.guards.plane import Plane, linear_threshold, plane_axes
 
 __all__ = ["stored_run"]
 

@@ -14,45 +14,43 @@ A panel is defined in the module of its family and listed in ``__all__`` there.
 from __future__ import annotations
 
 from plots.panels import (
-    _cascades,
     _differences,
-    _held,
-    _landscapes,
     _many,
     _over_time,
     _portraits,
-    _race,
-    _shown,
-    _states,
     _stribeck,
-    _titles,
-    _unfolded,
+    active_states,
+    held_outputs,
+    selection,
+    titles,
 )
-from plots.panels._cascades import *  # noqa: F403
 from plots.panels._differences import *  # noqa: F403
-from plots.panels._held import *  # noqa: F403
-from plots.panels._landscapes import *  # noqa: F403
 from plots.panels._many import *  # noqa: F403
 from plots.panels._over_time import *  # noqa: F403
 from plots.panels._portraits import *  # noqa: F403
-from plots.panels._race import *  # noqa: F403
-from plots.panels._shown import *  # noqa: F403
-from plots.panels._states import *  # noqa: F403
 from plots.panels._stribeck import *  # noqa: F403
-from plots.panels._titles import *  # noqa: F403
-from plots.panels._unfolded import *  # noqa: F403
+from plots.panels.active_states import *  # noqa: F403
+from plots.panels.guards import landscapes, racing
+from plots.panels.guards.landscapes import *  # noqa: F403
+from plots.panels.guards.racing import *  # noqa: F403
+from plots.panels.held_outputs import *  # noqa: F403
+from plots.panels.micro_steps import cascades, unfolding
+from plots.panels.micro_steps.cascades import *  # noqa: F403
+from plots.panels.micro_steps.unfolding import *  # noqa: F403
+from plots.panels.selection import *  # noqa: F403
+from plots.panels.titles import *  # noqa: F403
 
 __all__: list[str] = []
-__all__ += _cascades.__all__
+__all__ += cascades.__all__
 __all__ += _differences.__all__
-__all__ += _held.__all__
-__all__ += _landscapes.__all__
+__all__ += held_outputs.__all__
+__all__ += landscapes.__all__
 __all__ += _many.__all__
 __all__ += _over_time.__all__
 __all__ += _portraits.__all__
-__all__ += _race.__all__
-__all__ += _shown.__all__
-__all__ += _states.__all__
+__all__ += racing.__all__
+__all__ += selection.__all__
+__all__ += active_states.__all__
 __all__ += _stribeck.__all__
-__all__ += _titles.__all__
-__all__ += _unfolded.__all__
+__all__ += titles.__all__
+__all__ += unfolding.__all__

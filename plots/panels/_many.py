@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
-from plots._matplotlib import Axes, ListedColormap
-from plots._window import Window
-from plots.panels._axes import Artists, lanes, note, time_axis
-from plots.panels._shown import checked_elements, checked_window, has_threshold, shown
-from plots.presets import font, pt
+from plots.panels.axes import Artists, lanes, note, time_axis
+from plots.panels.selection import checked_elements, checked_window, has_threshold, shown
+from plots.panels.window import Window
 from plots.style import INK, PAPER, ramp
+from plots.style.matplotlib import Axes, ListedColormap
+from plots.style.presets import font, pt
 
 __all__ = ["heat", "slipping"]
 
@@ -53,7 +53,7 @@ def heat(
 
     Examples
     --------
-    >>> from plots._matplotlib import Figure
+    >>> from plots.style.matplotlib import Figure
     >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
     >>> picture, *boundaries = heat(Figure().subplots(), run)
@@ -126,7 +126,7 @@ def slipping(
 
     Examples
     --------
-    >>> from plots._matplotlib import Figure
+    >>> from plots.style.matplotlib import Figure
     >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
     >>> slipping(Figure().subplots(), run)[-1].get_text()

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gms_fsm.traces.trace import Trace
-from plots._matplotlib import Axes
-from plots._window import Window
-from plots.panels._axes import (
+from plots.panels.axes import (
     Artists,
     draw_curve,
     element_look,
@@ -18,15 +16,17 @@ from plots.panels._axes import (
     note,
     time_axis,
 )
-from plots.panels._shown import (
+from plots.panels.selection import (
     checked_elements,
     checked_window,
     has_threshold,
     scaled,
     shown,
 )
-from plots.presets import pt
+from plots.panels.window import Window
 from plots.style import INK, LINE_GREY
+from plots.style.matplotlib import Axes
+from plots.style.presets import pt
 
 NO_VARIABLE = "no deflection:\nthis chart has no variables"
 

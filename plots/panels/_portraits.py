@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
-from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
-from plots._window import Window
-from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
 from plots.panels._many import counted_away, place_of
-from plots.panels._shown import checked_elements, scaled, shown
-from plots.presets import pt, to_scale
+from plots.panels.axes import VECTOR_ROWS, Artists, draw_curve, log_axis
+from plots.panels.selection import checked_elements, scaled, shown
+from plots.panels.window import Window
 from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
+from plots.style.matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
+from plots.style.presets import pt, to_scale
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
 

@@ -11,12 +11,12 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.systems.system import loaded
 from gms_fsm.traces.trace import Trace
-from plots._matplotlib import Axes
-from plots._window import Window
-from plots.panels._axes import Artists, draw_curve
-from plots.panels._shown import scaled, shown
-from plots.presets import pt
+from plots.panels.axes import Artists, draw_curve
+from plots.panels.selection import scaled, shown
+from plots.panels.window import Window
 from plots.style import INK, PALE_GREY, PAPER
+from plots.style.matplotlib import Axes
+from plots.style.presets import pt
 
 __all__ = ["stribeck"]
 

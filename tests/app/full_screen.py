@@ -10,9 +10,9 @@ from typing import Any
 
 from textual.pilot import Pilot
 
-from gms_fsm.app.debugger.tui._app import FullScreen
 from gms_fsm.app.scenario import scenario_to_debug, session_of
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger.tui._app import FullScreen
+from gms_fsm.session.session import Session
 from tests.helpers import ROOT
 
 FIG_4 = "paper_fig4_stick_slip"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm._files import LIST
+from gms_fsm.foundation.files import LIST
 from gms_fsm.records.units import convert_numbers
 from tests.scenario_files import (
     MEASURED,

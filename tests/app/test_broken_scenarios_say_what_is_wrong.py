@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm._files import LIST
 from gms_fsm.app.scenario import load_scenario
+from gms_fsm.foundation.files import LIST
 from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,

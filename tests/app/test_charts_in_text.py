@@ -7,12 +7,12 @@ import re
 import pytest
 
 from gms_fsm import Prescribed
-from gms_fsm.app.debugger._view import EdgeView, StateView, chart_states
-from gms_fsm.app.debugger.tui._chart import chart_art
-from gms_fsm.app.debugger.tui._spans import plain
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.chart import Chart
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger._view import EdgeView, StateView, chart_states
+from gms_fsm.debugger.tui._chart import chart_art
+from gms_fsm.debugger.tui._spans import plain
+from gms_fsm.session.session import Session
 from tests.helpers import FIG4_SINE, stick_slip
 
 TURNS = "╮╯┤┐┘┓┛┨┪┩┥┫┦┧"  # characters with an arm to the left and none to the right

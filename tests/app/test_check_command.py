@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 import pytest
 
 import plots
-from gms_fsm._files import LIST
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.files import LIST
 from tests.scenario_files import CommandLine, one_message
 
 EXPECTED = {

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from gms_fsm import Prescribed
-from gms_fsm.app.debugger import ALIASES, COMMANDS, Debugger, help_of
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger import ALIASES, COMMANDS, Debugger, help_of
+from gms_fsm.session.session import Session
 from tests.app.test_debugger_transcripts import FIG_4, answers, talk
 from tests.helpers import FIG4_SINE, stick_slip
 

@@ -11,9 +11,9 @@ import sys
 import pytest
 
 from gms_fsm import GMS, Chart, ChartModel, GMSParameters, Prescribed, State, Stribeck, Transition
-from gms_fsm.app.debugger import COMMANDS, Debugger
 from gms_fsm.app.scenario import load_scenario, run_debugger
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger import COMMANDS, Debugger
+from gms_fsm.session.session import Session
 from tests.app.test_debugger_transcripts import FIG_4, SCENARIOS, talk
 from tests.helpers import ROOT
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition
-from gms_fsm.app.debugger import COMMANDS, Debugger, help_of
 from gms_fsm.app.scenario import scenario_to_debug
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger import COMMANDS, Debugger, help_of
+from gms_fsm.session.session import Session
 from tests.helpers import ROOT, stick_slip
 
 SCENARIOS = ROOT / "scenarios"

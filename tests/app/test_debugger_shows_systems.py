@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from gms_fsm.app.debugger import COMMANDS, Debugger, help_of, view
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger import COMMANDS, Debugger, help_of, view
+from gms_fsm.session.session import Session
 from tests.inspection.test_session_of_a_system import pushed
 from tests.systems_cases import CASES
 

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition, simulate
-from gms_fsm.app.debugger import Debugger
 from gms_fsm.app.scenario import load_scenario, run_debugger, session_of
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger import Debugger
+from gms_fsm.session.session import Session
 from tests.app.test_debugger_on_a_model_of_ones_own import own, session_on
 from tests.app.test_debugger_shows_systems import made, pulled
 from tests.helpers import FIG4_SINE, ROOT, stick_slip

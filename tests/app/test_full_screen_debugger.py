@@ -11,12 +11,12 @@ import pytest
 pytest.importorskip("textual", reason="needs the extra tui")
 
 from gms_fsm import Prescribed
-from gms_fsm.app.debugger import COMMANDS, Debugger
-from gms_fsm.app.debugger.tui._app import FullScreen
-from gms_fsm.app.debugger.tui._keys import KEYS
-from gms_fsm.app.debugger.tui._spans import DARK, LIGHT
-from gms_fsm.app.debugger.tui._widgets import Help
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger import COMMANDS, Debugger
+from gms_fsm.debugger.tui._app import FullScreen
+from gms_fsm.debugger.tui._keys import KEYS
+from gms_fsm.debugger.tui._spans import DARK, LIGHT
+from gms_fsm.debugger.tui._widgets import Help
+from gms_fsm.session.session import Session
 from tests.app.full_screen import (
     FIG_4,
     LARGE,
@@ -194,7 +194,7 @@ def test_mistakes_are_answered_as_at_the_prompt(monkeypatch: pytest.MonkeyPatch)
             begin = max(i for i, text in enumerate(app.said) if text.startswith("(t="))
             assert " ".join(" ".join(app.said[begin + 1 :]).split()) == expected
             assert expected in " ".join(app.panels["answers"].shown.split())
-        monkeypatch.setattr("gms_fsm.app.debugger.tui._app.chart_states", broken)
+        monkeypatch.setattr("gms_fsm.debugger.tui._app.chart_states", broken)
         await press(pilot, "s")
         assert app.panels["chart"].shown == "cannot be shown here: division by zero"
         assert _row(app) == 1

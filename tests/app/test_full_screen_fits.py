@@ -9,10 +9,10 @@ import pytest
 pytest.importorskip("textual", reason="needs the extra tui")
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck
-from gms_fsm.app._quantities import quantity
-from gms_fsm.app.debugger.tui._app import PAGES, FullScreen
-from gms_fsm.app.debugger.tui._widgets import Panel
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger.tui._app import PAGES, FullScreen
+from gms_fsm.debugger.tui._widgets import Panel
+from gms_fsm.foundation.quantities import quantity
+from gms_fsm.session.session import Session
 from tests.app.full_screen import LARGE, SMALL, drive, press, screen_text, session, settle
 
 pytestmark = pytest.mark.slow

@@ -8,9 +8,9 @@ import sys
 import pytest
 
 from gms_fsm import Prescribed
-from gms_fsm.app.debugger.tui import run_tui
+from gms_fsm.debugger.tui import run_tui
 from gms_fsm.errors import SessionError
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.session import Session
 from tests.helpers import ROOT, stick_slip
 from tests.scenario_files import CommandLine, one_message
 

@@ -9,10 +9,10 @@ import pytest
 
 pytest.importorskip("textual", reason="needs the extra tui")
 
-from gms_fsm.app._quantities import quantity
-from gms_fsm.app.debugger import Debugger, view
-from gms_fsm.app.debugger._text import DRAWN
-from gms_fsm.app.debugger.tui._app import FullScreen
+from gms_fsm.debugger import Debugger, view
+from gms_fsm.debugger._text import DRAWN
+from gms_fsm.debugger.tui._app import FullScreen
+from gms_fsm.foundation.quantities import quantity
 from tests.app.full_screen import LARGE, drive, session, settle
 from tests.app.test_debugger_is_plain_text import EVERYTHING
 

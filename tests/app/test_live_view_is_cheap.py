@@ -10,8 +10,8 @@ import pytest
 from rich.console import Console
 
 from gms_fsm import simulate
-from gms_fsm.app._quantities import quantity
 from gms_fsm.app.live import BETWEEN_FRAMES, CURVE, LiveView
+from gms_fsm.foundation.quantities import quantity
 from gms_fsm.run.simulate import Moment
 from tests.helpers import open_loop, pulled_mass, stick_slip
 

@@ -17,7 +17,7 @@ from gms_fsm.charts import LUGRE, gms_element
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.run.simulate import Moment
 from plots import block_diagram, mermaid, render, statechart
-from plots.formats import of
+from plots.output.formats import of
 from tests.helpers import pulled_mass, stick_slip
 from tests.scenario_files import CommandLine
 

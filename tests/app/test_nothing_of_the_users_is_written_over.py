@@ -21,9 +21,9 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
-from gms_fsm._files import LIST, output_folder, remove_leftovers, write_whole
 from gms_fsm.app.cli import main
 from gms_fsm.errors import GMSError, OutputError
+from gms_fsm.foundation.files import LIST, output_folder, remove_leftovers, write_whole
 from tests.helpers import ROOT, same_bits, stick_slip
 from tests.scenario_files import MEASURED, OPEN_LOOP
 
@@ -305,7 +305,7 @@ def test_files_of_a_live_process_are_kept(tmp_path: Path) -> None:
     code = """
 import sys, time
 from pathlib import Path
-from gms_fsm._files import write_whole
+from gms_fsm.foundation.files import write_whole
 def write(file):
     file.write(b"whole")
     print("begun", flush=True)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from gms_fsm.app._quantities import BLOCKS, PREFIXES, quantity, sparkline
+from gms_fsm.foundation.quantities import BLOCKS, PREFIXES, quantity, sparkline
 
 POWERS = {prefix: power for power, prefix in PREFIXES.items()}
 NUMBERS = st.floats(min_value=1e-11, max_value=1e11).flatmap(

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from gms_fsm import GMSError, ParameterError, Record, RecordError
-from gms_fsm.app.reportcard import datasets, make, page, write
-from gms_fsm.app.reportcard.datasets import DataSet, Split, data_set
-from gms_fsm.app.reportcard.methods import METHODS, Method, Predictor
+from gms_fsm.app.benchmark import datasets, make, page, write
+from gms_fsm.app.benchmark.datasets import DataSet, Split, data_set
+from gms_fsm.app.benchmark.methods import METHODS, Method, Predictor
 from gms_fsm.identification.bank import stop_operators
 from gms_fsm.identification.fit import fitted
 from tests.helpers import ROOT
@@ -105,7 +105,7 @@ def test_a_fit_that_was_interrupted_is_no_row(monkeypatch: pytest.MonkeyPatch) -
         local = replace(task, options=replace(task.options, search="local"))
         return replace(fitted(local, intervals=False), stopped="interrupted")
 
-    monkeypatch.setattr("gms_fsm.app.reportcard.methods.fitted", interrupted)
+    monkeypatch.setattr("gms_fsm.app.benchmark.methods.fitted", interrupted)
     card = make(Path(), data=[SMALL], methods=[constant(0.0), of_card("GMS 1")])
     assert not card.complete
     assert [row.model for row in card.sections[0].rows] == ["other", "constant 0"]

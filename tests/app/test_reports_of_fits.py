@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from gms_fsm import Fit, Record
-from gms_fsm._extras import missing
 from gms_fsm.app import fit_report
 from gms_fsm.app.fit_report import report_files, write_report
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import OutputError, ParameterError
+from gms_fsm.foundation.extras import missing
 from gms_fsm.identification.result import Choice, ChoiceRow
 from tests.identification.fits_made import small, two_records, with_profiles, with_table
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm._files import LIST
 from gms_fsm.app.report import compare, measured_force, plain, run_scenario
 from gms_fsm.app.scenario import Loaded, load_scenario
+from gms_fsm.foundation.files import LIST
 from tests.helpers import ROOT, same_bits
 from tests.scenario_files import data_folder
 

@@ -28,7 +28,7 @@ from gms_fsm import (
 from gms_fsm.app.live import LiveView
 from gms_fsm.app.report import _parameters
 from gms_fsm.errors import ExpressionError, ParameterError
-from gms_fsm.lowering._generated import standalone
+from gms_fsm.lowering.generated import standalone
 from gms_fsm.lowering.program import arguments, lower
 from gms_fsm.run.simulate import Moment
 from gms_fsm.run.sweep import Sweep, sweep
@@ -173,7 +173,7 @@ def test_pictures(trace: Trace, tmp_path: Path) -> None:
 
 def test_the_replay_page_omits_s(trace: Trace) -> None:
     pytest.importorskip("uplot", reason="the page needs the extra 'replay'")
-    from plots.replay import replay_html
+    from plots.page.replay import replay_html
 
     data = replay_html(trace).partition('id="data">')[2].partition("</script>")[0]
     (run,) = json.loads(data)["runs"]

@@ -157,8 +157,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         ("CHARTS = [1]", r"odd.py: CHARTS is \[1\]; it must be a tuple of Entry"),
         ("CHARTS = (1,)", r"odd.py: CHARTS is \(1,\); it must be a tuple of Entry"),
         (
-            "from gms_fsm.charts.lugre import CHARTS",
-            "odd.py: the name 'lugre' is already used by gms_fsm/charts/lugre.py",
+            "from gms_fsm.charts.zoo.bristles.lugre import CHARTS",
+            "odd.py: the name 'lugre' is already used by gms_fsm/charts/zoo/bristles/lugre.py",
         ),
     ],
 )

@@ -41,7 +41,7 @@ def test_page(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.delenv("GMS_FSM_DATA", raising=False)
     monkeypatch.setattr("warnings.showwarning", None)  # the command line sets its own
     assert formats()  # all are in the table
-    monkeypatch.setattr("gms_fsm._formats.FORMATS", list(FORMATS))  # a page adds one
+    monkeypatch.setattr("gms_fsm.formats.FORMATS", list(FORMATS))  # a page adds one
     page = Page(str(path.relative_to(ROOT)))
     printed: str | None = None
     for block in blocks_of(path.read_text(encoding="utf-8")):

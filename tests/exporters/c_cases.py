@@ -11,7 +11,7 @@ import numpy as np
 
 from gms_fsm import GMS, Body, Contact, GMSParameters, LuGre, Model, Stribeck, System
 from gms_fsm.app.scenario import load_system
-from gms_fsm.charts.karnopp import KARNOPP
+from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
 from gms_fsm.systems.models import ChartModel
 from tests.physics.test_sliding_between_states import follower
 

@@ -17,7 +17,7 @@ import numpy as np
 from gms_fsm import GMSError, Model, Prescribed, Settings, System, Trace, export, simulate
 from gms_fsm.exporters import Subject
 from gms_fsm.exporters._c import CEngine, engine_of
-from gms_fsm.run.start import Start
+from gms_fsm.run.problem import Start
 from gms_fsm.systems.signals import Corners
 
 FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.exporters.matlab import matlab
+from gms_fsm.exporters.targets.matlab import matlab
 
 OCTAVE = shutil.which("octave-cli")
 DRIVER = """\

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gms_fsm.exporters._plain_c import plain_c
 from gms_fsm.exporters._subject import Subject
+from gms_fsm.exporters.plain.c import plain_c
 from tests.exporters.text_cases import case
 
 STEP = 1e-3

@@ -16,11 +16,11 @@ import pytest
 
 from gms_fsm import GMS, Body, Contact, GMSParameters, System, simulate
 from gms_fsm.app.scenario import load_system
-from gms_fsm.charts.karnopp import KARNOPP
+from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
 from gms_fsm.exporters import Subject
-from gms_fsm.exporters._fmu_model import FmuArguments, both_of
+from gms_fsm.exporters.fmi.model import FmuArguments, both_of
 from gms_fsm.systems.models import ChartModel
-from integrators import exchange, stepping
+from integrators.runners import exchange, stepping
 
 PAPER = GMS(GMSParameters.paper("stick-slip"), law="signed")
 KARNOPP_VALUES = {"F_c": 1.0, "F_s": 1.5, "sigma_2": 0.4, "D": 1e-4}

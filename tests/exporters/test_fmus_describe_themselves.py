@@ -21,7 +21,7 @@ from gms_fsm import (
     export,
 )
 from gms_fsm.app.scenario import load_system
-from gms_fsm.exporters._fmu_units import base_units
+from gms_fsm.exporters.fmi.units import base_units
 from gms_fsm.systems.models import ChartModel
 
 PAPER = GMS(GMSParameters.paper("stick-slip"), law="signed")

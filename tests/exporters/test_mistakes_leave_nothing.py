@@ -26,7 +26,7 @@ from gms_fsm import (
     export,
 )
 from gms_fsm.exporters import FORMATS, Format, Subject, formats, register
-from plots.mermaid import mermaid
+from plots.output.mermaid import mermaid
 from tests.exporters.test_what_cannot_be_written_is_named import system as driven
 from tests.scenario_files import CommandLine, one_message
 

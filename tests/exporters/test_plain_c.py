@@ -13,8 +13,8 @@ import pytest
 
 from gms_fsm import Chart, ChartModel, Contact, GMSParameters, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._plain_c import plain_c
 from gms_fsm.exporters._subject import Subject
+from gms_fsm.exporters.plain.c import plain_c
 from tests.exporters.plain_c_runs import COMPILERS, compared, compiled, needs_c
 from tests.exporters.text_cases import case
 

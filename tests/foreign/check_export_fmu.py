@@ -21,8 +21,8 @@ from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
 
 from gms_fsm import Body, Contact, FrictionState, Prescribed, Settings, System, simulate
-from gms_fsm.charts.karnopp import KARNOPP
 from gms_fsm.charts.registry import registered
+from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
 from gms_fsm.systems.models import ChartModel, demonstration
 from tests.exporters.c_cases import CASES, case
 from tests.exporters.c_programs import known_floors

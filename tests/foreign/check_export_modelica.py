@@ -11,7 +11,7 @@ from pymoca import parser
 
 from gms_fsm import Body, System, simulate
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.exporters.modelica import modelica
+from gms_fsm.exporters.targets.modelica import modelica
 from tests.exporters.rumoca_runs import T_END, compared, ran_in_rumoca
 from tests.exporters.text_cases import NAMES, case, loaded
 

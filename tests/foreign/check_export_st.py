@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.exporters.st import structured_text
+from gms_fsm.exporters.targets.st import structured_text
 from tests.exporters.text_cases import NAMES, case
 
 STEP = 1e-3

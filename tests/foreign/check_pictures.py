@@ -16,8 +16,8 @@ import pytest
 
 from gms_fsm import Chart
 from gms_fsm.charts import CHARTS
-from plots.plantuml import plantuml
-from plots.tikz import tikz
+from plots.output.plantuml import plantuml
+from plots.output.tikz import tikz
 
 Ran = Callable[..., None]
 PAGE = r"""\documentclass{article}

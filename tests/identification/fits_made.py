@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gms_fsm import GMS, Fit, GMSParameters, Record, Stribeck, fit
-from gms_fsm.identification._profile import Profile
+from gms_fsm.identification.certainty.profile import Profile
 from gms_fsm.identification.result import Estimate
 
 PERIOD = 2.0  # s

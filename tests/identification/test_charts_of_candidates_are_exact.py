@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gms_fsm import ChartModel, Prescribed, simulate
-from gms_fsm.identification._linear import linear_names
 from gms_fsm.identification.candidates import BEHIND_BACKLASH, STIFFER_ONE_WAY
+from gms_fsm.identification.problem.linear import linear_names
 from gms_fsm.systems.mounted import mounted_alone
 from tests.helpers import FASTEST
 

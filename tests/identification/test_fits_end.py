@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, ParameterError, Record, State, StepLimitError, fit
-from gms_fsm.identification import _runs, _task
+from gms_fsm.identification.problem import runs, task
 from tests.identification.records import bank, measured, sine
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
@@ -43,12 +43,12 @@ def _lag() -> Record:
 
 def test_a_proposal_costs_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     lost = 0
-    own = _runs.Driver.run
+    own = runs.Driver.run
 
     def watched(self: Any, subject: Any, course: Any) -> Any:
         nonlocal lost
         start = self.start(subject, course)
-        searching = self.rtol == _task.COARSE_RTOL
+        searching = self.rtol == task.COARSE_RTOL
         assert start.options.max_steps == (3000 if searching else 30_000)
         try:
             return own(self, subject, course)
@@ -56,7 +56,7 @@ def test_a_proposal_costs_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
             lost += 1
             raise
 
-    monkeypatch.setattr(_runs.Driver, "run", watched)
+    monkeypatch.setattr(runs.Driver, "run", watched)
     # At the start a run takes some 1,700 steps; a few times stiffer, more than the budget.
     found = fit(
         _lag(), _stiff(1e3), free=("k", "rate"), most_steps=3000, bounds={"rate": (1e-2, 1e9)}
@@ -74,7 +74,7 @@ def test_what_ran_in_the_search_runs_at_the_end(most_steps: int) -> None:
 
 
 def test_what_does_not_run_at_the_end_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_task, "FINE_BUDGETS", 1)
+    monkeypatch.setattr(task, "FINE_BUDGETS", 1)
     with pytest.raises(ParameterError, match=r"ran on few rows, and not on all.*larger most_steps"):
         fit(_lag(), _stiff(5.0), free=("k", "rate"), most_steps=430, search="local")
 
@@ -87,7 +87,7 @@ def test_nothing_that_runs_is_said_so() -> None:
 def test_interrupt_keeps_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
     record = measured(bank([2e4], [5e-5]), sine(2e-4, 1.0, 3.0), 0.01, 0)
     called = 0
-    own = _runs.Pool.map
+    own = runs.Pool.map
 
     def interrupted(self: Any, call: Any, given: Any) -> Any:
         nonlocal called
@@ -96,7 +96,7 @@ def test_interrupt_keeps_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
             raise KeyboardInterrupt
         return own(self, call, given)
 
-    monkeypatch.setattr(_runs.Pool, "map", interrupted)
+    monkeypatch.setattr(runs.Pool, "map", interrupted)
     found = fit(record, bank([1e4], [4e-5]), free=("k", "weights"))
     assert found.stopped == "The search was interrupted: this is the best so far."
     assert found.stopped in str(found)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm.identification._statistics import certainty, correlation_time, phase_floor
+from gms_fsm.identification.certainty.statistics import certainty, correlation_time, phase_floor
 from tests.identification.records import noise
 
 ROWS, DRAWS = 4000, 120

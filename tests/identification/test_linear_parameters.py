@@ -12,7 +12,7 @@ import pytest
 
 from gms_fsm import Body, Chart, ChartModel, Contact, Prescribed, State, System, simulate
 from gms_fsm.charts.registry import registered
-from gms_fsm.identification._linear import linear_names
+from gms_fsm.identification.problem.linear import linear_names
 from gms_fsm.systems.models import demonstration, with_values
 from gms_fsm.systems.mounted import mounted_alone
 from gms_fsm.systems.numbers import value_in

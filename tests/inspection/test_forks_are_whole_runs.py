@@ -24,7 +24,7 @@ from gms_fsm import (
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import OutputError
-from gms_fsm.inspection.branches import Tree
+from gms_fsm.session.tree.branches import Tree
 from gms_fsm.systems.models import with_values
 from gms_fsm.systems.rigs import with_numbers
 from tests.helpers import FASTEST, FIG4_SINE, pulled_mass, stick_slip

@@ -6,7 +6,7 @@ import pytest
 from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, simulate
 from gms_fsm.app.report import run_scenario
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.inspection.notes import notes_on
+from gms_fsm.session.notes import notes_on
 from tests.helpers import ROOT, open_loop, pulled_mass, stick_slip
 
 

@@ -19,9 +19,9 @@ from gms_fsm import Chart, Finding, LuGre, Parameter, Report, State, Stribeck, T
 from gms_fsm.charts import LAWS, LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ExpressionError, ParameterError
-from gms_fsm.inspection import _prover
-from gms_fsm.inspection.prove import CHECKS, Check, default_domain
 from gms_fsm.language import evaluate
+from gms_fsm.verification import _prover
+from gms_fsm.verification.prove import CHECKS, Check, default_domain
 
 STEP = 2.0**-20  # s; exact in floats
 OF_EVERY_CHART = [check for check in CHECKS if check != "release"]

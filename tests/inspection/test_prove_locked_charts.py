@@ -26,7 +26,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import CHARTS
-from gms_fsm.inspection.prove import Check, default_domain
+from gms_fsm.verification.prove import Check, default_domain
 
 NEW = ("stiction", "backlash", "end-stop", "dog-clutch")
 STICTION = CHARTS["stiction"]

@@ -9,8 +9,8 @@ import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.errors import ExpressionError, SessionError
-from gms_fsm.inspection.explain import explain
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.explain import explain
+from gms_fsm.session.session import Session
 from tests.helpers import FIG4_SINE, stick_slip
 
 EDGES = ("break_away_forward", "break_away_backward", "arrest")

@@ -10,7 +10,7 @@ import pytest
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition, simulate
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import ParameterError, SessionError
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.session import Session
 from gms_fsm.traces.failures import LivelockError, SimulationError
 from tests.helpers import stick_slip
 

@@ -11,7 +11,7 @@ import scipy.integrate
 
 from gms_fsm import Prescribed, Slider
 from gms_fsm.errors import OutputError, SessionError, TraceFileError
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.session import Session
 from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Body, Contact, Prescribed, Session, System, simulate
-from gms_fsm.app.debugger import Debugger
+from gms_fsm.debugger import Debugger
 from gms_fsm.systems.models import with_values
 from tests.helpers import FASTEST, FIG4_SINE, same_bits, stick_slip
 

@@ -13,7 +13,7 @@ LONG = """
 import resource, sys
 from pathlib import Path
 from gms_fsm import GMS, GMSParameters, Prescribed
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.session import Session
 session = Session(GMS(GMSParameters.paper("stick-slip"), law="signed"),
                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0, method="rk4", step=1e-3)
 session.goto(100.0)

@@ -10,7 +10,7 @@ import pytest
 
 from gms_fsm import Body, Chart, Contact, Sampled, State, System, Transition, simulate
 from gms_fsm.errors import ExpressionError, ParameterError, SessionError
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.session import Session
 from tests.helpers import same_bits, stick_slip
 from tests.systems_cases import CASES, DRY, STICTION
 

@@ -8,8 +8,8 @@ import pytest
 
 from gms_fsm import Prescribed, simulate
 from gms_fsm.errors import ChartError, ParameterError, SessionError
-from gms_fsm.inspection._poking import Edits
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.session import Session
+from gms_fsm.session.tree.poking import Edits
 from tests.helpers import FIG4_SINE, open_loop, pulled_mass, stick_slip
 
 

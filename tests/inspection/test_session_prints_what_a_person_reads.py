@@ -7,10 +7,10 @@ import io
 import pytest
 
 from gms_fsm import Prescribed, simulate
-from gms_fsm.app.debugger import Debugger
+from gms_fsm.debugger import Debugger
 from gms_fsm.errors import SessionError
-from gms_fsm.inspection.explain import explain
-from gms_fsm.inspection.session import Fired, Session
+from gms_fsm.session.explain import explain
+from gms_fsm.session.session import Fired, Session
 from tests.app.test_debugger_on_a_model_of_ones_own import contact
 from tests.helpers import FIG4_SINE, stick_slip
 

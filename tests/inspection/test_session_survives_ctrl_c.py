@@ -10,8 +10,8 @@ from collections.abc import Callable
 import pytest
 
 from gms_fsm import Prescribed, simulate
-from gms_fsm.app.debugger import Debugger
-from gms_fsm.inspection.session import Session
+from gms_fsm.debugger import Debugger
+from gms_fsm.session.session import Session
 from tests.helpers import same_bits, stick_slip
 
 

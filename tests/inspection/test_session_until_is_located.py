@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from gms_fsm import Prescribed
 from gms_fsm.errors import ExpressionError
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.session import Session
 from tests.helpers import one_element, pulled_mass, stick_slip
 
 

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider, Stribeck, Trace, simulate
-from gms_fsm.inspection.session import Branch, Here, Session
+from gms_fsm.session.session import Branch, Here, Session
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.traces.failures import SimulationError
 from tests.helpers import pulled_mass, same_bits

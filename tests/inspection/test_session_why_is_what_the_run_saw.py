@@ -8,8 +8,8 @@ import pytest
 
 from gms_fsm import Prescribed, simulate
 from gms_fsm.errors import SessionError
-from gms_fsm.inspection.explain import explain
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.explain import explain
+from gms_fsm.session.session import Session
 from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gms_fsm import Prescribed, Session
-from gms_fsm.traces._views import steps_of
+from gms_fsm.traces.views import steps_of
 from tests.helpers import FIG4_SINE, stick_slip
 
 

@@ -13,9 +13,9 @@ import mpmath
 import pytest
 
 from integrators import elementary
-from integrators.machine_code.translate import Translator
+from integrators.machine_code.front_end.translate import Translator
+from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.tree import Local
-from integrators.machine_code.values import NumberValue
 
 TWO = ("atan2", "power")
 ODD = ("asin", "asinh", "atan", "sin", "sinh", "tan", "tanh")

@@ -18,27 +18,19 @@ import pytest
 
 pytest.importorskip("llvmlite")
 
-from integrators import (
-    advance,
-    columns,
-    crossings,
-    elementary,
-    loop,
-    seizing,
-    sliding,
-    step_size,
-    stepping,
-)
-from integrators.compiled import INLINE
+from integrators import advance, crossings, elementary, loop, sliding, step_size
 from integrators.elementary import asinh, atan, atan2, cos, exp, log, power
 from integrators.machine_code import llvm, objects
 from integrators.machine_code.c99 import c99_text
+from integrators.machine_code.front_end.translate import HostFunction, TranslationError, Translator
+from integrators.machine_code.front_end.values import ArrayValue, NumberValue
 from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.llvm import llvm_text
-from integrators.machine_code.translate import HostFunction, TranslationError, Translator
 from integrators.machine_code.tree import Const, Local
-from integrators.machine_code.values import ArrayValue, NumberValue
+from integrators.runners import columns, stepping
+from integrators.runners.compiled import INLINE
 from integrators.step_size import retry_factor
+from integrators.switching import sliding_bounds
 
 SIZE = 5
 INFINITY = float("inf")
@@ -598,7 +590,7 @@ def test_an_error_names_the_line(function, line):
 
 def test_what_is_said_about_putting_inline_is_said_about_functions_that_exist():
     """Those of the loop are in its modules, the others in every generated program."""
-    modules = (advance, columns, crossings, loop, seizing, sliding, step_size, stepping)
+    modules = (advance, columns, crossings, loop, sliding_bounds, sliding, step_size, stepping)
     known = {name for module in modules for name in vars(module)}
     program = {"arm", "flow", "flow_live", "jolts", "normal", "observe", "switch", "tick"}
     assert INLINE.keys() - known == program

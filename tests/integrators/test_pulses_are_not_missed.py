@@ -9,7 +9,7 @@ import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, Slider, State, simulate
 from gms_fsm.language import parse_value
-from gms_fsm.lowering._pulses import waking_times
+from gms_fsm.lowering.pulses import waking_times
 from tests.helpers import pulled_mass
 
 SPRING = ChartModel(

@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 
 from integrators.crossings import NO_CHANGE, Path, first_change, is_quiet_step, watched
-from integrators.states import beginning
+from integrators.runners.states import beginning
 from integrators.steps import ArcMotion, Dense, Now, Scratch
 
 Margin = Callable[[float], float]

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gms_fsm.errors import ExpressionError
-from gms_fsm.inspection.explain import holds
 from gms_fsm.language import InState, Not, parse_condition, spell, states_in
 from gms_fsm.language._vectors import truths
+from gms_fsm.session.explain import holds
 from integrators import elementary
 
 NAMES = ("a", "b", "c")

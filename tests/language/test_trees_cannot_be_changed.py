@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from gms_fsm.language import MATLAB_LIKE, Requirement, parse_condition, split
-from gms_fsm.language._tree import walk
+from gms_fsm.language.tree import walk
 
 
 def test_a_tree_and_its_spelling_cannot_be_changed() -> None:

@@ -41,7 +41,7 @@ def until_done(name: str, engine: str, path: Path, share: float) -> tuple[Trace,
 @pytest.fixture(autouse=True)
 def _short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make a compiled run return often enough to be interrupted."""
-    monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 30)
+    monkeypatch.setattr("gms_fsm.run.recording.compiled_run.STEPS_AT_ONCE", 30)
 
 
 @each(sorted(set(CORPUS) - LEFT_OUT))

@@ -17,9 +17,9 @@ import pytest
 
 from gms_fsm.app import lessons
 from gms_fsm.app.lessons import LESSONS, Result
-from gms_fsm.app.lessons._lesson import Lesson, grid
-from gms_fsm.app.lessons.notebooks import composed
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.lesson import Lesson, grid
+from gms_fsm.app.lessons.engine.notebooks import composed
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
 from tests.helpers import ROOT, matrix
 from tests.scenario_files import CommandLine

@@ -24,7 +24,7 @@ from gms_fsm.app.lessons import l8_chart_or_ifelse as l8
 from gms_fsm.app.lessons import l9_contacts as l9
 from gms_fsm.app.lessons import l10_which_model as l10
 from gms_fsm.app.lessons import l11_what_a_record_tells as l11
-from gms_fsm.phenomena._specimens import bench_bank
+from gms_fsm.phenomena.specimens import bench_bank
 from tests.helpers import same_bits
 
 pytestmark = pytest.mark.slow  # they share the runs

@@ -22,14 +22,15 @@ import numpy as np
 import pytest
 
 from gms_fsm import ChartModel, Prescribed, simulate
-from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering._store import CodeFolder
+from gms_fsm.foundation.store import CodeFolder
+from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.program import lower
-from gms_fsm.run import _compiled_run
-from integrators import columns, elementary, loop, step_size
-from integrators import compiled as machine
-from integrators.machine_code import statements
+from gms_fsm.run.recording import compiled_run
+from integrators import elementary, loop, step_size
+from integrators.machine_code.front_end import statements
 from integrators.machine_code.layout import BlockLayout
+from integrators.runners import columns
+from integrators.runners import compiled as machine
 from tests.helpers import CURVE, ROOT, open_loop, stick_slip
 
 pytestmark = pytest.mark.slow
@@ -339,7 +340,7 @@ def _name(rig: Prescribed = OPEN_LOOP, elements: int = 4, **options: Any) -> str
     model = ChartModel(stick_slip("signed").chart, values, n=elements, stribeck=CURVE)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compiled, "store", lambda: store)
-        patch.setattr(_compiled_run, "_known", {})
+        patch.setattr(compiled_run, "_known", {})
         with pytest.raises(LookupError):
             simulate(model, rig, 1.0, engine="compiled", **options)
     return store.asked[0]

@@ -19,7 +19,7 @@ from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRecord
 from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.lowering.program import lower
-from gms_fsm.systems._assembly import assembled
+from gms_fsm.systems.reading.assembly import assembled
 from gms_fsm.systems.system import system_of
 from tests.helpers import ROOT, pulled_mass, stick_slip
 
@@ -42,10 +42,10 @@ ALLOWED = {
         "located.transitions.t[:MODEL.n]",
     },
     "gms_fsm/records/_selection.py": {"kept[:first]"},  # rows of a measured record
-    "gms_fsm/lowering/_pulses.py": {"rests[first:last]"},  # samples of a signal
+    "gms_fsm/lowering/pulses.py": {"rests[first:last]"},  # samples of a signal
     # In the vector of the MATLAB text, which has its own layout.
-    "gms_fsm/exporters/matlab.py": {"first + n", "n * len(order) + 1"},
-    "plots/_elements.py": {  # lengths on paper
+    "gms_fsm/exporters/targets/matlab.py": {"first + n", "n * len(order) + 1"},
+    "plots/systems/elements.py": {  # lengths on paper
         "ROW * n + 0.15",
         "ROW * n + 0.3",
         "0.5 * ROW * n + 0.3",
@@ -230,7 +230,7 @@ def test_texts_name_the_same_places(shared: tuple[str, ...], n: int, others: int
 
 
 def test_machine_code_finds_what_it_writes_into_the_log() -> None:
-    """`integrators.columns.record` is told where the numbers of a firing are."""
+    """`integrators.runners.columns.record` is told where the numbers of a firing are."""
     layout = lower(stick_slip("signed"), pulled_mass()[1]).layout
     own, seen = layout.recorded
     names = list(layout.y)

@@ -29,7 +29,7 @@ from gms_fsm import (
 )
 from gms_fsm.app import paper
 from gms_fsm.errors import ParameterError
-from gms_fsm.lowering._generated import standalone
+from gms_fsm.lowering.generated import standalone
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm.lowering._store import CodeFolder
+from gms_fsm.foundation.store import CodeFolder
 
 CONTENT = random.Random(1).randbytes(300)
 

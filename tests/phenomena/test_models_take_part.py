@@ -7,8 +7,8 @@ import pytest
 from gms_fsm import Chart, Contact, State, measure_phenomena
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import GMSError
-from gms_fsm.phenomena._specimens import specimens_of
 from gms_fsm.phenomena.measure import Bench, chosen_phenomena
+from gms_fsm.phenomena.specimens import specimens_of
 from tests.phenomena.cases import BENCH, DRY
 
 LOADED = Chart(

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from gms_fsm import GMS, ChartModel, Prescribed, PulledSlider, Slider, Trace, simulate
 from gms_fsm.errors import GMSError
-from gms_fsm.inspection.explain import Explanation, explain, explain_state, values_at
+from gms_fsm.session.explain import Explanation, explain, explain_state, values_at
 from gms_fsm.traces.failures import SimulationError
 from tests.corpus import ENGINES
 from tests.helpers import FASTEST, other_parts

@@ -25,8 +25,8 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.charts.end_stop import END_STOP
-from gms_fsm.inspection.explain import explain
+from gms_fsm.charts.zoo.joints.end_stop import END_STOP
+from gms_fsm.session.explain import explain
 from gms_fsm.traces.failures import LivelockError, NotUniqueError
 from tests.corpus import FALLING, relay
 from tests.helpers import FASTEST

@@ -19,7 +19,7 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.inspection.explain import explain
+from gms_fsm.session.explain import explain
 from tests import older_files
 from tests.corpus import HELD, PUSHED, Belt, coulomb, runs_down
 from tests.helpers import same_bits

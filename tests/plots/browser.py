@@ -46,7 +46,7 @@ if MISSING:
 from axe_playwright_python.sync_playwright import Axe  # noqa: E402  # after the skip
 from playwright.sync_api import Browser, Page, expect, sync_playwright  # noqa: E402, F401
 
-from plots.replay import write_replay  # noqa: E402
+from plots.page.replay import write_replay  # noqa: E402
 
 ARGUMENTS = [
     "--no-sandbox",

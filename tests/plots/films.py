@@ -17,7 +17,7 @@ from PIL import Image
 import plots
 from gms_fsm import Trace
 from plots.film._movie import Movie
-from plots.formats import FORMATS, Format, register
+from plots.output.formats import FORMATS, Format, register
 
 
 def with_movie(trace: Trace, folder: Path, use: Callable[[Movie], Any], **options: Any) -> Any:

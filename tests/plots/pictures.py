@@ -11,9 +11,9 @@ from xml.etree import ElementTree
 import pytest
 
 from gms_fsm.charts.chart import Chart
-from plots._fonts import width
-from plots._graphviz import drawn
-from plots.statechart import statechart
+from plots.charts.statechart import statechart
+from plots.output.graphviz import drawn
+from plots.style.fonts import width
 
 SVG = "{http://www.w3.org/2000/svg}"
 

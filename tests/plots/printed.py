@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from plots.panels._line_names import LineNames
+from plots.panels.guards.line_names import LineNames
 
 PIXEL = 1.0
 

@@ -14,7 +14,7 @@ from itertools import combinations
 
 import pytest
 
-from plots.block_diagram import block_diagram
+from plots.systems.block_diagram import block_diagram
 from tests.plots.pictures import SVG, Box, Picture, Point, points_of
 
 SIZES = [1, 3, 4, 5, 20]

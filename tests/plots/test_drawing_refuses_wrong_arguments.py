@@ -22,11 +22,12 @@ from gms_fsm.errors import ParameterError
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 import plots
-from plots import LiveChart, _elements, block_diagram, figures, live_statechart, panels, statechart
-from plots._matplotlib import Axes, Figure
-from plots.mechanism import schematic_figure
-from plots.presets import Preset
-from plots.replay import replay_html
+from plots import LiveChart, block_diagram, figures, live_statechart, panels, statechart
+from plots.page.replay import replay_html
+from plots.style.matplotlib import Axes, Figure
+from plots.style.presets import Preset
+from plots.systems import elements
+from plots.systems.mechanism import schematic_figure
 from tests.helpers import open_loop, stick_slip
 from tests.identification.fits_made import small, two_records
 from tests.plots.systems_to_draw import BLOCKS, STICTION
@@ -83,7 +84,7 @@ REFUSED: list[tuple[str, Call, str, list[Any]]] = [
      [([1.0], [1.0, 2.0]), ([], []), ([1.0], [NAN]), (["a"], [1.0]), 3.0]),
     ("difference", lambda w: panels.difference(ax(), np.zeros(3), np.zeros(3), w), "floor", [0.0]),
     ("save", lambda w: figures.save(Figure(), w), "path", ["a.bmp"]),
-    ("schematic of a row", lambda w: _elements.elements_at(ax(), run(), w), "row", ROWS),
+    ("schematic of a row", lambda w: elements.elements_at(ax(), run(), w), "row", ROWS),
     ("schematic", lambda w: schematic_figure(elements=w), "elements", [0, 13, 2.0, True]),
     ("schematic of a system", plots.schematic, "system", ["scenario.toml"]),
     ("landscape of an element", lambda w: plots.landscape(run(), w), "element",
@@ -164,7 +165,7 @@ LATE = np.array([20.0, 30.0])
         (lambda: plots.landscape(run(), 0, row=3, t=1.0), r"row is 3 and t is 1\.0; give one"),
         (lambda: plots.phase(run(), row=0, window=(2.0, 6.0)), r"row 0 is at t = 0 s, outside"),
         (lambda: plots.landscape(prandtl_tomlinson().run(), 0), "no variables, and its guards"),
-        (lambda: _elements.elements_at(ax(), system_run(BLOCKS).contact("pad1")),
+        (lambda: elements.elements_at(ax(), system_run(BLOCKS).contact("pad1")),
          "this chart has no variables; draw the chart with"),
         (lambda: live_statechart(run()), "row is None and t is None; give exactly one"),
         (lambda: live_statechart(run(), row=0, t=0.0), "give exactly one"),
@@ -203,7 +204,7 @@ DRAWN: dict[str, Call] = {
     "live_statechart": partial(live_statechart, row=0),
     "animate": partial(plots.animate, path="run.gif"),
     "statechart": lambda trace: statechart(STICTION, counts=trace),
-    "schematic": partial(_elements.elements_at, ax()),
+    "schematic": partial(elements.elements_at, ax()),
     "cascade_window": panels.cascade_window,
     "shown": panels.shown,
     **{name: partial(getattr(panels, name), ax()) for name in OF_A_TRACE},

@@ -25,7 +25,7 @@ pytest.importorskip("anywidget", reason="the widget needs the extra 'jupyter'")
 pytest.importorskip("uplot", reason="the widget needs the extra 'jupyter'")
 
 import plots
-from plots.widget._explorer import Explorer
+from plots.widget.explorer import Explorer
 
 
 @pytest.fixture

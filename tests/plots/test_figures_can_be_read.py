@@ -45,10 +45,10 @@ from gms_fsm import (
     prove,
     simulate,
 )
-from plots import figures, panels, presets
-from plots.mechanism import schematic_figure
-from plots.presets import PRESETS, Preset
-from plots.style import ROLES, ramp
+from plots import figures, panels
+from plots.style import ROLES, presets, ramp
+from plots.style.presets import PRESETS, Preset
+from plots.systems.mechanism import schematic_figure
 from tests.helpers import (
     FIG4_SINE,
     ROOT,
@@ -357,7 +357,7 @@ def test_pyplot_is_never_imported(tmp_path: Path) -> None:
 import sys
 from gms_fsm import GMS, GMSParameters, Prescribed, simulate
 from plots import figures
-from plots.mechanism import schematic_figure
+from plots.systems.mechanism import schematic_figure
 run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
 for number, make in enumerate((figures.overview, figures.ribbons_figure, schematic_figure)):
     figures.save(make(run), f"{sys.argv[1]}/{number}.png")

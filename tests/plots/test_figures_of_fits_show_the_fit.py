@@ -17,10 +17,11 @@ import pytest
 pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
 
 from gms_fsm.app.paper.held import Lag
-from gms_fsm.identification._profile import LIMIT
-from plots import figures, notebook
+from gms_fsm.identification.certainty.profile import LIMIT
+from plots import figures
 from plots.figures import fit_figure, profiles_figure
-from plots.presets import SCREEN
+from plots.output import notebook
+from plots.style.presets import SCREEN
 from tests.identification.fits_made import (
     small,
     two_records,

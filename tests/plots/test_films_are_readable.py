@@ -21,9 +21,9 @@ from matplotlib.transforms import Bbox
 
 from gms_fsm import LivelockError, PulledSlider, Trace, simulate
 from gms_fsm.charts.registry import entry
-from plots._graphviz import available
 from plots.film._movie import Movie
 from plots.film._pace import FADE, SLOW, Frame, Pace, paced
+from plots.output.graphviz import available
 from plots.style import CHART_THEMES
 from tests.charts.test_registry_finds_what_is_there import every, mounted
 from tests.helpers import bank, matrix, one_element, open_loop, pulled_mass, stick_slip

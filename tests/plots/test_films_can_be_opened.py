@@ -18,12 +18,12 @@ pytest.importorskip("matplotlib", reason="films need the extra 'plots'")
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-import plots.live_chart
+import plots.charts.live_chart
 from gms_fsm import Trace, simulate
 from gms_fsm.errors import MissingExtraError, OutputError
-from plots._graphviz import available
-from plots.animation import animate
-from plots.formats import endings
+from plots.film.animation import animate
+from plots.output.formats import endings
+from plots.output.graphviz import available
 from plots.style import CHART_THEMES
 from tests.helpers import one_element, open_loop, stick_slip
 from tests.plots.films import count, frames_of, with_movie
@@ -68,7 +68,7 @@ def test_a_gif_shows_the_frames_for_the_right_time(
 
 
 def test_a_gif_of_constant_frames_is_one_frame(tmp_path: Path) -> None:
-    from plots.film._files import gif
+    from plots.film.files import gif
 
     class Still:
         frames, fps, size, colours = 5, 7.0, (8, 6), ["black"]
@@ -170,7 +170,7 @@ def test_the_active_state_moves_with_the_run(tmp_path: Path) -> None:
 
 def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Any] = []
-    real = plots.live_chart.picture
+    real = plots.charts.live_chart.picture
 
     def counted(*arguments: Any) -> bytes:
         calls.append(arguments)

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from gms_fsm.charts.chart import Chart, State, Transition
-from plots._fonts import MONO_EM, missing_glyphs, width
-from plots.statechart import statechart
+from plots.charts.statechart import statechart
+from plots.style.fonts import MONO_EM, missing_glyphs, width
 
 
 def mono_font() -> object:

@@ -22,8 +22,8 @@ from gms_fsm.app.scenario import Scenario
 from gms_fsm.charts import LUGRE
 from gms_fsm.errors import MissingExtraError, ParameterError
 from gms_fsm.exporters import formats as exported
-from plots import formats
-from plots.formats import FORMATS, Format, Written, of, register
+from plots.output import formats
+from plots.output.formats import FORMATS, Format, Written, of, register
 from tests.helpers import ROOT, stick_slip
 from tests.scenario_files import OPEN_LOOP, CommandLine, one_message
 
@@ -33,7 +33,7 @@ SUBJECTS: tuple[Written, ...] = ("graph", "chart", "figure", "animation", "page"
 @pytest.fixture(autouse=True)
 def _own_table(monkeypatch: pytest.MonkeyPatch) -> None:
     assert exported()  # all are in the table
-    monkeypatch.setattr("gms_fsm._formats.FORMATS", list(FORMATS))
+    monkeypatch.setattr("gms_fsm.formats.FORMATS", list(FORMATS))
 
 
 @pytest.fixture(scope="module")

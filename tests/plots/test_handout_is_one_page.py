@@ -17,9 +17,9 @@ from matplotlib import rc_context
 import plots
 from gms_fsm.charts.registry import registered
 from gms_fsm.systems.models import Model, demonstration
-from plots._excitation import excited
-from plots._handout import PAGE, SMALLEST, handout_figure
-from plots._svg_artists import EXACT
+from plots.handouts.excitation import excited
+from plots.handouts.page import PAGE, SMALLEST, handout_figure
+from plots.output.svg_artists import EXACT
 from tests.helpers import bank, matrix, stick_slip
 from tests.plots.printed import drawn_texts, problems
 from tests.plots.systems_to_draw import SCENARIOS

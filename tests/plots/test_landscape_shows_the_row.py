@@ -16,8 +16,8 @@ from gms_fsm.charts import CHARTS
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.inspection.explain import explain
 from gms_fsm.language import clauses
+from gms_fsm.session.explain import explain
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
@@ -28,9 +28,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation
 
 from plots import figures, panels
-from plots._plane import Plane, linear_threshold, plane_axes
-from plots.panels._line_names import LineNames, NamedLine
-from plots.panels._race import held_back_by
+from plots.panels.guards.line_names import LineNames, NamedLine
+from plots.panels.guards.plane import Plane, linear_threshold, plane_axes
+from plots.panels.guards.racing import held_back_by
 from tests.helpers import FASTEST, one_element, pulled_mass, stick_slip, wear
 from tests.helpers import open_loop as sine
 from tests.zoo.zoo_cases import elasto_plastic, karnopp, modelica

@@ -15,14 +15,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-import plots.live_chart
+import plots.charts.live_chart
 from gms_fsm import LuGre, Prescribed, Stribeck, Trace, simulate
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import MissingExtraError, OutputError
-from gms_fsm.inspection.explain import explain, explain_state, values_at
+from gms_fsm.session.explain import explain, explain_state, values_at
 from gms_fsm.systems.models import ChartModel
-from plots.live_chart import LiveChart, live_statechart
-from plots.statechart import statechart
+from plots.charts.live_chart import LiveChart, live_statechart
+from plots.charts.statechart import statechart
 from plots.style import CHART_THEMES
 from tests.helpers import one_element, open_loop, stick_slip
 from tests.plots.charts_to_draw import FIVE_STATES, THREE_STATES
@@ -187,7 +187,7 @@ def test_one_layout_serves_all_frames_and_texts_do_not_move(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     calls = []
-    real = plots.live_chart.picture
+    real = plots.charts.live_chart.picture
 
     def counted(*arguments: object) -> bytes:
         calls.append(arguments)
@@ -249,7 +249,7 @@ def test_at_is_the_last_row_at_or_before_a_time() -> None:
 
 
 def test_without_graphviz_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["plots._graphviz"], "drawn", lambda *_: None)
+    monkeypatch.setattr(sys.modules["plots.output.graphviz"], "drawn", lambda *_: None)
     with pytest.raises(
         MissingExtraError, match=r"Graphviz, .* pip install .*\[render\].* program dot"
     ):
@@ -257,7 +257,7 @@ def test_without_graphviz_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_graphviz_with_unexpected_output_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = plots.live_chart.picture
+    real = plots.charts.live_chart.picture
 
     def other(graph: object, form: str) -> bytes:
         return real(graph, form).replace(b"<text", b"<tspan", 1).replace(b"</text", b"</tspan", 1)  # type: ignore[arg-type]

@@ -21,7 +21,7 @@ import gms_fsm.charts.chart
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.language import MATLAB_LIKE, spell
-from plots.mermaid import mermaid
+from plots.output.mermaid import mermaid
 from tests.plots.charts_to_draw import FIVE_STATES, HOSTILE, THREE_STATES
 
 WORDS = Chart(

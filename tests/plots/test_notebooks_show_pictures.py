@@ -20,8 +20,8 @@ import plots
 from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, simulate
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.errors import OutputError
-from plots import drawings, notebook
-from plots._graphviz import available
+from plots.output import drawings, notebook
+from plots.output.graphviz import available
 from tests.helpers import ROOT, one_element, stick_slip
 from tests.plots.systems_to_draw import BLOCKS, SERVO, run
 

@@ -15,8 +15,8 @@ import plots
 from gms_fsm import Chart, State
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ParameterError
-from plots.plantuml import plantuml
-from plots.tikz import CODES, tikz
+from plots.output.plantuml import plantuml
+from plots.output.tikz import CODES, tikz
 from tests.plots.charts_to_draw import HOSTILE
 from tests.plots.test_mermaid_reads_back import WORDS
 

@@ -21,9 +21,9 @@ import pytest
 
 from gms_fsm.charts import CHARTS, GMS_ELEMENT
 from gms_fsm.errors import OutputError, ParameterError
-from plots.block_diagram import block_diagram
-from plots.render import render
-from plots.statechart import statechart
+from plots.charts.statechart import statechart
+from plots.output.render import render
+from plots.systems.block_diagram import block_diagram
 from tests.plots.charts_to_draw import LONG_GUARDS, MANY_EDGES, THREE_LOOPS
 from tests.plots.pictures import SVG, root_of, size_of
 from tests.plots.systems_to_draw import BLOCKS, SERVO

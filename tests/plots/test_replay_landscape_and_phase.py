@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm.inspection.explain import explain, values_at
 from gms_fsm.language import evaluate
+from gms_fsm.session.explain import explain, values_at
 from tests.plots.browser import (
     Open,
     box_of,
@@ -151,7 +151,7 @@ WORST = """() => {
 def test_the_clause_that_holds_an_edge_back_is_that_of_the_printed_race(
     open_page: Open, name: str
 ) -> None:
-    from plots.panels._race import held_back_by  # needs matplotlib
+    from plots.panels.guards.racing import held_back_by  # needs matplotlib
 
     page, trace = open_page(name), run(name)
     checked = 0

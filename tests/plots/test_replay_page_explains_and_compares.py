@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm.inspection.explain import explain
+from gms_fsm.session.explain import explain
 from tests.helpers import matrix
 from tests.plots.browser import (
     SIZES,

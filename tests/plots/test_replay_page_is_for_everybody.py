@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from plots.replay import replay
+from plots.page.replay import replay
 from tests.helpers import matrix
 from tests.plots.browser import (
     EVIL,

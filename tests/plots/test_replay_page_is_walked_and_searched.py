@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gms_fsm.errors import ExpressionError
-from gms_fsm.inspection.session import Session
 from gms_fsm.language import CONSTANTS, FUNCTIONS, SEVERAL, evaluate, parse_condition
+from gms_fsm.session.session import Session
 from tests.plots.browser import (
     Open,
     box_of,

@@ -22,11 +22,11 @@ from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError
-from gms_fsm.inspection.prove import prove
 from gms_fsm.systems.models import ChartModel, LuGre
 from gms_fsm.traces.failures import SimulationError
-from plots.page import _chart, _rows
-from plots.replay import replay, replay_html, write_replay
+from gms_fsm.verification.prove import prove
+from plots.page import _rows, chart
+from plots.page.replay import replay, replay_html, write_replay
 from tests.helpers import FASTEST, FIG4_SINE, bank, pulled_mass, stick_slip
 from tests.plots.stored import column, data_of, integers, log, modes, same
 from tests.plots.systems_to_draw import BLOCKS, PULLED, STICTION
@@ -262,7 +262,7 @@ def test_a_chart_without_edges_and_a_model_of_many_elements_have_pages() -> None
 
 
 def test_without_graphviz_the_page_has_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_chart, "drawn", lambda graph, form: None)
+    monkeypatch.setattr(chart, "drawn", lambda graph, form: None)
     assert "No chart: Graphviz" in replay_html(fig4("signed"))
 
 

@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.text import Text
 
-from plots import _elements
-from plots.mechanism import schematic_figure
 from plots.style import STATE_FILLS, element_colour, state_look
+from plots.systems import elements
+from plots.systems.mechanism import schematic_figure
 from tests.helpers import pulled_mass
 from tests.plots.printed import problems
 from tests.plots.systems_to_draw import GMS12
@@ -37,7 +37,7 @@ def texts(drawn: list[Artist]) -> list[str]:
 
 
 def test_symbols_without_a_run() -> None:
-    drawn = _elements.elements_at(Figure().subplots(), elements=3)
+    drawn = elements.elements_at(Figure().subplots(), elements=3)
     for kind in ("contact", "spring", "damper"):
         assert len(parts(drawn, kind)) == 3
     wanted = {"$k_{1}$", r"$\sigma_{3}$", "$z_{2}$", "$v$", "$F$", "slider", "E3"}
@@ -46,24 +46,24 @@ def test_symbols_without_a_run() -> None:
 
 def test_contact_positions_follow_the_deflections(run: Trace) -> None:
     for row in (0, 400, -1):
-        drawn = _elements.elements_at(Figure().subplots(), run, row)
+        drawn = elements.elements_at(Figure().subplots(), run, row)
         centres = [c.get_x() + c.get_width() / 2 for c in parts(drawn, "contact")]  # type: ignore[attr-defined]
-        shift = _elements.WALL - _elements.REST - np.array(centres)
-        expected = _elements.SWING * run.z[row] / np.abs(run.z).max()
+        shift = elements.WALL - elements.REST - np.array(centres)
+        expected = elements.SWING * run.z[row] / np.abs(run.z).max()
         np.testing.assert_allclose(shift, expected, atol=1e-12)
 
 
 def test_sticking_contacts_are_plain_and_slipping_ones_hatched(run: Trace) -> None:
     slipping = (run.states == "slip").sum(axis=1)
     row = int(np.flatnonzero(slipping == 2)[5])
-    drawn = _elements.elements_at(Figure().subplots(), run, row)
+    drawn = elements.elements_at(Figure().subplots(), run, row)
     for i, box in enumerate(parts(drawn, "contact")):
         assert isinstance(box, Rectangle)
         look = state_look(int(run.states[row, i] == "slip"))
         assert to_hex(box.get_facecolor()).upper() == look["facecolor"]
         assert (box.get_hatch() or "") == look["hatch"]
         assert f"E{i + 1} {run.states[row, i]}" in texts(drawn)
-    full = _elements.elements_at(Figure().subplots(), run, 0)
+    full = elements.elements_at(Figure().subplots(), run, 0)
 
     def arrows(artists: list[Artist]) -> int:
         return sum(isinstance(a, FancyArrowPatch) for a in artists)
@@ -73,7 +73,7 @@ def test_sticking_contacts_are_plain_and_slipping_ones_hatched(run: Trace) -> No
 
 
 def test_numbers_have_units(run: Trace) -> None:
-    drawn = _elements.elements_at(Figure().subplots(), run, 900)
+    drawn = elements.elements_at(Figure().subplots(), run, 900)
     shown = texts(drawn)
     for symbol, unit in (
         ("$k_{1}$", "N/m"),
@@ -91,7 +91,7 @@ def test_numbers_have_units(run: Trace) -> None:
 
 def test_deflections_have_equal_digits_and_a_true_minus(run: Trace) -> None:
     for row in (100, 400, 900):
-        shown = texts(_elements.elements_at(Figure().subplots(), run, row))
+        shown = texts(elements.elements_at(Figure().subplots(), run, row))
         numbers = [text.split()[2] for text in shown if text.startswith("$z_")]
         assert len(numbers) == run.n
         assert len({len(number.partition(".")[2]) for number in numbers}) == 1
@@ -99,7 +99,7 @@ def test_deflections_have_equal_digits_and_a_true_minus(run: Trace) -> None:
 
 
 def test_springs_have_the_colours_of_elements(run: Trace) -> None:
-    drawn = _elements.elements_at(Figure().subplots(), run)
+    drawn = elements.elements_at(Figure().subplots(), run)
     colours = [to_hex(a.get_color()).upper() for a in parts(drawn, "spring")]  # type: ignore[attr-defined]
     assert colours == [element_colour(i, run.n) for i in range(run.n)]
 
@@ -117,7 +117,7 @@ def test_twelve_elements_fit_on_a_page_without_overlaps() -> None:
 def test_lugre_is_one_bristle_that_neither_sticks_nor_slips() -> None:
     model = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))
     run = simulate(model, Prescribed("0.01"), 0.1)
-    drawn = _elements.elements_at(Figure().subplots(), run)
+    drawn = elements.elements_at(Figure().subplots(), run)
     shown = texts(drawn)
     assert r"$\sigma_0$ = 1000 N/m" in shown
     assert r"$\sigma_1$ = 31.6 Ns/m" in shown

@@ -18,9 +18,9 @@ import gms_fsm.charts.chart
 from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.language import MATLAB_LIKE, clauses, spell
-from plots._labels import edge_id, part_id
-from plots._notation import Writer
-from plots.statechart import statechart
+from plots.charts.labels import edge_id, part_id
+from plots.charts.notation import Writer
+from plots.charts.statechart import statechart
 from tests.helpers import matrix
 from tests.plots.charts_to_draw import (
     FIVE_STATES,

@@ -22,12 +22,12 @@ from gms_fsm.language import MATLAB_LIKE, parse_condition, parse_value, spell
 from gms_fsm.systems.models import ChartModel
 from gms_fsm.systems.system import Body, Contact, System
 from plots import LiveChart, mermaid
-from plots._labels import LONGEST_LINE, Tally, edge_id, wrapped
-from plots._notation import Writer
-from plots.page._chart import chart_svg
+from plots.charts.labels import LONGEST_LINE, Tally, edge_id, wrapped
+from plots.charts.notation import Writer
+from plots.charts.statechart import MOST_EDGES, Sheet, statechart
 from plots.page._rows import page_rows
 from plots.page._run import stored_run
-from plots.statechart import MOST_EDGES, Sheet, statechart
+from plots.page.chart import chart_svg
 from plots.style import CHART_THEMES
 from tests.helpers import one_element, open_loop, stick_slip
 from tests.plots.charts_to_draw import (

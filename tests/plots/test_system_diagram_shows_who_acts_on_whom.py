@@ -10,7 +10,7 @@ import pytest
 
 from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider
 from gms_fsm.systems.system import Body, Contact, System, system_of
-from plots.block_diagram import block_diagram
+from plots.systems.block_diagram import block_diagram
 from tests.plots.pictures import SVG, Box, Picture
 from tests.plots.systems_to_draw import BLOCKS, DRY, SERVO, STICTION, systems
 

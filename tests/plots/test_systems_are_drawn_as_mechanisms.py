@@ -18,7 +18,7 @@ from gms_fsm import PulledSlider
 from gms_fsm.language import MATLAB_LIKE, spell
 from gms_fsm.systems.system import Body, Contact, System, system_of
 from plots import schematic
-from plots._mechanical_layout import Item, arranged, force_of
+from plots.systems.mechanical_layout import Item, arranged, force_of
 from tests.plots.printed import problems
 from tests.plots.systems_to_draw import BLOCKS, DRY, GMS12, PULLED, STICTION, systems
 

@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace, simulate
-from integrators import elementary, quick
+from integrators import elementary
+from integrators.runners import quick
 from tests.helpers import ROOT, open_loop, stick_slip
 
 pytestmark = pytest.mark.slow

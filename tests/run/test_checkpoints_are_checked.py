@@ -24,7 +24,7 @@ import pytest
 from gms_fsm import Prescribed, Slider, simulate
 from gms_fsm.errors import CheckpointError, ParameterError, SignalError
 from gms_fsm.run._identity import identity
-from integrators import states
+from integrators.runners import states
 from tests.helpers import ROOT, open_loop, same_bits, stick_slip
 
 LEVEL = 0.2
@@ -43,7 +43,7 @@ ENGINES = [
 @pytest.fixture(autouse=True)
 def _short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make a compiled run return often enough to be interrupted."""
-    monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
+    monkeypatch.setattr("gms_fsm.run.recording.compiled_run.STEPS_AT_ONCE", 60)
 
 
 def begun(path: Path, rig: Any, engine: str = "machines", **options: Any) -> None:
@@ -282,7 +282,7 @@ def test_another_version_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     with pytest.raises(CheckpointError, match=r"started by gms-fsm 0\.0\.7 .* this is gms-fsm "):
         goes_on(path, open_loop())
     with monkeypatch.context() as patch:
-        patch.setattr("integrators.compiled.edition", lambda: "another loop")
+        patch.setattr("integrators.runners.compiled.edition", lambda: "another loop")
         with pytest.raises(CheckpointError, match="which may compute different bits"):
             goes_on(path, open_loop())
 

@@ -19,7 +19,7 @@ from tests.helpers import CURVE, open_loop, other_parts, pulled_mass, stick_slip
 
 pytest.importorskip("llvmlite", reason="needs the extra fast")
 
-from gms_fsm.lowering import _compiled as compiled
+from gms_fsm.lowering import compiling as compiled
 
 
 def agreed(model: Any, rig: Any, t_end: float, **options: Any) -> Trace:

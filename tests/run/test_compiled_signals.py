@@ -27,8 +27,8 @@ from gms_fsm import (
     simulate,
     sweep,
 )
-from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering._store import CodeFolder
+from gms_fsm.foundation.store import CodeFolder
+from gms_fsm.lowering import compiling as compiled
 from gms_fsm.traces.failures import NotFiniteError, SimulationError
 from tests.helpers import same_bits, stick_slip
 

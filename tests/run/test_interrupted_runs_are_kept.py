@@ -20,7 +20,7 @@ import pytest
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.app.report import run_scenario
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.run._recording import Recorder, _Columns
+from gms_fsm.run.recording.recording import Recorder, _Columns
 from tests.helpers import ROOT, pulled_mass, stick_slip
 from tests.scenario_files import OPEN_LOOP
 
@@ -54,7 +54,7 @@ def begins(whole: Trace, part: Trace) -> None:
 def test_the_results_so_far_are_in_trace(
     engine: str, options: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
+    monkeypatch.setattr("gms_fsm.run.recording.compiled_run.STEPS_AT_ONCE", 60)
 
     def stop(moment: Any) -> None:
         if moment.t > 9.0:

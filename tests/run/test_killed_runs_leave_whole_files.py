@@ -28,10 +28,10 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Sweep, Trace, simulate, sweep
-from gms_fsm._files import LIST, leftovers, write_together, write_whole
 from gms_fsm.app.cli import main
 from gms_fsm.errors import OutputError
-from gms_fsm.inspection.session import Session
+from gms_fsm.foundation.files import LIST, leftovers, write_together, write_whole
+from gms_fsm.session.session import Session
 from tests.helpers import ROOT, pulled_mass, same_bits, stick_slip
 from tests.scenario_files import OPEN_LOOP
 

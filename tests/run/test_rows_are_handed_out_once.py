@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gms_fsm import simulate, sweep
-from gms_fsm.run._compiled_run import CompiledRun
+from gms_fsm.run.problem import Start
+from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.settings import Settings
-from gms_fsm.run.start import Start
 from gms_fsm.systems.mounted import mounted
 from tests.helpers import pulled_mass
 

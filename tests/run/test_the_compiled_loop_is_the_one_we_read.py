@@ -1,4 +1,4 @@
-"""`integrators.columns.record`, run by Python over the compiled engine's arrays: the same rows.
+"""`integrators.runners.columns.record`, run by Python over the compiled engine's arrays: the same rows.
 
 So the loop that fills the columns is correct as source, whatever a compiler makes of it; that the
 compiled code does the same is the claim of test_compiled_is_bit_identical.py.
@@ -11,17 +11,17 @@ import pytest
 
 pytest.importorskip("llvmlite", reason="needs the extra fast")
 
-import integrators.compiled
+import integrators.runners.compiled
 from gms_fsm import Slider, simulate
-from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering._observing import on_surfaces
-from gms_fsm.run import _compiled_run
-from gms_fsm.traces import _observed
+from gms_fsm.lowering import compiling as compiled
+from gms_fsm.lowering.observing import on_surfaces
+from gms_fsm.run.recording import compiled_run
+from gms_fsm.traces import observed
 from gms_fsm.traces.failures import LivelockError
-from integrators import columns
 from integrators.loop import Machines
 from integrators.machine_code.layout import BlockLayout
-from integrators.observing import observe_rows as rows_observed
+from integrators.runners import columns
+from integrators.runners.observing import observe_rows as rows_observed
 from integrators.sliding import Functions
 from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
 from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
@@ -35,9 +35,12 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     returned = []
 
     def engine(program, run):
-        inside = integrators.compiled._longest(run) <= integrators.compiled.LONGEST_INSIDE
+        inside = (
+            integrators.runners.compiled._longest(run)
+            <= integrators.runners.compiled.LONGEST_INSIDE
+        )
         return SimpleNamespace(
-            layout=BlockLayout(run, integrators.compiled.is_known, inside=inside)
+            layout=BlockLayout(run, integrators.runners.compiled.is_known, inside=inside)
         )
 
     def run(self, most_steps, *, pause):
@@ -64,9 +67,9 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         return table
 
     monkeypatch.setattr(compiled, "engine", engine)
-    monkeypatch.setattr(_compiled_run, "_known", {})
-    monkeypatch.setattr(_compiled_run.Columns, "run", run)
-    monkeypatch.setattr(_observed, "observe_rows", observe_rows)
+    monkeypatch.setattr(compiled_run, "_known", {})
+    monkeypatch.setattr(compiled_run.Columns, "run", run)
+    monkeypatch.setattr(observed, "observe_rows", observe_rows)
     return returned
 
 

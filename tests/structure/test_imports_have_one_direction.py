@@ -14,7 +14,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import gms_fsm
-from gms_fsm import _display
+from gms_fsm.foundation import display
 from tests.helpers import ROOT
 
 PACKAGES = ("gms_fsm", "integrators", "plots")
@@ -130,9 +130,9 @@ def test_no_contract_ignores_an_import() -> None:
 
 
 def test_what_draws_is_found_by_its_declaration() -> None:
-    group = tomllib.loads(_display.PROJECT.read_text(encoding="utf-8"))["project"]["entry-points"]
-    for name, declared in group[_display.GROUP].items():
-        found = _display.asked(name)
+    group = tomllib.loads(display.PROJECT.read_text(encoding="utf-8"))["project"]["entry-points"]
+    for name, declared in group[display.GROUP].items():
+        found = display.asked(name)
         assert f"{found.__module__}:{found.__name__}" == declared
 
 

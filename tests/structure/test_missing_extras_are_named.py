@@ -1,6 +1,6 @@
 """A missing extra is reported: the module, the extra, and what works without it.
 
-One function writes these texts, `gms_fsm._extras.missing`, from one table of the extras.
+One function writes these texts, `gms_fsm.foundation.extras.missing`, from one table of the extras.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Prescribed, Sweep, prove, simulate, sweep
-from gms_fsm._extras import EXTRAS, missing, require
 from gms_fsm.errors import MissingExtraError
+from gms_fsm.foundation.extras import EXTRAS, missing, require
 from tests.helpers import ROOT, stick_slip
 
 FOR_DEVELOPERS = {"all", "bench", "cluster", "dev", "docs", "foreign", "hosts", "mutation", "test"}
@@ -41,7 +41,7 @@ def test_the_text_is_in_one_place() -> None:
     texts = {p: p.read_text(encoding="utf-8") for p in sources if p.suffix == ".py"}
     homes = {p.relative_to(ROOT).as_posix() for p, text in texts.items() if "gms-fsm[" in text}
     raised = {p.name for p, text in texts.items() if "MissingExtraError(" in text}
-    assert homes == {"gms_fsm/_extras.py"}
+    assert homes == {"gms_fsm/foundation/extras.py"}
     assert raised == {"_extras.py", "errors.py"}
 
 
@@ -50,7 +50,7 @@ def made() -> Sweep:
 
 
 def replayed() -> str:
-    from plots.replay import replay_html
+    from plots.page.replay import replay_html
 
     return replay_html(simulate(stick_slip("signed"), Prescribed("0.2"), 0.1))
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gms_fsm import GMS, Body, Chart, ChartModel, Contact, GMSParameters, State, System
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.registry import entry
-from gms_fsm.inspection.session import Session
+from gms_fsm.session.session import Session
 from gms_fsm.systems.models import demonstration
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.numbers import known_in, law_of, value_in, varied, with_law

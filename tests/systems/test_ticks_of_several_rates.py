@@ -12,14 +12,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gms_fsm import simulate
-from gms_fsm.exporters._fmu_model import both_of
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.run._printed import printed
-from gms_fsm.run._ticks import Clock, clocks_of, ticks_of
-from gms_fsm.run.start import Start
+from gms_fsm.exporters.fmi.model import both_of
+from gms_fsm.run.printed import printed
+from gms_fsm.run.problem import Start
+from gms_fsm.run.ticks import Clock, clocks_of, ticks_of
 from gms_fsm.systems.system import Body, Contact, Sampled, System
 from integrators.loop import Buffers
-from integrators.stepping import Clocks, next_tick, restart
+from integrators.runners.stepping import Clocks, next_tick, restart
 from tests.helpers import stick_slip
 
 Clocking = tuple[tuple[float, float], ...]  # of each its period and offset

@@ -26,10 +26,10 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import names_in, parse_value
 from gms_fsm.lowering.layout import SystemLayout
-from gms_fsm.systems._assembly import assembled
+from gms_fsm.session.explain import values_at
+from gms_fsm.systems.reading.assembly import assembled
 from gms_fsm.systems.system import system_of
 from gms_fsm.traces.monitors import examine
 from gms_fsm.traces.scope import Scope, invariant_names, watch_names
@@ -170,7 +170,7 @@ def test_a_session_takes_the_same_names(case: str) -> None:
 @pytest.mark.skipif(importlib.util.find_spec("uplot") is None, reason="needs uplot-python")
 @pytest.mark.parametrize("case", ["gms", "one element"])
 def test_a_page_takes_the_same_names(case: str) -> None:
-    from plots.replay import replay_html
+    from plots.page.replay import replay_html
 
     model, rig = CASES[case]
     page = replay_html(simulate(model, rig, 8.0))

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Trace, Transition, simulate
-from gms_fsm.traces._archives import write_arrays
+from gms_fsm.traces.files.archives import write_arrays
 from tests import older_files
 from tests.helpers import FASTEST, pulled_mass, same_bits, stick_slip
 from tests.traces.test_traces_of_systems_round_trip import belt

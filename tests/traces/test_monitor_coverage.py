@@ -20,7 +20,7 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.inspection.explain import explain
+from gms_fsm.session.explain import explain
 from gms_fsm.traces.verdicts import CoverageVerdict
 from tests.helpers import FIG4_SINE, one_element, pulled_mass, stick_slip
 

@@ -29,9 +29,9 @@ from gms_fsm import (
 )
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ParameterError
-from gms_fsm.inspection.explain import holds, values_at
-from gms_fsm.inspection.session import Session
 from gms_fsm.language import parse_condition
+from gms_fsm.session.explain import holds, values_at
+from gms_fsm.session.session import Session
 from gms_fsm.systems.mounted import mounted_alone
 from gms_fsm.traces.failures import LivelockError, SimulationError
 from gms_fsm.traces.monitors import Chattering, Coverage, Invariant, Passivity, checked, examine

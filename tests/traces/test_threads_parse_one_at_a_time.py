@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from gms_fsm.language import parse_value
-from gms_fsm.traces._archives import member
+from gms_fsm.traces.files.archives import member
 
 
 @pytest.mark.slow

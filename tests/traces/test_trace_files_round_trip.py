@@ -34,9 +34,9 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm._files import write_whole
 from gms_fsm.errors import GMSError, OutputError, SignalError, TraceFileError
-from gms_fsm.traces import _csv
+from gms_fsm.foundation.files import write_whole
+from gms_fsm.traces.files import csv_files
 from tests.helpers import pulled_mass, stick_slip
 
 ENDINGS = pytest.mark.parametrize("ending", [".npz", ".csv"])
@@ -186,7 +186,7 @@ def test_csv_has_one_line_for_each_row_whatever_is_written_at_once(
         rows = zip(*(column.tolist() for column in columns.values()), strict=True)
         return "".join(f"{','.join(map(cell, row))}\n" for row in [columns, *rows])
 
-    monkeypatch.setattr(_csv, "AT_ONCE", at_once)
+    monkeypatch.setattr(csv_files, "AT_ONCE", at_once)
     trace = made(case)
     path = trace.save(tmp_path / "run.csv")
     head, _, rows = path.read_bytes().decode().partition("\n")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import gms_fsm.charts.seven_parameter as page
+import gms_fsm.charts.zoo.bristles.seven_parameter as page
 from gms_fsm import ChartModel, Prescribed, simulate
 from gms_fsm.charts.registry import entry
 

@@ -21,9 +21,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from gms_fsm._files import output_folder, write_whole
-from gms_fsm.app.lessons._lesson import Lesson, Result
+from gms_fsm.app.lessons.engine.lesson import Lesson, Result
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
+from gms_fsm.foundation.files import output_folder, write_whole
 
 __all__ = ["LESSONS", "Lesson", "Result", "Taught", "lesson", "listed", "numbered", "teach"]
 
@@ -146,7 +146,7 @@ def teach(number: int, folder: str | Path) -> Taught:
     UserWarning
         If the figure or the page is omitted because an extra is not installed.
     """
-    from plots import formats
+    from plots.output import formats
 
     chosen = lesson(number)
     stem = f"lesson_{number}"
@@ -171,7 +171,7 @@ def _draw(result: Result, paths: list[Path]) -> list[Path]:
 
 
 def _replay(result: Result, paths: list[Path]) -> list[Path]:
-    from plots.replay import replay
+    from plots.page.replay import replay
 
     runs = result.replayed
     page = replay(*runs.values(), title=result.lesson.heading, names=list(runs))

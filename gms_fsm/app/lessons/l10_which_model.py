@@ -59,7 +59,7 @@ For a contact that rests: {chosen[0]}; that also lags: {chosen[1]}; that also re
 
 ```python
 from gms_fsm.app.lessons.l10_which_model import MODELS
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(creeps, max(MODELS, key=lambda model: result.number(model, "drift")))
 reveal(makes_energy, max(MODELS, key=lambda model: result.number(model, "passivity")))
@@ -159,11 +159,11 @@ from functools import partial
 from typing import Any
 
 from gms_fsm import PhenomenaTable, measure_phenomena
-from gms_fsm.app.lessons._lesson import FIRST, GUIDE, SECOND, Lesson, Result, note
-from gms_fsm.phenomena._presliding import nested as inner_loops
-from gms_fsm.phenomena._specimens import specimens_of
+from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, Result, note
 from gms_fsm.phenomena.limits import LIMITS
 from gms_fsm.phenomena.measure import Bench
+from gms_fsm.phenomena.presliding import nested as inner_loops
+from gms_fsm.phenomena.specimens import specimens_of
 from plots.style import INK, LINE_GREY
 
 MODELS = ("stiction", "lugre", "elasto-plastic", "gms-signed", "gms-published")

@@ -62,7 +62,7 @@ one factor of each product, and design the motion before measuring.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 rows = result.correlated.training["rows"]
 found = [each["F_c"].value for each in result.products]
@@ -164,7 +164,7 @@ from gms_fsm import (
     fit,
     simulate,
 )
-from gms_fsm.app.lessons._lesson import DOTS, GUIDE, Lesson, grid, note, ticks
+from gms_fsm.app.lessons.engine.lesson import DOTS, GUIDE, Lesson, grid, note, ticks
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import INK, LINE_GREY, PALE_GREY, TEXT_GREY
 

@@ -50,7 +50,7 @@ still stick. A single LuGre bristle also makes loops, but they do not close.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(first_slip, 1e6 * result.let_go.min(), "um")
 reveal(gap_at_a, abs(result.misses[1]), "N")
@@ -108,7 +108,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, Stribeck, simulate
-from gms_fsm.app.lessons._lesson import DOTS, FIRST, GUIDE, Lesson, draw, grid, note
+from gms_fsm.app.lessons.engine.lesson import DOTS, FIRST, GUIDE, Lesson, draw, grid, note
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY
 

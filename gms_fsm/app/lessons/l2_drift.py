@@ -47,7 +47,7 @@ the same.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(lugre_drift, 1e3 * result.drifts[0], "mm/s")
 reveal(gms_drift, 1e3 * abs(result.drifts[2]), "mm/s")
@@ -107,7 +107,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Slider, Trace, simulate
-from gms_fsm.app.lessons._lesson import Lesson, draw, grid, note
+from gms_fsm.app.lessons.engine.lesson import Lesson, draw, grid, note
 from gms_fsm.app.paper import FORCE
 from gms_fsm.app.paper.experiments import lugre_like
 from gms_fsm.charts.parameters import FloatArray

@@ -44,7 +44,7 @@ nearly does). Locate the switches, or test with a step that does not divide the 
 
 ```python
 from gms_fsm.app.lessons.l3_missed_window import STEP, STEPS, window_width
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(window, 1e6 * window_width(), "us")
 reveal(found, result.counts[STEPS.index(STEP)])
@@ -104,7 +104,16 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
-from gms_fsm.app.lessons._lesson import DOTS, FASTEST, Lesson, forces, grid, note, shown, ticks
+from gms_fsm.app.lessons.engine.lesson import (
+    DOTS,
+    FASTEST,
+    Lesson,
+    forces,
+    grid,
+    note,
+    shown,
+    ticks,
+)
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import INK, LINE_GREY, PALE_GREY
 

@@ -46,7 +46,7 @@ little, where s(v) rises at a reversal and z follows while the slider hardly mov
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.predict import reveal
+from gms_fsm.app.lessons.engine.predict import reveal
 
 energy = result.published_energy
 reveal(signed_z, abs(result.signed.z).max(), "m")
@@ -92,7 +92,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
-from gms_fsm.app.lessons._lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
+from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
 from gms_fsm.app.paper import FIG4_END, VELOCITY
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import LINE_GREY, PALE_GREY

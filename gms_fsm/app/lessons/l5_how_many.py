@@ -42,7 +42,7 @@ threshold: put it well below the smallest motion of interest.
 
 ```python
 from gms_fsm.app.lessons.l5_how_many import COUNTS
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(error_of_four, 100 * result.errors[COUNTS.index(4)], "%")
 reveal(loss_of_two, 100 * result.losses[COUNTS.index(2)] / result.losses[-1], "% of that of 12")
@@ -99,7 +99,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, Trace, simulate
-from gms_fsm.app.lessons._lesson import BROAD, DOTS, Lesson, grid, note, ticks
+from gms_fsm.app.lessons.engine.lesson import BROAD, DOTS, Lesson, grid, note, ticks
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import ELEMENT_DASHES, INK, PALE_GREY, TEXT_GREY, ramp
 

@@ -48,7 +48,7 @@ motion it keeps sliding.
 
 ```python
 from gms_fsm.app.lessons.l6_stick_slip import SPEED, SPEEDS
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 here, slow = result.cycles[SPEEDS.index(SPEED)], result.cycles[0]
 reveal(pull_at_slip, here.pull_at_slip, "N")
@@ -105,7 +105,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, PulledSlider, Stribeck, Trace, simulate
-from gms_fsm.app.lessons._lesson import GUIDE, Lesson, draw, grid, note, shown, ticks
+from gms_fsm.app.lessons.engine.lesson import GUIDE, Lesson, draw, grid, note, shown, ticks
 from plots.style import INK, LINE_GREY, TEXT_GREY
 
 MASS, STIFFNESS = 1.0, 2.0  # kg, N/m

@@ -44,7 +44,7 @@ the frequency of the widest loop reveals C.
 
 ```python
 from gms_fsm.app.lessons.l7_frictional_lag import OMEGAS
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(accelerating, "higher" if min(result.widths) > 0 else "lower")
 reveal(widest, OMEGAS[int(result.widths.argmax())], "rad/s")
@@ -96,7 +96,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, Trace, simulate
-from gms_fsm.app.lessons._lesson import BROAD, DOTS, GUIDE, Lesson, grid, note, ticks
+from gms_fsm.app.lessons.engine.lesson import BROAD, DOTS, GUIDE, Lesson, grid, note, ticks
 from plots.style import ELEMENT_DASHES, INK, LINE_GREY, ramp
 
 MEAN, SWING = 1.5e-3, 1e-3  # m/s: v = MEAN + SWING cos(w t), never zero

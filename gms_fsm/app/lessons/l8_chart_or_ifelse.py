@@ -57,7 +57,7 @@ it within a factor of {within:.0f}.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.predict import reveal
+from gms_fsm.app.lessons.engine.predict import reveal
 
 reveal(numbers_that_differ, result.differ[0])
 reveal(spike, result.between(4.9, 5.0).max(), "N")
@@ -100,7 +100,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Slider, Trace, simulate
-from gms_fsm.app.lessons._lesson import (
+from gms_fsm.app.lessons.engine.lesson import (
     DOTS,
     FASTEST,
     FIRST,

@@ -61,7 +61,7 @@ are.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(released, result.released, "s")
 reveal(speed_while_stuck, abs(result.speeds_while_stuck).max(), "m/s")
@@ -139,7 +139,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import Body, Contact, Spring, System, Trace, simulate
-from gms_fsm.app.lessons._lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
+from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
 from gms_fsm.app.lessons.l6_stick_slip import SIGMA_2, F_c, F_s, bank
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.parameters import FloatArray

@@ -18,7 +18,7 @@ from gms_fsm.app.paper import (
     PAPER_STEP,
     VELOCITY,
 )
-from gms_fsm.charts.lugre import BENCHMARK
+from gms_fsm.charts.zoo.bristles.lugre import BENCHMARK
 from gms_fsm.run.simulate import Moment, simulate
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._files import output_folder, write_whole
 from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.app.paper.claims import PAIRS, Claim, differing_numbers, force_difference, judge
 from gms_fsm.app.paper.experiments import Progress, experiments, run_one
 from gms_fsm.app.paper.held import OSCILLATION, PAPERS_FORCE, PAPERS_PLACE, RAMP, figure_3_lags
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
-from gms_fsm.charts.lugre import BENCHMARK
+from gms_fsm.charts.zoo.bristles.lugre import BENCHMARK
 from gms_fsm.errors import MissingExtraError
+from gms_fsm.foundation.files import output_folder, write_whole
 from gms_fsm.language import evaluate
 from gms_fsm.systems.signals import Formula
 from gms_fsm.traces.failures import SimulationError
@@ -61,7 +61,7 @@ def write(
     SimulationError
         If a run cannot continue; the run so far is written to ``partial.npz``.
     """
-    from plots import formats
+    from plots.output import formats
 
     chosen = experiments(force, velocity)
     drawn = [file for name in CHARTS for file in formats.files(name, "graph")]
@@ -101,7 +101,7 @@ def _keep(folder: Path, name: str, trace: Trace) -> list[Path]:
 
 def _draw_charts(folder: Path) -> list[Path]:
     import plots
-    from plots import formats
+    from plots.output import formats
 
     pictures = {
         "chart_element": plots.statechart(GMS_ELEMENT["published"]),
@@ -118,7 +118,8 @@ def _draw_charts(folder: Path) -> list[Path]:
 
 
 def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list[Path]:
-    from plots import figures, formats
+    from plots import figures
+    from plots.output import formats
 
     def applied(trace: Trace) -> NDArray[np.float64]:
         tree = Formula(force).tree

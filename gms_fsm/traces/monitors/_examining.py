@@ -6,8 +6,8 @@ import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from gms_fsm._arguments import listed
 from gms_fsm.errors import ParameterError, shown
+from gms_fsm.foundation.arguments import listed
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces.monitors._chattering import chattering
 from gms_fsm.traces.monitors._coverage import coverage

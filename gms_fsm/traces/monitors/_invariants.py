@@ -15,7 +15,7 @@ from gms_fsm.errors import ExpressionError, SignalError
 from gms_fsm.language import Condition, names_in, parse_condition, states_in, truths
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted
-from gms_fsm.traces._between import first_true, interpolated
+from gms_fsm.traces.between import first_true, interpolated
 from gms_fsm.traces.monitors._kinds import Invariant
 from gms_fsm.traces.monitors._words import elements_text, values_text
 from gms_fsm.traces.rows import Rows

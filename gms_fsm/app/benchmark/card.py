@@ -1,0 +1,189 @@
+"""Training and scoring every method on every data set."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gms_fsm._version import __version__
+from gms_fsm.app.benchmark.datasets import DATA_SETS, DataSet, held_rows, score
+from gms_fsm.app.benchmark.methods import METHODS, Method, Predictor
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import GMSError
+
+__all__ = ["Card", "Row", "Section", "make"]
+
+Told = Callable[[str, float], object]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One model on one data set.
+
+    Parameters
+    ----------
+    model : str
+        Name.
+    free : int or None
+        Number of unknowns; None where it is not known.
+    train_rmse, rmse, r2 : float or None
+        On training rows and on what was held out, N.
+    seconds : float or None
+        Time for all splits.
+    by_record : dict of str to float
+        RMSE of each held-out record, N.
+    note : str
+        What to know, or why it failed.
+    """
+
+    model: str
+    free: int | None = None
+    train_rmse: float | None = None
+    rmse: float | None = None
+    r2: float | None = None
+    seconds: float | None = None
+    by_record: dict[str, float] = field(default_factory=dict)
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """All models on one data set.
+
+    Parameters
+    ----------
+    name, title, held_out, licence : str
+        Of the data set.
+    rows : tuple of Row
+        In the order in which they were made.
+    """
+
+    name: str
+    title: str
+    held_out: str
+    licence: str
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True)
+class Card:
+    """A report card.
+
+    Parameters
+    ----------
+    sections : tuple of Section
+        One per data set.
+    machine : str
+        On which it was made.
+    complete : bool
+        False if it was interrupted.
+    """
+
+    sections: tuple[Section, ...]
+    machine: str
+    complete: bool = True
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as plain data, for JSON."""
+        return asdict(self)
+
+
+def make(
+    folder: Path,
+    *,
+    only: Sequence[str] = (),
+    data: Sequence[DataSet] = DATA_SETS,
+    methods: Sequence[Method] = METHODS,
+    told: Told | None = None,
+) -> Card:
+    """Train and score the methods; Ctrl-C ends it with what is complete.
+
+    Parameters
+    ----------
+    folder : Path
+        With the data.
+    only : sequence of str
+        Names of data sets; all by default.
+    data : sequence of DataSet
+        The data sets.
+    methods : sequence of Method
+        The models.
+    told : callable, optional
+        Called with what is being done and the share that is done.
+
+    Returns
+    -------
+    Card
+        A row for each method.
+
+    Raises
+    ------
+    RecordError
+        If the data are not there.
+    """
+    chosen = [each for each in data if not only or each.name in only]
+    read = [(each, each.splits(folder)) for each in chosen]  # so that missing data are said first
+    sections, complete = [], True
+    for each, splits in read:
+        held = held_rows(splits)
+        rows: list[Row] = []
+        for model, errors in each.published.items():
+            pooled = float(np.sqrt(np.mean(np.square(list(errors.values())))))
+            note = "published errors, full rate; mean over tests"
+            rows.append(Row(model, rmse=pooled, by_record=dict(errors), note=note))
+        mine = [method for method in methods if each.name in method.on]
+        try:
+            for i, method in enumerate(mine):
+                if told is not None:
+                    told(f"{each.name}: {method.name}", i / len(mine))
+                rows.append(_row(method, each, splits))
+        except KeyboardInterrupt:
+            complete = False
+        licence = next(iter(held.values())).licence
+        sections.append(Section(each.name, each.title, each.held_out, licence, tuple(rows)))
+        if not complete:
+            break
+    return Card(tuple(sections), _machine(), complete)
+
+
+def _row(method: Method, data: DataSet, splits: Sequence[Any]) -> Row:
+    began = time.perf_counter()
+    forces: dict[str, FloatArray] = {}
+    squares, count = 0.0, 0
+    predictor: Predictor | None = None
+    try:
+        for split in splits:
+            predictor = method.train(split.training, data.smoothing, predictor)
+            for record in split.held:
+                forces[record.name] = predictor.predict(record)[record.chosen]
+            for record in split.training:
+                error = (predictor.predict(record) - record.columns["force"])[record.chosen]
+                squares, count = squares + float(error @ error), count + error.size
+    except GMSError as error:
+        return Row(method.name, seconds=time.perf_counter() - began, note=str(error))
+    assert predictor is not None
+    scores: Any = score(held_rows(tuple(splits)), forces)
+    return Row(
+        method.name,
+        predictor.free,
+        float(np.sqrt(squares / count)),
+        scores["rmse"],
+        scores["r2"],
+        time.perf_counter() - began,
+        scores["by_record"],
+        predictor.note,
+    )
+
+
+def _machine() -> str:
+    return (
+        f"gms-fsm {__version__}, Python {platform.python_version()}, {platform.system()} "
+        f"{platform.machine()}, {os.cpu_count()} cores"
+    )

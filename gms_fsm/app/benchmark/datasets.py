@@ -1,0 +1,183 @@
+"""The data sets of the report card, and what of each is held out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import ParameterError, RecordError
+from gms_fsm.identification.certainty.compared import score_of
+from gms_fsm.records import damper, tribometer
+from gms_fsm.records.parts import only
+from gms_fsm.records.record import Record
+
+__all__ = ["DATA_SETS", "DataSet", "Split", "data_set", "held_rows", "score"]
+
+TRAIN = (20.0, 100.0)  # s; the rows from 100 s on are held out
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """What is trained on, and what is predicted.
+
+    Parameters
+    ----------
+    training : tuple of Record
+        With the training rows selected.
+    held : tuple of Record
+        With the held-out rows selected.
+    """
+
+    training: tuple[Record, ...]
+    held: tuple[Record, ...]
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """Public records with a rule of what is held out.
+
+    Parameters
+    ----------
+    name, title : str
+        For files and for tables.
+    held_out : str
+        The rule, in words.
+    smoothing : float or None
+        Time constant of the motion, s.
+    splits : callable
+        Reads a folder.
+    published : mapping of str to mapping of str to float
+        Errors that others reported: model, then record, N.
+    """
+
+    name: str
+    title: str
+    held_out: str
+    smoothing: float | None
+    splits: Callable[[Path], tuple[Split, ...]]
+    published: Mapping[str, Mapping[str, float]]
+
+
+def _tribometer(folder: Path) -> tuple[Split, ...]:
+    record = tribometer(folder)
+    t = record.columns["time"]
+    return (
+        Split((only(record, (t >= TRAIN[0]) & (t < TRAIN[1])),), (only(record, t >= TRAIN[1]),)),
+    )
+
+
+def _damper(folder: Path) -> tuple[Split, ...]:
+    every = tuple(damper(folder / "damper" if (folder / "damper").is_dir() else folder))
+    return tuple(Split(every[:i] + every[i + 1 :], (each,)) for i, each in enumerate(every))
+
+
+# RMSE of the predictions that the authors stored with their data, on the full rate.
+LUGRE = (3380, 3013, 3085, 3256, 4225, 3355, 2951, 2698, 2638, 2488, 2531, 2787, 3469)
+DATA_SETS = (
+    DataSet(
+        "tribometer",
+        "Reciprocating tribometer, 50 cycles of 4 s, 5 N",
+        "trained on 20 to 100 s, held out from 100 s on",
+        0.02,
+        _tribometer,
+        {},
+    ),
+    DataSet(
+        "damper",
+        "Banded rotary friction damper with backlash, 13 harmonic tests",
+        "each test in turn",
+        None,
+        _damper,
+        {
+            "LuGre, stored with the data": {
+                f"test{number:02d}": float(rmse) for number, rmse in enumerate(LUGRE)
+            }
+        },
+    ),
+)
+
+
+def data_set(name: object) -> DataSet:
+    """Return a data set by name.
+
+    Parameters
+    ----------
+    name : str
+        ``"tribometer"`` or ``"damper"``.
+
+    Returns
+    -------
+    DataSet
+        That one.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of this name.
+
+    Examples
+    --------
+    >>> data_set("damper").held_out
+    'each test in turn'
+    """
+    for each in DATA_SETS:
+        if each.name == name:
+            return each
+    known = ", ".join(each.name for each in DATA_SETS)
+    raise ParameterError(
+        "there is no such data set", place="dataset", value=name, advice=f"there are {known}"
+    )
+
+
+def held_rows(splits: tuple[Split, ...]) -> dict[str, Record]:
+    """Return the records with held-out rows, by name.
+
+    Parameters
+    ----------
+    splits : tuple of Split
+        Of one data set.
+
+    Returns
+    -------
+    dict of str to Record
+        With the held-out rows selected.
+    """
+    return {record.name: record for split in splits for record in split.held}
+
+
+def score(held: Mapping[str, Record], forces: Mapping[str, FloatArray]) -> dict[str, object]:
+    """Return how well forces reproduce what was held out.
+
+    Parameters
+    ----------
+    held : mapping of str to Record
+        From `held_rows`.
+    forces : mapping of str to ndarray
+        By record, one force for each held-out row, N.
+
+    Returns
+    -------
+    dict
+        ``rmse`` and ``r2`` over all rows, ``rows``, and ``by_record``: the RMSE of each record.
+
+    Raises
+    ------
+    RecordError
+        If a record without forces, or with another number of them, is scored.
+    """
+    modelled, measured, by_record = [], [], {}
+    for name, force in forces.items():
+        target = held[name].columns["force"][held[name].chosen]
+        if force.shape != target.shape:
+            raise RecordError(
+                f"{force.size} forces for {target.size} held-out rows", place=held[name].place
+            )
+        modelled.append(force)
+        measured.append(target)
+        by_record[name] = score_of(target, force)["rmse"]
+    whole = score_of(np.concatenate(measured), np.concatenate(modelled))
+    return {**whole, "by_record": by_record}

@@ -1,0 +1,243 @@
+"""The models of the report card, from a static curve to what `choose` finds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares, nnls
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.charts.stribeck import Stribeck
+from gms_fsm.charts.zoo.bristles.bouc_wen import BOUC_WEN
+from gms_fsm.charts.zoo.bristles.dahl import DAHL
+from gms_fsm.identification.bank import initial_bank, stop_operators, thresholds
+from gms_fsm.identification.candidates import Start, gms
+from gms_fsm.identification.choose import choose
+from gms_fsm.identification.fit import fitted, task_of
+from gms_fsm.identification.problem.task import Options
+from gms_fsm.identification.result import Fit
+from gms_fsm.records.parts import thinned
+from gms_fsm.records.record import Record
+from gms_fsm.systems.models import ChartModel, LuGre
+
+__all__ = ["METHODS", "Method", "Predictor"]
+
+FEW = 1500  # rows of each of several records that a fit is made with; all are predicted
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """A trained model.
+
+    Parameters
+    ----------
+    free : int
+        Number of unknowns.
+    predict : callable
+        Takes a record and returns the force at all of its rows, N.
+    note : str
+        What it is, if the name of the method does not say.
+    fit : Fit, optional
+        Where it came from, to start the next one.
+    """
+
+    free: int
+    predict: Callable[[Record], FloatArray]
+    note: str = ""
+    fit: Fit | None = None
+
+
+Train = Callable[[Sequence[Record], float | None, Predictor | None], Predictor]
+
+
+@dataclass(frozen=True)
+class Method:
+    """A kind of model, and on which data sets it is tried.
+
+    Parameters
+    ----------
+    name : str
+        For tables.
+    train : callable
+        Takes training records, the smoothing of their motion, and the predictor of the previous
+        split, from which it may start.
+    on : tuple of str
+        Names of data sets.
+    """
+
+    name: str
+    train: Train
+    on: tuple[str, ...] = ("tribometer",)
+
+
+# --------------------------------------------------------------------------- without memory
+def _static(records: Sequence[Record], smoothing: float | None, _: Predictor | None) -> Predictor:
+    """Fit a Stribeck curve, smoothed at zero velocity, with viscous friction and an offset."""
+    v = np.concatenate([each.motion(smoothing).velocity[each.chosen] for each in records])
+    force = np.concatenate([each.columns["force"][each.chosen] for each in records])
+    fastest, size = float(np.abs(v).max()), float(np.std(force))
+
+    def curve(velocity: FloatArray, p: FloatArray) -> FloatArray:
+        v_s, v_t = fastest * np.exp(p[3:5])
+        stribeck = p[0] + p[1] * np.exp(-((velocity / v_s) ** 2))
+        found: FloatArray = stribeck * np.tanh(velocity / v_t) + p[2] * velocity / fastest + p[5]
+        return found
+
+    start = np.array([size, 0.1 * size, 0.0, -1.0, -3.0, float(force.mean())])
+
+    def left(p: FloatArray) -> FloatArray:
+        found: FloatArray = curve(v, p) - force
+        return found
+
+    with np.errstate(over="ignore"):  # a curve that is flat at all speeds
+        best = least_squares(left, start).x
+    return Predictor(6, lambda record: curve(record.motion(smoothing).velocity, best))
+
+
+# --------------------------------------------------------------------------- Maxwell-slip
+def _maxwell(n: int) -> Train:
+    """Stop operators on a grid of thresholds, viscous friction and offset, by NNLS."""
+
+    def columns(record: Record, smoothing: float | None, r: FloatArray) -> FloatArray:
+        motion = record.motion(smoothing)
+        one = np.ones((motion.time.size, 1))
+        z = stop_operators(motion.position, r)
+        found: FloatArray = np.hstack([z / r, motion.velocity[:, None], one, -one])
+        return found
+
+    def train(records: Sequence[Record], smoothing: float | None, _: Any) -> Predictor:
+        travel = max(float(np.ptp(each.motion(smoothing).position)) for each in records)
+        r = np.quantile(thresholds(travel), np.linspace(0.0, 1.0, n))
+        basis = np.concatenate([columns(each, smoothing, r)[each.chosen] for each in records])
+        force = np.concatenate([each.columns["force"][each.chosen] for each in records])
+        scale = np.linalg.norm(basis, axis=0)
+        triangle: Any = np.linalg.qr(np.column_stack([basis / scale, force]), mode="r")
+        shares, _residual = nnls(triangle[:, :-1], triangle[:, -1], maxiter=1000)
+        weights = shares / scale
+        return Predictor(n + 2, lambda record: columns(record, smoothing, r) @ weights)
+
+    return train
+
+
+# --------------------------------------------------------------------------- fits
+def _bank_numbers(records: Sequence[Record], smoothing: float | None) -> tuple[float, float]:
+    """Return stiffness and plateau force of one spring, N/m and N."""
+    bank = initial_bank(records, 1, smoothing=smoothing)
+    return float(bank.parameters.k[0]), bank.stribeck.F_c
+
+
+def _dahl(records: Sequence[Record], smoothing: float | None) -> Start:
+    k, F_c = _bank_numbers(records, smoothing)
+    return Start(ChartModel(DAHL, {"sigma_0": k, "F_c": F_c}), ("sigma_0", "F_c"))
+
+
+def _lugre(records: Sequence[Record], smoothing: float | None) -> Start:
+    k, F_c = _bank_numbers(records, smoothing)
+    speed = np.concatenate([np.abs(each.motion(smoothing).velocity) for each in records])
+    middle = float(np.median(speed[speed > 0.1 * np.quantile(speed, 0.99)]))
+    model = LuGre(
+        sigma_0=k, sigma_1=0.0, sigma_2=0.0, stribeck=Stribeck(F_c, 1.05 * F_c, 0.5 * middle)
+    )
+    return Start(
+        model,
+        ("sigma_0", "sigma_2", "F_c", "F_s", "v_s"),
+        bounds={"v_s": (0.05 * middle, 20.0 * middle)},
+    )
+
+
+def _bouc_wen(records: Sequence[Record], smoothing: float | None) -> Start:
+    k, F_c = _bank_numbers(records, smoothing)
+    values = {"k": k, "alpha": 0.01, "D": F_c / k, "A": 1.0, "beta": 0.5, "gamma": 0.5, "p": 2.0}
+    return Start(
+        ChartModel(BOUC_WEN, values),
+        ("k", "alpha", "D", "gamma", "p"),
+        bounds={"alpha": (1e-6, 0.5), "gamma": (-0.5, 0.499), "p": (1.0, 10.0)},
+    )
+
+
+def _gms(n: int) -> Callable[[Sequence[Record], float | None], Start]:
+    return lambda records, smoothing: gms(records, smoothing, n=n)
+
+
+def _fitted(build: Callable[[Sequence[Record], float | None], Start]) -> Train:
+    """Fit by hops; later splits are refined from the previous one."""
+
+    def train(
+        records: Sequence[Record], smoothing: float | None, before: Predictor | None
+    ) -> Predictor:
+        few = _few(records)
+        if before is not None and before.fit is not None:
+            return _refined(few, smoothing, before.fit)
+        start = build(few, smoothing)
+        return _predictor(_fit(few, start, smoothing, "hops", None))
+
+    return train
+
+
+def _chosen(
+    records: Sequence[Record], smoothing: float | None, before: Predictor | None
+) -> Predictor:
+    """Choose among the candidates; later splits refine what the first one chose."""
+    few = _few(records)
+    if before is not None and before.fit is not None:
+        return replace(_refined(few, smoothing, before.fit), note=before.note)
+    found = choose(few, smoothing=smoothing)
+    assert found.choice is not None
+    return replace(_predictor(found), note=found.choice.chosen)
+
+
+def _refined(records: Sequence[Record], smoothing: float | None, before: Fit) -> Predictor:
+    given = before.task.options
+    start = Start(before.model, given.free, given.tied, given.bounds)
+    return _predictor(_fit(records, start, smoothing, "local", before.begin))
+
+
+def _fit(
+    records: Sequence[Record],
+    start: Start,
+    smoothing: float | None,
+    search: str,
+    begin: str | None,
+) -> Fit:
+    """Fit without intervals, which predictions do not need."""
+    options = Options(
+        free=start.free,
+        tied=start.tied,
+        bounds=start.bounds,
+        smoothing=smoothing,
+        search=search,
+        begin=begin,
+    )
+    return fitted(task_of(records, start.model, {}, options), intervals=False)
+
+
+def _predictor(found: Fit) -> Predictor:
+    if found.stopped:  # a fit keeps its best on Ctrl-C; a row of the card is complete or not there
+        raise KeyboardInterrupt
+    return Predictor(len(found.table), found.predict, fit=found)
+
+
+def _few(records: Sequence[Record]) -> list[Record]:
+    """Return several records in fewer rows; one record as it is."""
+    if len(records) == 1:
+        return list(records)
+    return [thinned(record, FEW) for record in records]
+
+
+BOTH = ("tribometer", "damper")
+METHODS = (
+    Method("static curve", _static, BOTH),
+    Method("Dahl", _fitted(_dahl)),
+    Method("LuGre", _fitted(_lugre)),
+    Method("Bouc-Wen", _fitted(_bouc_wen)),
+    Method("Maxwell-slip, NNLS, 15", _maxwell(15)),
+    Method("Maxwell-slip, NNLS, 24", _maxwell(24), ("damper",)),
+    Method("GMS 1", _fitted(_gms(1))),
+    Method("GMS 2", _fitted(_gms(2)), BOTH),
+    Method("GMS 4", _fitted(_gms(4))),
+    Method("GMS 8", _fitted(_gms(8))),
+    Method("choose", _chosen, BOTH),
+)

@@ -1,0 +1,182 @@
+"""Lessons as notebooks, composed of ``notebook.md`` and the words of a lesson.
+
+A fenced ``python`` block is a cell.
+
+A notebook is a JSON file (nbformat 4.5), written here without Jupyter's packages. It has no
+outputs. To run it, a kernel is needed: ``pip install ipykernel``, and a program that opens
+notebooks.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from gms_fsm.app.lessons import lesson
+from gms_fsm.foundation.files import output_folder, write_whole
+
+__all__ = ["cells_of", "composed", "notebook", "write_notebook"]
+
+TEMPLATE = Template(Path(__file__).with_name("notebook.md").read_text(encoding="utf-8"))
+NEW = "<!-- a new cell -->\n"
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
+# Left out of cells: comments, and pictures, which the cells draw themselves.
+LEFT_OUT = re.compile(r"^(?:<!--.*?-->|!\[[^\]]*\]\([^)]*\))\n", re.MULTILINE | re.DOTALL)
+
+Cell = tuple[str, str]  # its kind, "markdown" or "code", and its text
+
+
+def write_notebook(number: int, folder: str | Path) -> Path:
+    """Write a lesson as a notebook.
+
+    Parameters
+    ----------
+    number : int
+        For example 7.
+    folder : str or Path
+        Output folder for ``lesson_N.ipynb``; created if it does not exist.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such lesson.
+    OutputError
+        If the file cannot be written, or exists and has been changed since it was written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_notebook(1, folder).name
+    'lesson_1.ipynb'
+    """
+    content, name = notebook(composed(number)), f"lesson_{number}.ipynb"
+    folder = output_folder(folder, [name])
+    return write_whole(folder / name, lambda file: file.write(content.encode()))
+
+
+def composed(number: int) -> tuple[Cell, ...]:
+    """Return the cells of a lesson.
+
+    Parameters
+    ----------
+    number : int
+        For example 7.
+
+    Returns
+    -------
+    tuple of (str, str)
+        ``"markdown"`` or ``"code"``, and the text of each cell.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such lesson.
+
+    Examples
+    --------
+    >>> kind, text = composed(1)[0]
+    >>> kind, text.splitlines()[0]
+    ('markdown', '# Lesson 1: Pre-sliding hysteresis')
+    """
+    chosen = lesson(number)
+    words = dict(chosen.words) | {"explanation": _escaped(chosen.words["explanation"])}
+    source = inspect.getsource(chosen.measure)
+    page = TEMPLATE.substitute(words, module=chosen.module, source=source)
+    return tuple(cell for part in page.split(NEW) for cell in cells_of(part))
+
+
+def cells_of(text: str) -> tuple[Cell, ...]:
+    r"""Split Markdown into cells: ``python`` blocks are code; their outputs are left out.
+
+    Parameters
+    ----------
+    text : str
+        The Markdown. Comments and pictures are left out.
+
+    Returns
+    -------
+    tuple of (str, str)
+        As from `composed`.
+
+    Examples
+    --------
+    >>> cells_of("Two.\n\n```python\n1 + 1\n```\n\n```text\n2\n```\n\nThree.\n")
+    (('markdown', 'Two.'), ('code', '1 + 1'), ('markdown', 'Three.'))
+    """
+    return tuple((kind, cell.strip("\n")) for kind, cell in _parts(text) if cell.strip())
+
+
+def _parts(text: str) -> Iterator[Cell]:
+    here, plain, after_code = 0, "", False
+    text = LEFT_OUT.sub("", text)
+    for fence in FENCE.finditer(text):
+        between = text[here : fence.start()]
+        here = fence.end()
+        plain += between
+        if fence[1] == "python":
+            yield "markdown", plain
+            yield "code", fence[2]
+            plain, after_code = "", True
+            continue
+        if not (fence[1] == "text" and after_code and not between.strip()):
+            plain += fence[0]
+        after_code = False
+    yield "markdown", plain + text[here:]
+
+
+def notebook(cells: tuple[Cell, ...]) -> str:
+    """Return cells as the text of a notebook file, without outputs.
+
+    Parameters
+    ----------
+    cells : tuple of (str, str)
+        From `composed` or `cells_of`.
+
+    Returns
+    -------
+    str
+        JSON; the same cells give the same text.
+
+    Examples
+    --------
+    >>> json.loads(notebook((("code", "1 + 1"),)))["cells"][0]["source"]
+    ['1 + 1']
+    """
+    content = {
+        "cells": [_cell(place, *cell) for place, cell in enumerate(cells)],
+        "metadata": {
+            "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+            "language_info": {"name": "python"},
+        },
+        "nbformat": 4,
+        "nbformat_minor": 5,
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+
+
+def _cell(place: int, kind: str, text: str) -> Mapping[str, Any]:
+    outputs: Mapping[str, Any] = {"execution_count": None, "outputs": []} if kind == "code" else {}
+    return {
+        "cell_type": kind,
+        "id": f"cell-{place}",
+        "metadata": {},
+        **outputs,
+        "source": text.splitlines(keepends=True),
+    }
+
+
+def _escaped(text: str) -> str:
+    """Return a docstring as Markdown, with stars escaped outside its code."""
+    parts = re.split(r"(``.*?``)", text, flags=re.DOTALL)
+    return "".join(part if i % 2 else part.replace("*", r"\*") for i, part in enumerate(parts))

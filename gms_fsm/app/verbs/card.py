@@ -1,0 +1,59 @@
+"""The verb that scores friction models on public records."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gms_fsm.app.verbs.console import note, progress_bars
+from gms_fsm.app.verbs.options import INTERRUPTED
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
+
+__all__ = ["reportcard_command"]
+
+
+def reportcard_command(
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder with the records; by default what GMS_FSM_DATA names.",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
+        "reportcard"
+    ),
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", help="Data set: tribometer or damper; repeat for several."),
+    ] = None,
+) -> None:
+    """Score friction models on public records; write a page and a JSON file."""
+    from gms_fsm.app.benchmark import make, write
+    from gms_fsm.app.benchmark.datasets import data_set
+    from gms_fsm.app.benchmark.pages import FILES
+    from gms_fsm.foundation.files import output_folder
+
+    folder = Path(os.environ.get("GMS_FSM_DATA", ".")) if data is None else data
+    names = [data_set(name).name for name in only or ()]
+    output_folder(output, FILES)
+    with progress_bars() as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, done: float) -> None:
+            if not tasks:
+                bars.start()
+                tasks[""] = bars.add_task(name, total=1.0)
+            bars.update(tasks[""], completed=done, description=name)
+
+        card = make(folder, only=names, told=show)
+    files = write(card, output)
+    typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
+    if not card.complete:
+        note("interrupted; what was complete is written")
+        raise typer.Exit(INTERRUPTED)

@@ -1,0 +1,296 @@
+"""Verbs that run something: the paper's experiments, scenarios, sweeps, lessons, the debugger."""
+
+from __future__ import annotations
+
+import collections
+import enum
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gms_fsm.app.paper import FORCE, VELOCITY
+from gms_fsm.app.verbs.console import messages, note, progress_bars
+from gms_fsm.app.verbs.options import INTERRUPTED, ContactName, Overrides, PresetName, ScenarioFile
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
+
+__all__ = [
+    "debug_command",
+    "lesson_command",
+    "paper_command",
+    "phenomena_command",
+    "run_command",
+    "schema_command",
+    "sweep_command",
+]
+
+
+class EngineName(enum.StrEnum):
+    """Engine that executes the chart."""
+
+    compiled = "compiled"
+    machines = "machines"
+    ifelse = "ifelse"
+
+
+def paper_command(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path("paper"),
+    force: Annotated[
+        str, typer.Option(help="Applied force of Fig. 3 in N, an expression of t (s).")
+    ] = FORCE,
+    velocity: Annotated[
+        str, typer.Option(help="Velocity of Fig. 4 in m/s, an expression of t (s).")
+    ] = VELOCITY,
+    preset: PresetName = "screen",
+) -> None:
+    """Run the paper's two experiments; write figures, traces, logs and claims.md."""
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+
+    import plots
+    from gms_fsm.app.paper import writing
+
+    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
+    with plots.preset(preset), progress_bars(*columns) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, done: float) -> None:
+            if name not in tasks:
+                bars.start()
+                tasks[name] = bars.add_task(name, total=1.0)
+            bars.update(tasks[name], completed=done)
+
+        files = writing.write(output, force, velocity, show)
+    typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
+
+
+def run_command(
+    scenario: ScenarioFile,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Output folder; out/<name> by default."),
+    ] = None,
+    overrides: Overrides = None,
+    live: Annotated[
+        bool,
+        typer.Option("--live", help="Show states, curves and transitions during the run."),
+    ] = False,
+    pace: Annotated[
+        float | None,
+        typer.Option(
+            help="With --live: simulated seconds per second of the clock, such as 0.1.",
+            show_default=False,
+        ),
+    ] = None,
+    checkpoint: Annotated[
+        bool,
+        typer.Option(
+            "--checkpoint",
+            help="Save the state in the output folder once a minute; the same command resumes it.",
+        ),
+    ] = False,
+    preset: PresetName = "screen",
+) -> None:
+    """Run a scenario; write the trace, transition log, overview figure and summary."""
+    import plots
+    from gms_fsm.app.live import LiveView
+    from gms_fsm.app.report import monitor_lines, note_lines, run_scenario, velocity_note
+    from gms_fsm.app.scenario import load_scenario
+
+    if pace is not None and not live:
+        raise typer.BadParameter("it is an option of --live", param_hint="--pace")
+    if pace is not None and not 0.0 < pace < math.inf:
+        raise typer.BadParameter(f"{pace:g} is not a positive number", param_hint="--pace")
+    loaded = load_scenario(scenario, overrides or [])
+    folder = Path("out") / scenario.stem if output is None else output
+    start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
+    try:
+        view = LiveView(messages(), start, end, detail=live, pace=pace)
+        with plots.preset(preset), view:
+            trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
+    except KeyboardInterrupt as error:
+        note(str(error) or "interrupted")
+        raise typer.Exit(INTERRUPTED) from None
+    if loaded.motion is not None and (text := velocity_note(trace, loaded.motion)):
+        note(text)
+    typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
+    for line in monitor_lines(trace):
+        typer.echo(line)
+    for each in note_lines(trace):
+        typer.echo(f"note: {each}")
+    typer.echo(f"start with {files[0]}")
+
+
+def sweep_command(
+    scenario: ScenarioFile,
+    over: Annotated[
+        list[str],
+        typer.Option(
+            help="Parameter to vary, as name=from:to:count; append ,log for logarithmic spacing. "
+            "Repeat the option to run every combination.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Output folder; out/<name>-sweep by default."),
+    ] = None,
+    overrides: Overrides = None,
+    engine: Annotated[
+        EngineName, typer.Option(help="All give the same numbers; compiled is the fastest.")
+    ] = EngineName.compiled,
+) -> None:
+    """Run a scenario over a grid of parameters; write all results and a summary table."""
+    from gms_fsm.app.scenario import load_scenario
+    from gms_fsm.app.sweeps import axis, failures, sweep_scenario
+
+    axes = [axis(text) for text in over]
+    loaded = load_scenario(scenario, overrides or [])
+    folder = Path("out") / f"{scenario.stem}-sweep" if output is None else output
+    if "monitors" in loaded.arguments:
+        note("a sweep has no monitors: run.monitors is ignored")
+    try:
+        result, files = sweep_scenario(loaded, axes, folder, engine=engine.value)
+    except KeyboardInterrupt:
+        note("interrupted; nothing was written")
+        raise typer.Exit(INTERRUPTED) from None
+    bad = int((result.outcome != "ok").sum())
+    typer.echo(
+        f"{len(result)} runs, {bad} failed, {len(result.transitions)} transitions; "
+        f"{len(files)} files in {folder}"
+    )
+    for run, message in failures(result, most=1):
+        typer.echo(f"first failure: run {run}: {message}")
+    typer.echo(f"start with {files[0]}")
+
+
+def phenomena_command(
+    files: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Files of your own: system files, scenario files, or chart files with --value.",
+            show_default=False,
+        ),
+    ] = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--model",
+            help="Included model, such as lugre or gms-signed; repeat for several. All by default.",
+        ),
+    ] = None,
+    phenomenon: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--phenomenon", help="Such as lag or drift; repeat for several. All by default."
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
+        "phenomena"
+    ),
+    bench: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", help="Number of the bench, such as F_s=0.4: the signals follow these scales."
+        ),
+    ] = None,
+    value: Annotated[
+        list[str] | None,
+        typer.Option("--value", help="Parameter of a chart file, such as F_c=1.0."),
+    ] = None,
+    contact: ContactName = "",
+) -> None:
+    """Measure which phenomena friction models show; write a table and figures."""
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+
+    from gms_fsm.app import phenomena as room
+    from gms_fsm.phenomena.measure import Bench
+    from gms_fsm.phenomena.results import VERDICTS
+
+    own = room.own_models(files or (), contact, room.numbers_given("--value", value or []))
+    models: dict[str, Any] | None = {**{name: name for name in model or ()}, **own} or None
+    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
+    with progress_bars(*columns) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, done: float) -> None:
+            if name not in tasks:
+                bars.start()
+                tasks[name] = bars.add_task(name, total=1.0)
+            bars.update(tasks[name], completed=done)
+
+        numbers = Bench.of(room.numbers_given("--set", bench or []))
+        table, written = room.write(output, models, phenomenon, bench=numbers, progress=show)
+    counts = collections.Counter(cell.measured.verdict for cell in table)
+    said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+    models_said = "1 model" if len(table.models) == 1 else f"{len(table.models)} models"
+    measured = len(table.phenomena)
+    phenomena_said = "1 phenomenon" if measured == 1 else f"{measured} phenomena"
+    typer.echo(f"{models_said}, {phenomena_said}: {said}")
+    typer.echo(f"{len(written)} files in {output}; start with {written[0]}")
+
+
+def schema_command() -> None:
+    """Print the JSON schema of scenario files, for editors."""
+    from gms_fsm.app.scenario import schema
+
+    typer.echo(json.dumps(schema(), indent=2))
+
+
+def debug_command(
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    tui: Annotated[
+        bool, typer.Option("--tui", help="Use the whole terminal: panels, keys and mouse.")
+    ] = False,
+    light: Annotated[
+        bool, typer.Option("--light", help="With --tui: dark text on a light ground.")
+    ] = False,
+) -> None:
+    """Step through a scenario in the terminal: break, why, back, poke, compare."""
+    from gms_fsm.app.scenario import run_debugger, scenario_to_debug, session_of
+    from gms_fsm.debugger.tui import run_tui
+
+    if light and not tui:
+        raise typer.BadParameter("it is an option of --tui", param_hint="--light")
+    loaded = scenario_to_debug(scenario, overrides or [])
+    if tui:
+        raise typer.Exit(run_tui(session_of(loaded), loaded.title, light=light))
+    raise typer.Exit(run_debugger(loaded))
+
+
+def lesson_command(
+    number: Annotated[
+        str,
+        typer.Argument(help="Number of the lesson; omit it to list all.", show_default=False),
+    ] = "",
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
+        "lessons"
+    ),
+    notebook: Annotated[
+        bool, typer.Option("--notebook", help="Write it as a notebook instead, without running it.")
+    ] = False,
+) -> None:
+    """Run a lesson: a figure, a replay page, and five lines with the measured values."""
+    from gms_fsm.app.lessons import LESSONS, listed, numbered, teach
+
+    if not number and not notebook:
+        typer.echo(listed())
+        return
+    if notebook:
+        from gms_fsm.app.lessons.engine.notebooks import write_notebook
+
+        for each in [numbered(number)] if number else LESSONS:
+            typer.echo(str(write_notebook(each, output)))
+        return
+    chosen = numbered(number)
+    with messages().status(f"running lesson {chosen}"):
+        taught = teach(chosen, output)
+    for line in taught.lines:
+        typer.echo(line)
+    typer.echo()
+    for path in taught.files:
+        typer.echo(str(path))

@@ -1,0 +1,156 @@
+"""Verbs that show a trace: figures, an animation, a replay page."""
+
+from __future__ import annotations
+
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gms_fsm.app.verbs.console import progress_bars
+from gms_fsm.app.verbs.options import ContactName, End, PresetName, Start, TraceFile
+from gms_fsm.errors import ParameterError, shown
+from gms_fsm.foundation.files import output_folder, refuse_input
+
+if TYPE_CHECKING:
+    from gms_fsm import Chart, Trace
+
+__all__ = ["animate_command", "plot_command", "replay_command"]
+
+
+def _of_contact(path: Path, contact: str) -> Trace:
+    """Return a saved run as one contact sees it: the one chosen, or the only one."""
+    run = _loaded(path)
+    known = ", ".join(map(repr, run.contacts))
+    if contact and contact not in run.contacts:
+        raise ParameterError(
+            f"{path} has no contact {shown(contact)}",
+            place="--contact",
+            advice=f"there are {known}",
+        )
+    if not contact and len(run.contacts) > 1:
+        raise ParameterError(
+            f"it has the contacts {known}",
+            place=str(path),
+            advice=f"say which one to show: --contact {run.contacts[0]}",
+        )
+    return run.contact(contact or run.contacts[0])
+
+
+def _loaded(path: Path) -> Trace:
+    from gms_fsm import Trace
+
+    return Trace.load(path)
+
+
+def _window(run: Trace, start: float | None, end: float | None) -> tuple[float, float] | None:
+    """Return the part of a run to show; None for the whole run."""
+    if start is None and end is None:
+        return None
+    return (
+        float(run.t[0]) if start is None else start,
+        float(run.t[-1]) if end is None else end,
+    )
+
+
+def plot_command(
+    trace: TraceFile,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
+        "figures"
+    ),
+    start: Start = None,
+    end: End = None,
+    contact: ContactName = "",
+    preset: PresetName = "screen",
+) -> None:
+    """Draw a run: an overview, and its break-aways in detail."""
+    import plots
+    from plots import figures
+    from plots.output import formats
+
+    run = _of_contact(trace, contact)
+    files = [formats.files(name, "figure") for name in ("overview", "ribbons")]
+    folder = output_folder(output, chain(*files))
+    window = _window(run, start, end)
+    with plots.preset(preset):
+        overview = figures.overview(run, window=window)
+        pictures = (overview, figures.ribbons_figure(run, window=window))
+    for figure, names in zip(pictures, files, strict=True):
+        for name in names:
+            typer.echo(str(figures.save(figure, folder / name)))
+
+
+def animate_command(
+    trace: TraceFile,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Output file, ending in {animation}.")
+    ] = Path("film.gif"),
+    frames: Annotated[int | None, typer.Option(help="Number of frames; usually 200.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Length of the film, instead of --frames.")
+    ] = None,
+    fps: Annotated[float, typer.Option(help="Frames per second, at most 50.")] = 20.0,
+    start: Start = None,
+    end: End = None,
+    contact: ContactName = "",
+) -> None:
+    """Make a film of a run: chart, bristles, force and states, slowed at transitions."""
+    from gms_fsm.traces.trace import files_of
+    from plots.film.animation import animate
+
+    refuse_input(output, *files_of(trace))
+    run = _of_contact(trace, contact)
+    with progress_bars() as bar:
+        task = bar.add_task("frames", total=frames)
+
+        def show(done: int, count: int) -> None:
+            bar.start()
+            bar.update(task, completed=done, total=count)
+
+        film = animate(
+            run,
+            output,
+            frames=frames,
+            seconds=seconds,
+            fps=fps,
+            t_start=start,
+            t_end=end,
+            progress=show,
+        )
+    typer.echo(str(film))
+
+
+def replay_command(
+    trace: TraceFile,
+    other: Annotated[
+        Path | None, typer.Argument(help="Second trace, shown alongside the first.")
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Output file, ending in {page}.")
+    ] = Path("replay.html"),
+    title: Annotated[str, typer.Option(help="Title of the page.")] = "",
+    start: Start = None,
+    end: End = None,
+    contact: ContactName = "",
+    check: Annotated[
+        bool, typer.Option("--check", help="Pin the counterexamples of `gms-fsm check`.")
+    ] = False,
+) -> None:
+    """Write a run as a web page in which it can be stepped through and explained."""
+    from gms_fsm import prove
+    from gms_fsm.traces.trace import files_of
+    from plots import write_replay
+
+    files = [trace] if other is None else [trace, other]
+    refuse_input(output, *chain(*map(files_of, files)))
+    runs = [_of_contact(each, contact) if contact else _loaded(each) for each in files]
+    names = [] if other is None else [each.stem for each in files]
+    charts: list[Chart] = []
+    for view in (run.contact(name) for run in runs for name in run.contacts):
+        if view.model.chart not in charts:
+            charts.append(view.model.chart)
+    reports = [prove(chart) for chart in charts] if check else []
+    window = _window(runs[0], start, end)
+    page = write_replay(output, *runs, title=title, names=names, window=window, checks=reports)
+    typer.echo(str(page))

@@ -1,0 +1,1 @@
+"""Charts as files: TOML, SCXML, machines of the package `transitions`."""

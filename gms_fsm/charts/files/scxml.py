@@ -1,0 +1,79 @@
+"""How a chart is written in SCXML: names, and the texts of conditions and assignments.
+
+The export writes them, and the import compares with them what it finds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from gms_fsm.language import ECMASCRIPT, Condition, Value, renamed, spell
+from gms_fsm.language.normal import renamed_in
+
+if TYPE_CHECKING:
+    from gms_fsm.charts.chart import Chart
+
+__all__ = ["OURS", "SCXML", "STEP", "VALUES", "assignments", "conditions", "written_out"]
+
+SCXML = "http://www.w3.org/2005/07/scxml"
+OURS = "urn:gms-fsm:chart:1"  # the namespace of what SCXML has no word for
+VALUES = "values"  # the event that brings the present values of what comes from outside
+STEP = "step"  # the event at which one transition is taken, the first whose condition holds
+
+
+def written_out(lets: Mapping[str, Value]) -> dict[str, Value]:
+    """Return named expressions without names of other ones, which SCXML does not have.
+
+    Parameters
+    ----------
+    lets : mapping of str to Value
+        `Chart.lets`.
+
+    Returns
+    -------
+    dict of str to Value
+        By name.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import parse_value, spell
+    >>> lets = {"a": parse_value("2 * v", ["v"]), "b": parse_value("a + 1", ["a"])}
+    >>> spell(written_out(lets)["b"])
+    '2.0 * v + 1.0'
+    """
+    done: dict[str, Value] = {}
+    for name, tree in lets.items():
+        done[name] = renamed(tree, done)
+    return done
+
+
+def conditions(chart: Chart) -> dict[str, str]:
+    """Return the guard of each edge as a condition in ECMAScript."""
+    lets = written_out(chart.lets)
+
+    def text(guard: Condition) -> str:
+        return spell(renamed_in(guard, lets), ECMASCRIPT)
+
+    return {name: text(guard) for name, guard in chart.guards.items()}
+
+
+def assignments(chart: Chart, kind: str, owner: str) -> dict[str, str]:
+    """Return what a state or an edge assigns, as expressions in ECMAScript, by name.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    kind : {"entry", "exit", "action"}
+        When.
+    owner : str
+        Name of the state or the edge.
+
+    Returns
+    -------
+    dict of str to str
+        In order.
+    """
+    lets, trees = written_out(chart.lets), chart.assignments[kind, owner]
+    return {name: spell(renamed(tree, lets), ECMASCRIPT) for name, tree in trees.items()}

@@ -1,0 +1,196 @@
+"""Charts as data for files: the tables of a chart file, which the headers of traces contain too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import (
+    ConfigDict,
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    model_serializer,
+    model_validator,
+)
+
+from gms_fsm.charts.parameters import Parameter
+from gms_fsm.charts.parts import State, Transition
+from gms_fsm.charts.reader import AGE
+from gms_fsm.errors import ChartError
+from gms_fsm.foundation.tables import ONE, TABLE, Table, Texts, built, read_file, write_file
+
+if TYPE_CHECKING:
+    from gms_fsm.charts.chart import Chart
+
+__all__ = ["ChartTable", "load", "save"]
+
+
+class ParameterTable(Table):
+    """A parameter with its unit and rule."""
+
+    name: str
+    unit: str = ""
+    rule: str = "finite"
+    per_element: bool = True
+    meaning: str = ""
+    assumed: str = ""
+
+
+class StateTable(Table):
+    """A state."""
+
+    name: str
+    flow: dict[str, str] = Field({})
+    entry: dict[str, str] = Field({})
+    exit: dict[str, str] = Field({})
+    outputs: dict[str, str] = Field({})
+    locked: bool = False
+
+
+class EdgeTable(Table):
+    """An edge, which may leave several states."""
+
+    model_config = ConfigDict(populate_by_name=True)
+
+    name: str
+    source: Texts = Field(alias="from")
+    target: str = Field(alias="to")
+    guard: str
+    actions: dict[str, str] = Field({}, alias="do")
+    impulse: bool = False
+
+
+def _form(given: Any) -> str:
+    return ONE if isinstance(given, str) else TABLE
+
+
+ParameterField = Annotated[
+    Annotated[str, Tag(ONE)] | Annotated[ParameterTable, Tag(TABLE)], Discriminator(_form)
+]
+
+
+class ChartTable(Table):
+    """A chart: keys of files as aliases, names of `Chart` as names, which headers of traces use."""
+
+    model_config = ConfigDict(populate_by_name=True)
+
+    name: str
+    reference: str = ""
+    inputs: list[str] = Field(["v"])
+    velocities: list[str] = Field(["v"])
+    variables: list[str] = Field([])
+    parameters: list[ParameterField] = Field([], alias="parameter")
+    let: dict[str, str] = Field({})
+    outputs: dict[str, str] = Field({})
+    contact_outputs: dict[str, str] = Field({})
+    states: list[StateTable] = Field(alias="state")
+    transitions: list[EdgeTable] = Field([], alias="edge")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_list(cls, given: Any) -> Any:
+        if isinstance(given, dict) and {"parameters", "parameter"} <= given.keys():
+            raise ValueError("it has parameters = [...] and [[parameter]]; give only one of them")
+        return given
+
+    @model_serializer(mode="wrap")
+    def _plain_names(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Write plain names of parameters as one list; else each as a table."""
+        data: dict[str, Any] = write(self)
+        given = data.get("parameter", [])
+        if not all(isinstance(each, str) for each in given):
+            data["parameter"] = [
+                {"name": each} if isinstance(each, str) else each for each in given
+            ]
+            return data
+        return {"parameters" if key == "parameter" else key: each for key, each in data.items()}
+
+    @classmethod
+    def of(cls, chart: Chart) -> ChartTable:
+        """Describe a chart.
+
+        Parameters
+        ----------
+        chart : Chart
+            Any chart.
+
+        Returns
+        -------
+        ChartTable
+            With the edges as they were given, and plain names of parameters without unit and rule.
+        """
+        edges: dict[str, dict[str, Any]] = {}
+        for edge in chart.transitions:
+            one = {name: getattr(edge, name) for name in EdgeTable.model_fields}
+            one["source"] = edges[edge.name]["source"] if edge.name in edges else []
+            one["source"].append(edge.source)
+            edges[edge.name] = one
+        for one in edges.values():
+            one["source"] = one["source"] if len(one["source"]) > 1 else one["source"][0]
+        return cls.model_validate(
+            {
+                "name": chart.name,
+                "reference": chart.reference,
+                "inputs": list(chart.inputs),
+                "velocities": list(chart.velocities),
+                # The age is there because a text reads it.
+                "variables": [name for name in chart.variables if name != AGE],
+                "parameters": [
+                    each.name if each == Parameter(each.name) else dict(vars(each))
+                    for each in chart.parameters
+                ],
+                "let": chart.let,
+                "outputs": chart.outputs,
+                "contact_outputs": chart.contact_outputs,
+                "states": [dict(vars(state)) for state in chart.states],
+                "transitions": list(edges.values()),
+            }
+        )
+
+    def build(self, kind: type[Chart]) -> Chart:
+        """Return the chart.
+
+        Parameters
+        ----------
+        kind : type of Chart
+            The class, which imports this module.
+
+        Returns
+        -------
+        Chart
+            Equal to the one described.
+
+        Raises
+        ------
+        ChartError, ExpressionError
+            With the part at fault as their key.
+        """
+        parameters = [
+            each if isinstance(each, str) else built(Parameter, "parameters", i, **vars(each))
+            for i, each in enumerate(self.parameters)
+        ]
+        states = [built(State, "states", i, **vars(each)) for i, each in enumerate(self.states)]
+        edges = [
+            built(Transition, "transitions", i, **vars(each))
+            for i, each in enumerate(self.transitions)
+        ]
+        return kind(
+            **{
+                **vars(self),
+                "parameters": parameters,
+                "states": states,
+                "transitions": edges,
+            }
+        )
+
+
+def load(path: Path, kind: type[Chart]) -> Chart:
+    """Read a chart file; errors name file, line, key and text."""
+    return read_file(path, ChartTable, ChartError, lambda table: table.build(kind))
+
+
+def save(chart: Chart, path: Path) -> Path:
+    """Write a chart file, unless something else is there."""
+    return write_file(path, ChartTable.of(chart))

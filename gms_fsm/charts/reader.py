@@ -1,0 +1,225 @@
+"""Reads the texts of a chart into trees, and says what each text may name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from gms_fsm.errors import ChartError, ExpressionError, Part
+from gms_fsm.language import Condition, Number, Value, names_in, parse_condition, parse_value
+
+if TYPE_CHECKING:
+    from gms_fsm.charts.chart import Chart
+    from gms_fsm.charts.parts import State
+
+__all__ = ["AGE", "Reader"]
+
+AGE = "age"  # s since the state was entered; a variable of every chart that reads it
+
+
+class Reader:
+    """Reads the texts of a chart whose names have been checked.
+
+    Parameters
+    ----------
+    chart : Chart
+        Its texts.
+    """
+
+    def __init__(self, chart: Chart) -> None:
+        self.chart, self.here = chart, Part(f"chart {chart.name!r}")
+        self.lets: dict[str, Value] = {}
+        self.known = dict.fromkeys(
+            [*chart.inputs, *chart.velocities, *chart.variables, *chart.parameter_names]
+        )
+        # A chart's own name goes before that of an acceleration.
+        declared = {*self.known, *chart.let}
+        self.late = [
+            each for each in (*chart.force_names, *chart.rate_names) if each not in declared
+        ]
+        self.ages = False
+
+    def trees(self) -> dict[str, Any]:
+        """Return what the chart keeps, by its name."""
+        chart, here = self.chart, self.here
+        self.only_forces(chart.outputs, here.of("outputs", "outputs"))
+        self.only_forces(chart.contact_outputs, here.of("contact_outputs", "contact_outputs"))
+        for name, text in chart.let.items():
+            self.lets[name] = self.value(
+                text, self.known_now, here.of(f"let {name!r}", "let", name)
+            )
+        flows: dict[tuple[str, str], Value] = {}
+        forces: dict[tuple[str, str], Value | None] = {}
+        assignments: dict[tuple[str, str], dict[str, Value]] = {}
+        for i, state in enumerate(chart.states):
+            owner = here.of(f"state {state.name!r}", "states", i)
+            self.only(state.flow, chart.variables, owner.of("flow", "flow"))
+            for variable in chart.variables:
+                flows[state.name, variable] = self.value(
+                    state.flow.get(variable, "0"),
+                    self.known_now,
+                    owner.of(f"flow of {variable!r}", "flow", variable),
+                )
+            for kind, texts in (("entry", state.entry), ("exit", state.exit)):
+                assignments[kind, state.name] = self.assignments(texts, owner.of(kind, kind))
+            for force in chart.force_names:
+                forces[state.name, force] = self.force(state, force, owner)
+        guards: dict[str, Condition] = {}
+        for i, edge in enumerate(chart.transitions):
+            owner = here.of(f"edge {edge.name!r}", "transitions", i)
+            guards[edge.name] = self.guard(edge.guard, owner.of("guard", "guard"))
+            assignments["action", edge.name] = self.assignments(
+                edge.actions, owner.of("action", "actions")
+            )
+        totals = {
+            force: self.total(chart.contact_outputs[force], force)
+            for force in chart.force_names
+            if force in chart.contact_outputs
+        }
+        variables = chart.variables
+        if self.ages:
+            variables = (*variables, AGE)
+            for state in chart.states:
+                flows[state.name, AGE] = Number(1.0)
+                assignments["entry", state.name][AGE] = Number(0.0)
+        return {
+            "variables": variables,
+            "lets": self.lets,
+            "flows": flows,
+            "forces": forces,
+            "assignments": assignments,
+            "guards": guards,
+            "totals": totals,
+        }
+
+    @property
+    def known_now(self) -> list[str]:
+        """The names that can be used, with the expressions read so far."""
+        return [*self.known, *self.lets]
+
+    def force(self, state: State, force: str, owner: Part) -> Value | None:
+        """Read a force in a state; None where the state is locked."""
+        self.only_forces(state.outputs, owner.of("outputs", "outputs"))
+        if state.locked:
+            if force in state.outputs:
+                raise ChartError(
+                    f"it is locked, and gives an output {force!r}",
+                    place=owner.words,
+                    advice=f"leave it out: {force} is what holds the contact",
+                    key=(*owner.key, "outputs", force),
+                )
+            return None
+        texts = {**self.chart.outputs, **state.outputs}
+        if force not in texts:
+            raise ChartError(
+                f"no output {force!r}",
+                place=owner.words,
+                advice=f"give one, here or in the chart's outputs, for example {{{force!r}: '0'}}",
+                key=owner.key,
+            )
+        rates = [f"d{variable}" for variable in self.chart.variables]
+        whose = owner if force in state.outputs else self.here
+        owner = whose.of(f"output {force!r}", "outputs", force)
+        return self.value(texts[force], [*self.known_now, *rates], owner)
+
+    def total(self, text: str, force: str) -> Value:
+        """Read the force of a contact over the sum of its elements' forces."""
+        chart = self.chart
+        owner = self.here.of(f"contact_outputs {force!r}", "contact_outputs", force)
+        shared = [each.name for each in chart.parameters if not each.per_element]
+        names = [*dict.fromkeys([*chart.inputs, *chart.velocities]), *shared, *self.lets]
+        tree = self.value(text, [*names, force], owner)
+        for name in sorted(names_in(tree) & {*self.lets}):
+            for read in sorted(self.inside(name) - {*names}):
+                raise ChartError(
+                    f"it reads {name!r}, which reads {read!r} of each element",
+                    place=owner.words,
+                    advice="a contact has one force; use what all its elements share",
+                    key=owner.key,
+                )
+        return tree
+
+    def inside(self, let: str) -> frozenset[str]:
+        """Return the names that a let is made from, but for other lets."""
+        found = names_in(self.lets[let])
+        return frozenset(
+            name for each in found for name in (self.inside(each) if each in self.lets else {each})
+        )
+
+    def guard(self, text: str, owner: Part) -> Condition:
+        """Read a guard."""
+        try:
+            tree = parse_condition(text, [*self.known_now, *self.late, *_age(text)])
+        except ExpressionError as error:
+            raise error.at(owner) from None
+        self.ages |= AGE in names_in(tree)
+        return tree
+
+    def assignments(self, texts: Mapping[str, str], owner: Part) -> dict[str, Value]:
+        """Read assignments to variables and velocities."""
+        self.only(texts, (*self.chart.variables, *self.chart.velocities), owner)
+        names = [*self.known_now, *self.late]
+        return {
+            name: self.value(text, names, Part(f"{owner.words} {name!r}", (*owner.key, name)))
+            for name, text in texts.items()
+        }
+
+    def value(self, text: str, names: Iterable[str], owner: Part) -> Value:
+        """Read a value."""
+        names = [*names, *_age(text)]
+        try:
+            tree = parse_value(text, names)
+        except ExpressionError as error:
+            self.refuse_loop(text, names, owner)
+            raise error.at(owner) from None
+        self.ages |= AGE in names_in(tree)
+        return tree
+
+    def refuse_loop(self, text: str, names: list[str], owner: Part) -> None:
+        """Refuse F and a where they would depend on themselves."""
+        try:
+            tree = parse_value(text, [*names, *self.late])
+        except ExpressionError:
+            return
+        for name in sorted(names_in(tree) & {*self.late}):
+            raise ChartError(
+                f"it reads {name!r}, which follows from it (an algebraic loop)",
+                place=owner.words,
+                advice=f"guards and actions can read {', '.join(self.late)}; a flow or a force "
+                "that needs them needs a variable in between",
+                key=owner.key,
+            )
+
+    def only(self, texts: Mapping[str, str], allowed: tuple[str, ...], owner: Part) -> None:
+        """Refuse texts for anything but the allowed variables."""
+        for name in texts:
+            if name not in allowed:
+                raise ChartError(
+                    f"{name!r} is not a variable",
+                    place=owner.words,
+                    advice=f"variables: {', '.join(map(repr, self.chart.variables)) or 'none'}",
+                    key=(*owner.key, name),
+                )
+
+    def only_forces(self, texts: Mapping[str, str], owner: Part) -> None:
+        """Refuse forces that the chart does not have."""
+        for name, text in texts.items():
+            if name not in self.chart.force_names:
+                raise ChartError(
+                    f"it has {name!r}",
+                    place=owner.words,
+                    advice=f"its forces are {', '.join(map(repr, self.chart.force_names))}",
+                    key=(*owner.key, name),
+                )
+            if hasattr(text, "keys"):
+                raise ChartError(
+                    f"output {name!r} is {text!r}",
+                    place=self.here.words,
+                    advice="it is one text for all states; where the force differs by state, give "
+                    "it there: State('forward', outputs={'F': 'F_c'})",
+                )
+
+
+def _age(text: object) -> list[str]:
+    """Return the name of the age where a text seems to read it; else messages would offer it."""
+    return [AGE] if isinstance(text, str) and (AGE in text or "after" in text) else []

@@ -1,0 +1,1 @@
+"""The included friction models, one per module: bristles, sliding, joints."""

@@ -1,0 +1,1 @@
+"""Models with a deflection z: a spring that sticks, yields or slips."""

@@ -1,0 +1,1 @@
+"""Gaps, stops and clutches."""

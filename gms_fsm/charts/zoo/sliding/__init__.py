@@ -1,0 +1,1 @@
+"""Models without an elastic bristle: stick, slip and the force between."""

@@ -1,0 +1,1 @@
+"""Friction in somebody's own loop: stepping, banks, equations with events."""

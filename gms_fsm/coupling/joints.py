@@ -1,0 +1,425 @@
+"""One contact or many, advanced together: the stepping of `FrictionState` and `FrictionBank`."""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
+from gms_fsm.coupling.joint import Asked, ElementSwitch, Joint, Line
+from gms_fsm.coupling.memory import BlockMemory, ListMemory, fast, machine_code
+from gms_fsm.coupling.steppable import start_of
+from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.run.problem import LATEST
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import Contact
+
+__all__ = ["Joints", "Snapshot", "content_of", "input_lines", "made_again"]
+
+CHANGE = 1e-4  # of the last velocity, for a derivative by differences
+Lost = dict[Joint, list[ElementSwitch]]  # switches that did not fit into the log of a sample
+# When it began, v0, v1, further inputs, lost switches, and a copy of the state before it.
+LastSample = tuple[float, Any, Any, Mapping[str, Line], Lost, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """A state to return to, of a `FrictionState` or a `FrictionBank`.
+
+    Parameters
+    ----------
+    t : float
+        s.
+    """
+
+    t: float
+    of: tuple[str, str] = field(repr=False)  # which friction, and its engine
+    content: Any = field(repr=False)
+
+
+class Alone:
+    """Lets one thread at a time into a friction, and refuses the others at once.
+
+    The same thread may come in again: after Ctrl-C it may never have left.
+    """
+
+    def __init__(self) -> None:
+        lock = threading.RLock()
+        self.acquire, self.leave = lock.acquire, lock.release
+
+    def __enter__(self) -> None:
+        if not self.acquire(False):
+            raise in_use()
+
+    def __exit__(self, *_: object) -> None:
+        self.leave()
+
+
+def in_use() -> ParameterError:
+    """Return the error for a call while another thread's call is under way."""
+    return ParameterError(
+        "another thread is in a call of this friction",
+        advice="give each thread a friction of its own, or hold a lock during each call; nothing "
+        "has changed",
+    )
+
+
+class JointGroup:
+    """Joints in one memory, advanced by one call; of one joint, all values are numbers."""
+
+    def __init__(
+        self, joints: Sequence[Joint], memory: BlockMemory | ListMemory, places: Any
+    ) -> None:
+        self.joints, self.places = joints, places
+        self.copy, self.take = memory.copy, memory.take
+        self._run, self._sample = memory.run, memory.sample
+        lines: Sequence[Any] = memory.lines
+        self._v, *others = lines
+        self._others = [*zip(joints[0].inputs, others, strict=False)]
+        self._entering = joints[0].enters
+
+    def step(
+        self,
+        v0: Any,
+        v1: Any,
+        t: float,
+        inputs: Mapping[str, Line],
+        lost: Lost,
+        now: float,
+        *,
+        mean: bool = False,
+    ) -> Any:
+        """Advance to t; return the forces there, or their integrals over the sample."""
+        for name, line in self._others:
+            line[0], line[1] = inputs[name]
+        if self._entering:
+            self._enter(t, {**inputs, "v": (v0, v1)})
+        v, sample = self._v, self._sample
+        sample.end, v[0], v[1] = t, v0, v1
+        sample.resumed = False
+        if mean:
+            sample.mean = True
+        if self._run():
+            for joint in self.joints:
+                if more := joint.finish(now):
+                    lost[joint] = more
+        return sample.impulse if mean else sample.force
+
+    def _enter(self, t: float, lines: Mapping[str, Line]) -> None:
+        for row, joint in enumerate(self.joints):
+            joint.enter(t, lines if len(self.joints) == 1 else _lines_of(lines, row))
+
+
+class JointGroups:
+    """Groups of joints, advanced one after the other; all values are arrays, one item a joint."""
+
+    def __init__(self, groups: Sequence[JointGroup]) -> None:
+        self.groups = groups
+        self._size = sum(len(group.joints) for group in groups)
+
+    def step(
+        self,
+        v0: Any,
+        v1: Any,
+        t: float,
+        inputs: Mapping[str, Line],
+        lost: Lost,
+        now: float,
+        *,
+        mean: bool = False,
+    ) -> FloatArray:
+        """Advance to t; return the forces there, or their integrals over the sample."""
+        found, lines = np.empty(self._size), {**inputs, "v": (v0, v1)}
+        for group in self.groups:
+            own = _lines_of(lines, group.places)
+            v0, v1 = own.pop("v")
+            found[group.places] = group.step(v0, v1, t, own, lost, now, mean=mean)
+        return found
+
+    def copy(self, into: Any = None, /) -> Any:
+        """Return the present state, in the memory of an older copy if one is given."""
+        older = [None] * len(self.groups) if into is None else into
+        return [group.copy(old) for group, old in zip(self.groups, older, strict=True)]
+
+    def take(self, copy: Any) -> None:
+        """Return to what `copy` returned."""
+        for group, each in zip(self.groups, copy, strict=True):
+            group.take(each)
+
+
+def _lines_of(lines: Mapping[str, Line], places: Any) -> dict[str, Line]:
+    """Return the inputs of one of the joints, by its number, or of some, by a list of numbers."""
+    own = float if isinstance(places, int) else np.asarray
+    return {name: (own(u[places]), own(w[places])) for name, (u, w) in lines.items()}
+
+
+class Joints:
+    """Contacts at one time, and their last sample.
+
+    A `FrictionState` is the bank of one: what is given and returned are numbers instead of arrays.
+    """
+
+    def __init__(
+        self,
+        given: Sequence[Model | Contact],
+        asked: Sequence[Asked],
+        engine: str | None,
+        *,
+        several: bool,
+    ) -> None:
+        self.engine = checked_engine(engine)
+        kind = BlockMemory if self.engine == "compiled" else ListMemory
+        starts = []
+        for i, each in enumerate(given):
+            try:
+                starts.append(start_of(each, *asked[i]))
+            except GMSError as error:
+                raise error.inside(f"models[{i}]") if several else error from None
+        alike: dict[Any, list[int]] = {}  # joints that share their machine code share a call
+        for i, start in enumerate(starts):
+            key = machine_code(start) if kind is BlockMemory else i
+            alike.setdefault(key, []).append(i)
+        groups, joints = [], dict[int, Joint]()
+        for places in alike.values():
+            memory = kind([starts[i] for i in places])
+            for i, own in zip(places, memory.each, strict=True):
+                name = f"joint {i}" if several else ""
+                joints[i] = Joint(given[i], asked[i], starts[i], own, name)
+            mine = [joints[i] for i in places]
+            groups.append(JointGroup(mine, memory, places if len(places) > 1 else places[0]))
+        self.each = [joints[i] for i in range(len(given))]
+        self.inputs = tuple(sorted({name for joint in self.each for name in joint.inputs}))
+        together: JointGroup | JointGroups = JointGroups(groups) if several else groups[0]
+        self._step, self._copy, self._take = together.step, together.copy, together.take
+        self._several = several
+        self.alone = Alone()
+        self.t = starts[0].t_start
+        self._last: LastSample | None = None
+        self._spare: Any = None  # memory for the next copy
+
+    # ------------------------------------------------------------------ samples
+    def advance(self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Any]) -> Any:
+        """Advance by a sample; if that fails everything is as before."""
+        if not self.alone.acquire(False):  # as `with self.alone`, in a third of the time
+            raise in_use()
+        try:
+            now = self.t
+            end = now + dt
+            if end == now and dt > 0.0:
+                raise ParameterError(
+                    f"it is below the resolution of the clock at t = {end!r} s",
+                    place="dt",
+                    value=dt,
+                    advice="start at a smaller t=...",
+                )
+            return self._commit(v0, v1, end, inputs)
+        finally:
+            self.alone.leave()
+
+    def advance_to(self, v0: Any, v1: Any, t: Any, inputs: Mapping[str, Any]) -> Any:
+        """Advance to a time that is not before the present one."""
+        with self.alone:
+            end = checked_scalar("t", t, "finite")
+            if end < self.t:
+                raise ParameterError(
+                    f"it is before the present time {self.t!r} s",
+                    place="t",
+                    value=end,
+                    advice="restore a snapshot to go back",
+                )
+            return self._commit(v0, v1, end, inputs)
+
+    def peek(self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Any]) -> Any:
+        """Return the forces at the end of a sample, and stay."""
+        if not self.alone.acquire(False):
+            raise in_use()
+        try:
+            now = self.t
+            end = now + dt
+            if end > LATEST:
+                raise too_late(end)
+            before = self._copy()
+            try:
+                return self._step(v0, v1, end, inputs, {}, now)
+            finally:
+                self._take(before)
+        finally:
+            self.alone.leave()
+
+    def _commit(self, v0: Any, v1: Any, end: float, inputs: Mapping[str, Line]) -> Any:
+        if end > LATEST:
+            raise too_late(end)
+        t, last, spare = self.t, self._last, self._spare
+        before = self._copy(spare)
+        lost: Lost = {}
+        try:
+            force = self._step(v0, v1, end, inputs, lost, t)
+            self.t, self._last = end, (t, v0, v1, inputs, lost, before)
+            self._spare = None if last is None else last[-1]
+        except BaseException:  # Ctrl-C, too
+            self._take(before)
+            self.t, self._last, self._spare = t, last, spare
+            raise
+        return force
+
+    # ------------------------------------------------------------------ what it found
+    @property
+    def switches(self) -> list[tuple[ElementSwitch, ...]]:
+        """Of each joint the edges taken in the last sample."""
+        lost: Lost = {} if self._last is None else self._last[4]
+        return [(*lost.get(joint, ()), *joint.logged) for joint in self.each]
+
+    @property
+    def mean_force(self) -> Any:
+        """The mean of the force over the last sample."""
+        with self.alone:
+            begin, _, v1, *_ = self._sample()
+            if begin == self.t:
+                return self._again(v1)
+            return self._again(v1, mean=True) / (self.t - begin)
+
+    @property
+    def dF_dv(self) -> Any:
+        """The derivative of the last force with respect to the velocity there."""
+        with self.alone:
+            _, v0, v1, *_ = self._sample()
+            larger = np.maximum if self._several else max
+            change = CHANGE * larger(larger(abs(v0), abs(v1)), self._speed)
+            return (self._again(v1 + change) - self._again(v1 - change)) / (2.0 * change)
+
+    @functools.cached_property
+    def _speed(self) -> Any:
+        """A small speed, m/s."""
+        speeds = [joint.speed for joint in self.each]
+        return np.array(speeds) if self._several else speeds[0]
+
+    def _sample(self) -> LastSample:
+        if self._last is None:
+            raise ParameterError("there is no last sample", advice="call advance first")
+        return self._last
+
+    def _again(self, v1: Any, *, mean: bool = False) -> Any:
+        """Return the force, or its integral, had the last velocity been v1."""
+        _, v0, _, inputs, _, before = self._sample()
+        now = self._copy()
+        try:
+            self._take(before)
+            return self._step(v0, v1, self.t, inputs, {}, self.t, mean=mean)
+        finally:
+            self._take(now)
+
+    # ------------------------------------------------------------------ going back
+    def snapshot(self) -> Snapshot:
+        """Return the present state."""
+        with self.alone:
+            return Snapshot(self.t, self._identity, self._copy())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Return to a snapshot of the same frictions."""
+        content = content_of(snapshot, Snapshot, self._identity)
+        with self.alone:
+            self._take(content)
+            self._moved_to(snapshot.t)
+
+    @functools.cached_property
+    def _identity(self) -> tuple[str, str]:
+        """What states can be exchanged with: the same numbers, and the same engine."""
+        stamps = tuple(joint.stamp for joint in self.each)
+        return repr(("bank", stamps)) if self._several else stamps[0], self.engine
+
+    def to_array(self) -> FloatArray:
+        """Return the present state as finite numbers."""
+        with self.alone:
+            return np.concatenate([joint.numbers for joint in self.each])
+
+    def from_array(self, array: ArrayLike) -> None:
+        """Return to what `to_array` returned."""
+        sizes = [joint.size for joint in self.each]
+        given = checked_array("array", array, None, "finite")
+        if given.size != sum(sizes):
+            raise ParameterError(
+                f"it has {given.size} numbers", place="array", advice=f"it must have {sum(sizes)}"
+            )
+        with self.alone:
+            parts = zip(self.each, np.split(given, np.cumsum(sizes)[:-1]), strict=True)
+            times, states = zip(*(joint.checked(part) for joint, part in parts), strict=True)
+            if len({*times}) > 1:
+                raise ParameterError("its joints are at different times", place="array")
+            for joint, state in zip(self.each, states, strict=True):
+                joint.write(state)
+            self._moved_to(times[0])
+
+    def _moved_to(self, t: float) -> None:
+        """Forget the last sample: the memory has been given another state."""
+        self.t, self._last = t, None
+        for joint in self.each:
+            joint.forget()
+
+
+def made_again(kind: Any, given: Any, arguments: Mapping[str, Any], array: FloatArray) -> Any:
+    """Return a copy of a `FrictionState` or a `FrictionBank`, also in another process."""
+    new = kind(given, **arguments)
+    new.from_array(array)
+    return new
+
+
+# --------------------------------------------------------------------------- arguments
+def checked_engine(engine: object) -> str:
+    """Return the name of an engine; None is machine code, where it can be made."""
+    if engine is None:
+        return "compiled" if fast() else "ifelse"
+    if not isinstance(engine, str) or engine not in ("compiled", "ifelse"):
+        raise ParameterError("it must be 'compiled' or 'ifelse'", place="engine", value=engine)
+    return engine
+
+
+def too_late(t: float) -> ParameterError:
+    """Return the error for the end of a sample that the clock cannot resolve."""
+    return ParameterError("it is too large", place="t", value=t, advice=f"at most {LATEST:g} s")
+
+
+def input_lines(given: Mapping[str, Any], known: Iterable[str], checked: Any) -> dict[str, Line]:
+    """Return further inputs at the start and at the end of a sample, or refuse them.
+
+    They must be exactly the known ones; checked(name, value) returns a value, or refuses it.
+    """
+    names = sorted(known)
+    if sorted(given) != names:
+        raise ParameterError(
+            f"the further inputs given are {', '.join(sorted(given)) or 'none'}",
+            advice=f"give {', '.join(f'{name}=(start, end)' for name in names)}"
+            if names
+            else "this friction has no inputs but its velocity",
+        )
+    return {name: _pair(name, each, checked) for name, each in given.items()}
+
+
+def _pair(name: str, given: Any, checked: Any) -> Line:
+    flat = isinstance(given, np.ndarray) and given.ndim == 0
+    if isinstance(given, tuple | list | np.ndarray) and not flat and len(given) == 2:
+        return checked(name, given[0]), checked(name, given[1])
+    raise ParameterError(
+        "it must be a pair, its value at the start and at the end of the sample",
+        place=name,
+        value=given,
+    )
+
+
+def content_of(snapshot: object, kind: type[Any], identity: tuple[str, str]) -> Any:
+    """Return the content of a snapshot if it is of the same friction."""
+    checked: Any = checked_kind("snapshot", snapshot, kind, "what snapshot() returned")
+    if checked.of != identity:
+        reason = "it is of a friction with another engine"
+        if checked.of[0] != identity[0]:
+            reason = "it is of another model, or of one with other numbers"
+        raise ParameterError(
+            reason, place="snapshot", advice="take it from a friction made in the same way"
+        )
+    return checked.content

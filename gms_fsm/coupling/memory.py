@@ -1,0 +1,290 @@
+"""The memory of joints, and what advances it: machine code, or the same functions in Python."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.lowering import compiling as compiled
+from gms_fsm.lowering.program import equations
+from gms_fsm.run.machines import IfElse
+from gms_fsm.run.problem import Start
+from gms_fsm.run.ticks import EXACT, clocks_of, in_units
+from gms_fsm.systems.signals import Corners
+from integrators import hybrid
+from integrators.loop import Buffers, Machines
+from integrators.machine_code.records import numbers_in, numbers_of, put_numbers
+from integrators.runners import states
+from integrators.runners.stepping import Clocks, Sample, restart, step_to
+from integrators.sliding import Functions
+
+if TYPE_CHECKING:
+    from integrators.runners.compiled import CompiledStepper as MachineCode
+
+__all__ = [
+    "BlockMemory",
+    "JointMemory",
+    "ListMemory",
+    "arguments_of",
+    "fast",
+    "machine_code",
+    "prepared",
+]
+
+MOST_SWITCHES = 64  # in the log of a sample; when it is full, it is emptied and the sample goes on
+SAMPLED, LOGGED = tuple(numbers_of(Sample)), ("t", "machine", "edge")
+
+
+class JointMemory(NamedTuple):
+    """What the loop keeps of one joint, and what advances it alone (see `step_to`)."""
+
+    buffers: Buffers
+    tables: Any  # the straight lines: of each input its times, then its values
+    sample: Sample
+    run: Callable[[], int]
+
+    def state(self) -> dict[str, Any]:
+        """Return what makes up its state: numbers, and the arrays (or lists) themselves."""
+        return {**states.state_of(self.buffers), **self._inputs()}
+
+    def put(self, state: Mapping[str, Sequence[Any]]) -> None:
+        """Return to a state, or to parts of it; see `integrators.runners.states.put_state`."""
+        states.put_state(self.buffers, state)
+        for name, place in self._inputs().items():
+            if name in state:
+                place[:] = state[name]
+
+    def _inputs(self) -> dict[str, Any]:
+        return {f"input {k}": self.tables[2 * k + 1] for k in range(len(self.sample.inputs))}
+
+
+def fast() -> bool:
+    """Return whether machine code can be made here."""
+    return all(map(importlib.util.find_spec, ("llvmlite", "platformdirs")))
+
+
+# --------------------------------------------------------------------------- in Python
+class ListMemory:
+    """Of one joint, in lists; its steps are Python functions.
+
+    Calling `run` advances it; see `step_to`.
+    """
+
+    def __init__(self, starts: Sequence[Start]) -> None:
+        (start,) = starts
+        program = start.program
+        switch, observe = IfElse(program), program.ieee["observe"]
+        functions = equations(program).functions(located=True)
+        machines = Machines(switch.ask, switch.act, switch.tick, switch.jolts, observe)
+        buffers, self.sample = prepared(start)
+        self.run = functools.partial(step_to, functions, machines, buffers, self.sample)
+        self.each = (JointMemory(buffers, functions.p[2], self.sample, self.run),)
+        self.lines = self.sample.inputs
+
+    def copy(self, _into: Any = None, /) -> Any:
+        """Return the present state."""
+        log = {f"log {name}": getattr(self.sample, name) for name in LOGGED}
+        numbers = {"sample": numbers_in(self.sample, SAMPLED)}
+        state = {**self.each[0].state(), **log, **numbers}
+        return {name: list(place) for name, place in state.items()}
+
+    def take(self, copy: Any) -> None:
+        """Return to what `copy` returned."""
+        self.each[0].put(copy)
+        put_numbers(self.sample, SAMPLED, copy["sample"])
+        for name in LOGGED:
+            getattr(self.sample, name)[:] = copy[f"log {name}"]
+
+
+def prepared(start: Start) -> tuple[Buffers, Sample]:
+    """Return the buffers of a run without an end, and its first sample.
+
+    Parameters
+    ----------
+    start : Start
+        The system, with its inputs as corner tables.
+
+    Returns
+    -------
+    (Buffers, Sample)
+        Made of lists. The only knot is the end of the sample; what ticks goes on forever.
+    """
+    program, layout = start.program, start.program.layout
+    made, size = equations(program), layout.y.size
+    b = hybrid.buffers(
+        made, start.t_start, start.y, start.mode, math.inf, start.options, capacity=1
+    )
+    clocks = _clocks(start)
+    two = [0.0] * 2 if clocks.made else []
+    plan = b.plan._replace(
+        jumps=[*two], before_jumps=[*two], ticks=[0] * len(two), knots=[start.t_start]
+    )
+    b = b._replace(plan=plan)
+    restart(b, clocks)
+    lines = [each for each in start.system.signals.values() if isinstance(each, Corners)]
+    sample = Sample(
+        end=start.t_start,
+        wanted=layout.observed.index(layout.banks[0].of("F")),
+        mean=False,
+        resumed=False,
+        switches=0,
+        code=0,
+        force=0.0,
+        impulse=0.0,
+        inputs=[[0.0, 0.0] for _ in lines or (None,)],
+        seen=[0.0] * layout.observed.size,
+        t=[0.0] * MOST_SWITCHES,
+        machine=[0] * MOST_SWITCHES,
+        edge=[0] * MOST_SWITCHES,
+        before=[0.0] * size,
+        middle=[0.0] * size,
+        slope=[0.0] * size,
+        clocks=clocks,
+    )
+    return b, sample
+
+
+def _clocks(start: Start) -> Clocks:
+    """Return what ticks, in units that make periods whole numbers if doubles can hold these."""
+    ticking = clocks_of(start.system)
+    units = in_units(ticking)
+    exact = units.largest < EXACT
+    return Clocks(
+        per_second=float(units.per_second) if exact else 1.0,
+        begin=0.0,
+        units=0.0,
+        period=[*map(float, units.period)] if exact else [each.period for each in ticking],
+        offset=[*map(float, units.first)] if exact else [each.offset for each in ticking],
+        made=[0 for _ in ticking],
+    )
+
+
+# --------------------------------------------------------------------------- machine code
+class BlockMemory:
+    """Of joints that differ in numbers only: blocks one after the other, for machine code.
+
+    Calling `run` advances all; it returns not 0 if `step_to` does for one of them. In `sample`, an
+    item is a number if there is one joint, else one number per joint.
+    """
+
+    def __init__(self, starts: Sequence[Start]) -> None:
+        from integrators.machine_code.layout import MemoryBlock
+
+        code, count = machine_code(starts[0]), len(starts)
+        self._words = np.zeros(count * code.layout.words, dtype=np.int64)
+        each = []
+        for start, words in zip(starts, self._words.reshape(count, -1), strict=True):
+            block = MemoryBlock(code.layout, arguments_of(start), words=words)
+            made = block.contents
+            block.update(made)  # numbers; there are no columns
+            run = functools.partial(code.one, block.address)
+            each.append(JointMemory(made.buffers, made.functions.p[2], made.sample, run))
+        self.each = each
+        # Items of a memoryview are written in half the time of those of an array.
+        view: Any = memoryview if count == 1 else functools.partial(_across, self._words, count)
+        first = each[0].sample
+        self.lines = [*map(view, first.inputs)]
+        blocks = self._words.reshape(count, -1)
+        self.sample: Any = first if count == 1 else SamplesAcross(blocks, code.layout.offset)
+        address = self._words.ctypes.data
+        self.run = each[0].run if count == 1 else functools.partial(code.each, address, count)
+
+    def copy(self, into: Any = None, /) -> Any:
+        """Return the present state, in the memory of an older copy if one is given."""
+        if into is None:
+            return self._words.copy()
+        into[:] = self._words
+        return into
+
+    def take(self, copy: Any) -> None:
+        """Return to what `copy` returned."""
+        self._words[:] = copy
+
+
+class SamplesAcross:
+    """The numbers of samples in blocks one after the other: arrays, assigned as a whole."""
+
+    def __init__(self, blocks: NDArray[np.int64], offset: Callable[[str], int]) -> None:
+        words = {"f": blocks.view(np.float64), "i": blocks}
+        kinds = numbers_of(Sample).items()
+        vars(self)["columns"] = {name: words[k][:, offset(f"sample.{name}")] for name, k in kinds}
+
+    def __getattr__(self, name: str) -> Any:
+        return vars(self)["columns"][name]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        vars(self)["columns"][name][...] = value
+
+
+def _across(words: Any, count: int, array: Any) -> Any:
+    """Return a view of an array in the first block and those in its place in the other blocks."""
+    place = (array.ctypes.data - words.ctypes.data) // words.itemsize
+    blocks = words.view(array.dtype).reshape(count, -1)
+    return blocks[:, place : place + array.size].T
+
+
+_known: dict[int, tuple[MachineCode, Any]] = {}
+
+
+def machine_code(start: Start) -> MachineCode:
+    """Return the steps of a system as machine code.
+
+    Parameters
+    ----------
+    start : Start
+        The system.
+
+    Returns
+    -------
+    integrators.runners.compiled.CompiledStepper
+        The same one for systems that differ in numbers only.
+
+    Raises
+    ------
+    MissingExtraError
+        If llvmlite is not installed.
+    """
+    from integrators.runners import compiled as machine
+
+    compiled.check_llvmlite()
+    program = start.program
+    key = id(program.functions)
+    made = _known.get(key, (None, None))[0]
+    if made is None:
+        if len(_known) >= compiled.MOST_ENGINES:
+            _known.clear()
+        made = machine.stepper(
+            compiled.text_of(program), arguments_of(start), compiled.store(), compiled.notify
+        )
+        _known[key] = made, program.functions  # kept, so that their `id` stays theirs
+    return made
+
+
+def arguments_of(start: Start) -> Any:
+    """Return the arguments of `integrators.runners.stepping.step_to`, made of lists.
+
+    Parameters
+    ----------
+    start : Start
+        The system, with its inputs as corner tables.
+
+    Returns
+    -------
+    integrators.runners.compiled.StepArguments
+        An example for `integrators.machine_code.layout.BlockLayout`.
+    """
+    from integrators.runners.compiled import StepArguments
+
+    made = compiled.functions(start.program)
+    p: Any = compiled.packed(start.program.p)
+    return StepArguments(
+        Functions(made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p),
+        Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
+        *prepared(start),
+    )

@@ -1,0 +1,193 @@
+"""A friction model, or a contact of a system, whose velocity somebody else's loop prescribes."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import checked_scalar
+from gms_fsm.errors import ParameterError
+from gms_fsm.language import CONSTANTS, FUNCTIONS
+from gms_fsm.run.problem import LATEST, Start
+from gms_fsm.run.settings import Settings
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.signals import Corners, Function
+from gms_fsm.systems.system import Body, Contact, System
+
+__all__ = ["alone", "begin", "other_inputs", "start_of", "start_of_system"]
+
+WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*")  # not the exponent of a number
+GIVEN = ("t", "x", "v")  # what a contact knows by itself: x is the integral of v
+
+
+def start_of(
+    given: Model | Contact,
+    t: float,
+    initial: Mapping[str, Any] | None,
+    rtol: float,
+    values: Mapping[str, float] | None = None,
+    settings: Settings | None = None,
+) -> Start:
+    """Return a friction model or a contact, moved by a velocity that is a straight line.
+
+    Parameters
+    ----------
+    given : Model or Contact
+        What steps.
+    t : float
+        s.
+    initial : mapping, optional
+        As for `gms_fsm.simulate`.
+    rtol : float
+        Relative tolerance.
+    values : mapping of str to float, optional
+        The velocity and the other inputs at t; 0 if omitted.
+    settings : Settings, optional
+        Method and tolerances; the default method with rtol if omitted.
+
+    Returns
+    -------
+    Start
+        Its signals are the inputs: ``v``, then those that the texts of a contact name.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be stepped, or an argument violates its rule.
+    """
+    contact = alone(given)
+    t, end = begin(t)
+    others = other_inputs(contact)
+    now = {} if values is None else values
+    signals = {
+        name: Corners(np.array([t, end]), np.full(2, now.get(name, 0.0)), held=True)
+        for name in ("v", *others)
+    }
+    system = System(
+        "prescribed velocity",
+        bodies=(Body("body", velocity="v"),),
+        contacts=(contact,),
+        signals=signals,
+    )
+    chosen = Settings(rtol=rtol) if settings is None else settings
+    return Start.of(system, None, end, _usable(chosen, "located"), t_start=t, initial=initial)
+
+
+def start_of_system(
+    system: System, t: float, initial: Mapping[str, Any] | None, settings: Settings
+) -> Start:
+    """Return a system whose records are straight lines, which somebody else's loop gives.
+
+    Parameters
+    ----------
+    system : System
+        What steps.
+    t : float
+        s.
+    initial : mapping, optional
+        As for `gms_fsm.simulate`.
+    settings : Settings
+        Method and tolerances.
+
+    Returns
+    -------
+    Start
+        With each record replaced by its value at t.
+
+    Raises
+    ------
+    ParameterError
+        If a signal is a Python function, or the settings are those of SciPy or without location.
+    """
+    t, end = begin(t)
+    signals = dict(system.signals)
+    for name, signal in system.signals.items():
+        if isinstance(signal, Function):
+            raise ParameterError(
+                "it is a Python function, which cannot be handed over",
+                place=f"signal {name!r}",
+                advice="give it as an expression in t, or as a record",
+            )
+        if isinstance(signal, Corners):
+            value = float(np.interp(t, signal.times, signal.values))
+            signals[name] = Corners(np.array([t, end]), np.full(2, value), held=True)
+    moved = dataclasses.replace(system, signals=signals)
+    chosen = _usable(settings, "located", "held")  # held events are periods of contacts
+    return Start.of(moved, None, end, chosen, t_start=t, initial=initial)
+
+
+def _usable(settings: Settings, *events: str) -> Settings:
+    """Return settings for stepping, or refuse."""
+    if not isinstance(settings.method, str) or settings.events not in events:
+        raise ParameterError(
+            "only the methods of gms-fsm that locate switches can be handed over",
+            place="settings",
+            advice='leave method and events out, or choose method="dp45"',
+        )
+    return dataclasses.replace(settings, engine="ifelse", output="end", t_eval=None)
+
+
+def begin(t: object) -> tuple[float, float]:
+    """Return the time at which a friction begins, and some later time."""
+    start = checked_scalar("t", t, "finite")
+    if not -LATEST <= start < LATEST:
+        raise ParameterError(
+            "the clock would be too coarse",
+            place="t",
+            value=start,
+            advice=f"at least {-LATEST:g} s, and less than {LATEST:g} s",
+        )
+    return start, min(start + 1.0, LATEST)
+
+
+def alone(given: Model | Contact) -> Contact:
+    """Return a contact that needs no bodies but its own, or refuse."""
+    if not isinstance(getattr(given, "chart", None), Chart):
+        raise ParameterError(
+            "it must be a model or a contact, for example GMS(parameters, law='signed')",
+            place="model_or_contact",
+            value=given,
+        )
+    chart = given.chart
+    here = f"chart {chart.name!r}"
+    if len(chart.velocities) != 1:
+        raise ParameterError(
+            f"it has the velocities {', '.join(chart.velocities)}",
+            place=here,
+            advice="only charts with one velocity can be stepped; put it into a System",
+        )
+    if chart.locks or chart.sets_velocity:
+        why = (
+            "it locks the contact, and the force of a lock depends on the masses that it holds"
+            if chart.locks
+            else "it sets the velocity, which your loop owns"
+        )
+        raise ParameterError(
+            why,
+            place=here,
+            advice="put it into a System, or use a chart without locks, such as GMS or LuGre",
+        )
+    if not isinstance(given, Contact):
+        return Contact("friction", given)
+    if given.period is not None:
+        raise ParameterError(
+            f"it has a period of {given.period!r} s",
+            place=f"contact {given.name!r}",
+            advice="leave it out, and call the contact at the ticks of your loop",
+        )
+    # Its x is the integral of the velocity given; the bodies of its system are not here.
+    inputs = {name: text for name, text in given.inputs.items() if name != "x"}
+    return given.replaced(v=("v",), inputs=inputs)
+
+
+def other_inputs(contact: Contact) -> list[str]:
+    """Return what the texts of a contact name, except what it knows by itself."""
+    named = dict.fromkeys([*contact.chart.inputs, *contact.inputs])
+    texts = [contact.inputs.get(name, name) for name in named if name != "s"]
+    found = dict.fromkeys(name for text in texts for name in WORD.findall(str(text)))
+    return [name for name in found if name not in {*GIVEN, *FUNCTIONS, *CONSTANTS}]

@@ -1,0 +1,153 @@
+"""What happened over time, as plain data: states, velocity and force, firings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gms_fsm.session.session import Fired, Session
+from gms_fsm.session.tree.branch import Branch
+
+__all__ = ["EventView", "Ribbons", "curves", "events", "ribbons"]
+
+
+@dataclass(frozen=True)
+class Ribbons:
+    """The states of all elements over time.
+
+    Parameters
+    ----------
+    start, end : float
+        Start and end time, s.
+    modes : tuple of (tuple of int or None)
+        State index of each element, for equal parts of that time; None where the branch has not
+        been computed.
+    now : int
+        The part that contains the cursor.
+    """
+
+    start: float
+    end: float
+    modes: tuple[tuple[int, ...] | None, ...]
+    now: int
+
+
+@dataclass(frozen=True)
+class EventView:
+    """One firing.
+
+    Parameters
+    ----------
+    row : int
+        The row it made.
+    t : float
+        Time, s.
+    fired : Fired
+        What fired.
+    """
+
+    row: int
+    t: float
+    fired: Fired
+
+
+def ribbons(
+    session: Session,
+    parts: int,
+    *,
+    branch: int | None = None,
+    span: tuple[float, float] | None = None,
+) -> Ribbons:
+    """Return the states of all elements over time.
+
+    Parameters
+    ----------
+    session : Session
+        The session.
+    parts : int
+        Number of equal parts of the time span.
+    branch : int, optional
+        Number of the branch; the current one if omitted.
+    span : tuple of float, optional
+        Start and end time, s; those of the run if omitted.
+
+    Returns
+    -------
+    Ribbons
+        The states in the middle of each part.
+    """
+    start, end = span or (session.branch.raw(0).t, session.t_end)
+    shown = session.tree.branch(branch)
+    rows = _sampled(shown, start, end, parts)
+    modes = tuple(None if row is None else shown.raw(row).mode for row in rows)
+    now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
+    return Ribbons(start, end, modes, now)
+
+
+def _sampled(branch: Branch, start: float, end: float, parts: int) -> list[int | None]:
+    """Return the row in the middle of each part of a time span; None where none is known."""
+    rows: list[int | None] = []
+    for part in range(parts):
+        row = branch.row_at(start + (end - start) * (part + 0.5) / parts)
+        # The states of the last row are known only up to its time.
+        reached = row + 1 < len(branch) or branch.ended
+        rows.append(row if row >= 0 and reached else None)
+    return rows
+
+
+def curves(
+    session: Session, machine: int, parts: int, span: tuple[float, float]
+) -> dict[str, tuple[float | None, ...]]:
+    """Return velocity and force of a contact over time.
+
+    Parameters
+    ----------
+    session : Session
+        The session.
+    machine : int
+        An element of the contact, counted over all contacts from 0.
+    parts : int
+        Number of equal parts of the time span.
+    span : tuple of float
+        Start and end time, s.
+
+    Returns
+    -------
+    dict of str to tuple
+        ``v``, m/s, and ``F``, N: the last row before the middle of each part; None where the
+        branch has not been computed.
+    """
+    branch, contact = session.branch, session.start.program.layout.bank(machine).name
+    found: dict[str, list[float | None]] = {"v": [], "F": []}
+    for row in _sampled(branch, *span, parts):
+        scope = None if row is None else branch.scope(branch.raw(row), contact)
+        for name, values in found.items():
+            values.append(None if scope is None else getattr(scope, name))
+    return {name: tuple(values) for name, values in found.items()}
+
+
+def events(session: Session, *, ahead: bool = False) -> tuple[EventView, ...]:
+    """Return the firings of the current branch, in the order of their rows.
+
+    Parameters
+    ----------
+    session : Session
+        The session.
+    ahead : bool
+        Whether to include those computed after the cursor.
+
+    Returns
+    -------
+    tuple of EventView
+        All firings up to the cursor.
+    """
+    branch = session.branch
+    rows = branch.firing_rows(len(branch) if ahead else branch.cursor + 1)
+    log = branch.log()  # one record for each of these rows
+    return tuple(
+        EventView(
+            row,
+            record.t,
+            Fired(record.element, record.edge, record.source, record.target, record.contact),
+        )
+        for row, record in zip(rows, log, strict=False)
+    )

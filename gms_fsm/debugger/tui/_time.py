@@ -1,0 +1,147 @@
+"""States, velocity and force over time, drawn in text with an axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from gms_fsm.debugger._over_time import Ribbons
+from gms_fsm.debugger._text import short
+from gms_fsm.debugger._view import ContactView, View
+from gms_fsm.debugger.tui._spans import Line, Row, Span, line, state_role
+from gms_fsm.foundation.quantities import quantity, sparkline
+
+__all__ = ["RIBBON", "axis", "curve_rows", "labels", "ranges", "ribbon_rows"]
+
+RIBBON = "─▓═┼▒┄"  # one mark per state, as at the line prompt
+UNITS = {"v": "m/s", "F": "N"}
+
+
+def labels(contacts: Sequence[ContactView]) -> list[str]:
+    """Return the label of each element: ``E1``, in a system ``gear 1``."""
+    return [
+        f"{contact.name} {each.number}" if contact.name else f"E{each.number}"
+        for contact in contacts
+        for each in contact.elements
+    ]
+
+
+def axis(start: float, end: float, width: int) -> str:
+    """Return times at round values below a strip of characters.
+
+    >>> axis(0.0, 100.0, 40)
+    '0 s                 50 s               '
+    """
+    rough = (end - start) / max(2, width // 10)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(m * power for m in (1, 2, 5, 10) if m * power >= rough)
+    text, k = "", math.ceil(start / step - 1e-9)
+    while k * step <= end:
+        column = int(width * (k * step - start) / (end - start))
+        label = f"{k * step:.6g} s"
+        if column >= len(text) + bool(text) and column + len(label) <= width:
+            text = text.ljust(column) + label
+        k += 1
+    return text.ljust(width - 1)
+
+
+def ribbon_rows(
+    ribbons: Ribbons, parent: Ribbons | None, view: View, chosen: int, lead: int
+) -> list[Row]:
+    """Return the states of all elements over time; the cursor is a column.
+
+    Parameters
+    ----------
+    ribbons : Ribbons
+        Of the current branch.
+    parent : Ribbons or None
+        Of the branch to compare with, over the same time.
+    view : View
+        The screen.
+    chosen : int
+        The marked element.
+    lead : int
+        Columns of the labels.
+
+    Returns
+    -------
+    list of Row
+        One per element; with a parent, a last one that marks where any state differs.
+    """
+    rows = []
+    states = [each.state for each in view.elements]
+    roles = [
+        state_role([state.name for state in contact.chart.states].index(each.state))
+        for contact in view.contacts
+        for each in contact.elements
+    ]
+    for i, label in enumerate(labels(view.contacts)):
+        mark = "▶" if i == chosen else " "
+        wide = max(2, lead - 2 - min(9, max(map(len, states))))
+        text = f"{mark}{short(label, wide):<{wide}}"
+        spans = [Span(text, "head" if i == chosen else "")]
+        room = lead - len(text) - 1
+        spans.append(Span(f"{short(states[i], room):<{room}} ", roles[i]))
+        for part, mode in enumerate(ribbons.modes):
+            shown = " " if mode is None else RIBBON[mode[i] % len(RIBBON)]
+            role = "dim" if mode is None else state_role(mode[i])
+            spans.append(Span("┃", "now") if part == ribbons.now else Span(shown, role))
+        rows.append(Row(_joined(spans)))
+    if parent is not None:
+        marks = [
+            "≠" if None not in (a, b) and a != b else " "
+            for a, b in zip(ribbons.modes, parent.modes, strict=True)
+        ]
+        rows.append(Row(line((f"{' differs':<{lead}}", "dim"), ("".join(marks), "fired"))))
+    return rows
+
+
+def _joined(spans: Sequence[Span]) -> Line:
+    """Return spans with neighbours of the same role as one."""
+    found: list[Span] = []
+    for span in spans:
+        if found and found[-1].role == span.role:
+            found[-1] = Span(found[-1].text + span.text, span.role)
+        else:
+            found.append(span)
+    return found
+
+
+def ranges(values: Mapping[str, Sequence[float | None]]) -> str:
+    """Return the ranges of velocity and force.
+
+    >>> ranges({"v": (0.0, None, 0.15), "F": (1.0, 2.0)})
+    'v 0 m/s to 150.0 mm/s  F 1.000 N to 2.000 N'
+    """
+    found = []
+    for name, each in values.items():
+        known = [value for value in each if value is not None and math.isfinite(value)]
+        if known:
+            low, high = (quantity(value, UNITS[name]) for value in (min(known), max(known)))
+            found.append(f"{name} {low} to {high}")
+    return "  ".join(found)
+
+
+def curve_rows(values: Mapping[str, Sequence[float | None]], lead: int, now: int) -> list[Row]:
+    """Return velocity and force over time as sparklines; `ranges` says what they span.
+
+    Parameters
+    ----------
+    values : dict
+        From `gms_fsm.debugger._view.curves`.
+    lead : int
+        Columns of the label.
+    now : int
+        The part that contains the cursor.
+
+    Returns
+    -------
+    list of Row
+        One per name.
+    """
+    rows = []
+    for name, each in values.items():
+        text = sparkline(each)
+        spans = [Span(f" {name:<{lead - 1}}"), Span(text[:now], "dim")]
+        rows.append(Row([*spans, Span(text[now : now + 1], "now"), Span(text[now + 1 :], "dim")]))
+    return rows

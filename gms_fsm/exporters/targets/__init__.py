@@ -1,0 +1,1 @@
+"""One module for each format; all of them are found here."""

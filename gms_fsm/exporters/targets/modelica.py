@@ -1,0 +1,317 @@
+"""Format ``modelica``: a model whose switches are events."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+
+from gms_fsm.exporters._names import check_functions, identifier
+from gms_fsm.exporters._readme import about_friction
+from gms_fsm.exporters._subject import Subject
+from gms_fsm.exporters.plain.element import NamedFriction
+from gms_fsm.exporters.plain.parts import Constant, Leaving
+from gms_fsm.exporters.plain.walker import indented
+from gms_fsm.formats import Format, register
+from gms_fsm.language import (
+    MODELICA,
+    Both,
+    Condition,
+    Either,
+    Node,
+    Requirement,
+    Split,
+    Value,
+    renamed,
+    spell,
+    split,
+)
+
+__all__ = ["WORDS", "modelica"]
+
+# Keywords of the Modelica language 3.6 (2.3.3), its built-in types, functions and operators.
+WORDS = frozenset(
+    re.findall(
+        r"\w+",
+        """
+        algorithm and annotation block break class connect connector constant constrainedby der
+        discrete each else elseif elsewhen encapsulated end enumeration equation expandable extends
+        external false final flow for function if import impure in initial inner input loop model
+        not operator or outer output package parameter partial protected public pure record
+        redeclare replaceable return stream then true type when while within
+        Boolean Clock ExternalObject Integer Real StateSelect String time
+        abs acos actualStream array asin assert atan atan2 backSample cardinality cat ceil change
+        cos cosh cross delay diagonal div edge exp fill firstTick floor getInstanceName hold
+        homotopy identity inStream integer interval linspace log log10 matrix max min mod ndims
+        noClock noEvent ones outerProduct pre previous product reinit rem rooted sample scalar
+        semiLinear shiftSample sign sin sinh size skew smooth spatialDistribution sqrt subSample sum
+        superSample symmetric tan tanh terminal terminate transpose vector zeros
+        """,
+    )
+)
+
+
+def modelica(subject: Subject) -> dict[str, str]:
+    """Return a friction as a Modelica model.
+
+    Parameters
+    ----------
+    subject : Subject
+        One friction, whose velocity is an input.
+
+    Returns
+    -------
+    dict of str to str
+        ``<name>.mo`` and ``README-<name>-modelica.md``.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be expressed; what is in the way is named.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> text = modelica(Subject.of(model, "modelica", name="gms"))["gms.mo"]
+    >>> "when pre(state) == 1 and z >= s and v > v_c then" in text
+    True
+    """
+    printer = ModelOfElements(subject)
+    return {
+        f"{subject.name}.mo": printer.text(),
+        f"README-{subject.name}-modelica.md": printer.readme(),
+    }
+
+
+class ModelOfElements:
+    """Prints a friction as a model of its elements."""
+
+    def __init__(self, subject: Subject) -> None:
+        self.name = identifier(subject.name, WORDS, f"name {subject.name!r}")
+        self.element = element = NamedFriction.of(subject, WORDS, time=False)
+        element.check_name(self.name)
+        # A class of its own: Rumoca 0.10 counts equations of arrays of nested classes twice.
+        self.kind, self.one = f"{self.name}_element", element.free("element")
+        self.part = element.free("F_i")
+        self.starts = {e.name: element.free(f"{e.name}_start") for e in element.variables}
+        used = [state.flow_names | state.guard_names for state in element.states]
+        every = frozenset[str]().union(*used)
+        self.own_lets = element.needed(every, per_element=True)
+        self.shared_lets = element.needed(every | element.total.names, per_element=False)
+        self.inside = every.union(*(each.value.names for each in self.own_lets))
+        total = f"sum({self.one}.{self.part})" if element.n > 1 else f"{self.one}.{self.part}"
+        self.texts = {"t": "time"}
+        self.total = {"t": "time", "F": total}
+        check_functions(element.trees, MODELICA, f"chart {subject.title!r}", "Modelica")
+
+    def spell(self, node: Node) -> str:
+        return spell(node, MODELICA, self.texts)
+
+    # ------------------------------------------------------------------ the whole
+    def text(self) -> str:
+        element = self.element
+        constants = [self.constant(each) for each in element.constants]
+        lines = [*self.one_element(), "", f"model {self.name} {_string(element.title)}"]
+        lines += _inside([f"input Real {name}{_comment(about)};" for name, about in element.inputs])
+        lines += _inside(['output Real F "N: friction force";', *constants])
+        if element.position:
+            start = MODELICA.number(element.position_start)
+            declared = f'Real {element.position}(start = {start}, fixed = true) "m: position";'
+            lines += _inside([declared])
+        size = f"[{element.n}]" if element.n > 1 else ""
+        lines += _inside([f"{self.kind} {self.one}{size}({self.given()});"])
+        lines += ["protected"] * bool(self.shared_lets)
+        lines += _inside(f"Real {e.name}{_comment(e.about)};" for e in self.shared_lets)
+        lines += ["equation", *_inside(self.equations())]
+        return "\n".join([*lines, f"end {self.name};"]) + "\n"
+
+    def constant(self, constant: Constant) -> str:
+        value, number = constant.value, MODELICA.number
+        if isinstance(value, tuple):
+            numbers = ", ".join(map(number, value))
+            text = f"{constant.name}[{len(value)}] = {{{numbers}}}"
+        else:
+            text = f"{constant.name} = {number(value)}"
+        return f"parameter Real {text}{_comment(constant.about)};"
+
+    def passed(self) -> list[str]:
+        """Return what elements are given as inputs: those of the friction, and what is shared."""
+        names = [name for name, _ in self.element.inputs]
+        names += [self.element.position] * bool(self.element.position)
+        names += [each.name for each in self.shared_lets]
+        return [name for name in names if name in self.inside]
+
+    def given(self) -> str:
+        """Return the numbers that elements are given."""
+        several = self.element.n > 1
+        found = [f"{'each ' * several}{name} = {name}" for name in self.passed()]
+        for each in self.element.constants:
+            if each.name in self.inside:
+                word = "each " if several and not isinstance(each.value, tuple) else ""
+                found.append(f"{word}{each.name} = {each.name}")
+        number = MODELICA.number
+        for variable in self.element.variables:
+            numbers = list(map(number, variable.start))
+            text = f"{{{', '.join(numbers)}}}" if several else numbers[0]
+            found.append(f"{self.starts[variable.name]} = {text}")
+        if len(self.element.states) > 1:
+            states = [str(index + 1) for index in self.element.start]
+            found.append(f"state_start = {'{' + ', '.join(states) + '}' if several else states[0]}")
+        return ", ".join(found)
+
+    def equations(self) -> list[str]:
+        element = self.element
+        lines = [f"{each.name} = {self.spell(each.value.tree)};" for each in self.shared_lets]
+        if element.position:
+            lines.append(f"der({element.position}) = {element.inputs[0][0]};")
+        return [*lines, f"F = {spell(element.total.tree, MODELICA, self.total)};"]
+
+    # ------------------------------------------------------------------ one element
+    def one_element(self) -> list[str]:
+        element = self.element
+        lines = [f'model {self.kind} "One element of {self.name}"']
+        inner = [f"input Real {name};" for name in self.passed()]
+        inner.append(f'output Real {self.part} "N: force of the element";')
+        inner += [
+            f"parameter Real {each.name}{_comment(each.about)};"
+            for each in element.constants
+            if each.name in self.inside
+        ]
+        for variable in element.variables:
+            start = self.starts[variable.name]
+            inner.append(f"parameter Real {start} = 0.0;")
+            declared = f"Real {variable.name}(start = {start}, fixed = true)"
+            inner.append(f"{declared}{_comment(variable.about)};")
+        if len(element.states) > 1:
+            names = ", ".join(f"{k} {each.name}" for k, each in enumerate(element.states, 1))
+            inner.append("parameter Integer state_start = 1;")
+            inner.append(f'Integer state(start = state_start, fixed = true) "{names}";')
+        rates = [each for each in element.variables if self.reads(each.rate)]
+        protected = [f"Real {each.name}{_comment(each.about)};" for each in self.own_lets]
+        protected += [f"Real {each.rate};" for each in rates]
+        lines += _inside(inner)
+        lines += ["protected", *_inside(protected)] if protected else []
+        body = [f"{each.name} = {self.spell(each.value.tree)};" for each in self.own_lets]
+        for each in element.variables:
+            flow = self.by_state([state.rates[each.name].tree for state in element.states])
+            if each in rates:
+                body += [f"{each.rate} = {flow};", f"der({each.name}) = {each.rate};"]
+            else:
+                body.append(f"der({each.name}) = {flow};")
+        force = self.by_state([state.force.tree for state in element.states])
+        body += [f"{self.part} = {force};", *self.switches()]
+        return [*lines, "equation", *_inside(body), f"end {self.kind};"]
+
+    def reads(self, rate: str) -> bool:
+        return any(rate in state.force.names for state in self.element.states)
+
+    def by_state(self, trees: list[Value]) -> str:
+        """Spell a value that depends on the state."""
+        if len(dict.fromkeys(trees)) == 1:
+            return self.spell(trees[0])
+        text = ""
+        for number, tree in enumerate(trees[:-1], 1):
+            text += f"{'else' * bool(text)}if state == {number} then {self.spell(tree)} "
+        return f"{text}else {self.spell(trees[-1])}"
+
+    def switches(self) -> list[str]:
+        """Spell the edges: the first one whose guard becomes true."""
+        lines, word, several = list[str](), "when", len(self.element.states) > 1
+        for number, state in enumerate(self.element.states, 1):
+            for edge in state.edges:
+                source = f"pre(state) == {number} and " if several else ""
+                lines.append(f"{word} {source}{self.guard(edge.guard)} then  // {edge.name}")
+                lines += _inside([f"state = {edge.target + 1};"] * several + self.resets(edge))
+                word = "elsewhen"
+        return [*lines, "end when;"] if lines else []
+
+    def guard(self, condition: Condition) -> str:
+        """Spell a guard by comparisons without abs: a narrow window is then not stepped over."""
+        text = self.spell(_joined(split(condition)))
+        return f"({text})" if " or " in text else text
+
+    def resets(self, edge: Leaving) -> list[str]:
+        """Spell assignments, all over the values before the edge."""
+        now: dict[str, Value] = {}
+        for name, tree in edge.steps:
+            now[name] = renamed(tree, now)
+        before = {each.name: f"pre({each.name})" for each in self.element.variables}
+        texts: Mapping[str, str] = self.texts | before
+        return [f"reinit({name}, {spell(tree, MODELICA, texts)});" for name, tree in now.items()]
+
+    # ------------------------------------------------------------------ for people
+    def readme(self) -> str:
+        name = self.name
+        wires = "".join(f" friction.{each} = ...;" for each, _ in self.element.inputs[1:])
+        return f"""\
+# {self.element.title} as a Modelica model
+
+- {name}.mo: the model `{name}`, and `{self.kind}`, of which it is made; no library is needed
+
+## How to run it
+
+Load {name}.mo into a Modelica tool, and use the model in another one:
+
+    model Test
+      {name} friction;
+    equation
+      friction.v = 0.1 * sin(time);{wires}
+    end Test;
+
+It has been simulated by Rumoca (`pip install rumoca`), in Python:
+
+    import rumoca
+    model = rumoca.Session().loads(text_of_both_models, model="Test")
+    config = rumoca.SimConfig(rtol=1e-9, atol=1e-14)
+    result = model.simulate((0.0, 10.0), dt=0.01, config=config)
+    result["friction.F"]
+
+Deflections are small: in every tool, choose an absolute tolerance far below them. pymoca has parsed
+the text; no other tool has run it.
+
+## What it computes
+
+{about_friction(self.element)}
+Guards are conditions of when-clauses, so the tool locates the switches; corners and jumps of the
+flow are if-expressions, which it locates too.
+
+## What it does not do
+
+A when-clause sees its condition become true. A guard that is true at the very beginning is taken
+only after it has been false.
+"""
+
+
+def _joined(part: Split) -> Condition:
+    """Return a split condition as a condition again."""
+    if isinstance(part, Requirement):
+        return part.relation
+    word, parts = part
+    operands = tuple(map(_joined, parts))
+    return Both(operands) if word == "both" else Either(operands)
+
+
+def _string(text: str) -> str:
+    clean = re.sub(r"\s+", " ", text).replace("\\", "/").replace('"', "'")
+    return f'"{clean}"'
+
+
+def _inside(lines: Iterable[str]) -> list[str]:
+    return indented(lines, "  ")
+
+
+def _comment(text: str) -> str:
+    return f" {_string(text)}" if text else ""
+
+
+register(
+    Format(
+        "modelica",
+        "friction",
+        "a Modelica model with events",
+        "gms-fsm",
+        modelica,
+        words=WORDS,
+        takes=("initial", "t_start"),
+    )
+)

@@ -1,0 +1,280 @@
+"""Format ``st``: the plain form as IEC 61131-3 structured text, a function block for a PLC."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._names import check_functions, identifier
+from gms_fsm.exporters._readme import about_friction
+from gms_fsm.exporters._subject import Subject
+from gms_fsm.exporters.plain.element import NamedFriction
+from gms_fsm.exporters.plain.form import PlainForm, declared, plain_form
+from gms_fsm.exporters.plain.parts import Constant
+from gms_fsm.exporters.plain.walker import Forms, Walker, indented
+from gms_fsm.formats import Format, register
+from gms_fsm.language import STRUCTURED_TEXT
+
+__all__ = ["WORDS", "structured_text"]
+
+# Keywords and elementary types of IEC 61131-3 (third edition), standard functions and function
+# blocks. The letters of instruction lists and of action qualifiers (S, R, N ...) are names in
+# structured text.
+WORDS = frozenset(
+    re.findall(
+        r"\w+",
+        """
+    ABS ABSTRACT ACOS ACTION ADD AND ANY ANY_BIT ANY_DATE ANY_DERIVED ANY_ELEMENTARY ANY_INT
+    ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_STRING ARRAY ASIN AT ATAN ATAN2 BOOL BY BYTE CASE CHAR CLASS
+    CONCAT CONFIGURATION CONSTANT CONTINUE COS CTD CTU CTUD DATE DATE_AND_TIME DELETE DINT DIV DO DT
+    DWORD ELSE ELSIF END_ACTION END_CASE END_CLASS END_CONFIGURATION END_FOR END_FUNCTION
+    END_FUNCTION_BLOCK END_IF END_INTERFACE END_METHOD END_NAMESPACE END_PROGRAM END_PROPERTY
+    END_REPEAT END_RESOURCE END_STEP END_STRUCT END_TRANSITION END_TYPE END_UNION END_VAR END_WHILE
+    EN ENO EQ EXIT EXP EXPT EXTENDS FALSE FINAL FIND FOR FROM FUNCTION FUNCTION_BLOCK F_EDGE F_TRIG
+    GE GOTO GT IF IMPLEMENTS INITIAL_STEP INSERT INT INTERFACE INTERNAL INTERVAL LDATE
+    LDATE_AND_TIME LDT LE LEFT LEN LIMIT LINT LN LOG LREAL LT LTIME LTIME_OF_DAY LTOD LWORD MAX
+    METHOD MID MIN MOD MOVE MUL MUX NAMESPACE NE NON_RETAIN NOT NULL OF ON OR OVERLAP OVERRIDE
+    POINTER PRIORITY PRIVATE PROGRAM PROPERTY PROTECTED PUBLIC READ_ONLY READ_WRITE REAL REF
+    REFERENCE REF_TO REPEAT REPLACE RESOURCE RETAIN RETURN RIGHT ROL ROR RS R_EDGE R_TRIG SEL SHL
+    SHR SIN SINGLE SINT SQRT SR STEP STRING STRUCT SUB SUPER TAN TASK THEN THIS TIME TIME_OF_DAY TO
+    TOD TOF TON TP TRANSITION TRUE TRUNC TYPE UDINT UINT ULINT UNION UNTIL USING USINT VAR
+    VAR_ACCESS VAR_CONFIG VAR_EXTERNAL VAR_GLOBAL VAR_INPUT VAR_IN_OUT VAR_OUTPUT VAR_TEMP WCHAR
+    WHILE WITH WORD WSTRING XOR
+    """,
+    )
+)
+SGN = """\
+FUNCTION {name} : LREAL
+VAR_INPUT
+    u : LREAL;
+END_VAR
+IF u > 0.0 THEN
+    {name} := 1.0;
+ELSIF u < 0.0 THEN
+    {name} := -1.0;
+ELSE
+    {name} := 0.0;
+END_IF;
+END_FUNCTION
+
+"""
+FORMS = Forms(
+    assign="{0} := {1};",
+    new="{0} := {1};",
+    load="{0} := {1};",
+    declare="",
+    first="IF {0} THEN",
+    then="ELSIF {0} THEN",
+    other="ELSE",
+    end="END_IF;",
+    loop="FOR {0} := 1 TO {1} DO",
+    end_loop="END_FOR;",
+    comment="(* {0} *)",
+    marks={"*)": "* )", "(*": "( *"},
+    nothing=";",
+)
+
+
+class _Words(frozenset[str]):
+    """Words that are the same in capitals and in small letters."""
+
+    def __contains__(self, word: object) -> bool:
+        return isinstance(word, str) and super().__contains__(word.upper())
+
+
+def structured_text(subject: Subject) -> dict[str, str]:
+    """Return the plain form of a friction as a function block.
+
+    Parameters
+    ----------
+    subject : Subject
+        One friction, whose velocity is an input.
+
+    Returns
+    -------
+    dict of str to str
+        ``<name>.st`` and ``README-<name>-st.md``.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be expressed; what is in the way is named.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> text = structured_text(Subject.of(model, "st", name="gms"))["gms.st"]
+    >>> "ELSIF z_i <= -s AND v < -v_c THEN" in text
+    True
+    """
+    printer = StructuredText(subject)
+    return {f"{subject.name}.st": printer.text(), f"README-{subject.name}-st.md": printer.readme()}
+
+
+class StructuredText:
+    """Prints the plain form of a friction."""
+
+    def __init__(self, subject: Subject) -> None:
+        name = subject.name
+        identifier(name.upper(), WORDS, f"name {name!r}")
+        self.name, element = name, NamedFriction.of(subject, WORDS, cases=False)
+        for each in (name, f"{name}_sgn"):
+            element.check_name(each, cases=False)
+        element = element.reserved(name, f"{name}_sgn")
+        self.form: PlainForm = plain_form(element, "cycle")
+        self.element = element.reserved(self.form.dt, self.form.part)
+        self.force = self.take("force")  # F would be the same as a chart's f
+        functions = {**STRUCTURED_TEXT.functions, "sgn": f"{name}_sgn({{0}})"}
+        self.dialect = replace(STRUCTURED_TEXT, functions=functions)
+        place = f"chart {subject.title!r}"
+        check_functions(element.trees, self.dialect, place, "structured text")
+        # One element needs no arrays and no loop.
+        self.i = self.take("i") if element.n > 1 else ""
+        at = f"[{self.i}]" if self.i else ""
+        self.now = {each.name: self.take(f"{each.name}_i") for each in element.variables if at}
+        self.state = self.take("state")
+        self.states = [self.take(f"STATE_{each.name.upper()}") for each in element.states]
+        self.walker = Walker(
+            FORMS,
+            self.dialect,
+            {
+                **{c.name: f"{c.name}{at}" for c in element.constants if c.several},
+                **self.now,
+                self.form.force: self.force,
+            },
+            [each.name for each in element.states],
+            test=lambda k: f"{self.state}{at} = {self.states[k]}",
+            enter=lambda k: f"{self.state}{at} := {self.states[k]};",
+            count=element.n,
+            index=self.i,
+            memory={name: f"{name}{at}" for name in self.now},
+        )
+        names = [*element.names, *self.states, *(each for each, _ in element.inputs), name]
+        for each in names:
+            if "__" in each or each.endswith("_"):
+                raise ParameterError(
+                    "structured text has no names with two underscores in a row or one at the end",
+                    place=f"chart {subject.title!r}, name {each!r}",
+                    advice="give it another name",
+                )
+
+    def take(self, name: str) -> str:
+        """Return a name that nothing else has, and is not given again."""
+        new = self.element.free(name)
+        self.element = self.element.reserved(new)
+        return new
+
+    # ------------------------------------------------------------------ the text
+    def text(self) -> str:
+        element, name = self.element, self.name
+        body = self.walker.lines(self.form.step)
+        inputs = [*element.inputs, (self.form.dt, "s: since the last call")]
+        lines = [
+            f"(* {FORMS.clean(element.title)}: the plain form, to be called once a cycle. *)",
+            f"FUNCTION_BLOCK {name}",
+            *_block("VAR_INPUT", (f"{each} : LREAL;{FORMS.note(about)}" for each, about in inputs)),
+            *_block("VAR_OUTPUT", [f"{self.force} : LREAL;  (* N: friction force *)"]),
+            *_block("VAR CONSTANT", self.constants()),
+            *_block("VAR", self.memory()),
+            *_block("VAR", self.locals()),
+            *body,
+            "END_FUNCTION_BLOCK",
+        ]
+        text = "\n".join(lines) + "\n"
+        return SGN.format(name=f"{name}_sgn") + text if f"{name}_sgn(" in text else text
+
+    def constants(self) -> Iterator[str]:
+        yield from map(self.constant, self.element.constants)
+        if len(self.element.states) > 1:
+            for index, name in enumerate(self.states):
+                yield f"{name} : INT := {index};"
+
+    def constant(self, constant: Constant) -> str:
+        value = constant.value
+        if isinstance(value, tuple):
+            return f"{constant.name} : {self.array('LREAL', value)};{FORMS.note(constant.about)}"
+        number = self.dialect.number(value)
+        return f"{constant.name} : LREAL := {number};{FORMS.note(constant.about)}"
+
+    def array(self, kind: str, values: Sequence[float | int]) -> str:
+        number = self.dialect.number
+        texts = [number(each) if isinstance(each, float) else str(each) for each in values]
+        if len(values) == 1:
+            return f"{kind} := {texts[0]}"
+        return f"ARRAY [1..{len(values)}] OF {kind} := [{', '.join(texts)}]"
+
+    def memory(self) -> Iterator[str]:
+        """Declare what is kept from call to call."""
+        element = self.element
+        for each in element.variables:
+            yield f"{each.name} : {self.array('LREAL', each.start)};{FORMS.note(each.about)}"
+        if element.position:
+            start = self.dialect.number(element.position_start)
+            yield f"{element.position} : LREAL := {start};  (* m: position *)"
+        if len(element.states) > 1:
+            yield f"{self.state} : {self.array('INT', element.start)};"
+
+    def locals(self) -> Iterator[str]:
+        """Declare what is computed in every call."""
+        if self.i:
+            yield f"{self.i} : INT;"
+        names = [each for each in declared(self.form.step) if each != self.form.force]
+        for name in (*self.now.values(), *names):
+            yield f"{name} : LREAL;"
+
+    # ------------------------------------------------------------------ for people
+    def readme(self) -> str:
+        name, element = self.name, self.element
+        inputs = "".join(f", {each} := ..." for each, _ in element.inputs[1:])
+        sgn = f" and the function {name}_sgn" if f"{name}_sgn(" in self.text() else ""
+        return f"""\
+# {element.title} as structured text (IEC 61131-3)
+
+- {name}.st: the function block {name}{sgn}
+
+## How to run it
+
+Import {name}.st into the project of a PLC, declare an instance, and call it once in every cycle of
+a task with a fixed interval:
+
+    VAR friction : {name}; END_VAR
+    friction(v := velocity{inputs}, {self.form.dt} := 0.001);
+    force := friction.{self.force};
+
+The compiler matiec 0.1 (`iec2c`) has translated it, and the result has run; blark has parsed it.
+No PLC has run it.
+
+## What it computes
+
+{about_friction(element)}
+Each call looks at every guard once, gives the force, and takes one explicit Euler step of length
+{self.form.dt} [s] with this velocity. These are the numbers of
+simulate(model, Prescribed(record), t_end, method="euler", step=..., events="step").
+
+## What it does not do
+
+Switches are seen at the next call, not where they happen, so the result is of first order in the
+cycle time. A velocity that passes through a narrow guard between two calls is not noticed.
+AND and OR may evaluate both sides.
+"""
+
+
+def _block(head: str, lines: Iterable[str]) -> list[str]:
+    inner = indented(lines)
+    return [head, *inner, "END_VAR"] if inner else []
+
+
+register(
+    Format(
+        "st",
+        "friction",
+        "IEC 61131-3 structured text, the plain form",
+        "gms-fsm",
+        structured_text,
+        words=_Words(WORDS),
+        takes=("initial", "t_start"),
+    )
+)

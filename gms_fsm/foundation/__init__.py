@@ -1,0 +1,1 @@
+"""What knows nothing of friction: arguments, files, extras, tables, displays."""

@@ -1,0 +1,337 @@
+"""Tables of files as pydantic models, and the error in a table in one sentence.
+
+The sentence gives key, value, rule, and the nearest key; it names no file.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
+
+from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, shown
+from gms_fsm.foundation.files import output_folder, write_whole
+from gms_fsm.foundation.toml import LARGEST_FILE, Key, data_of, line_of, override, text_of, written
+
+__all__ = [
+    "LIST",
+    "ONE",
+    "TABLE",
+    "TEXT",
+    "Numbers",
+    "Table",
+    "Texts",
+    "Value",
+    "built",
+    "explained",
+    "read_file",
+    "write_file",
+]
+
+# Tags of union members in pydantic's errors; no key of a file looks like these.
+ONE, LIST, TEXT, TABLE = "<one>", "<list>", "<text>", "<table>"
+
+
+class Table(BaseModel):
+    """A table of a file, without unknown keys or type conversions."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+def _form(given: Any) -> str:
+    return LIST if isinstance(given, list) else ONE
+
+
+def _kind(given: Any) -> str:
+    return TEXT if isinstance(given, str) else ONE
+
+
+# A number, or one per element; one text or several; an expression or a number.
+Numbers = Annotated[
+    Annotated[float, Tag(ONE)] | Annotated[list[float], Tag(LIST)], Discriminator(_form)
+]
+Texts = Annotated[Annotated[str, Tag(ONE)] | Annotated[list[str], Tag(LIST)], Discriminator(_form)]
+Value = Annotated[Annotated[str, Tag(TEXT)] | Annotated[float, Tag(ONE)], Discriminator(_kind)]
+
+Kind = TypeVar("Kind", bound=BaseModel)
+Made = TypeVar("Made")
+
+
+# --------------------------------------------------------------------------- files
+def read_file(
+    path: Path,
+    kind: type[Kind],
+    error: type[GMSError],
+    build: Callable[[Kind], Made],
+    overrides: Sequence[str] = (),
+) -> Made:
+    """Read what a TOML file describes.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : type of Table
+        What it must contain.
+    error : type of GMSError
+        The class of error to raise for a file that is not such a table.
+    build : callable
+        ``build(table)`` returns the object; the part at fault is the `GMSError.key` of its errors.
+    overrides : sequence of str
+        Keys to change, as in `gms_fsm.foundation.toml.override`.
+
+    Returns
+    -------
+    object
+        From `build`.
+
+    Raises
+    ------
+    GMSError
+        Naming file, line, key, and what is wrong.
+    """
+    text = text_of(path, error)
+    data = data_of(text, path, error)
+    replaced = [override(data, each) for each in overrides]
+
+    def place_of(key: Key) -> list[str]:
+        """Return where a key is given: on a line, or by an override."""
+        if any(key[: len(each)] == each for each in replaced):
+            return ["--set"]
+        line = line_of(text, key)
+        return [f"line {line}"] if line else []
+
+    try:
+        table = kind.model_validate(data)
+    except ValidationError as found:
+        key, sentence = explained(found, data, kind)
+        raise error(": ".join([*place_of(key), sentence]), place=str(path)) from None
+    try:
+        return build(table)
+    except GMSError as found:
+        key = _key_in_file(found.key, data, kind)
+        place = place_of(key)
+        place += [".".join(map(str, key))] if key else []
+        raise (found.inside(", ".join(place)) if place else found).inside(path) from None
+
+
+def write_file(path: Path, table: Table) -> Path:
+    """Write a table to a TOML file, whole.
+
+    Parameters
+    ----------
+    path : Path
+        File name ending in ``.toml``.
+    table : Table
+        Keys with their default values are left out.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written, has another ending, or exists and is not as gms-fsm wrote it.
+    """
+    if path.suffix != ".toml":
+        raise OutputError(f"its name must end in .toml, not {path.suffix!r}", place=str(path))
+    text = written(table.model_dump(by_alias=True, exclude_defaults=True))
+    try:
+        raw = text.encode()
+    except UnicodeEncodeError as error:
+        found = shown(error.object[error.start : error.end])
+        raise OutputError(
+            f"a text has the character {found}, which no file can store", place=str(path)
+        ) from None
+    if len(raw) > LARGEST_FILE:
+        raise OutputError(
+            f"it would have {len(raw)} bytes, and at most {LARGEST_FILE} can be read",
+            place=str(path),
+            advice="give long signals as expressions",
+        )
+    output_folder(path.parent, [path.name])
+    return write_whole(path, lambda file: file.write(raw))
+
+
+def built(make: Callable[..., Made], *key: str | int, **given: Any) -> Made:
+    """Return what a function makes; its errors name a part of something larger.
+
+    Parameters
+    ----------
+    make : callable
+        Such as a class.
+    *key : str or int
+        The part: ``"states", 2``.
+    **given : object
+        Arguments of `make`.
+
+    Returns
+    -------
+    object
+        From `make`.
+
+    Raises
+    ------
+    GMSError
+        As `make` does, with `key` before its own key.
+    """
+    try:
+        return make(**given)
+    except GMSError as error:
+        raise error.replaced(key=(*key, *error.key)) from None
+
+
+def _key_in_file(key: Key, given: Any, root: type[BaseModel]) -> Key:
+    """Return the key of a part as the file has it: with aliases, and no deeper than its tables."""
+    options, found, data = [root], list[str | int](), given
+    for part in key:
+        if not isinstance(data, dict | list):
+            break
+        name = part
+        if isinstance(part, str) and options:
+            field = _fitting(options, data).model_fields.get(part)
+            options = [] if field is None else _tables_in(field.annotation)
+            if field is not None and field.alias in data:
+                name = field.alias or part
+        found.append(name)
+        try:
+            data = _inside(data, name)
+        except (LookupError, TypeError):
+            break
+    return tuple(found)
+
+
+# --------------------------------------------------------------------------- errors
+def explained(
+    error: ValidationError, data: dict[str, Any], root: type[BaseModel]
+) -> tuple[Key, str]:
+    """Describe the first validation error in one sentence, and count the others.
+
+    Parameters
+    ----------
+    error : ValidationError
+        The errors found by pydantic.
+    data : dict
+        Contents of the file.
+    root : type of Table
+        What the file was checked against.
+
+    Returns
+    -------
+    tuple, str
+        The key; and the sentence: key, value, rule, and the nearest valid key for a mistyped one.
+    """
+    findings = error.errors(include_url=False)
+    # An unknown key is often the cause of a missing one, so report it first.
+    first = min(findings, key=lambda f: f["type"] != "extra_forbidden")
+    places = _written_key(first["loc"], data)
+    rest = len(findings) - 1
+    sentence = _sentence(first, places, data, root) + (f" (and {rest} more)" if rest else "")
+    tag = first.get("ctx", {}).get("discriminator", "").strip("'")
+    return (*places, tag) if tag else places, sentence
+
+
+def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseModel]) -> str:
+    key = cut(".".join(map(str, places)))
+    value, kind = first.get("input"), first["type"]
+    if kind == "extra_forbidden":
+        valid = _valid_keys(places[:-1], data, root)
+        wanted = str(places[-1])[:LONGEST_SHOWN]
+        near = difflib.get_close_matches(wanted, valid, n=1) or _elsewhere(wanted, data, root)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        return f"{key} = {shown(value)}: unknown key; {hint}valid here: {', '.join(valid)}"
+    if kind == "missing":
+        return f"{key} is missing"
+    if kind == "union_tag_not_found":
+        return f"{key}.kind is missing"
+    if kind == "union_tag_invalid":
+        tag, allowed = first["ctx"]["discriminator"].strip("'"), first["ctx"]["expected_tags"]
+        return f"{key}.{tag} = {shown(first['ctx']['tag'])}: it must be one of {allowed}"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return f"{key} = {shown(value)}: it must be a table, [{key}]"
+    text = first["msg"].removeprefix("Value error, ")
+    text = text.replace("Input should be", "it must be")
+    if isinstance(value, dict):
+        return f"[{key}] {text}" if key else text
+    return f"{key} = {shown(value)}: {text}"
+
+
+def _elsewhere(key: str, data: dict[str, Any], root: type[BaseModel]) -> list[str]:
+    """Return the most similar key of another table, with its table."""
+    tables = [
+        name
+        for name, field in root.model_fields.items()
+        if name in data or isinstance(field.default, BaseModel)
+    ]
+    places = {
+        name: f"{table}.{name}" for table in tables for name in _valid_keys((table,), data, root)
+    }
+    return [places[name] for name in difflib.get_close_matches(key, places, n=1)]
+
+
+def _written_key(loc: tuple[int | str, ...], data: Any) -> Key:
+    """Return the location of an error as the user wrote it, without the tags of union members."""
+    places: list[int | str] = []
+    for part in loc:
+        chosen = [data.get(key) for key in ("kind", "chart")] if isinstance(data, dict) else []
+        # The tags of our unions look like <this>; those of pydantic's are the value of a key.
+        if isinstance(part, str) and (part.startswith("<") or part in chosen):
+            continue
+        places.append(part)
+        inside = isinstance(data, dict) or (isinstance(data, list) and isinstance(part, int))
+        try:
+            data = data[part] if inside else None
+        except (LookupError, TypeError):
+            data = None
+    return tuple(places)
+
+
+def _inside(data: Any, part: str | int) -> Any:
+    return data[part]
+
+
+def _valid_keys(places: Key, data: dict[str, Any], root: type[BaseModel]) -> list[str]:
+    """Return the keys that are valid in a table of the file."""
+    options, table = [root], data
+    for place in places:
+        if not isinstance(place, int):
+            fields = _fitting(options, table).model_fields
+            named = {field.alias or name: field for name, field in fields.items()} | fields
+            if place not in named:
+                return []
+            options = _tables_in(named[place].annotation)
+            if not options:
+                return []
+        try:
+            table = _inside(table, place)
+        except (LookupError, TypeError):
+            table = {}
+    fields = _fitting(options, table).model_fields
+    return [field.alias or name for name, field in fields.items()]
+
+
+def _fitting(options: list[type[BaseModel]], table: Any) -> type[BaseModel]:
+    """Return the kind of a table, or the first kind if none fits."""
+    if isinstance(table, dict):
+        return next((each for each in options if _fits(each, table)), options[0])
+    return options[0]
+
+
+def _tables_in(annotation: Any) -> list[type[BaseModel]]:
+    """Return the tables allowed by an annotation, including those in unions."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [table for part in get_args(annotation) for table in _tables_in(part)]
+
+
+def _fits(option: type[BaseModel], table: dict[str, Any]) -> bool:
+    """Return whether a table of the file is of this kind, or for this chart."""
+    for key in ("kind", "chart"):
+        if key in option.model_fields:
+            return table.get(key) in get_args(option.model_fields[key].annotation)
+    return True

@@ -1,0 +1,466 @@
+"""Runs of one record under many numbers: the motion drives the model, the rows are those measured.
+
+A run that fails, or needs more steps than its budget, is lost; nothing else is. Every thread keeps
+its own buffers, so that runs can go side by side.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import GMSError, MissingExtraError, ParameterError, shown
+from gms_fsm.lowering.compiling import check_llvmlite
+from gms_fsm.lowering.program import Program, arguments, same_text
+from gms_fsm.records.record import Record
+from gms_fsm.run.problem import Start
+from gms_fsm.run.recording.compiled_run import CompiledRun
+from gms_fsm.run.settings import Settings
+from gms_fsm.run.simulate import Run
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.signals import Corners
+from gms_fsm.traces.observed import Observed
+from gms_fsm.traces.trace import Trace
+
+__all__ = [
+    "BEGINS",
+    "LOST",
+    "Course",
+    "Driver",
+    "Measured",
+    "Pool",
+    "Ran",
+    "course_of",
+    "driver_of",
+    "engine",
+    "with_numbers",
+]
+
+BEGINS = ("relaxed", "run in")
+COVERED = 0.9  # share of the travel that a run-in must cover
+NEAR = 0.02  # of the travel: where the motion is back at its start
+STEPS_PER_ROW = 60  # default budget of a run
+FEWEST_STEPS = 200_000
+MOST_KEPT = 32  # runs with their buffers, in each thread
+
+
+def engine() -> str:
+    """Return the fastest engine that is installed; all give the same numbers."""
+    try:
+        check_llvmlite()
+    except MissingExtraError:
+        return "ifelse"
+    return "compiled"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What of a run is compared with which column of the record.
+
+    Parameters
+    ----------
+    text : str
+        As the user gave it: ``"F"``, ``"gear.F"``, ``"load.x"``.
+    column : str
+        ``"force"``, ``"position"`` or ``"velocity"``.
+    contact : str
+        The contact whose force it is, if it is one.
+    body : str
+        The body whose position or velocity it is, if it is one.
+    """
+
+    text: str
+    column: str
+    contact: str = ""
+    body: str = ""
+
+    @classmethod
+    def of(cls, text: Any, subject: Mounted) -> Measured:
+        """Read what is measured; a `ParameterError` if the subject has no such thing."""
+        contacts, bodies = subject.contacts, subject.bodies
+        owner, _, which = text.rpartition(".") if isinstance(text, str) else ("", "", "")
+        if which == "F":
+            if not owner and len(contacts) <= 1:
+                return cls(text, "force", contact=subject.system.contacts[0].name)
+            if owner in contacts:
+                return cls(text, "force", contact=owner)
+        elif owner in bodies and which in ("x", "v"):
+            return cls(text, {"x": "position", "v": "velocity"}[which], body=owner)
+        known = ["F"] if len(contacts) <= 1 else []
+        known += [f"{name}.F" for name in contacts]
+        known += [f"{name}.{each}" for name in bodies for each in "xv"]
+        raise ParameterError(
+            f"there is nothing called {shown(text)} to compare with the record",
+            place="measured",
+            advice=f"it can be {', '.join(known)}",
+        )
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+        return {"force": "N", "position": "m", "velocity": "m/s"}[self.column]
+
+    def values(self, ran: Ran, program: Program | None = None) -> FloatArray:
+        """Return its values at the rows of a run, with the numbers of a program."""
+        program = ran.program if program is None else program
+        if self.body:
+            return np.asarray(
+                getattr(ran.trace.body(self.body), {"position": "x"}.get(self.column, "v"))
+            )
+        seen = Observed(program, ran.trace.rows, compiled=engine() == "compiled")
+        return seen[program.layout.contact(self.contact).of("F")]
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What one record makes a model do.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    t, v, x : ndarray, shape (rows,)
+        The motion at its rows: s, m/s, m.
+    measured : ndarray, shape (rows,)
+        What the model is compared with.
+    rows : ndarray of bool, shape (rows,)
+        The rows that count.
+    lead : tuple of ndarray
+        Times and velocities before the first row: the run-in; empty without one.
+    budget : int
+        Steps a run may take.
+    """
+
+    record: Record
+    t: FloatArray
+    v: FloatArray
+    x: FloatArray
+    measured: FloatArray
+    rows: NDArray[np.bool_]
+    lead: tuple[FloatArray, FloatArray]
+    budget: int
+
+    @cached_property
+    def signal(self) -> Corners:
+        """The velocity, with the run-in."""
+        times, values = self.lead
+        return Corners(
+            np.concatenate([times, self.t]), np.concatenate([values, self.v]), held=False
+        )
+
+    @cached_property
+    def acceleration(self) -> FloatArray:
+        """Of the motion at its rows, m/s^2."""
+        return np.gradient(self.v, self.t)
+
+    def thinned(self, every: int) -> Course:
+        """Return the same course with every n-th row only."""
+        if every <= 1:
+            return self
+        kept = slice(None, None, every)
+        times, values = self.lead
+        lead = times[::-1][every - 1 :: every][::-1], values[::-1][every - 1 :: every][::-1]
+        return replace(
+            self,
+            t=self.t[kept],
+            v=self.v[kept],
+            x=self.x[kept],
+            measured=self.measured[kept],
+            rows=self.rows[kept],
+            lead=lead,
+        )
+
+    def ended(self) -> Course:
+        """Return the same course up to the last row that counts."""
+        last = int(np.flatnonzero(self.rows)[-1]) + 1
+        cut = slice(None, last)
+        return replace(
+            self,
+            t=self.t[cut],
+            v=self.v[cut],
+            x=self.x[cut],
+            measured=self.measured[cut],
+            rows=self.rows[cut],
+        )
+
+
+def course_of(
+    record: Record,
+    column: str,
+    *,
+    rows: NDArray[np.bool_] | None,
+    smoothing: float | None,
+    begin: str,
+    most_steps: int | None,
+    seen: int | None = None,
+) -> Course:
+    """Return what a record makes a model do.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    column : str
+        What is compared; it need not be there if no rows count.
+    rows : ndarray of bool or None
+        The rows that count; None for those the record has selected.
+    smoothing : float or None
+        Of the motion, s.
+    begin : {"relaxed", "run in"}
+        What is before the first row.
+    most_steps : int or None
+        Budget of a run.
+    seen : int or None
+        Number of rows that a run-in is taken from; all of them by default.
+
+    Returns
+    -------
+    Course
+        The course.
+    """
+    motion = record.motion(smoothing)
+    nothing = np.empty(0)
+    first = slice(seen)
+    lead = None
+    if begin == "run in":
+        lead = _run_in(motion.time[first], motion.position[first], motion.velocity[first])
+    times, values = (nothing, nothing) if lead is None else lead
+    count = motion.time.size + times.size
+    return Course(
+        record,
+        motion.time,
+        motion.velocity,
+        motion.position,
+        record.columns.get(column, np.full(motion.time.size, np.nan)),
+        record.chosen if rows is None else rows & record.chosen,
+        (times, values),
+        max(FEWEST_STEPS, STEPS_PER_ROW * count) if most_steps is None else most_steps,
+    )
+
+
+def _run_in(t: FloatArray, x: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return times and velocities of a first pass, to put before the record.
+
+    It ends where the motion is back at its starting position in the same direction after covering
+    its travel, so that position and velocity continue; None if it never is, or begins at rest.
+    """
+    travel, fastest = float(np.ptp(x)), float(np.abs(v).max())
+    if travel == 0.0 or abs(v[0]) < 1e-2 * fastest:
+        return None
+    covered = np.maximum.accumulate(x) - np.minimum.accumulate(x) >= COVERED * travel
+    back = covered & (np.abs(x - x[0]) <= NEAR * travel) & (v * v[0] > 0.0)
+    found = np.flatnonzero(back)
+    if not found.size:
+        return None
+    # The nearest of the first passage.
+    passage = found[found < found[0] + max(2, t.size // 20)]
+    last = int(passage[np.argmin(np.abs(x[passage] - x[0]))])
+    if last < 2:
+        return None
+    return t[:last] - t[last] + t[0], v[:last]
+
+
+@dataclass(frozen=True, eq=False)
+class Ran:
+    """A run that reached its end.
+
+    Parameters
+    ----------
+    program : Program
+        With the numbers of the run.
+    trace : Trace
+        Its rows are those of the course.
+    """
+
+    program: Program
+    trace: Trace
+
+
+@dataclass(eq=False)
+class _Kept:
+    """The compiled run of a course in one thread, to be used again."""
+
+    course: Course
+    run: CompiledRun
+
+
+@dataclass(frozen=True, eq=False)
+class Driver:
+    """Runs a subject along courses.
+
+    Parameters
+    ----------
+    drive : str
+        The signal of a system that the record's velocity replaces; empty for a model, and for a
+        system that moves by itself.
+    rtol : float
+        Relative tolerance.
+    budgets : int
+        How many budgets of its course a run may take.
+    """
+
+    drive: str
+    rtol: float
+    budgets: int
+    _own: threading.local = field(default_factory=threading.local, repr=False)
+
+    def run(self, subject: Mounted, course: Course) -> Ran:
+        """Run; a `GMSError` if the numbers break a rule or the run fails."""
+        kept, what = self._runs.get(id(course)), self.driven(subject, course)
+        if kept is not None and same_text(kept.run.start.system, what.system):
+            kept.run.reset(what)
+            run: Run | CompiledRun = kept.run
+        else:
+            start = self.start(subject, course)
+            if start.chosen.engine == "compiled":
+                run = CompiledRun(start)
+                while len(self._runs) >= MOST_KEPT:  # the oldest goes first
+                    del self._runs[next(iter(self._runs))]
+                self._runs[id(course)] = _Kept(course, run)
+            else:
+                run = Run(start)
+        while run.advance():
+            pass
+        trace = run.recorder.trace()
+        return Ran(run.recorder.start.program, trace)
+
+    @property
+    def _runs(self) -> dict[int, _Kept]:
+        runs: dict[int, _Kept] = vars(self._own).setdefault("runs", {})
+        return runs
+
+    def driven(self, subject: Mounted, course: Course) -> Mounted:
+        """Return a subject that the motion of a course drives."""
+        return subject.driven(self.drive, course.signal) if self.drive else subject
+
+    def start(self, subject: Mounted, course: Course) -> Start:
+        """Return the start of a run along a course."""
+        settings = Settings(
+            engine=engine(), rtol=self.rtol, t_eval=course.t, max_steps=course.budget * self.budgets
+        )
+        first = course.signal.times[0] if self.drive else course.t[0]
+        what = self.driven(subject, course)
+        return Start.on(what, float(course.t[-1]), settings, t_start=float(first))
+
+
+def driver_of(subject: Mounted, drive: str | None, rtol: float, budgets: int) -> Driver:
+    """Return what runs a subject.
+
+    Parameters
+    ----------
+    subject : Mounted
+        A model, or a system.
+    drive : str or None
+        As the user gave it.
+    rtol : float
+        Relative tolerance.
+    budgets : int
+        As in `Driver`.
+
+    Returns
+    -------
+    Driver
+        The driver.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such signal, or it cannot be told which one is meant.
+    """
+    system = subject.system
+    if not subject.named:
+        if drive is not None:
+            raise ParameterError(
+                "a model is driven by the velocity of the record",
+                place="drive",
+                value=drive,
+                advice="leave it out; only a system has signals to choose from",
+            )
+        return Driver("v", rtol, budgets)
+    if drive is not None:
+        if drive not in system.signals:
+            raise ParameterError(
+                f"system {system.name!r} has no signal {shown(drive)}",
+                place="drive",
+                advice=f"there are {', '.join(system.signals) or 'none'}",
+            )
+        return Driver(drive, rtol, budgets)
+    driven = [each.velocity for each in system.bodies if each.driven]
+    if not driven:
+        return Driver("", rtol, budgets)
+    if len(driven) == 1 and driven[0] in system.signals:
+        return Driver(str(driven[0]), rtol, budgets)
+    raise ParameterError(
+        "it cannot be told which signal the velocity of the record replaces",
+        place="drive",
+        advice=f"name one of {', '.join(system.signals) or 'the signals of the system'}",
+    )
+
+
+def with_numbers(program: Program, subject: Mounted, course: Course, driver: Driver) -> Program:
+    """Return a program with the numbers of a subject in place of its own."""
+    return replace(program, p=arguments(driver.driven(subject, course).system))
+
+
+# --------------------------------------------------------------------------- side by side
+Given = TypeVar("Given")
+Result = TypeVar("Result")
+
+
+class Pool:
+    """Calls side by side in threads; results come in order, whatever ends first.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Number of threads; one per core by default.
+    """
+
+    def __init__(self, workers: int | None = None) -> None:
+        self._threads = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+        self._limits: contextlib.AbstractContextManager[object] = contextlib.nullcontext()
+
+    def __enter__(self) -> Pool:
+        self._limits = _alone()
+        self._limits.__enter__()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._threads.shutdown(wait=True, cancel_futures=True)
+        self._limits.__exit__(None, None, None)
+
+    def map(self, call: Callable[[Given], Result], given: Iterable[Given]) -> list[Result]:
+        """Return the results of calls in the order given."""
+        tasks = [self._threads.submit(call, each) for each in given]
+        try:
+            return [task.result() for task in tasks]
+        finally:  # also on Ctrl-C: what has not begun does not begin
+            for task in tasks:
+                task.cancel()
+
+
+def _alone() -> contextlib.AbstractContextManager[object]:
+    """Let linear algebra use one thread per call, if the extra ``fast`` is there to say so.
+
+    Its own threads would wait for each other and for those of the pool: a fit takes three times as
+    long, and its last digits depend on the number of cores.
+    """
+    try:
+        from threadpoolctl import threadpool_limits
+    except ImportError:
+        return contextlib.nullcontext()
+    limits: contextlib.AbstractContextManager[object] = threadpool_limits(1, user_api="blas")
+    return limits
+
+
+LOST = (GMSError, ArithmeticError, np.linalg.LinAlgError)  # what makes a proposal worthless

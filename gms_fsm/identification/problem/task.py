@@ -1,0 +1,278 @@
+"""One fit, from its arguments to the best point: coarse rows first, then all of them."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.identification.problem.experiment import Experiment, Point, split_unknowns
+from gms_fsm.identification.problem.linear import linear_names
+from gms_fsm.identification.problem.runs import (
+    BEGINS,
+    Course,
+    Measured,
+    Pool,
+    course_of,
+    driver_of,
+)
+from gms_fsm.identification.problem.search import Best, de, hops, refine
+from gms_fsm.identification.problem.unknowns import Unknown, unknowns_of, values_by_key
+from gms_fsm.records.record import Record
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import varied
+
+__all__ = ["Options", "Task", "Window", "inside", "training_rows"]
+
+Window = tuple[float, float]
+COARSE_ROWS, FEWEST_ROWS = 3000, 300  # of all records together, and of each
+COARSE_RTOL, FINE_RTOL = 1e-6, 1e-9
+FINE_STEPS = (1e-3, 1e-4)
+# What ran in the search must run with all rows and the small tolerance, too: these runs are few,
+# and may take more steps.
+FINE_BUDGETS = 10
+DISTANT = 0.02  # relative: how much better the other beginning must be
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Options:
+    """The arguments of a fit, checked."""
+
+    free: tuple[str, ...]
+    tied: tuple[str, ...] = ()
+    nuisance: tuple[str, ...] = ("offset",)
+    linear: tuple[str, ...] = ()
+    measured: str = "F"
+    drive: str | None = None
+    train: Window | None = None
+    test: Window | None = None
+    cycles: float | None = None
+    search: str = "hops"
+    bounds: Mapping[str, Window] = field(default_factory=dict)
+    seed: int = 0
+    most_steps: int | None = None
+    smoothing: float | None = None
+    begin: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A model, records and options: everything that a fit depends on.
+
+    Parameters
+    ----------
+    subject : Mounted
+        With the start values.
+    records : tuple of Record
+        The records.
+    options : Options
+        The arguments.
+    begin : str
+        What is before the first row of a record.
+    ran : list of int
+        One number: how many runs were made.
+    """
+
+    subject: Mounted
+    records: tuple[Record, ...]
+    options: Options
+    begin: str = BEGINS[1]
+    ran: list[int] = field(default_factory=lambda: [0])
+
+    @cached_property
+    def measured(self) -> Measured:
+        """What is compared."""
+        return Measured.of(self.options.measured, self.subject)
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What is found."""
+        given = self.options
+        return unknowns_of(self.subject, given.free, given.tied, given.bounds)
+
+    @cached_property
+    def courses(self) -> tuple[Course, ...]:
+        """The records with the rows to train on, up to the last of them."""
+        found = []
+        for record in self.records:
+            course = self.course(record, training_rows(record, self.options))
+            if course.rows.any():
+                found.append(course.ended())
+        return tuple(found)
+
+    def course(self, record: Record, rows: NDArray[np.bool_] | None) -> Course:
+        """Return what a record makes the model do, with the rows that count (None: all)."""
+        given, seen = self.options, None
+        if any(record is each for each in self.records):  # its run-in was that of training rows
+            known = np.flatnonzero(training_rows(record, given) & record.chosen)
+            seen = int(known[-1]) + 1 if known.size else None
+        return course_of(
+            record,
+            self.measured.column,
+            rows=rows,
+            smoothing=given.smoothing,
+            begin=self.begin,
+            most_steps=given.most_steps,
+            seen=seen,
+        )
+
+    # ------------------------------------------------------------------ as least squares
+    @cached_property
+    def fine(self) -> Experiment:
+        """With all rows."""
+        return self._experiment(self.courses, FINE_RTOL, FINE_BUDGETS)
+
+    @cached_property
+    def coarse(self) -> Experiment:
+        """With a few thousand rows, for searching."""
+        return self.measured_as(self.courses)
+
+    def measured_as(self, courses: tuple[Course, ...]) -> Experiment:
+        """Return the experiment with few rows of some courses, which may have other values."""
+        many = max(FEWEST_ROWS, COARSE_ROWS // len(courses))
+        few = [each.thinned(max(1, int(each.rows.sum()) // many)) for each in courses]
+        return self._experiment(tuple(few), COARSE_RTOL, 1)
+
+    def _experiment(self, courses: tuple[Course, ...], rtol: float, budgets: int) -> Experiment:
+        given = self.options
+        linear = (*given.linear, *(linear_names(self.subject) if self.measured.contact else ()))
+        searched, solved = split_unknowns(self.unknowns, linear)
+        driver = driver_of(self.subject, given.drive, rtol, budgets)
+        names = tuple(each.name for each in self.unknowns)
+        return Experiment(
+            self.subject,
+            searched,
+            solved,
+            names,
+            given.nuisance,
+            courses,
+            driver,
+            self.measured,
+            self.ran,
+        )
+
+    def beginning(self, begin: str) -> Task:
+        """Return the same task with another beginning."""
+        return replace(self, begin=begin)
+
+    def without(self, name: str, value: float) -> Task:
+        """Return the same task with one of its unknowns held at a value."""
+        gone = next(each for each in self.unknowns if each.name == name)
+        kept = [each for each in self.unknowns if each.name != name]
+        subject = varied(self.subject, values_by_key(self.subject, [gone], [value]))
+        tied = tuple(key for key in self.options.tied if any(e.key == key for e in kept))
+        names = {*(each.name for each in kept), *(each.key for each in kept)}
+        bounds = {key: pair for key, pair in self.options.bounds.items() if key in names}
+        options = replace(
+            self.options, free=tuple(each.name for each in kept), tied=tied, bounds=bounds
+        )
+        return replace(self, subject=subject, options=options)
+
+    # ------------------------------------------------------------------ searching
+    def coarse_search(self, best: Best, pool: Pool) -> Task:
+        """Search on few rows; return the task with the beginning that suits the data."""
+        given = self.options
+        {"hops": hops, "de": de, "local": _local}[given.search](self.coarse, given.seed, best, pool)
+        return self.settled(best)
+
+    def settled(self, best: Best) -> Task:
+        """Return the task with the beginning that fits better, if the user did not say."""
+        if self.options.begin is not None or best.point is None:
+            return self
+        if not any(course.lead[0].size for course in self.courses):
+            return self  # no record has begun in motion, and the data say nothing
+        other = self.beginning(BEGINS[0])
+        there = other.coarse.at(best.point.u)
+        if there.lost is None and there.cost < (1.0 - DISTANT) * best.point.cost:
+            best.point = there
+            return other
+        return self
+
+    def polish(self, u: FloatArray, best: Best, pool: Pool) -> None:
+        """Refine on all rows, with smaller and smaller steps."""
+        for step in FINE_STEPS:
+            found = refine(self.fine, u, step, pool=pool, kept=best)
+            u = found.u if found.lost is None else u
+
+
+def training_rows(record: Record, options: Options) -> NDArray[np.bool_]:
+    """Return which rows of a record may be trained on: without `train`, all but those of `test`."""
+    time = record.columns["time"]
+    if options.train is not None:
+        return inside(time, options.train)
+    return ~inside(time, options.test) if options.test is not None else np.ones(time.size, bool)
+
+
+def inside(time: FloatArray, window: Window) -> NDArray[np.bool_]:
+    """Return which times are in a window, its end excluded."""
+    found: NDArray[np.bool_] = (time >= window[0]) & (time < window[1])
+    return found
+
+
+def _local(experiment: Experiment, _: int, best: Best, pool: Pool) -> None:
+    best.take([experiment.start_point()])
+    refine(experiment, experiment.coordinates.start, 1e-2, 30, pool, best)
+
+
+@contextlib.contextmanager
+def bar(text: str, progress: bool | None) -> Iterator[Callable[[float], None]]:
+    """Show a progress bar on standard error.
+
+    Parameters
+    ----------
+    text : str
+        What is in progress.
+    progress : bool or None
+        None: if standard error is a terminal.
+
+    Yields
+    ------
+    callable
+        Takes the share that is done.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if not (console.is_terminal if progress is None else progress):
+        yield lambda _: None
+        return
+    columns = text, BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=console) as shown:
+        task = shown.add_task(text, total=1.0)
+        yield lambda share: shown.update(task, completed=share)
+
+
+def stretches(courses: Sequence[Course], residual: FloatArray) -> list[FloatArray]:
+    """Return residuals by unbroken stretches of rows.
+
+    Parameters
+    ----------
+    courses : sequence of Course
+        Whose rows the residuals belong to.
+    residual : ndarray, shape (rows,)
+        All of them.
+
+    Returns
+    -------
+    list of ndarray
+        None is empty.
+    """
+    places = [np.flatnonzero(course.rows) for course in courses]
+    ends = np.cumsum([where.size for where in places])[:-1]
+    found = list[FloatArray]()
+    for where, own in zip(places, np.split(residual, ends), strict=True):
+        found += np.split(own, np.flatnonzero(np.diff(where) > 1) + 1)
+    return [each for each in found if each.size]
+
+
+def at_all_rows(experiment: Experiment, point: Point, course: Course) -> FloatArray:
+    """Return the modelled values at all rows of a course, nuisance terms included."""
+    subject = experiment.reference(experiment.coordinates.numbers(point.u))
+    _, rest, columns = experiment.columns(subject, course)
+    return rest + columns @ point.linear

@@ -1,1 +1,0 @@
-"""Looking into charts and runs: explanations, notes, proofs, step-by-step sessions."""

@@ -1,0 +1,315 @@
+"""Transformations of trees: clauses, atomic comparisons, corners and jumps, renaming."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from gms_fsm.language._powers import integer_power
+from gms_fsm.language.functions import ROUGH
+from gms_fsm.language.tree import (
+    Binary,
+    Both,
+    Call,
+    Condition,
+    Either,
+    InState,
+    Name,
+    Negative,
+    Not,
+    Number,
+    Relation,
+    Value,
+    rebuilt,
+    walk,
+)
+
+__all__ = [
+    "Comparison",
+    "Requirement",
+    "Split",
+    "clauses",
+    "comparisons",
+    "renamed",
+    "rough_points",
+    "split",
+    "substitute",
+    "turning_inside",
+]
+
+
+def clauses(condition: Condition) -> tuple[Condition, ...]:
+    """Return the parts of a conjunction, or the condition alone.
+
+    Parameters
+    ----------
+    condition : Condition
+        For example a guard.
+
+    Returns
+    -------
+    tuple of Condition
+        In the order of the text.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import clauses, parse_condition, spell
+    >>> [spell(c) for c in clauses(parse_condition("z >= s and v > 0", "zsv"))]
+    ['z >= s', 'v > 0.0']
+    """
+    return condition.operands if isinstance(condition, Both) else (condition,)
+
+
+# --------------------------------------------------------------------------- atomic comparisons
+@dataclass(frozen=True)
+class Comparison:
+    """The one relation behind ``z >= s`` and ``z < s``: its margin is ``left - right``.
+
+    True where the margin is positive and, unless `strict`, also where it is zero. In IEEE
+    arithmetic the sign of ``left - right`` agrees exactly with the raw comparison.
+    """
+
+    left: Value
+    right: Value
+    strict: bool
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A comparison that must be true (or false, if `holds` is False)."""
+
+    comparison: Comparison
+    holds: bool
+
+    @property
+    def relation(self) -> Relation:
+        """The requirement as an ordinary relation."""
+        strict = self.comparison.strict
+        op = (">" if strict else ">=") if self.holds else ("<=" if strict else "<")
+        return Relation(op, self.comparison.left, self.comparison.right)
+
+
+Split: TypeAlias = "Requirement | tuple[str, tuple[Split, ...]]"
+
+
+def split(condition: Condition, holds: bool = True) -> Split:
+    """Split a condition into comparisons joined only by ``"both"`` and ``"either"``.
+
+    ``abs(u) <= c`` becomes ``u <= c`` and ``u >= -c`` (a root finder on ``c - abs(u)`` would step
+    over a narrow window; two monotone margins prevent that), negations are pushed down to the
+    comparisons, and ``z < s`` and ``z >= s`` become the same `Comparison`.
+
+    Parameters
+    ----------
+    condition : Condition
+        A checked condition.
+    holds : bool
+        False to split its negation.
+
+    Returns
+    -------
+    Requirement or (str, tuple)
+        A requirement, or ``("both" | "either", parts)``.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import parse_condition, spell, split
+    >>> word, parts = split(parse_condition("abs(v) <= c", ["v", "c"]))
+    >>> word, [spell(p.relation) for p in parts]
+    ('both', ['v <= c', 'v >= -c'])
+    """
+    match condition:
+        case InState():
+            raise TypeError("a guard depends on values, not on states")
+        case Not(operand):
+            return split(operand, not holds)
+        case Both(operands) | Either(operands):
+            word = "both" if isinstance(condition, Both) == holds else "either"
+            parts: list[Split] = []
+            for operand in operands:
+                part = split(operand, holds)
+                if isinstance(part, Requirement) or part[0] != word:
+                    parts.append(part)
+                else:  # a conjunction nested in a conjunction
+                    parts.extend(part[1])
+            return word, tuple(parts)
+        case Relation(op, Call("abs", (Call("abs") as inner,)), bound):
+            return split(Relation(op, inner, bound), holds)  # ||u|| is |u|
+        case Relation(op, Call("abs", (inner,)), bound):
+            below = op in ("<", "<=")
+            other = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}[op]
+            two = (Relation(op, inner, bound), Relation(other, inner, Negative(bound)))
+            return split(Both(two) if below else Either(two), holds)
+        case Relation(op, left, Call("abs", (inner,))):
+            mirrored = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}[op]
+            return split(Relation(mirrored, Call("abs", (inner,)), left), holds)
+        case Relation(op, left, right):
+            positive = op in (">", ">=")
+            strict = op in (">", "<=")  # a <= b is the negation of a > b
+            return Requirement(Comparison(left, right, strict), positive == holds)
+
+
+def comparisons(part: Split) -> tuple[Comparison, ...]:
+    """Return the atomic comparisons of a split condition.
+
+    Parameters
+    ----------
+    part : Requirement or (str, tuple)
+        From `split`.
+
+    Returns
+    -------
+    tuple of Comparison
+        In the order of the text, with repetitions.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import comparisons, parse_condition, spell, split
+    >>> [spell(c.left) for c in comparisons(split(parse_condition("z >= s and v > 0", "zsv")))]
+    ['z', 'v']
+    """
+    if isinstance(part, Requirement):
+        return (part.comparison,)
+    return tuple(c for each in part[1] for c in comparisons(each))
+
+
+# --------------------------------------------------------------------------- corners and jumps
+def rough_points(value: Value) -> tuple[Value, ...]:
+    """Return every u whose sign decides a corner or a jump of `value`, innermost first.
+
+    ``sgn(u)`` and ``abs(u)`` turn at u = 0, ``min(a, b)`` and ``max(a, b)`` at a - b = 0.
+
+    Parameters
+    ----------
+    value : Value
+        A flow or a signal.
+
+    Returns
+    -------
+    tuple of Value
+        Without duplicates.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import parse_value, rough_points, spell
+    >>> [spell(u) for u in rough_points(parse_value("sgn(v) + max(v, 2)", ["v"]))]
+    ['v', 'v - 2.0']
+    """
+    found = [_turning(n) for n in walk(value) if isinstance(n, Call) and n.function in ROUGH]
+    return tuple(dict.fromkeys(found))
+
+
+def turning_inside(value: Value, new: Mapping[str, Value]) -> Value:
+    """Return a value with names replaced only inside its calls to sgn, abs, min and max.
+
+    Parameters
+    ----------
+    value : Value
+        For example an output that uses the rate dz.
+    new : mapping of str to Value
+        The replacement for each name.
+
+    Returns
+    -------
+    Value
+        A tree whose corners do not depend on these names.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import Name, parse_value, spell, turning_inside
+    >>> spell(turning_inside(parse_value("k * dz + abs(dz)", ["k", "dz"]), {"dz": Name("v")}))
+    'k * dz + abs(v)'
+    """
+    if isinstance(value, Call) and value.function in ROUGH:
+        return renamed(value, new)
+    return rebuilt(value, lambda part: turning_inside(part, new))
+
+
+def _turning(call: Call) -> Value:
+    if call.function in ("sgn", "abs"):
+        return call.arguments[0]
+    a, b = call.arguments
+    return a if b == Number(0.0) else Binary("-", a, b)
+
+
+def substitute(
+    value: Value, name_of: Callable[[Value, Call], str | None]
+) -> tuple[Value, dict[str, Call]]:
+    """Replace every rough call by a name whose value is computed beforehand from a frozen sign.
+
+    Parameters
+    ----------
+    value : Value
+        A flow or a signal.
+    name_of : callable
+        Takes the value at whose sign a call turns and the call, whose arguments are already
+        smooth; returns a different name for each call, or None to leave it in place.
+
+    Returns
+    -------
+    smooth : Value
+        The tree with names in place of the calls.
+    calls : dict of str to Call
+        The call that each such name stands for, in the order in which they must be computed;
+        arguments are already smooth. A call under a square root or a power is left in place: with
+        its sign frozen, it would become negative beyond the corner, where these are not defined.
+    """
+    calls: dict[str, Call] = {}
+
+    def smooth(node: Value) -> Value:
+        match node:
+            case Call("sqrt"):
+                return node
+            case Binary("**", base, exponent) if integer_power(exponent) is None:
+                return Binary("**", base, smooth(exponent))
+            case Call(function, arguments) if function in ROUGH:
+                inner = Call(function, tuple(smooth(argument) for argument in arguments))
+                name = name_of(_turning(node), inner)
+                if name is None:
+                    return inner
+                calls[name] = inner
+                return Name(name)
+        return rebuilt(node, smooth)
+
+    return smooth(value), calls
+
+
+def renamed(value: Value, new: Mapping[str, Value]) -> Value:
+    """Return a value with some names replaced by other values.
+
+    Parameters
+    ----------
+    value : Value
+        A tree.
+    new : mapping of str to Value
+        The replacements, by name.
+
+    Returns
+    -------
+    Value
+        The new tree.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import Name, parse_value, renamed, spell
+    >>> spell(renamed(parse_value("k * dz", ["k", "dz"]), {"dz": Name("v")}))
+    'k * v'
+    """
+    if isinstance(value, Name):
+        return new.get(value.id, value)
+    return rebuilt(value, lambda part: renamed(part, new))
+
+
+def renamed_in(condition: Condition, new: Mapping[str, Value]) -> Condition:
+    """Return a condition with some names replaced by values."""
+    match condition:
+        case Relation(op, left, right):
+            return Relation(op, renamed(left, new), renamed(right, new))
+        case Not(operand):
+            return Not(renamed_in(operand, new))
+        case Both(operands):
+            return Both(tuple(renamed_in(each, new) for each in operands))
+        case Either(operands):
+            return Either(tuple(renamed_in(each, new) for each in operands))
+    return condition

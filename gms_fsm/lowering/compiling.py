@@ -1,0 +1,300 @@
+"""A program's functions compiled to machine code from the same generated text (extra ``fast``)."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import os
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.foundation.extras import missing
+from gms_fsm.foundation.store import CodeFolder
+from gms_fsm.language.functions import sgn
+from gms_fsm.lowering.generated import SIGNALS, load
+from gms_fsm.lowering.observing import on_surfaces
+from gms_fsm.lowering.program import Arguments, Program, guarded
+from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
+
+if TYPE_CHECKING:
+    from integrators.machine_code.layout import MemoryBlock
+    from integrators.runners.compiled import CompiledFunction, RecordArguments
+
+__all__ = [
+    "Prepared",
+    "check_llvmlite",
+    "engine",
+    "functions",
+    "notify",
+    "observe_rows",
+    "packed",
+    "store",
+    "text_of",
+]
+
+Packed = tuple[FloatArray, FloatArray, FloatArray]
+MOST_ENGINES = 256  # in memory
+MOST_SPARE = 4  # blocks that are kept for further calls
+_lock = threading.RLock()  # a sweep may compile from several threads
+
+
+def check_llvmlite() -> None:
+    """Raise an error unless llvmlite is installed.
+
+    Raises
+    ------
+    MissingExtraError
+        With advice on how to install it.
+    """
+    for module in ("llvmlite", "platformdirs"):
+        if importlib.util.find_spec(module) is None:
+            raise missing(module, "fast")
+
+
+def packed(p: Arguments) -> Packed:
+    """Return a program's arguments as arrays.
+
+    Parameters
+    ----------
+    p : tuple of lists
+        ``Program.p``.
+
+    Returns
+    -------
+    tuple of ndarray
+        Shared numbers (m,), own parameters (rows, n), corner tables (2 tables, corners). Shorter
+        rows are padded by repeating their last entry: elements that no contact has, corners that
+        change no value.
+
+    Examples
+    --------
+    >>> packed(([2.0], [[1.0, 1.0]], []))[1].shape
+    (1, 2)
+    """
+    shared, own, tables = p
+    return np.array(shared, dtype=np.float64), _table(own), _table(tables)
+
+
+def _table(rows: list[list[float]]) -> FloatArray:
+    length = max(map(len, rows), default=0)
+    padded = [row + row[-1:] * (length - len(row)) for row in rows]
+    return np.array(padded, dtype=np.float64).reshape(len(rows), length)
+
+
+def engine(program: Program, run: RecordArguments) -> CompiledFunction:
+    """Return the loop of a program as machine code.
+
+    Parameters
+    ----------
+    program : Program
+        From `gms_fsm.lowering.program.lower`.
+    run : RecordArguments
+        From `integrators.runners.compiled.example`, with the functions from `functions`.
+
+    Returns
+    -------
+    CompiledFunction
+        To be called with a block.
+
+    Raises
+    ------
+    MissingExtraError
+        If llvmlite is not installed.
+    """
+    from integrators.runners import compiled
+
+    check_llvmlite()
+    with _lock:
+        return compiled.engine(text_of(program), run, _calls(program), store(), notify)
+
+
+def text_of(program: Program) -> str:
+    """Return what the machine code of a program depends on: its text, and what the text calls.
+
+    Parameters
+    ----------
+    program : Program
+        From `gms_fsm.lowering.program.lower`.
+
+    Returns
+    -------
+    str
+        Of fixed length.
+    """
+    from integrators.runners.compiled import digest
+
+    return digest(sgn, piecewise_linear, piecewise_slope, text=program.source)
+
+
+def _calls(program: Program) -> list[Callable[[float], float]]:
+    """Return the signals that are Python functions, by number."""
+    return [guarded(name, call) for name, call in program.callables.items()]
+
+
+def functions(program: Program) -> Mapping[str, Any]:
+    """Return a program's functions in the form that is translated to machine code.
+
+    Parameters
+    ----------
+    program : Program
+        From `gms_fsm.lowering.program.lower`.
+
+    Returns
+    -------
+    mapping of str to callable
+        By name. Signals that are Python functions have been replaced by their numbers.
+    """
+    return _loaded(program.source, tuple(program.callables))
+
+
+@functools.lru_cache(maxsize=64)
+def _loaded(source: str, callables: tuple[str, ...]) -> dict[str, Any]:
+    from integrators.machine_code.front_end.translate import HostFunction
+
+    names: dict[str, Any] = {**SIGNALS, "__name__": __name__}
+    names |= {f"{name}_signal": HostFunction(k) for k, name in enumerate(callables)}
+    return load("compiled program", source, names)
+
+
+@functools.cache
+def store() -> CodeFolder | None:
+    """Return the cache for machine code, or None if no cache can be used.
+
+    It is in the platform's folder for caches, or in GMS_FSM_CACHE.
+
+    Returns
+    -------
+    CodeFolder or None
+        Ready for use.
+    """
+    from platformdirs import user_cache_path
+
+    given = os.environ.get("GMS_FSM_CACHE")
+    return CodeFolder.at((Path(given) if given else user_cache_path("gms-fsm")) / "machine-code")
+
+
+def notify(text: str) -> None:
+    """Print a message about a slow step to stderr, if somebody waits there.
+
+    Parameters
+    ----------
+    text : str
+        What is being compiled, or how long that took.
+    """
+    if sys.stderr.isatty():
+        print(f"gms-fsm: {text}", file=sys.stderr)
+
+
+def observe_rows(
+    program: Program, t: FloatArray, y: FloatArray, mode: NDArray[np.int64], kept: range
+) -> FloatArray:
+    """Return some results of `observe` for many rows, with all signs evaluated live.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    t, y, mode : ndarray, shapes (rows,), (rows, m), (rows, n)
+        The rows.
+    kept : range
+        Places in ``program.layout.observed``, one after the other.
+
+    Returns
+    -------
+    ndarray, shape (rows, kept)
+        Bit for bit the same as the readable engine.
+    """
+    made = _observer(program)
+    block = made.block()
+    functions = block.contents.functions
+    table = np.empty((t.size, len(kept)))
+    shared, own, tables = packed(program.p)
+    rows = block.contents._replace(
+        t=np.ascontiguousarray(t),
+        y=np.ascontiguousarray(y),
+        mode=np.ascontiguousarray(mode),
+        table=table,
+        functions=functions._replace(p=(*functions.p[:2], tables)),
+    )
+    functions.p[0][...], functions.p[1][...] = shared, own
+    block.update(rows)
+    made.engine(block, kept.start, t.size)
+    made.take_back(block)
+    return table
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What calls of one kind have in common: machine code, and a block as it is at the beginning.
+
+    Parameters
+    ----------
+    engine : CompiledFunction
+        The machine code.
+    example : named tuple
+        Of its arguments.
+    functions : mapping
+        Of the program; kept, so that their `id` stays theirs.
+    """
+
+    engine: CompiledFunction
+    example: Any
+    functions: Any
+    _spare: list[MemoryBlock] = field(default_factory=list)  # of calls that have ended
+
+    @functools.cached_property
+    def _first(self) -> MemoryBlock:
+        from integrators.machine_code.layout import MemoryBlock
+
+        first = MemoryBlock(self.engine.layout, self.example)
+        first.update(first.contents)
+        return first
+
+    def block(self) -> MemoryBlock:
+        """Return a block of its own for a call."""
+        from integrators.machine_code.layout import MemoryBlock
+
+        try:
+            return self._spare.pop()
+        except IndexError:
+            return MemoryBlock(self.engine.layout, self.example, self._first)
+
+    def take_back(self, block: MemoryBlock) -> None:
+        """Keep a block that nothing refers to any more for the next call."""
+        if len(self._spare) < MOST_SPARE:
+            block.become(self._first)  # and refer to no columns
+            self._spare.append(block)
+
+
+_observers: dict[int, Prepared] = {}
+
+
+def _observer(program: Program) -> Prepared:
+    from integrators.runners import compiled
+
+    check_llvmlite()
+    layout, key = program.layout, id(program.functions)
+    with _lock:
+        if key in _observers:
+            return _observers[key]
+        if len(_observers) >= MOST_ENGINES:
+            _observers.clear()
+        made = compiled.observer(
+            text_of(program),
+            functions(program)["observe"],
+            on_surfaces(program, functions(program), packed(program.p)),
+            (layout.y.size, layout.modes, layout.observed.size),
+            _calls(program),
+            store(),
+            notify,
+        )
+        _observers[key] = Prepared(*made, program.functions)
+        return _observers[key]

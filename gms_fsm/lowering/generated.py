@@ -1,0 +1,340 @@
+"""Loading of generated code so that debuggers and tracebacks find its lines.
+
+This is the only place where text becomes code, and the text is always our own, printed from a
+checked tree.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import functools
+import hashlib
+import inspect
+import linecache
+import math
+from collections.abc import Callable, Iterable, Mapping
+from types import CodeType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.foundation.parser import PARSER
+from gms_fsm.language import ELEMENTARY, NAMESPACE
+from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
+from integrators import elementary
+from integrators.runners import quick
+
+__all__ = [
+    "SIGNALS",
+    "bare",
+    "elementary_text",
+    "ieee",
+    "load",
+    "load_careful",
+    "quickened",
+    "standalone",
+]
+
+
+# What generated text calls besides the functions of the expression language.
+SIGNALS: Mapping[str, Any] = {
+    "piecewise_linear": piecewise_linear,
+    "piecewise_slope": piecewise_slope,
+    "nan": math.nan,
+}
+
+
+def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    r"""Run generated text and return the names it defines.
+
+    Parameters
+    ----------
+    title : str
+        Shown in place of a file name.
+    source : str
+        Python text.
+    names : mapping, optional
+        Objects it may use in addition to the functions of the expression language.
+
+    Returns
+    -------
+    dict
+        Its namespace.
+
+    Examples
+    --------
+    >>> load("example", "def twice(v):\n    return 2.0 * v\n")["twice"](3.0)
+    6.0
+    """
+    namespace: dict[str, Any] = {**NAMESPACE, **(names or {})}
+    exec(_compiled(title, source), namespace)
+    return namespace
+
+
+def quickened(namespace: dict[str, Any]) -> dict[str, Any]:
+    """Let a namespace replace its elementary functions by machine code when they are called often.
+
+    Parameters
+    ----------
+    namespace : dict
+        From `load`; changed in place.
+
+    Returns
+    -------
+    dict
+        The same.
+    """
+
+    def counted(name: str, function: Callable[..., float], count: int) -> Callable[..., float]:
+        left = quick.FREE
+
+        def call(*arguments: float) -> float:
+            nonlocal left
+            left -= 1
+            if left == 0:
+                namespace[name] = quick.scalar(function, count)
+            return function(*arguments)
+
+        return call
+
+    for name in ELEMENTARY:
+        namespace[name] = counted(name, NAMESPACE[name], 2 if name == "pow" else 1)
+    return namespace
+
+
+def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Run generated text with functions and numbers that never raise, for use by `ieee`.
+
+    Parameters
+    ----------
+    title, source, names
+        As in `load`.
+
+    Returns
+    -------
+    dict
+        Its namespace.
+    """
+    namespace: dict[str, Any] = {**NAMESPACE, **(names or {}), **_IEEE, "_wide": _wide}
+    exec(_compiled(title, source, careful=True), namespace)
+    return namespace
+
+
+def standalone(source: str) -> str:
+    r"""Return generated text as a standalone program, with the imports and functions that it uses.
+
+    Parameters
+    ----------
+    source : str
+        From `gms_fsm.lowering.program.lower`.
+
+    Returns
+    -------
+    str
+        Python text that depends only on the standard library.
+
+    Raises
+    ------
+    ParameterError
+        If one of its signals is a user's Python function, which cannot be written as text.
+
+    Examples
+    --------
+    >>> print(standalone("# twice\ndef twice(u):\n    return 2.0 * sqrt(u)\n"))
+    # twice
+    <BLANKLINE>
+    from math import sqrt
+    <BLANKLINE>
+    <BLANKLINE>
+    def twice(u):
+        return 2.0 * sqrt(u)
+    <BLANKLINE>
+    """
+    used, own = set[str](), set[str]()
+    for node in ast.walk(_tree(source)):
+        match node:
+            case ast.Name(id=name, ctx=ast.Load()):
+                used.add(name)
+            case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name):
+                own.add(name)
+    known: dict[str, Any] = {**NAMESPACE, **SIGNALS}
+    missing = sorted(used - own - set(dir(builtins)))
+    if foreign := [name for name in missing if name not in known]:
+        raise ParameterError(
+            "a Python function, which cannot be written as text",
+            place=f"{', '.join(foreign)}",
+            advice="give the signal as an expression or as corners",
+        )
+    borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
+    parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []
+    if ours := [name for name in missing if name in ELEMENTARY]:
+        parts.insert(0, elementary_text(ours))
+    parts += ["\n" + bare(known[name]) for name in missing if name not in {*borrowed, *ours}]
+    head, body = _split_head(source)
+    return "\n".join([head, *parts, "\n" + body.lstrip("\n")])
+
+
+def elementary_text(names: Iterable[str]) -> str:
+    """Return the text of elementary functions of the language, and of all that they use.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Such as ``exp``; ``pow`` is one, too.
+
+    Returns
+    -------
+    str
+        Python text that depends only on the standard library.
+
+    Examples
+    --------
+    >>> program = {}
+    >>> exec(elementary_text(["pow"]), program)
+    >>> program["pow"](2.0, 0.5) == 2.0 ** 0.5
+    True
+    """
+    tree = _tree(inspect.getsource(elementary))
+    parts: dict[str, ast.stmt] = {}
+    for part in tree.body:
+        match part:
+            case ast.FunctionDef(name=name):
+                parts[name] = part
+            case ast.Assign(targets=targets):
+                for each in ast.walk(ast.Tuple(targets)):
+                    if isinstance(each, ast.Name):
+                        parts[each.id] = part
+    waiting = [NAMESPACE[name].__name__ for name in names]
+    used = set[ast.stmt]()
+    while waiting:
+        found = parts.get(waiting.pop())
+        if found is not None and found not in used:
+            used.add(found)
+            waiting += [each.id for each in ast.walk(found) if isinstance(each, ast.Name)]
+    lines = ["import math\n"]
+    for part in tree.body:
+        if part in used:
+            lines.append(("\n\n" if isinstance(part, ast.FunctionDef) else "") + _unannotated(part))
+    renamed = {NAMESPACE[name].__name__: name for name in names}
+    return "\n".join([*lines, *(f"\n{b} = {a}" for a, b in renamed.items() if a != b), ""])
+
+
+def _tree(source: str) -> ast.Module:
+    """Parse a text, one at a time."""
+    with PARSER:
+        return ast.parse(source)
+
+
+def _split_head(source: str) -> tuple[str, str]:
+    """Split the leading comments of a text from the rest."""
+    lines = source.splitlines(keepends=True)
+    end = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    return "".join(lines[:end]), "".join(lines[end:])
+
+
+def bare(function: Callable[..., Any]) -> str:
+    """Return a function's text without annotations, with its docstring cut to the first line."""
+    return _unannotated(_tree(inspect.getsource(function))) + "\n"
+
+
+def _unannotated(tree: ast.AST) -> str:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.arg):
+            node.annotation = None
+        if isinstance(node, ast.FunctionDef):
+            node.returns = None
+            first = (ast.get_docstring(node) or "").partition("\n")[0]
+            node.body[0] = ast.Expr(ast.Constant(first))
+    return ast.unparse(ast.fix_missing_locations(tree))
+
+
+@functools.lru_cache(maxsize=256)
+def _compiled(title: str, source: str, careful: bool = False) -> CodeType:
+    digest = hashlib.sha256(source.encode()).hexdigest()[:8]
+    shown = "".join(c if c.isprintable() else "?" for c in title)  # not all are valid in file names
+    filename = f"<{shown} {digest}>"
+    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    if not careful:
+        return compile(source, filename, "exec")
+    tree = ast.fix_missing_locations(_WideNumbers().visit(_tree(source)))
+    return compile(tree, filename, "exec")
+
+
+class _WideNumbers(ast.NodeTransformer):
+    """Replaces every literal number by one that does not raise: 1.0 / 0.0 becomes inf."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        if not isinstance(node.value, float):
+            return node
+        return ast.Call(ast.Name("_wide", ast.Load()), [node], [])
+
+
+# --------------------------------------------------------------------------- IEEE arithmetic
+# A trial step may reach a point where exp overflows or a root has a negative argument. There IEEE
+# arithmetic yields inf or NaN and the step size shrinks; Python raises. So the text runs as it is,
+# fast, and if it raises, again with numbers that do not: the same bits as the compiled text.
+def ieee(fast: Callable[..., Any], careful: Callable[..., Any]) -> Callable[..., Any]:
+    r"""Return a generated function that yields inf and NaN where Python would raise.
+
+    Parameters
+    ----------
+    fast : callable
+        The function, operating on Python floats.
+    careful : callable
+        The same function from `load_careful`.
+
+    Returns
+    -------
+    callable
+        Takes the same arguments as both.
+
+    Examples
+    --------
+    >>> source = "def rate(y, dy):\n    dy[0] = 1.0 / y[0]\n"
+    >>> rate = ieee(load("example", source)["rate"], load_careful("example", source)["rate"])
+    >>> dy = [0.0]
+    >>> rate([0.0], dy)
+    >>> dy
+    [inf]
+    """
+
+    @functools.wraps(fast)
+    def function(*arguments: Any) -> Any:
+        try:
+            return fast(*arguments)
+        except (ArithmeticError, ValueError) as error:
+            if isinstance(error, GMSError):  # from a user's own signal
+                raise
+        wide = [_wide(argument) for argument in arguments]
+        with np.errstate(all="ignore"):
+            value = careful(*wide)
+        for argument, result in zip(arguments, wide, strict=True):
+            if isinstance(argument, list):
+                argument[:] = [float(u) if isinstance(u, float) else u for u in result]
+        return value
+
+    return function
+
+
+def _wide(argument: Any) -> Any:
+    """Return floats, however nested, as NumPy numbers, which do not raise."""
+    if isinstance(argument, float):
+        return np.float64(argument)
+    if isinstance(argument, list | tuple):
+        return type(argument)(_wide(part) for part in argument)
+    if hasattr(argument, "__dict__"):  # an element, whose values are read by a guard
+        return SimpleNamespace(**{name: _wide(value) for name, value in vars(argument).items()})
+    return argument
+
+
+def _wide_result(function: Callable[..., float]) -> Callable[..., Any]:
+    """Return a function whose result does not raise when it is used."""
+    return lambda *arguments: np.float64(function(*map(float, arguments)))
+
+
+_IEEE: Mapping[str, Callable[..., Any]] = {
+    **{name: _wide_result(each) for name, each in ELEMENTARY.items()},
+    "sqrt": np.sqrt,
+}

@@ -1,0 +1,1 @@
+"""A program from its plan to its text."""

@@ -1,0 +1,377 @@
+"""Lines of generated text that know what they read.
+
+A function is put together from its body outwards: what the body reads is computed before it, and so
+on, until only arguments are left. Nothing is computed that nobody reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple
+
+from gms_fsm.language import Binary, Call, Name, Node, Value, spell
+from gms_fsm.language.tree import walk
+from gms_fsm.lowering.places import Places, total
+from gms_fsm.lowering.printing.names import computed_names
+from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall
+from gms_fsm.systems.reading.assembly import of
+from integrators import LIVE
+
+__all__ = ["CodeLine", "ProgramWriter", "Signs", "indented", "one_line", "reads_of"]
+
+# Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
+# may be marked as live.
+Signs = Literal["held", "live", "given"]
+QUICK = ("abs", "min", "max", "sgn", "sqrt")  # functions that need no library
+TABLES = "the tables"  # what a signal that is a table reads
+
+
+class CodeLine(NamedTuple):
+    """A line of text, and the names from the trees that it reads.
+
+    A lazy line stands for: compute this name here, unless it has been computed.
+    """
+
+    text: str
+    reads: frozenset[str] = frozenset()
+    lazy: str = ""
+
+
+def reads_of(lines: Iterable[CodeLine]) -> frozenset[str]:
+    """Return what lines read."""
+    return frozenset[str]().union(*(line.reads for line in lines))
+
+
+def _does_something(lines: Iterable[CodeLine]) -> bool:
+    """Return whether lines are more than comments."""
+    return any(not line.text.lstrip().startswith("#") for line in lines)
+
+
+def indented(lines: Iterable[CodeLine]) -> list[CodeLine]:
+    """Return lines one level deeper."""
+    return [line._replace(text="    " + line.text) for line in lines]
+
+
+class ProgramWriter:
+    """Writes values, loops over elements and functions of a plan.
+
+    Parameters
+    ----------
+    plan : ProgramPlan
+        Of the program.
+    """
+
+    def __init__(self, plan: ProgramPlan) -> None:
+        self.plan, self.read = plan, plan.read
+        self.names, self.layout = plan.names, plan.layout
+        self.sizes = [block.size for block in plan.layout.y.blocks]
+        # What is computed with the forces, never at the head of a function.
+        self.late = {name for bank in plan.read.banks for name in (*bank.forces, *bank.rates)} | {
+            f"{body.name} a" for body in plan.read.system.bodies
+        }
+
+    # ------------------------------------------------------------------ values
+    def spell(self, node: Node) -> str:
+        """Spell a tree with the names of the text."""
+        return spell(node, rename=self.names.texts)
+
+    def local(self, name: str) -> str:
+        """Return the name in the text."""
+        return self.names.local[name]
+
+    def put(self, target: str, tree: Value, note: str = "") -> CodeLine:
+        """Write an assignment to a name or a place of the text."""
+        return CodeLine(f"{target} = {self.spell(tree)}{note}", computed_names(tree))
+
+    def at(self, array: str, places: Places[str], name: str) -> tuple[str, frozenset[str]]:
+        """Spell a place of an array, and say which sizes it reads."""
+        sizes = frozenset(f"#{size}" for size in places.sizes(name))
+        return f"{array}[{places.text(name)}]", sizes
+
+    def store(self, array: str, places: Places[str], name: str, text: str) -> CodeLine:
+        """Write an assignment to a place of an array."""
+        place, sizes = self.at(array, places, name)
+        return CodeLine(f"{place} = {text}", sizes)
+
+    # ------------------------------------------------------------------ corners and jumps
+    def computed(
+        self, target: str, value: Computed, signs: Signs, note: str = ""
+    ) -> list[CodeLine]:
+        """Write an assignment of a value, after its rough calls."""
+        return [*self.calls(value.calls, signs), self.put(target, value.tree, note)]
+
+    def calls(self, calls: Iterable[RoughCall], signs: Signs) -> list[CodeLine]:
+        """Assign rough calls, each once."""
+        return [self.call(each, signs) for each in dict.fromkeys(calls)]
+
+    def call(self, rough: RoughCall, signs: Signs) -> CodeLine:
+        """Assign a rough call, whose sign is held, live or given."""
+        call, live = rough.call, self.spell(rough.call)
+        if signs == "live":
+            return CodeLine(f"{rough.name} = {live}", computed_names(call))
+        held = self.plan.held
+        sizes = frozenset(f"#{size}" for size in held.sizes(rough.turning))
+        sign = f"held[{held.text(rough.turning)}]"
+        first = self.spell(call.arguments[0])
+        match call.function:
+            case "sgn":
+                value = sign
+            case "abs":
+                value = self.spell(Binary("*", Name(sign), call.arguments[0]))
+            case "min":
+                value = f"{first} if {sign} <= 0.0 else {self.spell(call.arguments[1])}"
+            case _:
+                value = f"{first} if {sign} >= 0.0 else {self.spell(call.arguments[1])}"
+        if signs == "given":
+            value = f"{live} if {sign} == {LIVE} else {value}"
+        elif call.function == "sgn":
+            return CodeLine(f"{rough.name} = {value}", sizes)
+        return CodeLine(f"{rough.name} = {value}", sizes | computed_names(call))
+
+    # ------------------------------------------------------------------ what elements read first
+    def element(self, bank: int, reads: frozenset[str], signs: Signs) -> list[CodeLine]:
+        """Assign what lines read of an element: its variables, and what is computed from them."""
+        needed = self.closure(reads)
+        owner, y = self.read.owner, self.layout.y
+        lines = []
+        for name in self.read.banks[bank].variables:
+            if name in needed:
+                place, sizes = self.at("y", y, name)
+                lines.append(CodeLine(f"{self.local(name)} = {place}", sizes))
+        for name, value in self.plan.definitions.items():
+            if name in needed and owner.get(name) == bank:
+                lines += self.computed(self.local(name), value, signs)
+        return lines
+
+    def closure(self, reads: frozenset[str]) -> frozenset[str]:
+        """Return names, and those that they are computed from."""
+        found, waiting = set[str](), [*reads]
+        while waiting:
+            name = waiting.pop()
+            if name not in found:
+                found.add(name)
+                if (value := self.plan.definitions.get(name)) is not None:
+                    waiting += computed_names(value.tree)
+                    waiting += (n for call in value.calls for n in computed_names(call.call))
+        return frozenset(found)
+
+    def loop(
+        self,
+        bank: int,
+        signs: Signs,
+        before: Sequence[CodeLine] = (),
+        branches: Mapping[str, list[CodeLine]] | None = None,
+        after: Sequence[CodeLine] = (),
+    ) -> list[CodeLine]:
+        """Write a loop over the elements of a contact: lines, an if-else over states, lines.
+
+        What is computed from the variables is computed where it is read: before the if-else if it
+        is read outside or in more than one branch, else in its branch.
+        """
+        rows = {} if branches is None else dict(branches)
+        wanted = [self.own(bank, reads_of(lines)) for lines in rows.values()]
+        outside = self.own(bank, reads_of([*before, *after]))
+        first = outside | {
+            name for each in wanted for name in each if sum(name in other for other in wanted) > 1
+        }
+        if len(rows) == 1:
+            first = first.union(*wanted)
+        variables = {*self.read.banks[bank].variables}
+        first |= frozenset(name for each in wanted for name in each if name in variables)
+        for (state, lines), each in zip(rows.items(), wanted, strict=True):
+            if inside := each - first:
+                made = self.element(bank, inside, signs)
+                seen = {self.local(name) for name in self.closure(inside) & first}
+                rows[state] = [
+                    line for line in made if line.text.split(" =")[0] not in seen
+                ] + lines
+        if len(rows) > 1:
+            rows = {state: self.lazily(lines) for state, lines in rows.items()}
+        body = [*before, *(self.by_state(bank, rows) if rows else []), *after]
+        body = [*self.element(bank, first, signs), *body]
+        if not body:
+            return []
+        text = f"for i in range({self.sizes[bank]}):"
+        return self.outward(
+            bank, [CodeLine(text, frozenset({f"#{self.sizes[bank]}"})), *indented(body)]
+        )
+
+    def lazily(self, lines: list[CodeLine]) -> list[CodeLine]:
+        """Let what takes long be computed in these lines, which may not be reached."""
+        names = [
+            name
+            for name in self.read.defined
+            if name in self.closure(reads_of(lines)) and self.takes_long(name)
+        ]
+        if not names:
+            return lines
+        without = [line._replace(reads=line.reads - {*names}) for line in lines]
+        return [*(CodeLine("", lazy=name) for name in names), *without]
+
+    def takes_long(self, name: str) -> bool:
+        """Return whether a shared quantity contains a function such as exp or a power."""
+        if name in self.late or name in self.read.owner or name not in self.plan.definitions:
+            return False
+        value = self.plan.definitions[name]
+        return not value.calls and any(
+            (isinstance(part, Call) and part.function not in QUICK)
+            or (isinstance(part, Binary) and part.op == "**")
+            for part in walk(value.tree)
+        )
+
+    def own(self, bank: int, reads: frozenset[str]) -> frozenset[str]:
+        """Return what is read of an element that is assigned first."""
+        parameters = {*self.read.own}
+        rates = {*map(self.read.banks[bank].rate, self.read.banks[bank].variables)}
+        owner = self.read.owner
+        return frozenset(
+            name
+            for name in self.closure(reads)
+            if owner.get(name) == bank and name not in parameters and name not in rates
+        )
+
+    def outward(self, bank: int, lines: list[CodeLine]) -> list[CodeLine]:
+        """Forget what lines read of an element; its parameters stay, as arrays."""
+        inside = {
+            name
+            for name, owner in self.read.owner.items()
+            if owner == bank and name not in self.read.own
+        }
+        return [line._replace(reads=line.reads - inside) for line in lines]
+
+    def by_state(self, bank: int, branches: Mapping[str, list[CodeLine]]) -> list[CodeLine]:
+        """Write an if-else over the element's state."""
+        states = self.names.states[bank]
+        filled = [
+            (states[state], body if _does_something(body) else [*body, CodeLine("pass")])
+            for state, body in branches.items()
+        ]
+        if not any(_does_something(body) for body in branches.values()):
+            return []
+        if len(filled) == 1:
+            return next(iter(branches.values()))
+        mode = self.mode(bank)
+        lines = []
+        for number, (constant, body) in enumerate(filled):
+            word = "if" if number == 0 else "elif"
+            last = number == len(filled) - 1
+            head = f"else:  # {constant}" if last else f"{word} {mode} == {constant}:"
+            lines += [CodeLine(head), *indented(body)]
+        return lines
+
+    def mode(self, bank: int, element: str = "i") -> str:
+        """Spell the mode of an element of a contact."""
+        return f"mode[{self.machine(bank, element)}]"
+
+    def machine(self, bank: int, element: str = "i") -> str:
+        """Spell the number of an element of a contact among all machines."""
+        return total([*self.sizes[:bank], element])
+
+    # ------------------------------------------------------------------ functions
+    def function(
+        self, signature: str, doc: str, body: list[CodeLine], signs: Signs, *, within: bool = False
+    ) -> list[str]:
+        """Assemble a function: signature, the values its body reads, then the body.
+
+        Within a step velocities that locks determine are computed; elsewhere they are in y.
+        """
+        at_once = self.closure(reads_of(body))
+        lazy = dict.fromkeys(line.lazy for line in body if line.lazy and line.lazy not in at_once)
+        found = {name: self.defined(name, signs) for name in lazy}
+        lines: list[CodeLine] = []
+        for line in body:
+            if not line.lazy:
+                lines.append(line)
+            elif line.lazy in found:
+                name = self.local(line.lazy)
+                made = [CodeLine(f"if {name} != {name}:"), *indented(found[line.lazy])]
+                lines += [each._replace(text=line.text + each.text) for each in made]
+        first = [
+            CodeLine(f"{self.local(name)} = nan  # computed where it is read") for name in lazy
+        ]
+        head = self.head(reads_of(lines) - {*lazy}, signs, self.followed() if within else [])
+        lines = [*head, *first, *lines] or [CodeLine("pass")]
+        return [f"def {signature}:", f'    """{doc}"""', *(f"    {line.text}" for line in lines)]
+
+    def followed(self) -> list[CodeLine]:
+        """Write the velocities that locks determine."""
+        return []
+
+    def rounded(self, name: str) -> list[CodeLine]:
+        """Write that a value is zero if it is so but for rounding."""
+        del name
+        return []
+
+    def head(
+        self, reads: frozenset[str], signs: Signs, followed: list[CodeLine] | None = None
+    ) -> list[CodeLine]:
+        """Write what is read before a body: numbers, states, and what is computed from them."""
+        needed = self.closure(reads | reads_of(followed or ())) - self.late
+        values: list[CodeLine] = []
+        for name in self.read.defined:
+            if followed and "." in name:  # the first one of a contact
+                values, followed = values + followed, None
+            if name in needed and name not in self.read.owner:
+                values += self.defined(name, signs)
+        values += followed or []
+        needed = (needed | self.closure(reads_of(values))) - self.late
+        shared = [(name, j) for j, name in enumerate(self.names.shared) if name in needed]
+        own = [(name, j) for j, name in enumerate(self.names.own) if name in needed]
+        # With several contacts their sizes are numerals.
+        sizes = [size for size in self.sizes if f"#{size}" in needed and len(self.sizes) == 1]
+        lines = []
+        if shared or own or sizes or TABLES in needed:
+            lines.append(CodeLine("shared, own, tables = p"))
+        lines += [CodeLine(f"{self.local(name)} = shared[{j}]") for name, j in shared]
+        lines += [CodeLine(f"{self.local(name)} = own[{j}]") for name, j in own]
+        for size in sizes:
+            # After the elements' modes come those of the surfaces: len(mode) says nothing.
+            weight = self.names.own.index(self.read.banks[0].weight)
+            lines.append(CodeLine(f"{size} = len(own[{weight}])"))
+        y = self.layout.y
+        lines += [
+            CodeLine(f"{self.local(name)} = y[{y.text(name)}]")
+            for name in y.shared
+            if name in needed
+        ]
+        return lines + values
+
+    def defined(self, name: str, signs: Signs) -> list[CodeLine]:
+        """Assign a shared quantity that is computed from others."""
+        target = self.local(name)
+        value = self.plan.definitions.get(name)
+        if value is not None:
+            if name.endswith(".curve S"):
+                return self.curve(name, value, signs)
+            return [*self.computed(target, value, signs), *self.rounded(name)]
+        if (name, "times") in self.plan.tables.shared:
+            return [
+                CodeLine(f"{target} = piecewise_linear(t, {self.table(name)})", frozenset({TABLES}))
+            ]
+        return [CodeLine(f"{target} = {name}_signal(t)")]
+
+    def curve(self, name: str, value: Computed, signs: Signs) -> list[CodeLine]:
+        """Assign a Stribeck curve; where it is flat to the last bit, exp would be lost."""
+        contact = name.removesuffix("curve S")
+        (bank,) = [each for each in self.read.banks if of(each.name, "") == contact]
+        v, F_c, flat = bank.velocities[0], f"{contact}curve F_c", f"{contact}curve v flat"
+        *calls, line = self.computed(self.local(name), value, signs, "  # (2)")
+        test = f"if abs({self.local(v)}) > {self.local(flat)}:"
+        constant = CodeLine(f"{self.local(name)} = {self.local(F_c)}", frozenset({F_c}))
+        return [
+            *calls,
+            CodeLine(test, frozenset({v, flat})),
+            *indented([constant]),
+            CodeLine("else:"),
+            *indented([line]),
+        ]
+
+    def table(self, name: str) -> str:
+        """Spell the corners of a signal: their times and values."""
+        places = (self.plan.tables.text((name, column)) for column in ("times", "values"))
+        return ", ".join(f"tables[{place}]" for place in places)
+
+
+def one_line(text: str) -> str:
+    """Return text fit for a comment: a line break would end it."""
+    return "".join(c if c.isprintable() else " " for c in text)

@@ -1,0 +1,587 @@
+"""The arguments of a simulation, checked and completed."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+import integrators
+from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
+from gms_fsm.errors import ParameterError, SignalError, shown
+from gms_fsm.lowering.floor import floor_of
+from gms_fsm.lowering.layout import BankPlaces, SystemLayout
+from gms_fsm.lowering.log_columns import LogRecord
+from gms_fsm.lowering.program import Program, arguments, lower
+from gms_fsm.lowering.pulses import waking_times
+from gms_fsm.lowering.scales import Setting, Tolerance, scales_of_system
+from gms_fsm.run.settings import Settings
+from gms_fsm.run.ticks import clocks_of, ticks_of
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import Mounted, mounted
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.signals import Corners, Formula
+from gms_fsm.systems.system import System
+from gms_fsm.traces.firings import Firings
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.trace import Trace
+from integrators import LoopOptions
+
+__all__ = ["STEPS_A_TICK", "Start"]
+
+STEPS_A_TICK = 4  # after each tick the steps begin anew
+LATEST = 1e9  # s; one tick of a double is then 1e-7 s
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A system ready to run.
+
+    Parameters
+    ----------
+    what : Mounted
+        What runs.
+    program : Program
+        Its generated program.
+    t_start, t_end, last : float
+        s; `last` is earlier than t_end if a sampled signal ends earlier.
+    y : list of float, shape (m,)
+        Initial state.
+    mode : list of int, shape (n,)
+        Initial states of the elements.
+    options : integrators.LoopOptions
+        Options of the integration.
+    settings : mapping
+        As recorded in the trace.
+    chosen : Settings
+        As given.
+    initial : mapping
+        As given.
+    """
+
+    what: Mounted
+    program: Program
+    t_start: float
+    t_end: float
+    last: float
+    y: list[float]
+    mode: list[int]
+    options: LoopOptions
+    settings: Mapping[str, Setting]
+    chosen: Settings
+    initial: Mapping[str, Any]
+
+    @property
+    def system(self) -> System:
+        """What runs."""
+        return self.what.system
+
+    @property
+    def model(self) -> Model:
+        """The model; of a system of the user's its only contact."""
+        return self.what.model
+
+    @property
+    def rig(self) -> Rig:
+        """What moves it."""
+        return self.what.rig
+
+    @property
+    def given(self) -> System | None:
+        """The system, if it is the user's and not a model on a rig."""
+        return self.what.given
+
+    def before_entry(self) -> tuple[list[float], list[int]]:
+        """Return the state vector before any entry, and 1 for what the initial values give."""
+        layout = self.program.layout
+        y, _, given = _given(self.system, layout, self.initial)
+        return y, [int(name in given) for name, _ in layout.y]
+
+    def chosen_tolerances(self) -> list[float]:
+        """Return the absolute tolerance of each component that was given; 0 for the others."""
+        layout = self.program.layout
+        none = {
+            name: [0.0] * len(layout.y.all_of(name)) for name in (*layout.y.shared, *layout.y.own)
+        }
+        return _tolerances(layout, self.chosen.atol, none)[0]
+
+    def trace(self, rows: Rows, stops: Rows, firings: Firings) -> Trace:
+        """Return the trace of a run.
+
+        Parameters
+        ----------
+        rows, stops : Rows
+            What was kept.
+        firings : Firings
+            The log.
+
+        Returns
+        -------
+        Trace
+            With what it was made from.
+        """
+        trace = Trace(rows, stops, firings, self.what, self.settings)
+        vars(trace)["program"] = self.program  # it need not be generated again
+        return trace
+
+    def firings(self, records: Iterable[LogRecord]) -> Firings:
+        """Return the firings of a run from its records."""
+        return Firings.of(records, self.program.layout, of_system=self.what.named)
+
+    def edge(self, machine: int, edge: int) -> tuple[BankPlaces, Transition]:
+        """Return the contact of a machine and one of its edges, by their numbers in the run."""
+        bank = self.program.layout.bank(machine)
+        chart = self.system.contact(bank.name).chart
+        return bank, chart.transitions[edge - bank.first_edge]
+
+    @property
+    def output(self) -> str:
+        """Rows to keep: ``"all"``, ``"t_eval"`` or ``"end"``."""
+        assert self.chosen.output is not None  # Settings fills it in
+        return self.chosen.output
+
+    @property
+    def implicit(self) -> str:
+        """An implicit method and the tolerances that it needs, as one writes them."""
+        missing = _without_scale(self.program.layout, self.options.atol)
+        return f"method=scipy.integrate.Radau{f', atol={missing}' if missing else ''}"
+
+    @classmethod
+    def of(
+        cls,
+        model: Model | System,
+        rig: Rig | None,
+        t_end: float,
+        settings: Settings | None = None,
+        **more: Any,
+    ) -> Start:
+        """Return the start of a model on a rig, or of a system; the rest is as for `on`."""
+        chosen = Settings() if settings is None else settings
+        return cls.on(mounted(model, rig, chosen.held_period), t_end, chosen, **more)
+
+    @classmethod
+    def on(
+        cls,
+        what: Mounted,
+        t_end: float,
+        settings: Settings,
+        *,
+        t_start: float = 0.0,
+        initial: Mapping[str, Any] | None = None,
+        rows_at_once: int = integrators.ROWS_AT_ONCE,
+        ticks_from: float | None = None,
+    ) -> Start:
+        """Check the arguments of `gms_fsm.simulate`.
+
+        Parameters
+        ----------
+        what : Mounted
+            What runs.
+        t_end, t_start, initial
+            See `gms_fsm.simulate`.
+        settings : Settings
+            Method, tolerances and output.
+        rows_at_once : int
+            Maximum number of steps in an arc.
+        ticks_from : float, optional
+            s: start of the run that this one continues, from which its ticks are counted. Samplers
+            that tick exactly at t_start have then done so; contacts with a period tick again.
+
+        Returns
+        -------
+        Start
+            Complete.
+
+        Raises
+        ------
+        ParameterError, SignalError
+            If an argument breaks its rule.
+        """
+        chosen, system = settings, what.system
+        t_start, t_end = _times(t_start, t_end)
+        _check_resolution(chosen, t_start, t_end)
+        program = lower(system)
+        scales = scales_of_system(program)
+        default = scales.tolerances(chosen.rtol)
+        tolerances, used = _tolerances(program.layout, chosen.atol, default)
+        method = chosen.method
+        if not isinstance(method, str) and min(tolerances) == 0.0:
+            missing = _without_scale(program.layout, tolerances)
+            raise ParameterError(
+                f"method {method.__name__} needs an absolute tolerance, and the chart "
+                f"gives no scale for {', '.join(missing)}",
+                advice=f"give one far below the values that matter, for example atol={missing}",
+            )
+        options = LoopOptions(
+            integrators.METHODS[method] if isinstance(method, str) else method,
+            None if chosen.events == "held" else chosen.step,
+            chosen.rtol,
+            tolerances,
+            chosen.max_step,
+            scales.time,
+            chosen.max_steps,
+            chosen.events != "step",
+            [] if chosen.output == "end" else _wanted(chosen, t_start, t_end),
+            rows_at_once,
+            relaxing=scales.relaxing,
+        )
+        last = _covered(system, t_start, t_end)
+        program = _with_waking_times(program, system, t_start, last)
+        origin = t_start if ticks_from is None else ticks_from
+        if clocks := clocks_of(system):
+            program = replace(program, ticks=ticks_of(clocks, origin, t_start, last))
+            most = chosen.max_steps + STEPS_A_TICK * len(program.ticks)
+            options = replace(options, max_steps=most)
+        initial = {} if initial is None else initial
+        y, mode = _initial(system, program, t_start, initial)
+        floor = floor_of(program, tolerances, (t_start, last), y, mode)
+        options = replace(options, floor=floor)
+        return cls(
+            what=what,
+            program=program,
+            t_start=t_start,
+            t_end=t_end,
+            last=last,
+            y=y,
+            mode=mode,
+            options=options,
+            settings=_recorded(chosen, used, t_start, t_end),
+            chosen=chosen,
+            initial=initial,
+        )
+
+    def with_numbers(self, what: Mounted) -> Start:
+        """Return the same start with different numbers; signals and initial values stay.
+
+        Parameters
+        ----------
+        what : Mounted
+            With the `same_text`.
+
+        Returns
+        -------
+        Start
+            With the tolerances of its numbers, and the entries of its default states.
+        """
+        program = replace(self.program, p=arguments(what.system))
+        scales = scales_of_system(program)
+        default = scales.tolerances(self.options.rtol)
+        tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
+        y, _ = _initial(what.system, program, self.t_start, self.initial)
+        span = self.t_start, self.last
+        floor = floor_of(program, tolerances, span, y, self.mode)
+        return replace(
+            self,
+            what=what,
+            program=program,
+            y=y,
+            options=replace(
+                self.options,
+                atol=tolerances,
+                time_scale=scales.time,
+                relaxing=scales.relaxing,
+                floor=floor,
+            ),
+            settings={**self.settings, "atol": used},
+        )
+
+
+def _recorded(chosen: Settings, atol: Setting, t_start: float, t_end: float) -> dict[str, Setting]:
+    """Return the settings as a trace records them."""
+    return {
+        "method": chosen.method_name,
+        "step": chosen.step,
+        "rtol": chosen.rtol,
+        "atol": atol,
+        "max_step": chosen.max_step if math.isfinite(chosen.max_step) else None,
+        "max_steps": chosen.max_steps,
+        "events": chosen.events,
+        "engine": chosen.engine,
+        "t_start": t_start,
+        "t_end": t_end,
+    }
+
+
+def _times(t_start: float, t_end: float) -> tuple[float, float]:
+    t_start = checked_scalar("t_start", t_start, "finite")
+    t_end = checked_scalar("t_end", t_end, "finite")
+    for name, time in (("t_start", t_start), ("t_end", t_end)):
+        if abs(time) > LATEST:
+            raise ParameterError(
+                f"{name} is {time!r} s", advice=f"beyond {LATEST:g} s time is resolved too coarsely"
+            )
+    if t_end <= t_start:
+        raise ParameterError(
+            f"t_end is {t_end!r}, t_start is {t_start!r}", advice="t_end must be later"
+        )
+    return t_start, t_end
+
+
+def _check_resolution(chosen: Settings, t_start: float, t_end: float) -> None:
+    """Refuse steps too short to be resolved at these times."""
+    tick = 16.0 * math.ulp(max(abs(t_start), abs(t_end)))
+    for name, length in (("step", chosen.step), ("max_step", chosen.max_step)):
+        if length is not None and length <= tick:
+            raise ParameterError(
+                f"{name} is {length!r} s, below the resolution of the clock ({tick:.2g} s here)",
+                advice="give a larger value",
+            )
+
+
+def _wanted(chosen: Settings, t_start: float, t_end: float) -> FloatArray | None:
+    """Return the requested times, if any, after checking that all lie within the run."""
+    if chosen.t_eval is None:
+        return None
+    times: FloatArray = np.asarray(chosen.t_eval)  # increasing
+    for time in (float(times[0]), float(times[-1])):
+        if not t_start <= time <= t_end:
+            raise ParameterError(
+                f"t_eval has {time!r}, outside of t_start = {t_start!r} to t_end = {t_end!r}"
+            )
+    return times
+
+
+def _tolerances(
+    layout: SystemLayout, atol: Tolerance, default: Mapping[str, list[float]]
+) -> tuple[list[float], float | dict[str, float | list[float]]]:
+    """Return the absolute tolerance of each component, and how to record them in the settings."""
+    places = layout.y
+    if atol is not None and not isinstance(atol, Mapping):
+        return [atol] * places.size, atol
+    rows = {name: default[name] for name in (*places.shared, *places.own)}
+    by_name: Mapping[str, Any] = {} if atol is None else atol
+    for key, given in by_name.items():
+        name = _component(layout, key, "atol")
+        if np.ndim(given) == 0:
+            rows[name] = [checked_scalar(f"atol[{key!r}]", given, "> 0")] * len(rows[name])
+        else:
+            rows[name] = as_floats(checked_array(f"atol[{key!r}]", given, len(rows[name]), "> 0"))
+    found: dict[str, float | list[float]] = {
+        name: row if name in places.own else row[0] for name, row in rows.items()
+    }
+    used = {layout.label(name): row for name, row in found.items()}
+    return places.joined(found), used
+
+
+def _without_scale(layout: SystemLayout, tolerances: list[float]) -> dict[str, float]:
+    """Return the components without an absolute tolerance, each with an example of one."""
+    places = layout.y
+    names = [*places.shared, *places.own]
+    return {
+        layout.label(name): 1e-12
+        for name in names
+        if not all(tolerances[k] for k in places.all_of(name))
+    }
+
+
+def _component(layout: SystemLayout, key: object, owner: str) -> str:
+    """Return the name in the layout of what a user calls a component."""
+    if not isinstance(key, str) or key not in layout.keys:
+        known = [layout.label(name) for name in (*layout.y.shared, *layout.y.own)]
+        raise ParameterError(
+            f"{owner} has the key {shown(key)}", advice=f"known are {', '.join(map(repr, known))}"
+        )
+    return layout.keys[key]
+
+
+def _with_waking_times(program: Program, system: System, t_start: float, t_end: float) -> Program:
+    """Return the program with the times at which its formulas start to change as knots."""
+    times = {
+        time
+        for signal in system.signals.values()
+        if isinstance(signal, Formula)
+        for time in waking_times(signal.tree, t_start, t_end)
+    }
+    return replace(program, knots=sorted({*program.knots, *times})) if times else program
+
+
+ROUNDING = 1e-9  # of a velocity, relative to those of the bodies
+
+
+def _covered(system: System, t_start: float, t_end: float) -> float:
+    """Return the last time covered by all sampled signals."""
+    last = t_end
+    for name, signal in system.signals.items():
+        if isinstance(signal, Corners) and not signal.held:
+            if not signal.times[0] <= t_start < signal.times[-1]:
+                raise SignalError(
+                    f"signal {name!r} covers {float(signal.times[0])!r} to "
+                    f"{float(signal.times[-1])!r} s, but the run starts at {t_start!r} s",
+                    advice="choose t_start within the record",
+                )
+            last = min(last, float(signal.times[-1]))
+    return last
+
+
+def _initial(
+    system: System, program: Program, t_start: float, initial: Mapping[str, Any]
+) -> tuple[list[float], list[int]]:
+    """Build the state vector and the modes."""
+    layout = program.layout
+    if initial == {} and _is_plain(system.shape):
+        return [0.0] * layout.y.size, [0] * layout.n
+    y, mode, given = _given(system, layout, initial)
+    y = _entered(system, program, t_start, y, mode, given)
+    _check_locks(system, program, t_start, y, mode)
+    return y, mode
+
+
+def _given(
+    system: System, layout: SystemLayout, initial: Mapping[str, Any]
+) -> tuple[list[float], list[int], set[str]]:
+    """Return the state vector and the modes before any entry, and what has been given."""
+    if not isinstance(initial, Mapping):
+        raise ParameterError(
+            "it must be a mapping, for example {'x': 0}", place="initial", value=initial
+        )
+    names: dict[str, Any] = {}
+    given: dict[str, Any] = {}
+    for key, value in initial.items():
+        contact = key.removesuffix("states").removesuffix(".") if isinstance(key, str) else ""
+        if key == "states" and len(layout.banks) == 1:
+            names[layout.banks[0].name] = value
+        elif isinstance(key, str) and key == f"{contact}.states":
+            names[system.contact(contact).name] = value
+        elif key in layout.keys:
+            given[layout.keys[key]] = value
+        else:
+            reason, advice = _unknown_initial(system, layout, key, value)
+            raise ParameterError(reason, advice=advice)
+    y: dict[str, Any] = dict.fromkeys(layout.y.shared, 0.0)
+    for each in system.sampled:
+        y |= each.initial
+    for name in layout.y.shared:
+        if name in given:
+            y[name] = checked_scalar(f"initial[{name!r}]", given[name], "finite")
+    for bank in layout.banks:
+        for variable in bank.variables:
+            name, label = bank.of(variable), layout.label(bank.of(variable))
+            values = checked_array(
+                f"initial[{label!r}]", given.get(name, [0.0] * bank.n), None, "finite"
+            )
+            if values.size != bank.n:
+                raise ParameterError(
+                    f"initial[{label!r}] has {values.size} entries",
+                    advice=f"the model has {bank.n} elements",
+                )
+            y[name] = as_floats(values)
+        y |= {
+            name: [0.0] * bank.n
+            for name in layout.y.own
+            if name not in y and name.startswith(bank.of(""))
+        }
+    state, mode = layout.y.joined(y), list[int]()
+    for bank, part in zip(layout.banks, system.contacts, strict=True):
+        chart = part.chart
+        default = [chart.default_state.name] * bank.n
+        wanted = names.get(bank.name, default)
+        if isinstance(wanted, str) or np.ndim(wanted) != 1 or len(wanted) != bank.n:
+            label = "states" if len(layout.banks) == 1 else f"{bank.name}.states"
+            raise ParameterError(
+                f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
+            )
+        mode += [chart.state_index(str(name)) for name in wanted]
+    return state, mode, {*given}
+
+
+@functools.lru_cache(maxsize=64)
+def _is_plain(shape: System) -> bool:
+    """Return whether systems of a shape start with 0 everywhere unless something else is given."""
+    locked = any(contact.chart.default_state.locked for contact in shape.contacts)
+    return not (shape.sampled or locked or _enters(shape))
+
+
+def _check_locks(
+    system: System, program: Program, t_start: float, y: list[float], mode: list[int]
+) -> None:
+    """Refuse a start in a state that holds a velocity at 0 while this is not 0."""
+    layout, out = program.layout, [0.0] * program.layout.shown.size
+    locked = [
+        (bank, contact.chart, state)
+        for bank, contact in zip(layout.banks, system.contacts, strict=True)
+        for state in [contact.chart.states[i] for i in mode[bank.elements]]
+        if state.locked
+    ]
+    if not locked:
+        return
+    program.ieee["values"](t_start, y, mode, program.p, program.calm, out)
+    free = [body for body in system.bodies if not body.driven]
+    fastest = max((abs(y[layout.y.index(body.v)]) for body in free), default=0.0)
+    for bank, chart, state in locked:
+        for name in chart.velocities:
+            v = out[layout.shown.index(bank.of(name))]
+            if not abs(v) <= ROUNDING * fastest:
+                key = "states" if len(layout.banks) == 1 else f"{bank.name}.states"
+                raise ParameterError(
+                    f"contact {bank.name!r} starts in state {state.name!r}, which holds {name} at "
+                    f"0, with {name} = {v:.6g}",
+                    place="initial",
+                    advice=f"give velocities for which {name} is 0, or another state, for example "
+                    f"initial={{{key!r}: [{_not_locked(chart)!r}]}}",
+                )
+
+
+def _not_locked(chart: Chart) -> str:
+    """Return the name of a state that holds nothing, or of any."""
+    return next((each for each in chart.states if not each.locked), chart.states[0]).name
+
+
+def _enters(system: System) -> bool:
+    """Return whether the default state of some chart has an entry."""
+    charts = (contact.chart for contact in system.contacts)
+    return any(chart.assignments["entry", chart.default_state.name] for chart in charts)
+
+
+def _entered(
+    system: System,
+    program: Program,
+    t_start: float,
+    y: list[float],
+    mode: list[int],
+    given: set[str],
+) -> list[float]:
+    """Perform the entry of each element's default state, as when a chart is first entered.
+
+    What the initial values give stays.
+    """
+    if not _enters(system):
+        return y
+    layout = program.layout
+    for bank, contact in zip(layout.banks, system.contacts, strict=True):
+        chart = contact.chart
+        for name in chart.assignments["entry", chart.default_state.name]:
+            if name in chart.velocities and 0 in mode[bank.elements]:
+                raise ParameterError(
+                    f"the entry of the default state {chart.states[0].name!r} sets {name!r}",
+                    place=f"chart {chart.name!r}",
+                    advice="give the initial velocity instead",
+                )
+    kept = [int(name in given) for name, _ in layout.y]
+    new = list(y)
+    program.adaptive.functions["enter"](t_start, new, [*layout.not_sliding(mode)], program.p, kept)
+    return new
+
+
+def _unknown_initial(
+    system: System, layout: SystemLayout, key: object, value: object
+) -> tuple[str, str]:
+    """Say what is wrong with a key of the initial values, and what to do."""
+    for body in system.bodies:
+        if body.driven and key in (body.v, f"{body.name}.v"):
+            whose = (
+                "the rig prescribes the velocity"
+                if body.velocity == "v"
+                else (f"the velocity of {body.name} is given")
+            )
+            return f"initial has {key!r} = {shown(value)}, but {whose}", "leave it out"
+    known = [layout.label(name) for name in (*layout.y.shared, *layout.y.own)]
+    states = ["states"] if len(layout.banks) == 1 else [f"{b.name}.states" for b in layout.banks]
+    return (
+        f"initial has the key {shown(key)}",
+        f"known are {', '.join(map(repr, [*known, *states]))}",
+    )

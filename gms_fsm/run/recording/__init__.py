@@ -1,0 +1,1 @@
+"""What a run records while it goes: rows, events, the moment that callbacks see."""

@@ -1,0 +1,490 @@
+"""A run by the compiled engine: the outer loop itself is machine code that fills columns."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gms_fsm.errors import SignalError
+from gms_fsm.lowering import compiling as compiled
+from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
+from gms_fsm.lowering.program import equations
+from gms_fsm.run.machines import Interference, MachineEngine
+from gms_fsm.run.problem import Start
+from gms_fsm.run.recording.moment import Place, Recording
+from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
+from gms_fsm.run.recording.recording import check_end, explained, interference_error
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.traces.failures import SimulationError
+from gms_fsm.traces.firings import Firings
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.trace import Trace
+from integrators import hybrid, loop
+from integrators.loop import Memory
+from integrators.machine_code.records import arrays_of, put_numbers
+from integrators.runners import states
+from integrators.runners.columns import LogColumns, Recorded
+from integrators.sliding import Functions, Sliding
+from integrators.steps import Now
+
+if TYPE_CHECKING:
+    from integrators.runners.compiled import RecordArguments
+
+__all__ = ["CompiledRun", "example_of"]
+
+WORTH_A_LOOK = 500_000  # steps: machine code takes fewer in less time than it takes to look ahead
+STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
+
+
+class CompiledRun:
+    """A simulation in progress, chunk by chunk; same interface as `gms_fsm.run.simulate.Run`.
+
+    Parameters
+    ----------
+    start : Start
+        The run to perform.
+    machines : MachineEngine, optional
+        With the user's own machines: each firing is replayed through them.
+    """
+
+    def __init__(self, start: Start, machines: MachineEngine | None = None) -> None:
+        self.start = start
+        self.columns = Columns(start)
+        self.recorder: Recording = self.columns
+        self.engine = machines
+        self.next_look = PATIENCE
+
+    @property
+    def buffers(self) -> hybrid.Buffers:
+        """The buffers in which the loop keeps its state."""
+        return self.columns.buffers
+
+    @property
+    def rows_wait(self) -> bool:
+        """The columns have all rows."""
+        return False
+
+    def kept(self) -> dict[str, Any]:
+        """Return the columns for a checkpoint."""
+        return self.columns.state()
+
+    def restore(self, kept: dict[str, Any]) -> None:
+        """Restore what `kept` returned; the buffers are already filled."""
+        self.columns.restore(kept)
+        memory = self.buffers.memory
+        t, y, mode = self.columns.latest
+        if self.engine is not None:
+            self.engine.restore(t, y, mode[self.start.program.layout.elements])
+            if memory.phase == loop.FIRE:  # its callbacks have run, the loop has yet to fire
+                _, edge = self.start.edge(memory.machine, memory.edge)
+                self.engine.set_state(memory.machine, edge.target)
+
+    def reset(self, what: Mounted) -> None:
+        """Start over with different numbers; signals and initial values stay.
+
+        Parameters
+        ----------
+        what : Mounted
+            With the same text as the previous one.
+        """
+        self.columns.reset(what)
+        self.next_look = PATIENCE
+
+    def advance(self) -> bool:
+        """Run until a chunk of steps is complete.
+
+        Returns
+        -------
+        bool
+            False if the run has reached its end.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot continue.
+        """
+        columns = self.columns
+        columns.make_room()
+        b, start, before = columns.buffers, columns.start, columns.latest
+        try:
+            event = columns.run(STEPS_AT_ONCE, pause=self.engine is not None)
+        except SignalError as error:
+            columns.interrupted(before)
+            raise SimulationError(
+                error.reason, columns.trace(), place=error.place, advice=error.advice
+            ) from None
+        except KeyboardInterrupt:  # in a Python function
+            columns.interrupted(before)
+            raise
+        if event == loop.DONE:
+            check_end(columns)
+            return False
+        if event == loop.ROWS:
+            steps = b.out.steps
+            if steps >= self.next_look and start.options.max_steps - steps >= WORTH_A_LOOK:
+                self.next_look = LATER * steps
+                check_pace(columns, columns.as_lists())
+        elif event == loop.FIRING:
+            self._replay(self.engine)
+        else:
+            failed = hybrid.failure(event, columns.as_lists(), start.program.relations)
+            raise explained(failed, columns) from None
+        return True
+
+    def _replay(self, engine: MachineEngine | None) -> None:
+        """Fire the user's machine just before the compiled loop fires."""
+        assert engine is not None
+        memory, (t, y, mode) = self.columns.buffers.memory, self.columns.latest
+        start = self.columns.start
+        if not memory.fired_one:  # the values when the guards were evaluated
+            jolt: Any = memory.jolt
+            engine.show(t, y, list(mode[start.program.layout.elements]), jolt.tolist())
+        try:
+            engine.trigger(memory.edge, memory.machine, t)
+        except Interference as error:
+            raise interference_error(error, self.columns) from error.__cause__
+
+
+class Columns:
+    """The arrays that a compiled run fills; they grow as needed.
+
+    Parameters
+    ----------
+    start : Start
+        The run.
+    p : tuple of ndarray, optional
+        Parameters that replace the program's own.
+    """
+
+    def __init__(self, start: Start, p: compiled.Packed | None = None) -> None:
+        self.start = start
+        layout = start.program.layout
+        size, modes = layout.y.size, layout.modes
+        self.prepared = _prepared(start)
+        self.engine, self.block = self.prepared.engine, self.prepared.block()
+        self.run_of: RecordArguments = self.block.contents
+        self.p = compiled.packed(start.program.p) if p is None else p
+        few = max(16, min(1024, 4_000_000 // size))  # initial number of rows
+        rows = {"all": few, "t_eval": 0, "end": 0}[start.output]
+        if start.options.times is not None:
+            rows = len(start.options.times)
+        stops = few if start.output == "t_eval" else 0
+        floats: Any = np.zeros  # the columns' fields are typed as lists; compiled code uses arrays
+        ints: Any = functools.partial(np.zeros, dtype=np.int64)
+        rows_t, rows_microstep, rows_y, rows_mode = _empty_rows(rows, size, modes)
+        stops_t, stops_microstep, stops_y, stops_mode = _empty_rows(stops, size, modes)
+        b = self.run_of.buffers
+        plan = hybrid.plan_of(
+            equations(start.program), start.t_start, start.last, start.options, len(start.mode)
+        )
+        self.buffers: hybrid.Buffers = b._replace(plan=_as_arrays(plan, b.plan))
+        out: Any = b.out  # arrays
+        out.every_step = start.options.times is None
+        out.times = np.asarray(() if out.every_step else start.options.times, float)
+        out.rows_t, out.rows_y = rows_t, rows_y
+        log: Any = self.run_of.log
+        self.log: LogColumns = log
+        log.t, log.machine, log.edge = floats(256), ints(256), ints(256)
+        log.numbers = floats((256, len(LOG_NUMBERS)))
+        log.rows_microstep, log.rows_mode = rows_microstep, rows_mode
+        log.stops_t, log.stops_microstep = stops_t, stops_microstep
+        log.stops_y, log.stops_mode = stops_y, stops_mode
+        self.handed_out = False  # whether a trace has the columns of rows, and not a copy
+        self._begin()
+        if stops:
+            self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
+            self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
+            self.log.stops_microstep[0] = 0
+            self.log.stops = 1
+
+    def __del__(self) -> None:
+        if hasattr(self, "block"):
+            self.prepared.take_back(self.block)
+
+    def run(self, most_steps: int, *, pause: bool) -> int:
+        """Run the machine code; see `integrators.runners.columns.record`."""
+        functions = self.run_of.functions
+        places: Any = functions.p
+        shared, own, tables = self.p
+        places[0][...], places[1][...] = shared, own
+        self.block.update(
+            self.run_of._replace(
+                functions=functions._replace(p=(*places[:2], tables)),
+                buffers=self.buffers,
+            )
+        )
+        return self.engine(self.block, most_steps, pause)
+
+    def reset(self, what: Mounted) -> None:
+        """Empty the columns and return to the start, with other numbers."""
+        self.start = self.start.with_numbers(what)
+        self.p = compiled.packed(self.start.program.p)
+        self.empty()
+
+    def _begin(self) -> None:
+        """Write the start into the buffers, which are otherwise as they were at the beginning."""
+        start = self.start
+        b: Any = self.buffers  # arrays
+        begun = states.beginning(start.t_start, start.last)
+        put_numbers(b.now, begun.keys(), begun.values())
+        b.now.y[:], b.now.mode[:], b.memory.anchor[:] = start.y, start.mode, start.y
+        b.now.floor[:] = start.options.floor or start.options.atol
+
+    def empty(self) -> None:
+        """Empty the columns and return to the start."""
+        if self.handed_out:
+            self._replace_rows()
+        start, log = self.start, self.log
+        b: Any = self.buffers  # arrays
+        memory, sliding = b.memory, b.sliding
+        for record, names in ((memory, states.COUNTS), (b.out, states.CURSOR)):
+            put_numbers(record, names, [0] * len(names))
+        sliding.count = 0
+        for counts in (
+            memory.switches,
+            memory.changes,
+            memory.was,
+            memory.jolt,
+            b.relations.watch,
+            sliding.which,
+            sliding.flags,
+            sliding.arrived,
+        ):
+            counts[:] = 0
+        self._begin()
+        sliding.live[:] = start.program.live
+        b.plan.control.atol[:] = start.options.atol
+        b.plan.relaxing[:] = hybrid.relaxation_times(start.options)
+        control = b.plan.control._replace(time_scale=start.options.time_scale)
+        self.buffers = b._replace(plan=b.plan._replace(control=control))
+        log.firings, log.stops = 0, min(1, len(log.stops_t))
+
+    def _replace_rows(self) -> None:
+        """Leave the columns of rows to the trace that has them."""
+        out: Any = self.buffers.out
+        layout = self.start.program.layout
+        t, microstep, y, mode = _empty_rows(len(out.rows_t), layout.y.size, layout.modes)
+        out.rows_t, out.rows_y = t, y
+        self.log.rows_microstep, self.log.rows_mode = microstep, mode
+        self.handed_out = False
+
+    def state(self) -> dict[str, Any]:
+        """Return the contents as arrays, for a checkpoint; 0 where nothing has been written."""
+        out, log = self.buffers.out, self.log
+        found: dict[str, Any] = {name: getattr(log, name) for name in arrays_of(LogColumns)}
+        found |= {"rows_t": out.rows_t, "rows_y": out.rows_y}
+        taken = self.buffers.memory.taken  # the modes of further rows come later
+        filled = dict.fromkeys(("rows_mode", "rows_microstep"), taken)
+        filled |= dict.fromkeys(("rows_t", "rows_y"), out.row)
+        filled |= {name: log.stops for name in found if name.startswith("stops")}
+        for name, count in filled.items():
+            found[name][count:] = 0
+        return {"counts": [log.firings, log.stops], **found}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Restore what `state` returned."""
+        out: Any = self.buffers.out
+        log: Any = self.log
+        log.firings, log.stops = map(int, state["counts"])
+        log.seen[...] = state["seen"]  # a place in the block
+        for name in arrays_of(LogColumns):
+            if name != "seen":
+                setattr(log, name, state[name])
+        out.rows_t, out.rows_y = state["rows_t"], state["rows_y"]
+
+    def make_room(self) -> None:
+        """Double the columns that are full."""
+        out, log = self.buffers.out, self.log
+        if out.every_step and out.row + 1 >= len(out.rows_t):
+            _double(out, "rows_t", "rows_y")
+            _double(log, "rows_microstep", "rows_mode")
+        if log.firings >= len(log.t):
+            _double(log, "t", "machine", "edge", "numbers")
+        if 0 < len(log.stops_t) <= log.stops:
+            _double(log, "stops_t", "stops_microstep", "stops_y", "stops_mode")
+
+    def interrupted(self, before: tuple[float, list[float], tuple[int, ...]]) -> None:
+        """Recover from machine code that was interrupted by an error in a user's function.
+
+        The rows are complete except for their modes; only the previous time and state are certain.
+        """
+        b: Any = self.buffers
+        log: Any = self.log
+        fresh = slice(int(b.memory.taken), int(b.out.row))
+        t, y, mode = before
+        modes = [*b.now.mode.tolist(), *b.sliding.flags.tolist()]
+        log.rows_microstep[fresh], log.rows_mode[fresh] = 0, modes
+        b.now.t, b.now.y[:], b.now.mode[:] = t, y, mode[: len(b.now.mode)]
+
+    @property
+    def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
+        """Time, state and modes reached."""
+        b: Any = self.buffers
+        modes = (*b.now.mode.tolist(), *b.sliding.flags.tolist())
+        return b.now.t, b.now.y.tolist(), modes
+
+    def around(self, t: float) -> tuple[Place, Place | None]:
+        """Return the last row at or before a time, and the next one."""
+        out, log, start = self.buffers.out, self.log, self.start
+        rows: Any = out  # arrays
+        count = out.row
+        row = int(np.searchsorted(rows.rows_t[:count], t, "right")) - 1
+        modes: Any = log.rows_mode
+        places = [
+            (float(rows.rows_t[i]), rows.rows_y[i].tolist(), tuple(modes[i].tolist()))
+            for i in (row, row + 1)
+            if 0 <= i < count
+        ]
+        if row < 0:
+            mode = start.program.layout.not_sliding(start.mode)
+            places.insert(0, (start.t_start, list(start.y), mode))
+        return places[0], (*places, None)[1]
+
+    def firings(self, after: int) -> list[LogRecord]:
+        """Return the records of the log from a number on."""
+        return [LogRecord(*each) for each in self.fired().at(slice(after, None)).records.tolist()]
+
+    def as_lists(self) -> hybrid.Buffers:
+        """Return the buffers with time, state and modes as Python numbers, for messages."""
+        b = self.buffers
+        return b._replace(
+            now=_with_lists(Now, b.now),
+            memory=_with_lists(Memory, b.memory),
+            sliding=_with_lists(Sliding, b.sliding),
+        )
+
+    def fired(self) -> Firings:
+        """Return the firings so far."""
+        start, count = self.start, self.log.firings
+        names = ("t", "machine", "edge", "numbers")
+        columns = {name: getattr(self.log, name)[:count] for name in names}
+        return Firings.copied(columns, start.program.layout, of_system=start.what.named)
+
+    def trace(self) -> Trace:
+        """Return the trace of all recorded data."""
+        start, log, out = self.start, self.log, self.buffers.out
+        count = out.row
+        if start.output == "end":
+            t, y, mode = self.latest
+            rows = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
+        else:
+            columns: Any = out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode
+            self.handed_out = count == len(out.rows_t)
+            rows = Rows(*columns) if self.handed_out else _rows(count, *columns)
+        stops = rows
+        if start.output == "t_eval":
+            stops = _rows(
+                log.stops,
+                log.stops_t,
+                log.stops_microstep,
+                log.stops_y,
+                log.stops_mode,
+            )
+        return start.trace(rows, stops, self.fired())
+
+
+_known: dict[Any, compiled.Prepared] = {}
+
+
+def _prepared(start: Start) -> compiled.Prepared:
+    """Return what a run has in common with others: what moves, the method, and the sizes."""
+    program = start.program
+    flow = "flow" if start.options.located else "flow_live"
+    key = id(program.functions), flow, start.options.method
+    if key not in _known:
+        if len(_known) >= compiled.MOST_ENGINES:
+            _known.clear()
+        run = example_of(start)
+        engine = compiled.engine(program, run)
+        _known[key] = compiled.Prepared(engine, run, program.functions)
+    return _known[key]
+
+
+def example_of(start: Start) -> RecordArguments:
+    """Return the arguments of `integrators.runners.columns.record`, with columns that may grow.
+
+    Parameters
+    ----------
+    start : Start
+        The run.
+
+    Returns
+    -------
+    integrators.runners.compiled.RecordArguments
+        An example for `integrators.machine_code.layout.BlockLayout`.
+    """
+    from integrators.runners.compiled import example
+
+    program, layout = start.program, start.program.layout
+    flow = "flow" if start.options.located else "flow_live"
+    made = compiled.functions(program)
+    p: Any = compiled.packed(program.p)
+    return example(
+        Functions(made[flow], made["arm"], made["margins"], made["normal"], made["follow"], p),
+        loop.Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
+        hybrid.buffers(
+            equations(program), start.t_start, start.y, start.mode, start.last, start.options, 0
+        ),
+        layout.observed.size,
+        Recorded(*map(_integers, layout.recorded)),
+        layout.modes,
+    )
+
+
+def _as_arrays(plan: Any, places: Any) -> Any:
+    """Return a plan whose lists are arrays, those inside the block in their places."""
+    places.control.atol[:], places.discrete[:] = plan.control.atol, plan.discrete
+    places.impulses[:] = plan.impulses
+    jumps = len(plan.jumps) > 0
+    places.relaxing[:] = plan.relaxing
+    return plan._replace(
+        impulses=places.impulses,
+        control=plan.control._replace(atol=places.control.atol),
+        discrete=places.discrete,
+        relaxing=places.relaxing,
+        jumps=plan.jumps if jumps else places.jumps,
+        before_jumps=plan.before_jumps if jumps else places.before_jumps,
+        ticks=plan.ticks if jumps else places.ticks,
+        knots=_floats(plan.knots) if plan.knots else places.knots,
+    )
+
+
+def _floats(numbers: Any) -> Any:
+    return np.array(numbers, dtype=np.float64)
+
+
+def _integers(numbers: Any) -> Any:
+    return np.array(numbers, dtype=np.int64)
+
+
+def _empty_rows(rows: int, size: int, modes: int) -> tuple[Any, Any, Any, Any]:
+    """Return columns for times, micro-steps, states and modes, in one piece of memory.
+
+    In several pieces they would be given back to the system after each run and fetched again for
+    the next one, which takes longer than filling them.
+    """
+    numbers = np.empty(rows * (2 + size + modes))
+    whole = numbers.view(np.int64)
+    start, end = 2 * rows, (2 + size) * rows  # of the states
+    y, mode = numbers[start:end].reshape(rows, size), whole[end:].reshape(rows, modes)
+    return numbers[:rows], whole[rows:start], y, mode
+
+
+def _with_lists(kind: Any, record: Any) -> Any:
+    """Return a copy of a record in a block, with lists instead of arrays."""
+    parts = (getattr(record, name) for name in kind.__match_args__)
+    return kind(*(part.tolist() if isinstance(part, np.ndarray) else part for part in parts))
+
+
+def _double(record: Any, *names: str) -> None:
+    for name in names:
+        column = getattr(record, name)
+        setattr(record, name, np.concatenate([column, np.zeros_like(column)]))
+
+
+def _rows(count: int, *columns: Any) -> Rows:
+    """Return the filled part of four columns."""
+    return Rows(*(column[:count].copy() for column in columns))

@@ -1,0 +1,144 @@
+"""Breakpoints, at which `proceed` of a session stops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from gms_fsm.errors import SessionError
+from gms_fsm.run.problem import Start
+from gms_fsm.session._conditions import holds_at, read
+from gms_fsm.session.elements import chart_of, contact_named, machine_of, source_of
+from gms_fsm.session.explain import holds
+from gms_fsm.session.tree.branch import Branch
+
+__all__ = ["KINDS", "Breakpoint", "hits", "new_breakpoint"]
+
+Kind = Literal["tested", "valid", "fires", "enter", "leave"]
+KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave")
+
+
+@dataclass
+class Breakpoint:
+    """A breakpoint, at which `Session.proceed` stops.
+
+    Parameters
+    ----------
+    kind : {"tested", "valid", "fires", "enter", "leave"}
+        Guard of an edge evaluated, guard becoming true, edge taken; state entered or left.
+    name : str
+        Name of the edge or state.
+    element : int or None
+        Element index, from 0; None for all elements.
+    condition : str
+        Additional condition that must hold; empty for none.
+    hits : int
+        Stop at this hit and at every later one.
+    seen : int
+        Number of hits so far.
+    contact : str
+        The contact, in a system; empty for all that have the edge or state.
+    """
+
+    kind: Kind
+    name: str
+    element: int | None = None
+    condition: str = ""
+    hits: int = 1
+    seen: int = 0
+    contact: str = ""
+
+
+def new_breakpoint(
+    start: Start, kind: str, name: str, element: int | str | None, condition: str, hits: int
+) -> Breakpoint:
+    """Return a breakpoint; raise an error if one of its parts is invalid."""
+    if kind not in KINDS:
+        raise SessionError(
+            f"unknown breakpoint kind {kind!r}", advice=f"it must be one of {', '.join(KINDS)}"
+        )
+    banks = start.program.layout.banks
+    contact, index = "", None
+    if isinstance(element, str) and element in [bank.name for bank in banks]:
+        contact = contact_named(element, start).name
+    elif element is not None:
+        machine = machine_of(element, start)
+        bank = start.program.layout.bank(machine)
+        contact, index = "" if start.given is None else bank.name, machine - bank.first
+    charts = [chart_of(start, bank) for bank in banks if contact in ("", bank.name)]
+    edges = [edge.name for chart in charts for edge in chart.transitions]
+    states = [state.name for chart in charts for state in chart.states]
+    known, what = (states, "state") if kind in ("enter", "leave") else (edges, "edge")
+    if name not in known:
+        there = ", ".join(dict.fromkeys(known)) or "none"
+        raise SessionError(f"no {what} {name!r}", advice=f"there are {there}")
+    if hits < 1:
+        raise SessionError(f"hits is {hits}", advice="it must be at least 1")
+    if condition:
+        read(start, condition)
+    return Breakpoint(kind, name, index, condition, hits, contact=contact)
+
+
+def hits(point: Breakpoint, branch: Branch, row: int) -> bool:
+    """Return whether a breakpoint hits at a row.
+
+    Parameters
+    ----------
+    point : Breakpoint
+        The breakpoint.
+    branch : Branch
+        The current branch.
+    row : int
+        Row number, at least 1.
+
+    Returns
+    -------
+    bool
+        Whether the event happens and the condition holds.
+    """
+    start = branch.start
+    if not any(_happens(point, branch, row, machine) for machine in _machines(point, start)):
+        return False
+    return not point.condition or holds_at(read(start, point.condition), branch, branch.raw(row))
+
+
+def _machines(point: Breakpoint, start: Start) -> list[int]:
+    """Return the elements that a breakpoint watches, counted over all contacts."""
+    found: list[int] = []
+    for bank in start.program.layout.banks:
+        if point.contact in ("", bank.name):
+            elements = range(bank.n) if point.element is None else (point.element,)
+            found += [bank.first + i for i in elements]
+    return found
+
+
+def _happens(point: Breakpoint, branch: Branch, row: int, machine: int) -> bool:
+    """Return whether the event of a breakpoint happens to an element at a row."""
+    start = branch.start
+    bank = start.program.layout.bank(machine)
+    chart, i = chart_of(start, bank), machine - bank.first
+    if point.kind in ("fires", "enter", "leave"):
+        fired = branch.fired(row)
+        if fired is None or fired.element != i or fired.contact not in ("", bank.name):
+            return False
+        names = {"fires": fired.edge, "enter": fired.target, "leave": fired.source}
+        return names[point.kind] == point.name
+    if point.name not in chart.guards:  # of another contact
+        return False
+    sources = source_of(point.name, chart)
+    before, now = branch.raw(row - 1), branch.raw(row)
+    if branch.state(now, machine) not in sources:
+        return False
+    if point.kind == "tested":
+        if not branch.asked(row, machine):
+            return False
+        # The loop evaluates guards where an arc ends, and again after every firing. Whether this
+        # was done at a row is known once the next row has been computed.
+        if row + 1 >= len(branch):
+            branch.pull()
+        return row in branch.stops or now.microstep > 0
+    guard = chart.guards[point.name]
+    held = branch.state(before, machine) == branch.state(now, machine) and holds(
+        guard, branch.scope(before, bank.name).guards(i)
+    )
+    return not held and holds(guard, branch.scope(now, bank.name).guards(i))

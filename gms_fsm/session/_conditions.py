@@ -1,0 +1,75 @@
+"""Conditions and watches of a session: parsed for a run, evaluated at a row or point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from gms_fsm.errors import ExpressionError, SessionError
+from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
+from gms_fsm.run.problem import Start
+from gms_fsm.session.explain import holds
+from gms_fsm.session.tree.branch import Branch, BranchRow
+from gms_fsm.traces.scope import watch_names
+from gms_fsm.traces.system_scope import owners_of, system_names
+
+__all__ = ["holds_at", "names_of", "read", "value_of"]
+
+
+def names_of(start: Start) -> list[str]:
+    """Return the names allowed in conditions and watches."""
+    return watch_names(start.model) if start.given is None else system_names(start.system)
+
+
+def read(start: Start, text: str) -> Condition:
+    """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``."""
+    states, n, owners = [], 0, {}
+    if len(start.system.contacts) == 1:
+        states, n = [state.name for state in start.model.chart.states], start.model.n
+    if start.given is not None:
+        owners = owners_of(start.system)
+    with _explained(start):
+        return parse_condition(text, names_of(start), states, n, own_state=n == 1, owners=owners)
+
+
+def holds_at(condition: Condition, branch: Branch, row: BranchRow) -> bool:
+    """Return whether a condition holds at a row of a branch, or at a point between two rows."""
+    return holds(condition, branch.watches(row))
+
+
+def value_of(start: Start, text: str, values: Mapping[str, Any]) -> float:
+    """Return the value of a watch expression, given the values of its names."""
+    with _explained(start):
+        tree = parse_value(text, names_of(start))
+    try:
+        return float(evaluate(tree, values))
+    except (ArithmeticError, ValueError) as error:
+        raise SessionError(f"{text!r} cannot be computed here: {error}") from None
+
+
+@contextmanager
+def _explained(start: Start) -> Iterator[None]:
+    """Say how to write a name that lacks the number of an element, or its contact."""
+    try:
+        yield
+    except ExpressionError as error:
+        for name, instead in _complete(start).items():
+            if error.reason.startswith(f"unknown name {name!r}"):
+                reason = f"unknown name {name!r}; {instead}"
+                raise ExpressionError(reason, error.text, error.column, error.allowed) from None
+        raise
+
+
+def _complete(start: Start) -> dict[str, str]:
+    """Return how to complete names that are incomplete."""
+    known, found = names_of(start), dict[str, str]()
+    for contact in start.system.contacts:
+        lead = "" if start.given is None else f"{contact.name}."
+        for name in contact.chart.variables:
+            for each in (name, f"{lead}{name}"):
+                found.setdefault(each, f"for element 1 write {lead}{name}1")
+        for each in known:
+            if lead and each.startswith(lead):
+                found.setdefault(each.removeprefix(lead), f"write {each}")
+    return {name: text for name, text in found.items() if name not in known}

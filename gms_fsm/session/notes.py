@@ -1,0 +1,125 @@
+"""Notes on a finished run: not errors, but probably not what the user meant.
+
+Mixed-up units (a stroke in metres with thresholds in micrometres, a v_c above every speed), and
+arrests that the clock could not resolve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.language import Call, Name, Relation, Value, clauses, evaluate
+from gms_fsm.lowering.scales import scales_of
+from gms_fsm.session.explain import holds, values_at
+from gms_fsm.systems.models import Model, parameters_of
+from gms_fsm.traces.scope import parameter_values
+from gms_fsm.traces.trace import Trace
+
+__all__ = ["notes_on"]
+
+FAR = 1e4  # a stroke of more thresholds than this is worth a note
+NEAR = 1e-2  # of the smallest threshold: smaller deflections are not near it
+MOST_ROWS = 1000  # rows
+
+
+def notes_on(trace: Trace) -> tuple[str, ...]:
+    """Return notes on a run, one sentence each.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+
+    Returns
+    -------
+    tuple of str
+        The notes; empty for most runs.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> notes_on(simulate(model, Prescribed("1e-7*sin(t)"), 1.0))
+    ('no transition: the speed stays below v_c (largest |v| 8.41e-08 m/s, v_c 1e-06 m/s)',)
+    """
+    return (*_sizes(trace), *_windows(trace))
+
+
+def _sizes(trace: Trace) -> Iterator[str]:
+    """Compare stroke, speed and deflections with the scales of the model."""
+    model, scales = trace.model, scales_of(trace.model)
+    if not model.chart.variables:
+        return
+    name = model.chart.variables[0]
+    least = np.array(scales.variables[name])
+    thresholds = trace.s.min(axis=0) if "s" in model.chart.inputs else least
+    if not len(trace) > 1 or not model.chart.transitions or not (thresholds > 0.0).all():
+        return
+    stroke, fastest = float(np.ptp(trace.x)), float(np.abs(trace.v).max())
+    deflected = float(np.abs(trace.z / thresholds).max())
+    if not len(trace.transitions):
+        if 0.0 < fastest <= scales.speed:
+            bound = "v_c" if "v_c" in model.values else "the smallest speed in a guard"
+            yield (
+                f"no transition: the speed stays below {bound} (largest |v| {fastest:.3g} m/s, "
+                f"{bound} {scales.speed:.3g} m/s)"
+            )
+        elif 0.0 < deflected < NEAR:
+            yield (
+                f"no transition: no element comes near its threshold (largest |{name}| is "
+                f"{deflected:.2g} of it, the smallest threshold {thresholds.min():.3g}); if this "
+                f"is not intended, check the units of {_scaling(model)}motion (m)"
+            )
+    elif stroke > FAR * float(thresholds.max()):
+        yield (
+            f"the stroke of {stroke:.3g} m is {stroke / float(thresholds.max()):.2g} times the "
+            "largest threshold: nearly all of it is gross sliding; if pre-sliding is intended, "
+            "check the unit of the motion (m)"
+        )
+
+
+def _scaling(model: Model) -> str:
+    """Return the parameters that scale thresholds and forces, with their units."""
+    known = [each for each in parameters_of(model) if each.unit in ("N/m", "m/N")]
+    return ", ".join(f"{each.name} ({each.unit})" for each in known) + (" and " if known else "")
+
+
+def _windows(trace: Trace) -> Iterator[str]:
+    """Search for windows such as |v| <= v_c that were crossed within one tick of the clock."""
+    if trace.settings.get("events") != "located":
+        return
+    whole = trace.whole()
+    t, v, chart = whole.t, whole.v, whole.model.chart
+    for edge, bound in _velocity_windows(chart):
+        missed = []
+        for i in range(whole.n):
+            try:
+                c = float(evaluate(bound, parameter_values(whole.model, i)))
+            except (KeyError, ArithmeticError, ValueError):
+                continue  # it depends on more than parameters
+            inside = whole.modes[:, i] == chart.state_index(edge.source)
+            jumped = inside[:-1] & inside[1:] & (v[:-1] * v[1:] < 0.0)
+            jumped &= (np.abs(v[:-1]) > c) & (np.abs(v[1:]) > c)
+            for row in (np.flatnonzero(jumped) + 1)[:MOST_ROWS].tolist():
+                still = values_at(whole, row, i) | {"v": 0.0}
+                if (curve := whole.model.stribeck) is not None:  # under the load of that row
+                    still["s"] *= curve.F_s / float(curve(v[row]))
+                if holds(chart.guards[edge.name], still):
+                    missed.append(float(t[row]))
+        if missed:
+            yield (
+                f"{edge.name} could not be detected {len(missed)} times, first at t = "
+                f"{min(missed):.9g} s: v passes its window within one tick of the clock; use a "
+                "larger v_c, or let the run start nearer to t = 0"
+            )
+
+
+def _velocity_windows(chart: Chart) -> Iterator[tuple[Transition, Value]]:
+    for edge in chart.transitions:
+        for part in clauses(chart.guards[edge.name]):
+            match part:
+                case Relation("<" | "<=", Call("abs", (Name("v"),)), bound):
+                    yield edge, bound

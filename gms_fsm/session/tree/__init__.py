@@ -1,0 +1,1 @@
+"""The branches of a session: computed row by row, walked, poked, exported."""

@@ -1,0 +1,149 @@
+"""Moving the cursor of a branch: by rows, by firings, to a time, or until a condition is true."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from gms_fsm.errors import SessionError, shown
+from gms_fsm.session.arguments import check_count
+from gms_fsm.session.tree.branch import Branch, BranchRow
+from gms_fsm.traces.between import first_true
+
+__all__ = [
+    "back",
+    "forward",
+    "goto",
+    "next_firing",
+    "previous_firing",
+    "reaches",
+    "step",
+    "walk_to",
+]
+
+LOOKS = 16  # points between two rows at which a condition is evaluated
+
+
+def forward(branch: Branch) -> Iterator[int]:
+    """Move forward by rows to the end, and yield the number of each new row."""
+    branch.between = None
+    while branch.cursor + 1 < len(branch) or branch.pull():
+        branch.on_row()
+        branch.cursor += 1
+        yield branch.cursor
+
+
+def step(branch: Branch, count: int) -> None:
+    """Go forward by rows, or to the end."""
+    check_count(count)
+    branch.between = None
+    for _ in itertools.islice(forward(branch), count):
+        pass
+
+
+def back(branch: Branch, count: int) -> None:
+    """Go back by rows; from a located point, the first is the row before it."""
+    check_count(count)
+    if branch.between is not None and count > 0:
+        branch.between, count = None, count - 1
+    branch.cursor = max(0, branch.cursor - count)
+
+
+def next_firing(branch: Branch) -> None:
+    """Go forward to the next firing, or the end."""
+    for row in forward(branch):
+        if branch.raw(row).microstep > 0:
+            return
+
+
+def previous_firing(branch: Branch) -> None:
+    """Go back to the previous firing, or the start."""
+    row = branch.cursor - (branch.between is None)
+    branch.between = None
+    while row > 0 and branch.raw(row).microstep == 0:
+        row -= 1
+    branch.cursor = max(row, 0)
+
+
+def goto(branch: Branch, t: float) -> None:
+    """Go to the last row at or before a time; raise `SessionError` before the start."""
+    start = branch.raw(0).t
+    if not isinstance(t, float | int | np.number):
+        raise SessionError("it must be a number of seconds", place="t", value=t)
+    if not t >= start:
+        raise SessionError(f"t = {shown(t)} s is before the start, {start!r} s")
+    branch.between = None
+    while branch.last.t <= t and branch.pull():
+        pass
+    branch.cursor = branch.row_at(t)
+
+
+def walk_to(branch: Branch, row: int, t: float | None) -> None:
+    """Go to a row, or to a time between it and the next, computing rows as needed."""
+    while row + (t is not None) >= len(branch) and branch.pull():
+        pass
+    branch.cursor = min(row, len(branch) - 1)
+    branch.between = None if t is None else branch.behind(branch.cursor)(t)
+
+
+def reaches(branch: Branch, holds: Callable[[BranchRow], bool]) -> bool:
+    """Go forward to the next point where a condition becomes true, located between rows.
+
+    Parameters
+    ----------
+    branch : Branch
+        The current branch.
+    holds : callable
+        The condition. If it is already true, it must first become false.
+
+    Returns
+    -------
+    bool
+        False if the end of the run was reached.
+    """
+    truth = holds(branch.here)
+    begin = None if branch.between is None else branch.between.t  # a second `until` starts there
+    while True:
+        branch.on_row()
+        row = branch.cursor
+        if row + 1 >= len(branch) and not branch.pull():
+            branch.between = None
+            branch.cursor = len(branch) - 1
+            return False
+        place, truth = _first_true(branch, row, begin, holds, truth)
+        begin = None
+        branch.between = place
+        if place is not None:
+            return True
+        branch.cursor = row + 1
+        now = holds(branch.here)
+        if now and not truth:
+            return True
+        truth = now
+
+
+def _first_true(
+    branch: Branch, row: int, begin: float | None, holds: Callable[[BranchRow], bool], truth: bool
+) -> tuple[BranchRow | None, bool]:
+    """Search between a row and the next for the point where a condition becomes true.
+
+    The next row itself is left to the caller. Returns the point, and the last truth value.
+    """
+    before, after = branch.raw(row), branch.raw(row + 1)
+    start = before.t if begin is None else begin
+    if after.microstep > 0 or after.t <= start or branch.start.program.ticks.at(after.t):
+        return None, truth  # at a tick values jump: nothing is between the rows
+    low, place = start, branch.behind(row)
+    for look in range(1, LOOKS + 1):
+        at_end = look == LOOKS
+        t = after.t if at_end else start + (after.t - start) * look / LOOKS
+        now = holds(after if at_end else place(t))
+        if now and not truth:
+            found = first_true(low, t, lambda t: holds(place(t)))
+            if at_end and found == after.t:
+                break
+            return place(found), True
+        low, truth = t, now
+    return None, truth

@@ -1,0 +1,1 @@
+"""Systems as files and as tables of headers."""

@@ -1,0 +1,311 @@
+"""The parts of a system: bodies, contacts and sampled controllers, as the user writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import FloatArray, checked_scalar
+from gms_fsm.charts.stribeck import Stribeck
+from gms_fsm.errors import ParameterError, cut, shown
+from gms_fsm.foundation.display import displayed
+from gms_fsm.systems.given import (
+    Text,
+    check_name,
+    check_text,
+    checked_numbers,
+    mapping_of,
+    several,
+    texts_of,
+)
+from gms_fsm.systems.models import Model, check_bank, is_model, with_values
+
+__all__ = ["LEAST_LOAD", "LOAD", "Body", "Contact", "Sampled", "loaded"]
+
+LOAD = "N"  # the input of a contact that multiplies its Stribeck curve
+LEAST_LOAD = 1e-9  # N; charts divide by thresholds
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body with one degree of freedom: free, or moved with a given velocity.
+
+    ``inertia * dv/dt = force`` minus what its contacts take from it.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its system.
+    inertia : str or float
+        kg (or kg m^2, with angles); None for a body whose velocity is given.
+    force : str or float
+        N, over ``t``, the names of bodies, further states, signals and numbers.
+    velocity : str or float, optional
+        m/s, over ``t``, signals and numbers: the body moves like this whatever acts on it.
+    x, v : str
+        What its position and its velocity are called in texts.
+
+    Examples
+    --------
+    >>> Body("load", inertia=1.0, force="K * (x_m - x_l)", x="x_l", v="v_l").v
+    'v_l'
+    """
+
+    name: str
+    inertia: Text | None = field(default=None, kw_only=True)
+    force: Text = field(default="0", kw_only=True)
+    velocity: Text | None = field(default=None, kw_only=True)
+    x: str = field(default="x", kw_only=True)
+    v: str = field(default="v", kw_only=True)
+
+    def __post_init__(self) -> None:
+        here = f"body {shown(self.name)}"
+        if (self.inertia is None) == (self.velocity is None):
+            raise ParameterError(
+                "it has neither an inertia nor a velocity"
+                if self.inertia is None
+                else "it has an inertia and a velocity",
+                place=here,
+                advice="give inertia=... to a free body, velocity=... to a driven one",
+            )
+        for each in ("inertia", "force", "velocity"):
+            if (text := getattr(self, each)) is not None:
+                check_text(text, f"{here}: {each}")
+        for name in (self.name, self.x, self.v):
+            check_name(name, here)
+
+    @property
+    def driven(self) -> bool:
+        """Whether its velocity is given."""
+        return self.velocity is not None
+
+
+@displayed("svg", "html")
+@dataclass(frozen=True, init=False, eq=False)
+class Contact:
+    """Machines of one chart on one relative velocity.
+
+    The contact takes its force F from each body, times that body's coefficient in `v`: its power is
+    F v, whatever the gearing.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its system.
+    chart : Chart or Model
+        A chart; or a friction model (`GMS`, `LuGre`, `ChartModel`), which brings its numbers.
+    values : mapping, optional
+        For each parameter of the chart a number, or one per element.
+    v : str or sequence of str
+        The relative velocity, linear in the bodies' velocities, such as ``"w_m - 3 * w_l"``; one
+        for each velocity of the chart.
+    n : int
+        Number of elements.
+    inputs : mapping of str to str or float
+        For an input of the chart what it is, over the names of the system; those of the same name
+        need not be given. A model with a Stribeck curve has the input N, a load in newtons, if it
+        is given: F_c and F_s are then coefficients of friction, and the thresholds are
+        ``weight * s(v) * N``. A load below 1e-9 N counts as 1e-9 N, since a threshold must be
+        positive. What the contact supplies itself cannot be given: t, its velocities, and the s of
+        a model.
+    period : float, optional
+        s: the machines are asked at these ticks only, and what the chart gives out is held between
+        them. Without a period the contact is continuous.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> Contact("bearing", GMS(GMSParameters.paper("stick-slip"), law="signed"), v="v_l").n
+    4
+    """
+
+    name: str
+    chart: Chart
+    values: Mapping[str, float | FloatArray]
+    v: tuple[str, ...]
+    n: int
+    inputs: Mapping[str, Text]
+    period: float | None
+    model: Model | None
+
+    def __init__(
+        self,
+        name: str,
+        chart: Chart | Model,
+        values: Mapping[str, Any] | None = None,
+        *,
+        v: str | Iterable[str] = "v",
+        n: int = 1,
+        inputs: Mapping[str, Text] | None = None,
+        period: float | None = None,
+    ) -> None:
+        here = f"contact {shown(name)}"
+        model = None
+        if isinstance(chart, Chart):
+            values = checked_numbers(chart, {} if values is None else values, n, here)
+        elif is_model(chart):
+            model = chart
+            if values is not None or n != 1:
+                raise ParameterError(
+                    "a model brings its values and its number of elements", place=here
+                )
+            chart, values, n = model.chart, model.values, model.n
+            inputs = {**getattr(model, "inputs", {}), **({} if inputs is None else inputs)}
+        else:
+            raise ParameterError(
+                "it must be a Chart, or a model such as GMS(parameters, law='signed')",
+                place=f"{here}: chart",
+                value=chart,
+            )
+        check_bank(chart, n, here)
+        velocities = several(v, str, f"{here}: v")
+        if len(velocities) != len(chart.velocities):
+            raise ParameterError(
+                f"v gives {len(velocities)} velocities, chart {chart.name!r} has "
+                f"{', '.join(chart.velocities)}",
+                place=here,
+            )
+        given = texts_of({} if inputs is None else inputs, f"{here}: inputs")
+        by_itself = {"t": "it is the time", **dict.fromkeys(chart.velocities, "give v=... instead")}
+        if model is not None:
+            by_itself["s"] = "its model has thresholds; a load on them is inputs={'N': ...}"
+        if taken := [each for each in given if each in by_itself]:
+            raise ParameterError(
+                f"inputs has {shown(taken[0])}, which the contact supplies itself",
+                place=here,
+                advice=by_itself[taken[0]],
+            )
+        if period is not None:
+            period = checked_scalar(f"{here}: period", period, "> 0")
+        for each, value in {
+            "name": name,
+            "chart": chart,
+            "values": values,
+            "v": velocities,
+            "n": n,
+            "inputs": given,
+            "period": period,
+            "model": model,
+        }.items():
+            object.__setattr__(self, each, value)
+
+    def __repr__(self) -> str:
+        count = f"{self.n} element{'s' * (self.n != 1)}"
+        return f"<Contact {cut(self.name)!r}: {cut(self.chart.name)}, {count}, v = {self.v[0]}>"
+
+    def with_model(self, model: Model) -> Contact:
+        """Return the same contact with another model of the same shape."""
+        check_bank(model.chart, model.n, f"contact {shown(self.name)}")
+        return self.replaced(model=model, chart=model.chart, values=model.values, n=model.n)
+
+    def with_values(self, values: Mapping[str, ArrayLike]) -> Contact:
+        """Return the same contact with some of its numbers replaced."""
+        if self.model is not None:
+            return self.with_model(with_values(self.model, values))
+        given = {**self.values, **values}
+        place = f"contact {shown(self.name)}"
+        return self.replaced(values=checked_numbers(self.chart, given, self.n, place))
+
+    def replaced(self, **fields: Any) -> Contact:
+        """Return the same contact with other fields, which fit together."""
+        new = object.__new__(Contact)
+        vars(new).update(vars(self) | fields)
+        return new
+
+    # What a `Model` has, so that everything that reads models reads contacts too.
+    @property
+    def title(self) -> str:
+        """Name and chart."""
+        return f"{self.name}: {self.chart.name if self.model is None else self.model.title}"
+
+    @property
+    def weights(self) -> FloatArray:
+        """Threshold weights, shape (n,), m/N."""
+        return np.ones(self.n) if self.model is None else self.model.weights
+
+    @property
+    def stribeck(self) -> Stribeck | None:
+        """The Stribeck curve of its model, if it has one."""
+        return None if self.model is None else self.model.stribeck
+
+    @property
+    def load(self) -> Text | None:
+        """What its Stribeck curve is multiplied by, if its input N is no input of the chart."""
+        chart = self.chart
+        own = {*chart.inputs, *chart.variables, *chart.parameter_names, *chart.let}
+        return None if self.stribeck is None or LOAD in own else self.inputs.get(LOAD)
+
+    @property
+    def sigma_2(self) -> float:
+        """Viscous friction of its model, Ns/m."""
+        return 0.0 if self.model is None else self.model.sigma_2
+
+
+def loaded(model: Model | Contact) -> bool:
+    """Return whether thresholds follow a load besides the velocity."""
+    return isinstance(model, Contact) and model.load is not None
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A sampled controller: values that change at exact ticks only.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its system.
+    period : float
+        s.
+    updates : mapping of str to str
+        For each value its text over the names of the system and ``period``; they run in this order
+        and see the results before them.
+    initial : mapping of str to float, optional
+        Values before the first tick; 0 where not given.
+    offset : float
+        s: the first tick is at t_start + offset. Period, offset and start count as the decimal
+        numbers that are written, so that ticks of several rates coincide exactly: ten periods of
+        0.1 ms are one of 1 ms. What ticks at one instant does so in the order listed.
+
+    Examples
+    --------
+    >>> Sampled("pid", period=1e-3, updates={"u": "k_p * (r - x)"}).period
+    0.001
+    """
+
+    name: str
+    period: float = field(kw_only=True)
+    updates: Mapping[str, str] = field(kw_only=True)
+    initial: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    offset: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        here = f"sampled {shown(self.name)}"
+        put = object.__setattr__
+        put(self, "period", checked_scalar(f"{here}: period", self.period, "> 0"))
+        put(self, "offset", checked_scalar(f"{here}: offset", self.offset, ">= 0"))
+        put(self, "updates", texts_of(self.updates, f"{here}: updates"))
+        put(self, "initial", mapping_of(self.initial, f"{here}: initial"))
+        if not self.updates:
+            raise ParameterError("it updates nothing", place=here)
+        for name in self.initial:
+            if name not in self.updates:
+                raise ParameterError(
+                    f"initial has {shown(name)}, which is not updated",
+                    place=here,
+                    advice=f"its values are {', '.join(self.updates)}",
+                )
+        put(
+            self,
+            "initial",
+            {
+                name: checked_scalar(
+                    f"{here}: initial[{name!r}]", self.initial.get(name, 0.0), "finite"
+                )
+                for name in self.updates
+            },
+        )

@@ -1,0 +1,1 @@
+"""Systems with all their texts read, and what follows from their numbers."""

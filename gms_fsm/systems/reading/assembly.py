@@ -1,0 +1,579 @@
+"""A system with all its texts read, and every quantity under a name of its own.
+
+In the trees made here a name of the system stands for itself; what belongs to a contact is called
+``contact.name``, so that charts may use the same names. A quantity computed from others (a signal,
+the velocity of a driven body, a relative velocity, an input, a named expression of a chart) is a
+`Definition`; definitions stand in an order in which they can be computed.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
+from gms_fsm.language import (
+    Binary,
+    Condition,
+    Name,
+    Number,
+    Value,
+    derivative,
+    evaluate,
+    names_in,
+    parse_value,
+    renamed,
+)
+from gms_fsm.language.normal import renamed_in
+from gms_fsm.systems.given import derivative_free, is_positive
+from gms_fsm.systems.parts import LEAST_LOAD, LOAD, Body, Contact
+from gms_fsm.systems.reading.definitions import Definition, Edge
+from gms_fsm.systems.reading.values import numbers_of, of
+from gms_fsm.systems.signals import Formula
+from gms_fsm.systems.springs import added, spring_forces
+
+if TYPE_CHECKING:
+    from gms_fsm.systems.system import System
+
+__all__ = [
+    "CURVE_LOAD",
+    "Assembly",
+    "Bank",
+    "Definition",
+    "Edge",
+    "Reader",
+    "assembled",
+    "of",
+]
+
+ZERO, ONE = Number(0.0), Number(1.0)
+CURVE_LOAD = "curve load"
+
+
+@dataclass(frozen=True, eq=False)
+class Bank:
+    """A contact whose chart is read over the names of the system.
+
+    Parameters
+    ----------
+    index : int
+        Among the contacts.
+    contact : Contact
+        What it is.
+    variables : tuple of str
+        The chart's, one value per element each.
+    velocities, forces, rates : tuple of str
+        For each velocity of the chart its name, that of the force, that of the acceleration.
+    position : str
+        Name of the relative position.
+    threshold : str
+        Name of the elements' thresholds; empty where the model has no curve.
+    jacobian : tuple of mapping of str to Value
+        For each velocity its coefficients, by body.
+    flows : mapping of (str, str) to Value
+        By state and variable.
+    outputs : mapping of (str, str) to Value or None
+        By state and force, of an element; None in a locked state.
+    totals : mapping of str to Value
+        By force: that of the contact over the sum, where it is not the sum itself.
+    edges : tuple of Edge
+        In the chart's order.
+    start : tuple of (str, Value)
+        The assignments at the start of a run.
+    means : mapping of str to Value
+        For each name of the chart what it stands for.
+    """
+
+    index: int
+    contact: Contact
+    variables: tuple[str, ...]
+    velocities: tuple[str, ...]
+    forces: tuple[str, ...]
+    rates: tuple[str, ...]
+    position: str
+    threshold: str
+    jacobian: tuple[Mapping[str, Value], ...]
+    flows: Mapping[tuple[str, str], Value]
+    outputs: Mapping[tuple[str, str], Value | None]
+    totals: Mapping[str, Value]
+    edges: tuple[Edge, ...]
+    start: tuple[tuple[str, Value], ...]
+    means: Mapping[str, Value]
+
+    @property
+    def name(self) -> str:
+        """The contact's."""
+        return self.contact.name
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+        return self.contact.n
+
+    @property
+    def chart(self) -> Chart:
+        """The contact's."""
+        return self.contact.chart
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the chart's states."""
+        return tuple(state.name for state in self.chart.states)
+
+    @property
+    def locked(self) -> tuple[str, ...]:
+        """Names of the states that lock it."""
+        return tuple(state.name for state in self.chart.states if state.locked)
+
+    def is_impulse(self, edge: Edge) -> bool:
+        """Return whether an edge changes velocities by an impulse."""
+        sets = any(name in self.velocities for name, _ in edge.steps)
+        return sets or (edge.locks and not edge.arrests and edge.source not in self.locked)
+
+    def changes_others(self, edge: Edge) -> int:
+        """Return 1 for an impulse, 2 for an edge that lets go of a lock: forces change at once."""
+        if self.is_impulse(edge):
+            return 1
+        return 2 if edge.source in self.locked and not edge.locks else 0
+
+    @property
+    def weight(self) -> str:
+        """Name of the weights, of which every bank has one per element."""
+        return of(self.name, "threshold weight")
+
+    @property
+    def periodic(self) -> bool:
+        """Whether its machines are asked at ticks only, and what they give out is held."""
+        return self.contact.period is not None
+
+    def held(self, name: str) -> str:
+        """Return what the held value of a rate or of a force is called."""
+        return f"{name} held"
+
+    def rate(self, variable: str) -> str:
+        """Return what the rate of a variable is called."""
+        contact, name = variable.rsplit(".", 1)
+        return of(contact, f"d{name}")
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """A system, read.
+
+    Parameters
+    ----------
+    system : System
+        What was read.
+    definitions : tuple of Definition
+        Each after those it needs.
+    banks : tuple of Bank
+        The contacts.
+    forces, inertias : mapping of str to Value
+        By free body.
+    flow : mapping of str to Value
+        Rates of the further states.
+    updates : mapping of str to mapping of str to Value
+        By sampler, those of its values.
+    shared : mapping of str to float
+        Numbers with one value, by name.
+    own : mapping of str to (int, ndarray)
+        Numbers with one value per element, by name: the bank, and the values.
+    """
+
+    system: System
+    definitions: tuple[Definition, ...]
+    banks: tuple[Bank, ...]
+    forces: Mapping[str, Value]
+    inertias: Mapping[str, Value]
+    flow: Mapping[str, Value]
+    updates: Mapping[str, Mapping[str, Value]]
+    shared: Mapping[str, float]
+    own: Mapping[str, tuple[int, np.ndarray]]
+
+    @cached_property
+    def free(self) -> tuple[Body, ...]:
+        """The bodies that are not driven."""
+        return tuple(body for body in self.system.bodies if not body.driven)
+
+    @cached_property
+    def defined(self) -> Mapping[str, Definition]:
+        """Definitions by name."""
+        return {each.name: each for each in self.definitions}
+
+    @cached_property
+    def owner(self) -> Mapping[str, int]:
+        """For each name with one value per element its bank."""
+        found = {name: bank for name, (bank, _) in self.own.items()}
+        for bank in self.banks:
+            found |= dict.fromkeys(bank.variables, bank.index)
+            found |= {bank.rate(name): bank.index for name in bank.variables}
+        return found | {each.name: each.bank for each in self.definitions if each.bank is not None}
+
+    def bit(self, bank: Bank) -> int:
+        """Return the bit of a contact with a period among all that ticks; 0 for any other."""
+        if bank.contact.period is None:
+            return 0
+        periodic = [each.index for each in self.banks if each.contact.period is not None]
+        return 1 << (len(self.system.sampled) + periodic.index(bank.index))
+
+    def bank_of(self, tree: Value | Condition) -> int | None:
+        """Return the bank whose elements have one value of a tree each; None if there is one."""
+        return next((self.owner[name] for name in names_in(tree) if name in self.owner), None)
+
+    def closure(self, names: Iterable[str]) -> frozenset[str]:
+        """Return names, and those that their definitions are computed from."""
+        found, waiting = set[str](), [*names]
+        while waiting:
+            name = waiting.pop()
+            if name not in found:
+                found.add(name)
+                definition = self.defined.get(name)
+                if definition is not None and definition.tree is not None:
+                    waiting += names_in(definition.tree)
+        return frozenset(found)
+
+    def expanded(self, tree: Value) -> Value:
+        """Return a tree over states, numbers, t and signals that are not formulas."""
+        inside = {
+            name: self.expanded(definition.tree)
+            for name in names_in(tree)
+            if (definition := self.defined.get(name)) is not None and definition.tree is not None
+        }
+        return renamed(tree, inside) if inside else tree
+
+
+@functools.lru_cache(maxsize=64)
+def assembled(system: System) -> Assembly:
+    """Read all texts of a system; a system is read once, when it is constructed.
+
+    Parameters
+    ----------
+    system : System
+        What runs.
+
+    Returns
+    -------
+    Assembly
+        With every quantity under a name of its own.
+
+    Raises
+    ------
+    ExpressionError, ParameterError
+        If a text cannot be read, a velocity is not linear, an inertia is not positive, or locks
+        that always hold depend on each other.
+    """
+    return Reader(system).read()
+
+
+class Reader:
+    """Reads the texts of a system into trees, and says what each text may name."""
+
+    def __init__(self, system: System) -> None:
+        self.system, self.here = system, Part(f"system {system.name!r}")
+        self.definitions: list[Definition] = []
+        self.shared, self.own = numbers_of(system)
+
+    def value(self, text: str | float, names: Iterable[str], owner: Part) -> Value:
+        """Return the tree of a text that may read some names."""
+        try:
+            return parse_value(text if isinstance(text, str) else repr(float(text)), names)
+        except ExpressionError as error:
+            raise error.at(owner) from None
+
+    def read(self) -> Assembly:
+        """Return the system with all its texts read."""
+        system, numbers = self.system, self.system.numbers
+        for name, signal in system.signals.items():
+            if isinstance(signal, str):
+                owner = self.here.of(f"signal {name!r}", "signals", name)
+                tree = self.value(signal, ["t", *numbers], owner)
+                self.definitions.append(Definition(name, tree))
+            else:
+                formula = signal.tree if isinstance(signal, Formula) else None
+                self.definitions.append(Definition(name, formula, signal=signal))
+        given = ["t", *system.signals, *numbers]
+        forces, inertias = {}, {}
+        for i, body in enumerate(system.bodies):
+            owner = self.here.of(f"body {body.name!r}", "bodies", i)
+            if body.velocity is None:
+                assert body.inertia is not None
+                forces[body.name] = self.value(body.force, system.names, owner.of("force", "force"))
+                tree = self.value(body.inertia, system.names, owner.of("inertia", "inertia"))
+                inertias[body.name] = tree
+            elif not (body.velocity == body.v and body.v in system.signals):
+                tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
+                self.definitions.append(Definition(body.v, tree))
+        for name, sign, term in spring_forces(system):
+            if name in forces:
+                forces[name] = added(forces[name], sign, term)
+        flow = {
+            name: self.value(text, system.names, self.here.of(f"flow of {name!r}", "flow", name))
+            for name, text in system.flow.items()
+        }
+        updates = {}
+        for i, each in enumerate(system.sampled):
+            own = {"period": Number(each.period)}
+            owner = self.here.of(f"sampled {each.name!r}", "sampled", i)
+            updates[each.name] = {
+                name: renamed(
+                    self.value(
+                        text, [*system.names, "period"], owner.of(repr(name), "updates", name)
+                    ),
+                    own,
+                )
+                for name, text in each.updates.items()
+            }
+        banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
+        self.check_inertias(inertias)
+        self.check_locks(banks)
+        return Assembly(
+            system,
+            tuple(self.definitions),
+            banks,
+            forces,
+            inertias,
+            flow,
+            updates,
+            self.shared,
+            self.own,
+        )
+
+    def bank(self, index: int, contact: Contact) -> Bank:
+        """Return a contact with the texts of its chart read."""
+        chart, model, c = contact.chart, contact.model, contact.name
+        owner = self.here.of(f"contact {c!r}", "contacts", index)
+        names: dict[str, Value] = {"t": Name("t")}
+        names |= {name: Name(of(c, name)) for name in contact.values}
+        self.check_inputs(index, contact)
+        own_names: dict[str, str] = {}  # of what an action can set
+        # Velocities and the position, those of a body where they are just that.
+        jacobian, moved = [], {body.v: body for body in self.system.bodies}
+        velocities = []
+        for text, name in zip(contact.v, chart.velocities, strict=True):
+            tree = self.value(text, [*moved, *self.system.numbers], owner.of("v", "v"))
+            row = self.coefficients(tree, moved, text, owner)
+            jacobian.append(row)
+            known = self.defined(of(c, name), tree)
+            names[name], own_names[name] = known, known.id
+            velocities.append(known.id)
+            if len(velocities) == 1:
+                where = renamed(tree, {v: Name(body.x) for v, body in moved.items()})
+                if "x" in contact.inputs:
+                    where = self.text_of_input(contact, "x", owner)
+                position = self.defined(of(c, "x"), where)
+                names["x"] = position
+        for name in chart.inputs:
+            if name not in names and not (name == "s" and model is not None):
+                names[name] = self.input(contact, name, owner)
+        curved = model is not None and model.stribeck is not None
+        threshold = self.curve(contact, index, names, owner) if curved else ""
+        for name in chart.variables:
+            names[name], names[f"d{name}"] = Name(of(c, name)), Name(of(c, f"d{name}"))
+            own_names[name] = of(c, name)
+        self.lets(contact, index, names)
+        # A chart may have a parameter called a, for example; guards then cannot read this rate.
+        rates = [of(c, f"rate {name}" if name in names else name) for name in chart.rate_names]
+        for name in (*chart.force_names, *chart.rate_names):
+            names.setdefault(name, Name(of(c, name)))
+
+        def steps(*keys: tuple[str, str]) -> tuple[tuple[str, Value], ...]:
+            return tuple(
+                (own_names[name], renamed(tree, names))
+                for key in keys
+                for name, tree in chart.assignments[key].items()
+            )
+
+        locked = {state.name for state in chart.states if state.locked}
+        totals = {
+            of(c, name): renamed(tree, names | {name: Name(of(c, name))})
+            for name, tree in chart.totals.items()
+        }
+        if model is not None:
+            force = of(c, "F")
+            viscous = Binary("*", Name(of(c, "model sigma_2")), Name(velocities[0]))
+            totals[force] = Binary("+", totals.get(force, Name(force)), viscous)  # (4)
+        return Bank(
+            index=index,
+            contact=contact,
+            variables=tuple(of(c, name) for name in chart.variables),
+            velocities=tuple(velocities),
+            forces=tuple(of(c, name) for name in chart.force_names),
+            rates=tuple(rates),
+            position=position.id,
+            threshold=threshold,
+            jacobian=tuple(jacobian),
+            flows={
+                (state, of(c, name)): renamed(tree, names)
+                for (state, name), tree in chart.flows.items()
+            },
+            outputs={
+                (state, of(c, name)): None if tree is None else renamed(tree, names)
+                for (state, name), tree in chart.forces.items()
+            },
+            totals=totals,
+            edges=tuple(
+                Edge(
+                    edge.name,
+                    edge.source,
+                    edge.target,
+                    renamed_in(chart.guards[edge.name], names),
+                    # Stateflow's order: exit of the source, action, entry of the target.
+                    steps(("exit", edge.source), ("action", edge.name), ("entry", edge.target)),
+                    edge.target in locked,
+                    number in chart.arrests,
+                )
+                for number, edge in enumerate(chart.transitions)
+            ),
+            start=steps(("entry", chart.default_state.name)),
+            means=names,
+        )
+
+    def check_inputs(self, index: int, contact: Contact) -> None:
+        """Refuse inputs that the chart does not read."""
+        for name in contact.inputs:
+            if name not in contact.chart.inputs and (name != LOAD or contact.load is None):
+                raise ParameterError(
+                    f"inputs has {shown(name)}, which its chart does not read",
+                    place=f"{self.here.words}, contact {contact.name!r}",
+                    advice=f"the chart's inputs are {', '.join(contact.chart.inputs) or 'none'}",
+                    key=("contacts", index, "inputs", name),
+                )
+
+    def check_inertias(self, inertias: Mapping[str, Value]) -> None:
+        """Refuse an inertia that is not positive."""
+        for i, body in enumerate(self.system.bodies):
+            if not body.driven and not is_positive(inertias[body.name], self.system.numbers):
+                owner = self.here.of(f"body {body.name!r}", "bodies", i)
+                raise ParameterError(
+                    f"the inertia {body.inertia!r} is not positive, or not finite",
+                    place=owner.words,
+                    advice="every free body needs one",
+                    key=(*owner.key, "inertia"),
+                )
+
+    def check_locks(self, banks: Iterable[Bank]) -> None:
+        """Refuse locks that nothing can keep, and those that always hold and repeat each other."""
+        free = [body.name for body in self.system.bodies if not body.driven]
+        always: list[Bank] = []
+        for bank in banks:
+            chart = bank.chart
+            if chart.locks or chart.sets_velocity:
+                for row, text in zip(bank.jacobian, bank.contact.v, strict=True):
+                    if not row.keys() & {*free}:
+                        raise ParameterError(
+                            f"chart {chart.name!r} locks the contact or sets its velocity, but "
+                            f"only driven bodies move it (v = {text!r})",
+                            place=f"{self.here.words}, contact {bank.name!r}",
+                            key=("contacts", bank.index, "v"),
+                            advice="mount it where a free body can follow, for example on a "
+                            "Slider or a PulledSlider",
+                        )
+            if all(state.locked for state in chart.states):
+                always.append(bank)
+                if _rank(always, free, self.system.numbers) < sum(len(b.jacobian) for b in always):
+                    names = ", ".join(repr(each.name) for each in always)
+                    raise ParameterError(
+                        f"the contacts {names} are always locked, and the lock of "
+                        f"{bank.name!r} follows from the others or from driven bodies",
+                        place=self.here.words,
+                        key=("contacts", bank.index),
+                        advice="leave one of them out, or give its chart a state that is not "
+                        "locked",
+                    )
+
+    def coefficients(
+        self, tree: Value, moved: Mapping[str, Body], text: str, owner: Part
+    ) -> Mapping[str, Value]:
+        """Return the coefficients of a velocity that is linear in the bodies' velocities."""
+        row: dict[str, Value] = {}
+        rest = renamed(tree, dict.fromkeys(moved, ZERO))
+        constant = derivative_free(rest)
+        for v, body in moved.items():
+            slope = derivative(tree, v)
+            if slope is None or names_in(slope) & {*moved}:
+                constant = False
+            elif slope != ZERO:
+                row[body.name] = slope
+        if not constant or not row:
+            raise ParameterError(
+                f"v = {text!r} is not linear in the velocities {', '.join(moved)}",
+                place=owner.words,
+                advice="write it for example as 'v_1 - ratio * v_2'",
+                key=(*owner.key, "v"),
+            )
+        return row
+
+    def defined(self, name: str, tree: Value) -> Name:
+        """Return the name of a value: its own, or that of what it is just equal to."""
+        if isinstance(tree, Name):
+            return tree
+        self.definitions.append(Definition(name, tree))
+        return Name(name)
+
+    def input(self, contact: Contact, name: str, owner: Part) -> Value:
+        """Bind an input of a chart."""
+        if name not in contact.inputs and name not in self.system.names:
+            raise ParameterError(
+                f"its chart reads the input {name!r}, which is not bound",
+                place=owner.words,
+                advice=f"give inputs={{{name!r}: ...}} over {', '.join(self.system.names)}",
+                key=owner.key,
+            )
+        tree = self.text_of_input(contact, name, owner)
+        return tree if isinstance(tree, Number) else self.defined(of(contact.name, name), tree)
+
+    def text_of_input(self, contact: Contact, name: str, owner: Part) -> Value:
+        """Read what an input is."""
+        text = contact.inputs.get(name, name)
+        return self.value(text, self.system.names, owner.of(f"input {name!r}", "inputs", name))
+
+    def curve(self, contact: Contact, index: int, names: dict[str, Value], owner: Part) -> str:
+        """Define the Stribeck curve of a model and the thresholds; return their name."""
+        c = contact.name
+        given = contact.stribeck
+        assert given is not None
+        tree = parse_value(given.text, [*given.numbers, "v"])
+        numbers: dict[str, Value] = {name: Name(of(c, f"curve {name}")) for name in given.numbers}
+        curve = of(c, "curve S")
+        self.definitions.append(Definition(curve, renamed(tree, numbers | {"v": names["v"]})))
+        strength: Value = Name(curve)
+        if contact.load is not None:
+            least = parse_value(f"max({LOAD}, {LEAST_LOAD!r})", [LOAD])
+            load = renamed(least, {LOAD: self.text_of_input(contact, LOAD, owner)})
+            self.definitions.append(Definition(of(c, CURVE_LOAD), load))
+            strength = Binary("*", strength, Name(of(c, CURVE_LOAD)))
+        threshold = of(c, "s")
+        weighted = Binary("*", Name(of(c, "threshold weight")), strength)
+        self.definitions.append(Definition(threshold, weighted, index))
+        names["s"] = Name(threshold)
+        return threshold
+
+    def lets(self, contact: Contact, index: int, names: dict[str, Value]) -> None:
+        """Define the named expressions of a chart."""
+        chart, c = contact.chart, contact.name
+        own = {name for name in names if names_in(names[name]) & {*self.own}}
+        own |= {*chart.variables, "s"} & {*names}
+        for name, tree in chart.lets.items():
+            per_element = bool(names_in(tree) & own)
+            if per_element:
+                own.add(name)
+            self.definitions.append(
+                Definition(of(c, name), renamed(tree, names), index if per_element else None)
+            )
+            names[name] = Name(of(c, name))
+
+
+def _rank(banks: Iterable[Bank], free: list[str], numbers: Mapping[str, float]) -> int:
+    """Return how many velocities of contacts are independent of each other."""
+    rows = [
+        [float(evaluate(row.get(body, ZERO), numbers)) for body in free]
+        for bank in banks
+        for row in bank.jacobian
+    ]
+    return int(np.linalg.matrix_rank(np.array(rows)))

@@ -1,0 +1,61 @@
+"""Systems whose texts were read before, with other numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from gms_fsm.systems.reading.assembly import Assembly, Reader
+from gms_fsm.systems.reading.values import numbers_of
+from gms_fsm.systems.springs import check_springs
+
+if TYPE_CHECKING:
+    from gms_fsm.systems.system import System
+
+__all__ = ["check_numbers", "renumbered"]
+
+
+def renumbered(read: Assembly, system: System) -> Assembly:
+    """Return what was read with the numbers of another system of the same texts.
+
+    Parameters
+    ----------
+    read : Assembly
+        Of a system.
+    system : System
+        One that differs from it in numbers only.
+
+    Returns
+    -------
+    Assembly
+        With the same trees. Its `system` stays the first one: a circle would have to wait for the
+        garbage collector.
+    """
+    shared, own = numbers_of(system)
+    pairs = zip(read.banks, system.contacts, strict=True)
+    banks = tuple(replace(bank, contact=contact) for bank, contact in pairs)
+    signals = {name: each for name, each in system.signals.items() if not isinstance(each, str)}
+    definitions = tuple(replace(each, signal=signals.get(each.name)) for each in read.definitions)
+    return replace(read, definitions=definitions, banks=banks, shared=shared, own=own)
+
+
+def check_numbers(read: Assembly, system: System) -> None:
+    """Refuse numbers with which a system that was read could not be run.
+
+    Parameters
+    ----------
+    read : Assembly
+        Of a system of the same texts.
+    system : System
+        With other numbers.
+
+    Raises
+    ------
+    ParameterError
+        If an inertia is not positive, a spring pushes away, or locks that always hold depend on
+        each other.
+    """
+    reader = Reader(system)
+    reader.check_inertias(read.inertias)
+    check_springs(system)
+    reader.check_locks(read.banks)

@@ -1,0 +1,79 @@
+"""What the trees of a system depend on: its texts, and which kinds of numbers it has."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.foundation.display import full_text
+
+if TYPE_CHECKING:
+    from gms_fsm.systems.system import System
+
+__all__ = ["ByIdentity", "texts_of_system"]
+
+T = TypeVar("T")
+
+
+def texts_of_system(system: System) -> tuple[Any, ...]:
+    """Return everything that the trees of a system depend on, in hashable form.
+
+    Parameters
+    ----------
+    system : System
+        Complete, but for its assembly.
+
+    Returns
+    -------
+    tuple
+        Equal for systems that differ in numbers only.
+    """
+    contacts = [
+        (
+            contact.name,
+            _text_of(ByIdentity(contact.chart)),
+            contact.v,
+            tuple(contact.inputs.items()),
+            tuple(np.ndim(contact.values[name]) for name in contact.chart.parameter_names),
+            contact.model is None,
+            contact.period is None,
+            contact.stribeck and contact.stribeck.text,
+        )
+        for contact in system.contacts
+    ]
+    signals = [
+        (name, signal if isinstance(signal, str) else (type(signal), getattr(signal, "text", "")))
+        for name, signal in system.signals.items()
+    ]
+    sampled = [(each.name, each.period, tuple(each.updates.items())) for each in system.sampled]
+    return (
+        system.name,
+        system.bodies,
+        system.springs,
+        tuple(contacts),
+        tuple(system.numbers),
+        tuple(signals),
+        tuple(system.flow.items()),
+        tuple(sampled),
+    )
+
+
+@functools.lru_cache(maxsize=256)
+def _text_of(chart: ByIdentity[Chart]) -> str:
+    return full_text(chart.it)
+
+
+class ByIdentity(Generic[T]):
+    """An object compared by identity, because its data cannot be hashed."""
+
+    def __init__(self, it: T) -> None:
+        self.it = it
+
+    def __hash__(self) -> int:
+        return id(self.it)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ByIdentity) and other.it is self.it

@@ -1,0 +1,133 @@
+"""States between two rows of one arc, by interpolation, and the time of a change, by bisection."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.lowering.observing import armed, rate
+from gms_fsm.lowering.program import Program
+from gms_fsm.traces.rows import Rows
+
+__all__ = ["between", "first_true", "interpolated", "slopes"]
+
+HALVINGS = 60  # bisections between two rows
+
+
+def first_true(low: float, high: float, holds: Callable[[float], bool]) -> float:
+    """Return the point at which a condition becomes true, found by bisection.
+
+    Parameters
+    ----------
+    low, high : float
+        The condition is false at low and true at high; neither is evaluated again.
+    holds : callable
+        The condition.
+
+    Returns
+    -------
+    float
+        The right end of the bracket, where the condition is true.
+
+    Examples
+    --------
+    >>> first_true(0.0, 1.0, lambda t: t >= 0.3)
+    0.3
+    """
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return high
+
+
+def interpolated(
+    program: Program,
+    mode: list[int],
+    t0: float,
+    y0: FloatArray,
+    t1: float,
+    y1: FloatArray,
+    t: float,
+) -> FloatArray:
+    """Return the state at t between two rows of one arc, by cubic Hermite interpolation.
+
+    The slopes come from the flow.
+
+    Parameters
+    ----------
+    program : Program
+        Program of the run.
+    mode : list of int
+        Active states between the rows.
+    t0, t1 : float
+        Times of the rows, s.
+    y0, y1 : ndarray, shape (m,)
+        Their states.
+    t : float
+        s, from t0 to t1.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        The state.
+    """
+    with np.errstate(all="ignore"):  # as in a run, overflow gives inf
+        at_start, at_end = slopes(program, mode, t0, y0, t1, y1)
+        h = t1 - t0
+        theta = (t - t0) / h
+        rise = y1 - y0
+        bend = h * at_start - rise
+        twist = rise - h * at_end - bend
+        value: FloatArray = y0 + theta * (rise + (1 - theta) * (bend + theta * twist))
+    return value
+
+
+def slopes(
+    program: Program, mode: list[int], t0: float, y0: FloatArray, t1: float, y1: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the one-sided dy/dt at two adjacent rows of one arc, seen from between them.
+
+    Parameters
+    ----------
+    program, mode, t0, y0, t1, y1
+        As in `interpolated`.
+
+    Returns
+    -------
+    tuple of ndarray, shape (m,)
+        Slopes at the first and at the second row.
+    """
+    # The signs inside the interval; at its ends they may be about to change.
+    held = armed(program, 0.5 * (t0 + t1), (0.5 * (y0 + y1)).tolist(), mode)
+    at_start, at_end = (rate(program, t, y.tolist(), mode, held) for t, y in ((t0, y0), (t1, y1)))
+    return at_start, at_end
+
+
+def between(program: Program, table: Rows, i: int, t: float) -> FloatArray:
+    """Return the state at a time in a run.
+
+    Parameters
+    ----------
+    program : Program
+        Of the run.
+    table : Rows
+        Its rows, with both sides of every stop.
+    i : int
+        The last row not after t.
+    t : float
+        s.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        The row itself at its time.
+    """
+    t0 = table.t[i]
+    if t == t0 or i + 1 == len(table):
+        return np.asarray(table.y[i])
+    mode, ends = table.mode[i].tolist(), (float(t0), table.y[i], float(table.t[i + 1]))
+    return interpolated(program, mode, *ends, table.y[i + 1], t)

@@ -1,0 +1,237 @@
+"""Parts of what a trace shows, beside its columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import OutputError, TraceFileError, why
+from gms_fsm.foundation.display import short_repr
+from gms_fsm.foundation.logs import Log
+from gms_fsm.lowering.observing import armed, rate, sigmas
+from gms_fsm.lowering.program import Program
+from gms_fsm.systems.system import Body
+from gms_fsm.traces.files.parts import Parts, Ran, checked
+from gms_fsm.traces.rows import Rows, merged
+
+if TYPE_CHECKING:
+    from gms_fsm.traces.trace import Trace
+
+__all__ = [
+    "BodyTrace",
+    "driven_velocity",
+    "dwell_times",
+    "picked",
+    "read_parts",
+    "sigma_at",
+    "sliding_of",
+    "steps_of",
+    "write_trace",
+]
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class BodyTrace:
+    """The motion of a body.
+
+    Parameters
+    ----------
+    name : str
+        The body's.
+    x, v : ndarray, shape (rows,)
+        Position [m] and velocity [m/s].
+    """
+
+    name: str
+    x: FloatArray
+    v: FloatArray
+
+
+def driven_velocity(trace: Trace, body: Body) -> FloatArray:
+    """Return the velocity of a driven body at all rows: the rate of its position."""
+    program, found = trace.program, []
+    place = program.layout.y.index(body.x)
+    rows = zip(trace.t.tolist(), trace.rows.y.tolist(), trace.rows.mode.tolist(), strict=True)
+    for t, y, mode in rows:
+        found.append(rate(program, t, y, mode, armed(program, t, y, mode))[place])
+    return np.array(found)
+
+
+def steps_of(trace: Trace) -> NDArray[np.int64]:
+    """Return the micro-step of the row that each entry of the log made.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run, or the run of one contact.
+
+    Returns
+    -------
+    ndarray of int, shape (transitions,)
+        Micro-steps count the firings of all contacts at one time.
+    """
+    log = trace.firings if trace.every is None else trace.every
+    counted: NDArray[np.int64] = np.arange(len(log)) - np.searchsorted(log.t, log.t) + 1
+    return counted if trace.every is None else counted[log.within(trace.places.name)]
+
+
+def picked(trace: Trace, keep: NDArray[Any] | slice) -> Trace:
+    """Return some of the rows, with what was observed there, and the whole log.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run.
+    keep : ndarray of int or bool, or slice
+        Which rows.
+
+    Returns
+    -------
+    Trace
+        Nothing is computed again.
+    """
+    rows = trace.rows.at(keep)
+    stored = {name: column[keep] for name, column in trace.stored.items()}
+    part = replace(trace, rows=rows, stops=rows, stored=stored)
+    seen = {name: column[keep] for name, column in trace.seen.items()}
+    vars(part).update({"program": trace.program, "seen": seen})
+    return part
+
+
+def dwell_times(trace: Trace) -> FloatArray:
+    """Return the time each element spent in each state.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run; its transition log is complete, whatever its rows are.
+
+    Returns
+    -------
+    ndarray, shape (n, states), s
+        Each row adds up to the duration of the run.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 3.0)
+    >>> dwell_times(trace)[0].round(9).tolist()
+    [2.0, 1.0]
+    """
+    states = [state.name for state in trace.model.chart.states]
+    total = np.zeros((trace.n, len(states)))
+    begin, end = trace.stops.t[0], trace.stops.t[-1]
+    begin, end = min(begin, trace.t[0]), max(end, trace.t[-1])
+    first = trace.stops if trace.stops.t[0] <= trace.t[0] else trace.rows
+    elements = trace.places.elements
+    for i in range(trace.n):
+        since, state = begin, int(first.mode[0, elements][i])
+        for record in trace.transitions[trace.transitions.element == i]:
+            total[i, states.index(record.source)] += record.t - since
+            since, state = record.t, states.index(record.target)
+        total[i, state] += end - since
+    return total
+
+
+_SLIDING = np.dtype(
+    [
+        ("t_start", "f8"),
+        ("t_end", "f8"),
+        ("surface", "U128"),
+        ("sigma_start", "f8"),
+        ("sigma_end", "f8"),
+    ]
+)
+
+
+def sliding_of(trace: Trace) -> Any:
+    """Return the intervals of a run in which the motion slides on a surface."""
+    table = merged(trace.rows, trace.stops)
+    found: list[tuple[Any, ...]] = []
+    if len(table) < 2:
+        return np.array(found, dtype=_SLIDING).view(Log)
+    for k, flags in enumerate(table.mode[:, trace.program.layout.slides].T):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], flags, [0]])))
+        for first, behind in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            # The last row of the interval itself, before any firing or jump of a signal.
+            last = int(np.searchsorted(table.t, table.t[behind - 1]))
+            if last > first and table.t[last] in trace.program.jumps:
+                last -= 1
+            begun, ended = (
+                sigma_at(trace.program, table, row, k) for row in (first, max(first, last))
+            )
+            name = trace.program.surface_names[k]
+            end = float(table.t[min(behind, len(table) - 1)])
+            found.append((float(table.t[first]), end, name, begun, ended))
+    return np.array(found, dtype=_SLIDING).view(Log)
+
+
+def sigma_at(program: Program, table: Rows, row: int, surface: int) -> float:
+    """Return the sign held on a surface at a row."""
+    t, y, mode = float(table.t[row]), table.y[row].tolist(), table.mode[row].tolist()
+    return sigmas(program, t, y, mode)[surface]
+
+
+def write_trace(trace: Trace, path: Path) -> Path:
+    """Write a trace; see `Trace.save`."""
+    if path.suffix not in (".npz", ".csv"):
+        raise OutputError(
+            f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",
+            place=str(path),
+        )
+    if trace.which:
+        raise OutputError(
+            f"this is what the contact {trace.which!r} sees of a run",
+            place=str(path),
+            advice="save the trace of the whole run",
+        )
+    from gms_fsm.traces.files import csv_files, npz_files
+    from gms_fsm.traces.files.header import Header
+
+    header = Header.of(trace.what, trace.settings, trace.monitors)
+    if path.suffix == ".csv":
+        starts = range(0, len(trace), csv_files.AT_ONCE)
+        parts = (picked(trace, slice(start, start + csv_files.AT_ONCE)) for start in starts)
+        return csv_files.write(path, header, (part.columns() for part in parts), trace.firings)
+    stored = dict(trace.seen)
+    for name in trace.what.bodies:
+        if trace.what.system.body(name).driven:
+            stored[trace.what.system.body(name).v] = trace.body(name).v
+    return npz_files.write(
+        path, Parts(header, Ran(trace.what), trace.rows, trace.stops, trace.firings, stored)
+    )
+
+
+def read_parts(path: Path) -> Parts:
+    """Return the parts of a trace file, checked."""
+    from gms_fsm.traces.files import csv_files, npz_files
+
+    reader = {".npz": npz_files.read, ".csv": csv_files.read}.get(path.suffix)
+    if reader is None:
+        raise TraceFileError(
+            f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",
+            place=str(path),
+        )
+    try:
+        return checked(reader(path))
+    except TraceFileError as error:
+        raise (error if error.outer else error.inside(path)) from None
+    except FileNotFoundError as error:
+        raise TraceFileError(
+            "no such file", place=error.filename, advice="check the name and the folder"
+        ) from None
+    except Exception as error:
+        # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, each
+        # with its own errors; in every case the file is at fault.
+        raise TraceFileError(
+            f"damaged or incomplete trace file ({why(error)})",
+            place=str(path),
+            advice="write it again",
+        ) from None

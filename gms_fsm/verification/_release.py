@@ -1,0 +1,82 @@
+"""The check *release* of charts with locked states, described in `gms_fsm.verification.prove`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from gms_fsm.charts.chart import Transition
+from gms_fsm.language import Requirement, split
+from gms_fsm.verification._checks import after, moving, moving_names, ways
+from gms_fsm.verification._prover import Answer, Prover, Reading, Undecided, names_of, refuted
+from gms_fsm.verification.findings import Finding
+
+__all__ = ["release"]
+
+
+def release(prover: Prover) -> Iterator[Finding]:
+    """Check that whoever lets go of a lock is not pushed back into one at once."""
+    chart, subject = prover.chart, prover.subject
+    if not subject.moves:
+        return
+    pairs = [
+        (edge, back)
+        for edge in chart.transitions
+        if subject.locked(edge.source) and not subject.locked(edge.target)
+        for _, back in chart.leaving(edge.target)
+        if subject.locked(back.target)
+    ]
+    if not pairs:
+        text = "no edge that leaves a locked state is followed by one that enters one"
+        yield Finding("release", "proved", (), text if chart.locks else "no state is locked")
+    for edge, back in pairs:
+        where = (edge.source, edge.name, edge.target, back.name)
+        yield prover.settle("release", where, _pushed_back, edge, back)
+
+
+def _pushed_back(prover: Prover, edge: Transition, back: Transition) -> Answer:
+    """Search for a load at which a contact lets go, and the flow leads into the guard back.
+
+    Each comparison of that guard must hold at the point and after it, or become true from zero. A
+    margin that stays at zero, or a point where a flow jumps, is not decided to first order.
+    """
+    subject, z3 = prover.subject, prover.z3
+    of_edge, of_flow, of_guard = Reading(), Reading(), Reading()
+    there = after(prover, of_edge, edge, prover.still)
+    let_go = [*prover.at_rest(edge.source), of_edge.truth(subject.guard(edge), prover.still)]
+    moved = moving(prover, of_flow, edge.target, there)
+    strict, loose, reached = [], [], []
+    for way in ways(split(subject.guard(back))):
+        here = [(part, of_guard.margin(part, moved)) for part in way]
+        growing = [z3.And(m.value == 0, m.slope > 0) for _, m in here]
+        strict.append(
+            z3.And(
+                [
+                    z3.Or(m.value > 0, grows, *([m.value == 0] if _inclusive(part) else []))
+                    for (part, m), grows in zip(here, growing, strict=True)
+                ]
+            )
+        )
+        resting = [z3.And(m.value == 0, m.slope >= 0) for _, m in here]
+        loose.append(
+            z3.And([z3.Or(m.value > 0, rests) for (_, m), rests in zip(here, resting, strict=True)])
+        )
+        reached.append(z3.And([m.value >= 0 for _, m in here]))
+    breaks: list[Any] = [*of_flow.breaks, *of_guard.breaks]
+    for reading in (of_edge, of_flow, of_guard):
+        prover.defined(reading, *let_go)
+    names = moving_names(prover, [subject.guard(back)], (edge.target,))
+    names |= names_of(*subject.trees(edge))
+    point = prover.example(names, *let_go, z3.Or(strict), *(u != 0 for u in breaks))
+    if point is not None:
+        text = f"after {edge.name} the contact is pushed back, and {back.name} locks it again"
+        return refuted(f"{text}: endless switching", point)
+    at_break = z3.And(z3.Or([u == 0 for u in breaks]), z3.Or(reached))
+    if prover.find(*let_go, z3.Or(*loose, at_break)) is not None:
+        raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
+    return Answer("proved", f"{back.name} cannot follow at once")
+
+
+def _inclusive(part: Requirement) -> bool:
+    """Return whether a comparison holds where both sides are equal."""
+    return part.comparison.strict != part.holds

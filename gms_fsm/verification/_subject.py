@@ -1,0 +1,215 @@
+"""A chart as the checks read it: named expressions expanded, F and a written out.
+
+The checks see a chart alone, without bodies. For a chart that reads F or a, locks the contact, or
+sets its velocity, two free quantities stand for the rest of the system: H, the force that would
+hold v where it is, and W > 0, the inverse of the inertia that the contact feels. Then
+``a = (H - F) W`` while the contact moves, and ``F = H``, ``a = 0``, ``v = 0`` while it is locked;
+v is a variable whose rate is a.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.language import Binary, Condition, Name, Number, Value, names_in, renamed
+from gms_fsm.language.normal import renamed_in
+
+__all__ = ["Subject", "subject_of"]
+
+ZERO = Number(0.0)
+AGE = "age"
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A chart as the checks read it.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    moves : bool
+        Whether F, a or a velocity takes part, so that H and W stand for the rest of the system.
+    inputs, variables : tuple of str
+        The chart's, with H and W, and with the velocities as variables, where it moves.
+    guards : mapping of (str, str) to Condition
+        By source and name of an edge.
+    steps : mapping of (str, str) to tuple of (str, Value)
+        Assignments of an edge, in order; they may name F and a.
+    before : mapping of (str, str) to mapping of str to Value
+        For an edge, F and a before its assignments, where these read them.
+    flows : mapping of (str, str) to Value
+        By state and variable.
+    load, mobility : str
+        What H and W are called here; empty if it does not move.
+    assumed : tuple of str
+        Conditions that hold by construction.
+    """
+
+    chart: Chart
+    moves: bool
+    inputs: tuple[str, ...]
+    variables: tuple[str, ...]
+    guards: Mapping[tuple[str, str], Condition]
+    steps: Mapping[tuple[str, str], tuple[tuple[str, Value], ...]]
+    before: Mapping[tuple[str, str], Mapping[str, Value]]
+    flows: Mapping[tuple[str, str], Value]
+    load: str
+    mobility: str
+    assumed: tuple[str, ...]
+
+    def guard(self, edge: Transition) -> Condition:
+        """Return the guard of an edge."""
+        return self.guards[edge.source, edge.name]
+
+    def assigned(self, edge: Transition) -> tuple[tuple[str, Value], ...]:
+        """Return the assignments of an edge."""
+        return self.steps[edge.source, edge.name]
+
+    def landed(self, edge: Transition) -> tuple[str, ...]:
+        """Return the velocities that an edge sets to 0, because it enters a locked state."""
+        return self.chart.velocities if self.locked(edge.target) else ()
+
+    def trees(self, edge: Transition) -> list[Value | Condition]:
+        """Return all that an edge reads."""
+        before = self.before[edge.source, edge.name].values()
+        return [self.guard(edge), *(tree for _, tree in self.assigned(edge)), *before]
+
+    def locked(self, state: str) -> bool:
+        """Return whether a state locks the contact."""
+        return self.chart.states[self.chart.state_index(state)].locked
+
+    @property
+    def used(self) -> frozenset[str]:
+        """The names that its guards, flows and assignments read."""
+        edges = (tree for edge in self.chart.transitions for tree in self.trees(edge))
+        return frozenset[str]().union(*map(names_in, [*edges, *self.flows.values()]))
+
+
+def subject_of(chart: Chart) -> Subject:
+    """Return a chart as the checks read it.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+
+    Returns
+    -------
+    Subject
+        Over its own names, H and W.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import CHARTS
+    >>> from gms_fsm.language import spell
+    >>> read = subject_of(CHARTS["stiction"])
+    >>> spell(read.guards["stuck", "release_forward"]), spell(read.flows["forward", "v"])
+    ('H > F_s', '(H - (F_c + b * v)) * W')
+    """
+    lets: dict[str, Value] = {}
+    for name, tree in chart.lets.items():
+        lets[name] = renamed(tree, lets)
+    declared = {*chart.inputs, *chart.velocities, *chart.variables, *chart.parameter_names, *lets}
+    late = [name for name in (*chart.force_names, *chart.rate_names) if name not in declared]
+    steps = {
+        (edge.source, edge.name): tuple(
+            (name, renamed(tree, lets))
+            for place in (("exit", edge.source), ("action", edge.name), ("entry", edge.target))
+            for name, tree in chart.assignments[place].items()
+        )
+        for edge in chart.transitions
+    }
+    guards = {name: renamed_in(tree, lets) for name, tree in chart.guards.items()}
+    read = _names(guards.values()) | _names(tree for row in steps.values() for _, tree in row)
+    moves = bool(read & {*late}) or chart.locks or chart.sets_velocity
+    load, mobility = _fresh("H", declared), _fresh("W", declared)
+    flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
+    values = {
+        state.name: _late(chart, state.name, late, lets | _rates(chart, flows, state.name), load)
+        for state in chart.states
+    }
+    if moves and len(chart.velocities) == 1:
+        for state in chart.states:
+            force = values[state.name]["F"]
+            net = Binary("*", Binary("-", Name(load), force), Name(mobility))
+            rate = ZERO if state.locked else net
+            flows[state.name, chart.velocities[0]] = rate
+            if chart.rate_names[0] in late:
+                values[state.name][chart.rate_names[0]] = rate
+    elif moves:  # the accelerations are coupled, which is not encoded: their names stay
+        for state in chart.states:
+            for velocity, name in zip(chart.velocities, chart.rate_names, strict=True):
+                flows[state.name, velocity] = ZERO if state.locked else Name(name)
+    inputs = [name for name in chart.inputs if not (moves and name in chart.velocities)]
+    if moves:
+        loads = [_load(load, chart, force) for force in chart.force_names]
+        inputs += [*loads, mobility]
+    else:
+        named = read | _names(flows.values())
+        inputs += [name for name in chart.velocities if name in named and name not in inputs]
+    return Subject(
+        chart=chart,
+        moves=moves,
+        inputs=tuple(inputs),
+        variables=(*chart.variables, *(chart.velocities if moves else ())),
+        guards={
+            (edge.source, edge.name): renamed_in(guards[edge.name], values[edge.source])
+            for edge in chart.transitions
+        },
+        steps=steps,
+        before={
+            (edge.source, edge.name): {
+                name: tree
+                for name, tree in values[edge.source].items()
+                if name in _names(step for _, step in steps[edge.source, edge.name])
+            }
+            for edge in chart.transitions
+        },
+        flows=flows,
+        load=load if moves else "",
+        mobility=mobility if moves else "",
+        assumed=(
+            *([f"{mobility} > 0"] if moves else []),
+            *([f"{AGE} >= 0"] if AGE in chart.variables else []),
+        ),
+    )
+
+
+def _names(trees: Iterable[Value | Condition]) -> frozenset[str]:
+    return frozenset[str]().union(*map(names_in, trees))
+
+
+def _fresh(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _load(load: str, chart: Chart, force: str) -> str:
+    return load + force.removeprefix(chart.force_names[0])
+
+
+def _rates(chart: Chart, flows: Mapping[tuple[str, str], Value], state: str) -> dict[str, Value]:
+    return {f"d{name}": flows[state, name] for name in chart.variables}
+
+
+def _late(
+    chart: Chart, state: str, late: Iterable[str], inside: Mapping[str, Value], load: str
+) -> dict[str, Value]:
+    """Return the forces of a contact of one element in a state, and its rates while locked."""
+    locked = chart.states[chart.state_index(state)].locked
+    found: dict[str, Value] = {}
+    for force in chart.force_names:
+        tree = chart.forces[state, force]
+        if tree is None:
+            found[force] = Name(_load(load, chart, force))
+        else:
+            found[force] = renamed(tree, inside)
+            if force in chart.totals:
+                found[force] = renamed(chart.totals[force], {**inside, force: found[force]})
+    if locked:
+        found |= {name: ZERO for name in chart.rate_names if name in late}
+    return found

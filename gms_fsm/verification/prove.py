@@ -1,0 +1,130 @@
+"""Prove statements about a chart from its guards and flows, or refute them by an example.
+
+Theory of operation. Every text of the chart becomes a formula over the real numbers, and the solver
+z3 searches for a point where the statement fails. *Proved* means that there is none within the
+domain. *Refuted* comes with one such point; its numbers are exact in floats, and every guard named
+was evaluated there. *Settled by order*: two edges are enabled at the same time, as such a point
+shows, and the machine takes the earlier one in the chart. This is not a fault, but a different
+order would be a different model.
+*Undecided* comes with the reason.
+
+- Over the reals, not floats: a proof says nothing about rounding.
+- Over points, not trajectories: a refuting point need not lie on the trajectory of any run.
+- Inputs (``s``, ``v``) and their rates (``ds/dt``, ``dv/dt``) are free symbols: that s is a
+  function of v is not used, so no transcendental function is needed. The rates are the same in
+  both states of a switch; in closed loop dv/dt can jump with the force, which is not followed.
+- ``sgn``, ``abs``, ``min`` and ``max`` are split by case, integer powers are products. ``exp``,
+  ``sqrt``, ``sin``, ``cos``, ``tanh`` and other powers are not encoded: undecided. A quotient
+  is accepted only if the domain proves its denominator nonzero.
+- A chart that reads F or a, locks the contact, or sets its velocity is read for a contact of one
+  element on any system: H, the force that would hold v where it is, and its rate are free, and so
+  is W > 0, the inverse of the inertia that the contact feels. While the contact moves,
+  ``a = (H - F) W`` is the rate of v; while it is locked, ``F = H`` and ``a = v = 0``. H and its
+  rate are the same on both sides of a switch, of an impulse too.
+- Only determinism and reachability use the priorities of edges; the other checks do not.
+
+The checks. *determinism*: no two edges of one state are enabled at the same time, or their
+order decides which is taken. *livelock*: no cycle of edges is enabled at one point. *reachability*,
+from the graph and the guards alone: every state can be entered and left, and every guard can hold
+where no earlier edge takes precedence. *chattering*: no two states have flows that cross the
+surfaces of the guards between them in opposite directions, each into the other's guard (to first
+order in time; edges that assign variables are undecided, unless their inputs exclude each other).
+*stability*: no state has an unstable equilibrium, for flows linear in the variable. *release*, for
+charts with locked states: whoever lets go is not pushed back at once, into the guard of an edge
+that locks it again (to first order in time). If it could be, the contact would chatter between
+stuck and moving.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import listed
+from gms_fsm.verification._checks import chattering, determinism, livelock, reachability, stability
+from gms_fsm.verification._prover import Prover
+from gms_fsm.verification._release import release
+from gms_fsm.verification._subject import subject_of
+from gms_fsm.verification.findings import CHECKS, Check, Finding, Report, Status
+
+__all__ = ["CHECKS", "Check", "Finding", "Report", "Status", "default_domain", "prove"]
+
+
+def default_domain(chart: Chart) -> tuple[str, ...]:
+    """Return the conditions assumed of a chart by default.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+
+    Returns
+    -------
+    tuple of str
+        The rule (`gms_fsm.Parameter`) of each input and parameter used in its guards, flows or
+        assignments, if it has one.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import LUGRE, gms_element
+    >>> default_domain(gms_element("signed")), default_domain(LUGRE)
+    (('s > 0', 'C > 0', 'v_c > 0'), ('s > 0', 'sigma_0 > 0'))
+    """
+    used, declared = subject_of(chart).used, chart.declared
+    return tuple(
+        condition
+        for name in chart.inputs + chart.parameter_names
+        if name in declared and name in used
+        for condition in declared[name].conditions
+    )
+
+
+def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
+    """Check a chart at all points of a domain.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart; only its texts are used.
+    domain : sequence of str, optional
+        Conditions on its names to assume, for example ``["s >= 0", "v_c > 0"]``. The default is
+        `default_domain`.
+
+    Returns
+    -------
+    Report
+        Findings, each proved, refuted by an example, or undecided with the reason.
+
+    Raises
+    ------
+    MissingExtraError
+        If z3 is not installed.
+    ExpressionError
+        If a condition cannot be parsed.
+    ParameterError
+        If the domain is empty, or uses a function that is not encoded.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import gms_element
+    >>> report = prove(gms_element("published"))  # doctest: +SKIP
+    >>> finding, = report.refuted  # doctest: +SKIP
+    >>> finding.check, finding.where, finding.counterexample  # doctest: +SKIP
+    ('stability', ('slip',), {'C': 1.0, 'v': -1.0, 's': 1.0, 'z': 1.0})
+    """
+    if not hasattr(chart, "guards"):
+        raise ParameterError(
+            "prove takes a Chart", place="chart", value=chart, advice="for a model, pass its .chart"
+        )
+    if domain is None:
+        domain = default_domain(chart)
+    domain = (
+        (domain,)
+        if isinstance(domain, str)
+        else tuple(listed("domain", domain, "a list of conditions"))
+    )
+    domain = (*domain, *subject_of(chart).assumed)
+    prover = Prover(chart, domain)
+    checks = (determinism, livelock, reachability, chattering, stability, release)
+    return Report(chart, domain, tuple(found for check in checks for found in check(prover)))

@@ -1,0 +1,184 @@
+"""A function while it is translated: its names, its local variables, and its statements so far."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from integrators.machine_code.front_end.sources import TranslationError, source_of
+from integrators.machine_code.front_end.values import ArrayValue, Value
+from integrators.machine_code.tree import (
+    Assign,
+    Const,
+    Expr,
+    Global,
+    Local,
+    Module,
+    Op,
+    Statement,
+    TypedFunction,
+    locals_in,
+)
+
+__all__ = ["Again", "Learnt", "Specialised", "Translating", "Work", "as_kind", "common"]
+
+RANK = "bif"  # truth values are integers, integers are floats
+
+
+class Again(Exception):
+    """Something has been learnt of a variable; the function is translated once more."""
+
+
+@dataclass
+class Learnt:
+    """What the assignments of a function say together.
+
+    A variable has one meaning in the whole function, which must be known where it is read, and this
+    may be before its last assignment.
+
+    Parameters
+    ----------
+    kinds : dict of str to str
+        Kinds of variables that are wider than their first assignments say.
+    varying : set of str
+        Parts of variables that are not the same in all assignments.
+    """
+
+    kinds: dict[str, str] = field(default_factory=dict)
+    varying: set[str] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class Specialised:
+    """A function for arguments of certain types, and what it returns, in terms of parameters.
+
+    Parameters
+    ----------
+    function : TypedFunction
+        The translated function.
+    result : Value or None
+        What it returns.
+    slots : tuple of Local
+        The locals in `result` that stand for returned numbers.
+    """
+
+    function: TypedFunction
+    result: Value | None
+    slots: tuple[Local, ...]
+
+
+class Translating(Protocol):
+    """What the translation of one function needs of that of the module."""
+
+    module: Module
+
+    def translated(self, function: Callable[..., Any], arguments: Sequence[Value]) -> Specialised:
+        """Return a function for some arguments."""
+
+    def table(self, values: tuple[Any, ...]) -> ArrayValue:
+        """Return constants as an array."""
+
+
+class Work:
+    """The translation of one function.
+
+    Parameters
+    ----------
+    translator : Translating
+        Of its module.
+    function : callable
+        The Python function.
+    learnt : Learnt
+        From previous attempts; changed in place.
+    """
+
+    def __init__(
+        self, translator: Translating, function: Callable[..., Any], learnt: Learnt
+    ) -> None:
+        self.translator, self.learnt = translator, learnt
+        self.source = source_of(function)
+        self.names: dict[str, Any] = function.__globals__
+        self.node: ast.AST = self.source.definition  # being translated
+        self.out: list[Statement] = []
+        self.parameters: dict[Local, None] = {}  # in order
+        self.variables: dict[str, Local] = {}
+        self.scope: dict[str, Value] = {}
+        self.first: dict[str, Value] = {}  # what was assigned first
+        self.assigned: dict[str, int] = {}  # how often the text assigns each name
+        self.slots: dict[str, Local] = {}  # of what is returned
+        self.gives: bool | None = None  # whether it returns a value
+        self.temporary = 0
+        self.count_assignments(self.source.definition)
+
+    def count_assignments(self, *nodes: ast.AST) -> None:
+        """Count assignments to names."""
+        for node in nodes:
+            for each in ast.walk(node):
+                if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store):
+                    self.assigned[each.id] = self.assigned.get(each.id, 0) + 1
+
+    def error(self, reason: str) -> TranslationError:
+        """Return an error at the present line."""
+        return self.source.error(reason, self.node)
+
+    def local(self, table: dict[str, Local], name: str, kind: str) -> Local:
+        """Return the local of a name; its kind is the widest of all assignments."""
+        kind = self.learnt.kinds.get(name, kind)
+        local = table.setdefault(name, Local(kind, name))
+        if local.kind != kind:
+            if "p" in (local.kind, kind):
+                raise self.error(f"{name} is an array and a number")
+            if RANK.index(kind) > RANK.index(local.kind):
+                self.learnt.kinds[name] = kind
+                raise Again
+        return local
+
+    def variable(self, name: str, kind: str) -> Local:
+        """Return the local variable of a name."""
+        return self.local(self.variables, name, kind)
+
+    def set(self, name: str, expr: Expr) -> Local:
+        """Assign a number or an address to a local variable."""
+        local = self.variable(name, expr.kind)
+        self.out.append(Assign(local, as_kind(self, expr, local.kind)))
+        return local
+
+    def fresh(self) -> str:
+        """Return a name that no variable has."""
+        self.temporary += 1
+        return f".{self.temporary}"
+
+    def new(self, kind: str) -> Local:
+        """Return a new local variable."""
+        return self.variable(self.fresh(), kind)
+
+    def kept(self, expr: Expr) -> Expr:
+        """Return an expression that keeps its present value."""
+        if isinstance(expr, Const | Global) or expr in self.parameters:
+            return expr
+        local = self.new(expr.kind)
+        self.out.append(Assign(local, expr))
+        return local
+
+    def constant(self, expr: Expr) -> bool:
+        """Return whether an expression reads nothing but parameters."""
+        return all(each in self.parameters for each in locals_in(expr))
+
+
+def as_kind(work: Work, expr: Expr, kind: str) -> Expr:
+    """Convert a number to a kind that is at least as wide."""
+    if expr.kind == kind:
+        return expr
+    if "p" in (expr.kind, kind) or RANK.index(kind) < RANK.index(expr.kind):
+        raise work.error(f"a number of kind {expr.kind} does not fit into {kind}")
+    if isinstance(expr, Const):
+        return Const(kind, float(expr.value) if kind == "f" else int(expr.value))
+    return Op(kind, "float" if kind == "f" else "int", (expr,))
+
+
+def common(work: Work, *parts: Expr) -> list[Expr]:
+    """Convert numbers to their widest kind."""
+    kind = max((part.kind for part in parts), key=RANK.index)
+    return [as_kind(work, part, kind) for part in parts]

@@ -1,0 +1,1 @@
+"""The loop as run by others: Python, machine code, SciPy's solvers, co-simulation."""

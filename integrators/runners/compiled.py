@@ -1,0 +1,549 @@
+"""`integrators.runners.columns.record` as machine code: the same functions, translated.
+
+Each system gets machine code of its own: its functions are known while translating, and so are the
+lengths of all arrays, unless they are long. An object is compiled once and stored.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import hashlib
+import math
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from types import CodeType, FunctionType
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from integrators import advance, crossings, elementary, loop, sliding, step_size, steps
+from integrators.loop import Buffers, Machines
+from integrators.machine_code import layout as layouts
+from integrators.machine_code import llvm, objects, records, tree
+from integrators.machine_code.front_end import (
+    bindings,
+    expressions,
+    passing,
+    sources,
+    statements,
+    translate,
+    values,
+    work,
+)
+from integrators.machine_code.front_end.translate import Translator
+from integrators.machine_code.front_end.values import NumberValue
+from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray, parts_of
+from integrators.machine_code.llvm import llvm_text
+from integrators.machine_code.objects import Library, target_name
+from integrators.machine_code.tree import Local
+from integrators.runners import columns, observing, stepping
+from integrators.runners.columns import LogColumns, Recorded
+from integrators.runners.stepping import Sample
+from integrators.sliding import Functions, Held, Sliding
+from integrators.steps import Coefficients
+from integrators.switching import jolts, sliding_bounds
+
+__all__ = [
+    "INLINE",
+    "CodeStore",
+    "CompiledFunction",
+    "CompiledStepper",
+    "RecordArguments",
+    "StepArguments",
+    "digest",
+    "edition",
+    "engine",
+    "example",
+    "is_known",
+    "observer",
+    "stepper",
+]
+
+# What is translated: the loop, and what it calls.
+LOOPS = (
+    elementary, steps, step_size, crossings, advance, sliding, sliding_bounds, jolts, loop, columns,
+    stepping, observing,
+)  # fmt: skip
+# Arrays longer than this are not inside the block, and their lengths are variables.
+LONGEST_INSIDE = 64 + 8
+
+# Functions that run once per arc, once per event, or never in most runs, and one that is long. Not
+# putting them inline saves a third of the compilation and costs nothing; with those of the bracket
+# it does.
+NOT_INLINE = [
+    "arm", "normal", "observe", "switch", "tick", "_solve", "slope_on", "seize", "look",
+    "scaled_size", "starting_step", "retry_factor", "next_on_grid", "raise_floor", "longest_next",
+    "_search", "_put_wanted", "_put_firing", "_put_stop", "_begin_arc", "_choose_stop", "_fired",
+    "_finish", "_held", "_jump", "_list", "_make_due", "_no_progress", "_often_changed",
+    "_only_due", "only_let_go", "_pick", "jolted", "arrived", "jolts", "_act", "_refuse",
+    "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
+    "advance", "_begin", "_impulse", "step_to",
+    "arm_on", "drop", "entangled", "let_go", "look_back", "look_held", "release", "_ask", "_bears",
+    "_combine", "crossed", "_is_far", "leave", "let_go_in_time", "_values",
+]  # fmt: skip
+# A step calls these seven times. Inline, the slopes stay in registers: a tenth of the time.
+INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", "flow_on"), True)
+
+
+class RecordArguments(NamedTuple):
+    """The arguments of `integrators.runners.columns.record`, without the last two."""
+
+    functions: Functions
+    machines: Machines
+    buffers: Buffers
+    log: LogColumns
+    recorded: Recorded
+
+
+class StepArguments(NamedTuple):
+    """The arguments of `integrators.runners.stepping.step_to`."""
+
+    functions: Functions
+    machines: Machines
+    buffers: Buffers
+    sample: Sample
+
+
+class ObserveArguments(NamedTuple):
+    """The arguments of `integrators.runners.observing.observe_rows`, without the last two."""
+
+    functions: Functions
+    observe: Callable[..., Any]
+    held: Any
+    sliding: Sliding
+    t: Any
+    y: Any
+    mode: Any
+    seen: Any
+    table: Any
+
+
+class CodeStore(Protocol):
+    """A cache for machine code. It must return exactly what was stored: wrong bits crash."""
+
+    def get(self, name: str) -> bytes | None:
+        """Return the content stored under a name, or None."""
+
+    def put(self, name: str, content: bytes) -> None:
+        """Store content under a name, if possible."""
+
+
+# --------------------------------------------------------------------------- what it depends on
+def digest(*functions: Callable[..., Any], text: str = "") -> str:
+    """Return a hash of what some functions do.
+
+    It is computed from their code as loaded, not from their files: these may have been replaced
+    under a running program, which would then store its old code under the new name.
+
+    Parameters
+    ----------
+    *functions : callable
+        Python functions.
+    text : str
+        Further text that affects the result.
+
+    Returns
+    -------
+    str
+        16 hexadecimal digits.
+    """
+    stamp = hashlib.sha256(text.encode())
+    codes = [function.__code__ for function in functions]
+    while codes:
+        code = codes.pop()
+        codes += [u for u in code.co_consts if isinstance(u, CodeType)]
+        constants = [u for u in code.co_consts if not isinstance(u, CodeType)]
+        stamp.update(repr((code.co_code, code.co_names, code.co_varnames, constants)).encode())
+    return stamp.hexdigest()[:16]
+
+
+@functools.cache
+def edition() -> str:
+    """Return a hash of what the loop computes, whatever system it runs.
+
+    Returns
+    -------
+    str
+        It changes with the loop's source, with how it is translated, and with the version of
+        Python.
+
+    Examples
+    --------
+    >>> len(edition())
+    16
+    """
+    front = (sources, work, bindings, passing, expressions, statements, translate)
+    tools = (*front, values, tree, records, layouts, llvm, objects)
+    functions: list[Callable[..., Any]] = []
+    constants: list[tuple[str, Any]] = []
+    for module in (*LOOPS, *tools):
+        for name, found in vars(module).items():
+            value = getattr(found, "__wrapped__", found)  # inside a cache
+            if isinstance(value, FunctionType) and value.__module__ == module.__name__:
+                functions.append(value)
+            elif isinstance(value, type) and value.__module__ == module.__name__:
+                members = vars(value).values()
+                functions += [each for each in members if isinstance(each, FunctionType)]
+            number = isinstance(value, int | float | str) or _is_table(value)
+            if number and not name.startswith("__"):
+                constants.append((name, value))
+            elif isinstance(value, dict) and {*map(type, value.values())} in ({str}, {bool}):
+                constants.append((name, sorted(value.values())))  # an empty one is filled later
+            else:
+                constants.append((name, getattr(value, "__match_args__", None)))
+    return digest(*functions, text=repr((sys.version, constants)))
+
+
+def _is_table(value: Any) -> bool:
+    """Return whether a value is a tuple of floats, or of such tuples."""
+    if not isinstance(value, tuple) or hasattr(value, "_fields"):
+        return isinstance(value, float)
+    return bool(value) and all(map(_is_table, value))
+
+
+# --------------------------------------------------------------------------- engines
+@dataclass(eq=False)
+class _Call:
+    """A call of machine code, and the first error in a function that it calls."""
+
+    block: MemoryBlock
+    error: BaseException | None = None
+    copy: list[Any] = field(default_factory=list)  # the block's contents then
+
+
+@dataclass(eq=False)
+class CompiledFunction:
+    """Machine code with the layout of its arguments.
+
+    Parameters
+    ----------
+    layout : BlockLayout
+        Of the block.
+    library : Library
+        Contains `entry`.
+    calls : sequence of callable
+        The functions of the host program that it calls.
+    extra : int
+        Number of integers that are passed besides the block.
+    """
+
+    layout: BlockLayout
+    library: Library
+    calls: Sequence[Callable[[float], float]]
+    extra: int
+    _function: Any = field(init=False)
+    _now: threading.local = field(default_factory=threading.local)  # `call`: of each thread
+
+    def __post_init__(self) -> None:
+        integers = [ctypes.c_int64] * self.extra
+        kind = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, *integers)
+        self._function = kind(self.library.address("entry"))
+        table = self.library.variable("callbacks") if self.calls else 0
+        if table:
+            thunk = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
+            self._thunks = [thunk(self._guarded(call)) for call in self.calls]
+            places = (ctypes.c_void_p * len(self.calls)).from_address(table)
+            for k, each in enumerate(self._thunks):
+                places[k] = ctypes.cast(each, ctypes.c_void_p).value
+
+    def _guarded(self, call: Callable[[float], float]) -> Callable[[float], float]:
+        """Return a function that never raises: machine code could not pass it on."""
+        now = self._now
+
+        def value(t: float) -> float:
+            try:
+                if now.call.error is None:
+                    return float(call(t))
+            except BaseException as error:
+                now.call.error, now.call.copy = error, now.call.block.copy()
+            return math.nan
+
+        return value
+
+    def __call__(self, block: MemoryBlock, *integers: int) -> int:
+        """Call the machine code; this releases the GIL.
+
+        Parameters
+        ----------
+        block : MemoryBlock
+            Up to date.
+        *integers : int
+            Further arguments.
+
+        Returns
+        -------
+        int
+            Its result.
+
+        Raises
+        ------
+        Exception
+            What a function of the host program raised; the block is as it was then.
+        """
+        now = self._now
+        outer, now.call = getattr(now, "call", None), _Call(block)
+        try:
+            result: int = self._function(block.address, *integers)
+            if now.call.error is not None:
+                block.restore(now.call.copy)
+                raise now.call.error
+        finally:
+            now.call = outer
+        return result
+
+
+def is_known(part: Any) -> bool:
+    """Return whether a part of some arguments takes no room in a block.
+
+    Parameters
+    ----------
+    part : object
+        A function, a named tuple, a list ...
+
+    Returns
+    -------
+    bool
+        True for functions and the coefficients of a method, which are known while translating.
+    """
+    return callable(part) or isinstance(part, Coefficients)
+
+
+def _made(
+    text: str,
+    function: Callable[..., Any],
+    arguments: Any,
+    extra: Sequence[str],
+    calls: Sequence[Callable[[float], float]],
+    store: CodeStore | None,
+    notify: Callable[[str], None],
+) -> CompiledFunction:
+    """Return an engine from the store, or compile it."""
+    layout = BlockLayout(arguments, is_known, inside=_longest(arguments) <= LONGEST_INSIDE)
+    library = _library(text, function, arguments, layout, extra, store, notify)
+    return CompiledFunction(layout, library, calls, len(extra))
+
+
+def _library(
+    text: str,
+    function: Callable[..., Any],
+    arguments: Any,
+    layout: BlockLayout,
+    extra: Sequence[str],
+    store: CodeStore | None,
+    notify: Callable[[str], None],
+    *,
+    each: bool = False,
+) -> Library:
+    """Return machine code from the store, or compile it."""
+    # Which of the functions in the text are called, and the coefficients.
+    fixed = [
+        getattr(part, "__name__", part) for part in parts_of(arguments, is_known) if is_known(part)
+    ]
+    what = edition(), function.__name__, text, layout.key(), fixed, target_name()
+    name = f"{function.__name__}-{hashlib.sha256(repr(what).encode()).hexdigest()[:24]}"
+    content = None if store is None else store.get(name)
+    if content is None:
+        started = time.perf_counter()
+        notify("compiling, once for each chart and method ...")
+        fields = layout.value.fields.values()
+        translator = Translator(INLINE)
+        numbers = [NumberValue(Local("i", each)) for each in extra]
+        made = translator.entry("entry", function, [*fields, *numbers])
+        if each:
+            translator.for_each("each", made, layout.words)
+        content = objects.compiled(llvm_text(translator.module))
+        if store is not None:
+            store.put(name, content)
+        notify(f"compiled in {time.perf_counter() - started:.1f} s")
+    return Library(content)
+
+
+def _longest(arguments: Any) -> int:
+    """Return the largest length of a list."""
+    lengths = [0]
+    for part in parts_of(arguments, is_known):
+        if isinstance(part, np.ndarray):
+            lengths += part.shape
+        elif isinstance(part, list):
+            lengths.append(
+                max(len(part), len(part[0]) if part and isinstance(part[0], list) else 0)
+            )
+    return max(lengths)
+
+
+def engine(
+    text: str,
+    arguments: RecordArguments,
+    calls: Sequence[Callable[[float], float]],
+    store: CodeStore | None,
+    notify: Callable[[str], None],
+) -> CompiledFunction:
+    """Return `integrators.runners.columns.record` as machine code for one system.
+
+    Parameters
+    ----------
+    text : str
+        Changes with the system's functions.
+    arguments : RecordArguments
+        From `example`, with those functions.
+    calls : sequence of callable
+        The functions that `integrators.machine_code.front_end.translate.HostFunction` stands for.
+    store : CodeStore, optional
+        The cache for machine code.
+    notify : callable
+        Called with a text before the system is compiled, which takes a while, and afterwards.
+
+    Returns
+    -------
+    CompiledFunction
+        To be called with a block, the largest number of steps, and whether to pause.
+    """
+    return _made(text, columns.record, arguments, ("steps", "pause"), calls, store, notify)
+
+
+@dataclass(eq=False)
+class CompiledStepper:
+    """Machine code that advances one block by a sample, or many of them.
+
+    Parameters
+    ----------
+    layout : BlockLayout
+        Of a block, which contains all its arrays.
+    library : Library
+        Contains `entry` and `each`.
+    """
+
+    layout: BlockLayout
+    library: Library
+
+    def __post_init__(self) -> None:
+        # It takes microseconds: to release the GIL would take a tenth of them.
+        one = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
+        self.one = one(self.library.address("entry"))
+        each = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
+        self.each = each(self.library.address("each"))
+
+
+def stepper(
+    text: str, arguments: StepArguments, store: CodeStore | None, notify: Callable[[str], None]
+) -> CompiledStepper:
+    """Return `integrators.runners.stepping.step_to` as machine code for one system.
+
+    Parameters
+    ----------
+    text, store, notify
+        As in `engine`.
+    arguments : StepArguments
+        Made of lists, with the system's functions; these call no functions of the host program.
+
+    Returns
+    -------
+    CompiledStepper
+        ``one(address)`` returns what `step_to` returns; ``each(address, count)`` calls it for many
+        blocks, one after the other in memory, and returns the sum of what it returns.
+    """
+    layout = BlockLayout(arguments, is_known)
+    step_to = stepping.step_to
+    return CompiledStepper(
+        layout, _library(text, step_to, arguments, layout, (), store, notify, each=True)
+    )
+
+
+def example(functions: Functions, machines: Machines, b: Buffers, observed: int, recorded: Recorded,
+            modes: int) -> RecordArguments:  # fmt: skip
+    """Return the arguments of `integrators.runners.columns.record`, with columns that may grow.
+
+    Parameters
+    ----------
+    functions, machines
+        Python functions, with arrays as parameters.
+    b : Buffers
+        From `integrators.hybrid.buffers`.
+    observed : int
+        Number of observed values.
+    recorded : Recorded
+        Where the numbers are that the log stores.
+    modes : int
+        Number of modes that are stored with a row.
+
+    Returns
+    -------
+    RecordArguments
+        An example for `integrators.machine_code.layout.BlockLayout`.
+    """
+    size = len(b.now.y)
+    column: Any = OuterArray
+    plan = b.plan._replace(jumps=column(), before_jumps=column(), ticks=column("i"), knots=column())
+    out = replace(b.out, times=column(), rows_t=column(), rows_y=column("f", size))
+    log = LogColumns(
+        firings=0,
+        stops=0,
+        t=column(),
+        machine=column("i"),
+        edge=column("i"),
+        numbers=column("f", 5),
+        seen=[0.0] * observed,
+        rows_microstep=column("i"),
+        rows_mode=column("i", modes),
+        stops_t=column(),
+        stops_microstep=column("i"),
+        stops_y=column("f", size),
+        stops_mode=column("i", modes),
+    )
+    p: Any = functions.p
+    shared, own, _ = p
+    functions = functions._replace(p=(shared, own, OuterArray(table=True)))
+    return RecordArguments(functions, machines, b._replace(plan=plan, out=out), log, recorded)
+
+
+def observer(
+    text: str,
+    observe: Callable[..., Any],
+    on: Held,
+    widths: tuple[int, int, int],
+    calls: Sequence[Callable[[float], float]],
+    store: CodeStore | None,
+    notify: Callable[[str], None],
+) -> tuple[CompiledFunction, ObserveArguments]:
+    """Return `integrators.runners.observing.observe_rows` as machine code for one system.
+
+    Parameters
+    ----------
+    text, calls, store, notify
+        As in `engine`.
+    observe : callable
+        ``observe(t, y, mode, signs, p, out)``.
+    on : Held
+        The system's functions, with arrays as parameters, and scratch space.
+    widths : (int, int, int)
+        Number of states, of modes of a row and of observed values.
+
+    Returns
+    -------
+    CompiledFunction
+        To be called with a block, the place of the first observed value that is kept, and the
+        number of rows.
+    ObserveArguments
+        The example that its block begins with.
+    """
+    p: Any = on.functions.p
+    shared, own, _ = p
+    size, modes, seen = widths
+    table: Any = OuterArray(table=True)
+    rows = ObserveArguments(
+        functions=on.functions._replace(p=(shared, own, table)),
+        observe=observe,
+        held=on.held,
+        sliding=on.sliding,
+        t=OuterArray(),
+        y=OuterArray("f", size),
+        mode=OuterArray("i", modes),
+        seen=[0.0] * seen,
+        table=table,
+    )
+    extra = "start", "count"
+    return _made(text, observing.observe_rows, rows, extra, calls, store, notify), rows

@@ -1,0 +1,237 @@
+"""One sample of somebody else's loop: inputs on straight lines from its start to its end.
+
+The end of a sample is a knot, as in a record: steps end there, but nothing is asked, armed or
+restarted. So the results are those of a run over the same samples as a record, to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from integrators.advance import RunPlan
+from integrators.loop import (
+    ARC,
+    ASK,
+    FIRED,
+    FIRING,
+    PAUSED,
+    ROWS,
+    SETTLED,
+    SLID,
+    START,
+    STOPPED,
+    Buffers,
+    Machines,
+    run_to_event,
+)
+from integrators.sliding import (
+    Functions,
+    Held,
+    flow_on,
+    follow_on,
+    look,
+    look_held,
+    margins_on,
+)
+from integrators.step_size import INFINITY
+from integrators.steps import ArcMotion, Vector
+from integrators.switching.sliding_bounds import let_go, look_back
+
+__all__ = ["FULL_LOG", "Clocks", "Sample", "next_tick", "restart", "step_to"]
+
+FULL_LOG = 21  # the log is full: empty it, and call again
+EXACT = 2.0**53  # up to here every whole number is a float
+
+
+@dataclass(slots=True, eq=False)
+class Clocks:
+    """What ticks: samplers, then discrete machines, each with its bit.
+
+    Periods and offsets are whole numbers of units, so that no sum of them is rounded.
+    """
+
+    per_second: float  # units in a second
+    begin: float  # a time, s
+    units: float  # after that time: their sum is the start
+    period: Vector
+    offset: Vector  # of each its first tick, from the start
+    made: list[int]  # ticks in the plan, or past
+
+
+@dataclass(slots=True, eq=False)
+class Sample:
+    """What a call is given, and what it finds."""
+
+    end: float  # its time
+    wanted: int  # place of the force among the observed values
+    mean: bool  # whether the mean is wanted
+    resumed: bool  # whether this call continues one that returned FULL_LOG
+    switches: int  # in the log
+    code: int  # what was returned
+    force: float  # at the end
+    impulse: float  # integral of the force over the sample, if the mean is wanted
+    inputs: list[Vector]  # of each input its value at the start and at the end; never empty
+    seen: Vector  # observed values at the end
+    t: Vector  # of each switch its time
+    machine: list[int]
+    edge: list[int]
+    before: Vector  # scratch space: the state at the start of a step
+    middle: Vector  # ... and in its middle
+    slope: Vector
+    clocks: Clocks
+
+
+def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample) -> int:
+    """Advance to the end of a sample.
+
+    Parameters
+    ----------
+    functions, machines
+        The system; its inputs are the corner tables among its parameters.
+    b : Buffers
+        The state, changed in place. The plan has one knot and no end.
+    sample : Sample
+        What is given and found. A sample that has no length shows the force at its end.
+
+    Returns
+    -------
+    int
+        0 at its end, FULL_LOG, or an error as in `run_to_event`.
+    """
+    now, memory, observe, end = b.now, b.memory, machines.observe, sample.end
+    on = Held(functions, now.held, b.sliding)
+    motion = ArcMotion(flow_on, margins_on, on, follow_on)
+    if not sample.resumed:
+        _begin(functions, b, sample)
+    sample.code = 0
+    while now.t < end or not (memory.phase == ARC or memory.phase == SETTLED):
+        t = now.t
+        for j in range(len(now.y)):
+            sample.before[j] = now.y[j]
+        event = run_to_event(functions, machines, motion, b, 1)
+        if len(b.plan.jumps) > 0 and b.plan.jumps[1] <= now.t:
+            next_tick(b.plan, sample.clocks)
+            memory.jump = 0
+        if sample.mean and now.t > t:
+            impulse = _impulse(machines, motion, b, sample, t)
+            sample.impulse += impulse
+        if event == FIRED:
+            row = sample.switches
+            sample.t[row] = now.t
+            sample.machine[row] = memory.machine
+            sample.edge[row] = memory.edge
+            sample.switches = row + 1
+            if row + 1 == len(sample.t):
+                sample.code = FULL_LOG
+                return FULL_LOG
+        elif event not in (ROWS, FIRING, STOPPED, SLID, PAUSED):
+            sample.code = event
+            return event
+    look(observe, on, now.t, now.y, now.mode, sample.seen)
+    sample.force = sample.seen[sample.wanted]
+    return 0
+
+
+def next_tick(plan: RunPlan, clocks: Clocks) -> None:
+    """Put a further tick into the plan, which has two: the last one, and the next one.
+
+    Parameters
+    ----------
+    plan : RunPlan
+        Its jumps are these ticks.
+    clocks : Clocks
+        What ticks, at least one.
+    """
+    plan.jumps[0] = plan.jumps[1]
+    plan.ticks[0] = plan.ticks[1]
+    t = INFINITY
+    for i in range(len(clocks.period)):
+        t = min(t, _due(clocks, i))
+    bits = 0
+    for i in range(len(clocks.period)):
+        if _due(clocks, i) <= t:
+            bits |= 1 << i
+            clocks.made[i] += 1
+    plan.jumps[1] = t
+    plan.ticks[1] = bits
+    # A step that ends on a jump would see the value after it: stop one clock tick before.
+    plan.before_jumps[0] = plan.before_jumps[1]
+    plan.before_jumps[1] = math.nextafter(t, -INFINITY)
+
+
+def _due(clocks: Clocks, i: int) -> float:
+    """Return the next tick of a clock."""
+    units = clocks.units + clocks.offset[i] + clocks.made[i] * clocks.period[i]
+    return clocks.begin + units / clocks.per_second
+
+
+def restart(b: Buffers, clocks: Clocks) -> None:
+    """Let all clocks begin at the time in the buffers, and put the first two ticks into the plan.
+
+    Parameters
+    ----------
+    b : Buffers
+        Their plan has room for two ticks, or for none if nothing ticks.
+    clocks : Clocks
+        What ticks.
+    """
+    t, plan = b.now.t, b.plan
+    clocks.begin, clocks.units = t, 0.0
+    units = t * clocks.per_second
+    if abs(units) < EXACT:
+        whole = int(units + 0.5) if units > 0.0 else int(units - 0.5)
+        if whole / clocks.per_second == t:
+            clocks.begin, clocks.units = 0.0, float(whole)
+    for i in range(len(clocks.made)):
+        clocks.made[i] = 0
+    for _k in range(len(plan.jumps)):
+        next_tick(plan, clocks)
+
+
+def _begin(functions: Functions, b: Buffers, sample: Sample) -> None:
+    """Write the straight lines; where an input jumps, guards are asked again."""
+    now, memory, end = b.now, b.memory, sample.end
+    _shared, _own, tables = functions.p
+    first = 1 if now.t >= end else 0  # of a sample without length only its end matters
+    on, jumps = Held(functions, now.held, b.sliding), False
+    for k in range(len(tables) // 2):
+        jumps = jumps or tables[2 * k + 1][1] != sample.inputs[k][first]
+    jumps = jumps and memory.phase != START
+    if jumps:
+        look_back(on, now, b.relations)
+    for k in range(len(tables) // 2):
+        times, values, given = tables[2 * k], tables[2 * k + 1], sample.inputs[k]
+        times[0] = now.t
+        times[1] = end
+        values[0] = given[0]
+        values[1] = given[1]
+    if jumps:
+        memory.phase = ASK
+        let_go(on, now, b.relations)
+    now.pause = end
+    now.latest = abs(end)
+    b.plan.knots[0] = end
+    b.out.next_knot = 0
+    b.out.steps = 0
+    sample.switches = 0
+    sample.impulse = 0.0
+
+
+def _impulse(machines: Machines, motion: ArcMotion, b: Buffers, sample: Sample, t: float) -> float:
+    """Return the integral of the force over the step from t, with the signs held in it (Simpson).
+
+    The state in the middle is on the cubic through both ends.
+    """
+    now, on, place = b.now, motion.p, sample.wanted
+    before, middle, slope, first = sample.before, sample.middle, sample.slope, b.scratch.k[0]
+    h = now.t - t
+    motion.flow(now.t, now.y, now.mode, now.held, motion.p, slope)
+    for j in range(len(now.y)):
+        middle[j] = 0.5 * (before[j] + now.y[j]) + 0.125 * h * (first[j] - slope[j])
+    look_held(machines.observe, on, t, before, now.mode, sample.seen)
+    total = sample.seen[place]
+    look_held(machines.observe, on, t + 0.5 * h, middle, now.mode, sample.seen)
+    total += 4.0 * sample.seen[place]
+    look_held(machines.observe, on, now.t, now.y, now.mode, sample.seen)
+    return h * (total + sample.seen[place]) / 6.0

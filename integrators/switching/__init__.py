@@ -1,0 +1,1 @@
+"""What switches at a stop: machines, jolts, start and end of sliding."""

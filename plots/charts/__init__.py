@@ -1,0 +1,1 @@
+"""State charts as pictures, and the parts they are made of."""

@@ -1,0 +1,211 @@
+"""Labels of Graphviz with fixed sizes: every piece of text has a cell of its own.
+
+The width of a cell comes from `plots.style.fonts`, not from the fonts that Graphviz finds, so that
+a picture has the same sizes wherever it is drawn. In the SVG a piece is one text, in this order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import ceil
+
+from plots.charts.labels import Piece, Row, escape, printable
+from plots.style import MONO, SANS, ChartTheme
+from plots.style.fonts import width
+
+__all__ = ["Cells", "Label"]
+
+PLAIN = 10  # points, of formulas
+LEAST = 7  # points, of every text but an index
+SMALLER = 0.72  # a lowered index
+LINE, TITLE = 1.4, 1.5  # height of a line, in sizes of its font
+SIDE = 6  # left and right of the text of a state
+
+# Of a role: size, face, bold, secondary.
+_FACES = {
+    "title": (12, SANS, True, False),
+    "among": (12, SANS, True, False),
+    "dot": (12, SANS, False, False),
+    "region": (13, SANS, True, False),
+    "note": (10, SANS, False, True),
+    "count": (9, SANS, False, True),
+    "never": (9, SANS, True, False),
+    "priority": (PLAIN, MONO, True, False),
+    "word": (PLAIN, MONO, False, True),
+}
+_FORMULA = (PLAIN, MONO, False, False)
+
+
+@dataclass(frozen=True)
+class Label:
+    """An HTML label of Graphviz, and its size.
+
+    Parameters
+    ----------
+    html : str
+        A table, with the angle brackets around it.
+    width, height : int
+        Points.
+    """
+
+    html: str
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Sets rows of pieces as tables.
+
+    Parameters
+    ----------
+    colours : ChartTheme
+        The theme.
+    scale : float
+        Size of all texts, 1 for the usual one.
+    """
+
+    colours: ChartTheme
+    scale: float = 1.0
+
+    def text(self, rows: Sequence[Row]) -> Label:
+        """Set lines of text below one another.
+
+        Parameters
+        ----------
+        rows : sequence of Row
+            The lines.
+
+        Returns
+        -------
+        Label
+            A table without border.
+        """
+        heights = [self._height(row) for row in rows]
+        wide = max(self._width(row) for row in rows) + 2
+        body = "".join(map(self._row, rows, heights, [wide] * len(rows)))
+        return Label(f"<{_table('', wide, sum(heights), body)}>", wide, sum(heights))
+
+    def guard(self, rows: Sequence[Row], marked: bool = False) -> Label:
+        """Set the label of an edge: the priority in a column of its own, then the lines.
+
+        Parameters
+        ----------
+        rows : sequence of Row
+            The first piece of each is the priority, or a blank.
+        marked : bool
+            Draw a frame.
+
+        Returns
+        -------
+        Label
+            A table on the colour of the paper.
+        """
+        first = max(self._width(row[:1]) for row in rows) + 2
+        heights = [self._height(row) for row in rows]
+        wide = first + max(self._width(row[1:]) for row in rows) + (6 if marked else 2)
+        body = "".join(
+            self._row(row, height, wide, first) for row, height in zip(rows, heights, strict=True)
+        )
+        look = f'BGCOLOR="{self.colours.paper}" '
+        tall = sum(heights) + 2
+        if marked:
+            look += f'BORDER="1" COLOR="{self.colours.ink}" '
+            body = body.replace(f'WIDTH="{wide}"', f'WIDTH="{wide - 2}"')
+        return Label(f"<{_table(look, wide, tall, body)}>", wide, tall)
+
+    def state(
+        self, rows: Sequence[Row], marked: bool = False, least: tuple[float, float] = (0, 0)
+    ) -> Label:
+        """Set the box of a state: its title, a rule, the other rows.
+
+        Parameters
+        ----------
+        rows : sequence of Row
+            The title first.
+        marked : bool
+            Draw the box thick.
+        least : (float, float)
+            Least width and height.
+
+        Returns
+        -------
+        Label
+            A table with round corners.
+        """
+        heights = [self._height(row) for row in rows]
+        wide = max(*map(self._width, rows), 36) + 2 * SIDE + 2
+        ink, border = self.colours.ink, 3 if marked else 1
+        tall = sum(heights) + 4 + 2 * border
+        wide += 2 * border - 2
+        wide, tall = max(wide, ceil(least[0])), max(tall, ceil(least[1]))
+        inner = wide - 2 * border
+        title, *more = (
+            self._row([Piece("", "pad"), *row], height, inner)
+            for row, height in zip(rows, heights, strict=True)
+        )
+        look = f'BORDER="{border}" COLOR="{ink}" BGCOLOR="{self.colours.paper}" STYLE="ROUNDED" '
+        rest = f'<TR><TD HEIGHT="{tall - sum(heights) - 2 * border - 1}"></TD></TR>'
+        body = f"{title}<HR/>" + "".join(more) + rest
+        return Label(f"<{_table(look, wide, tall, body)}>", wide, tall)
+
+    def _row(self, row: Row, height: int, wide: int, first: int = 0) -> str:
+        """Return one line as a row of a table; its pieces are a table in it."""
+        cells, at = "", 0.0
+        for i, piece in enumerate(row):
+            end = at + self._piece_width(piece)
+            if i == 0 and first:
+                end = first
+            cells += self._cell(piece, max(round(end) - round(at), 1), height)
+            at = max(end, at + 1)
+        # Graphviz would spread the cells over the line: the last one fills it.
+        cells += f"<TD {_size(wide - round(at), height)}></TD>"
+        inner = _table("", wide, height, f"<TR>{cells}</TR>")
+        return f"<TR><TD {_size(wide, height)}>{inner}</TD></TR>"
+
+    def _cell(self, piece: Piece, wide: int, height: int) -> str:
+        size = _size(wide, height)
+        if piece.role == "pad":
+            return f"<TD {size}></TD>"
+        _, face, bold, soft = _FACES.get(piece.role, _FORMULA)
+        points = self._points(piece)
+        words = escape(piece.text)
+        words = f"<B>{words}</B>" if bold else words
+        colour = self.colours.soft if soft else self.colours.ink
+        place = ' VALIGN="BOTTOM"' if piece.lowered else ""
+        return (
+            f'<TD ALIGN="LEFT"{place} {size}><FONT FACE="{face}" POINT-SIZE="{points}" '
+            f'COLOR="{colour}">{words}</FONT><BR ALIGN="LEFT"/></TD>'
+        )
+
+    def _width(self, row: Iterable[Piece]) -> int:
+        return ceil(sum(map(self._piece_width, row)))
+
+    def _piece_width(self, piece: Piece) -> float:
+        if piece.role == "pad":
+            return SIDE - 1
+        face = _FACES.get(piece.role, _FORMULA)[1]
+        return width(printable(piece.text), self._points(piece), mono=face == MONO)
+
+    def _points(self, piece: Piece) -> int:
+        """Return the size of a text; Graphviz takes whole points only."""
+        size = max(_FACES.get(piece.role, _FORMULA)[0] * self.scale, LEAST)
+        return int(size * (SMALLER if piece.lowered else 1))
+
+    def _height(self, row: Row) -> int:
+        sizes = [(_FACES.get(piece.role, _FORMULA)[0], piece.role) for piece in row] or [(0, "")]
+        size, role = max(sizes)
+        return ceil(size * self.scale * (TITLE if role in ("title", "region") else LINE))
+
+
+def _table(look: str, wide: int, tall: int, body: str) -> str:
+    border = "" if "BORDER" in look else 'BORDER="0" '
+    return (
+        f'<TABLE {look}{border}CELLBORDER="0" CELLSPACING="0" CELLPADDING="0" '
+        f"{_size(wide, tall)}>{body}</TABLE>"
+    )
+
+
+def _size(wide: int, tall: int) -> str:
+    return f'FIXEDSIZE="TRUE" WIDTH="{max(wide, 1)}" HEIGHT="{tall}"'

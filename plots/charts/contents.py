@@ -1,0 +1,140 @@
+"""What a picture of a chart shows of each state, and of the chart as a whole, in every format."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gms_fsm.charts.chart import Chart, State
+from gms_fsm.language import Value
+from plots.charts.notation import Writer
+
+__all__ = ["Texts", "chart_texts", "state_texts"]
+
+SAID_ONCE = 3  # states: where so many have the same force, it is said once for all of them
+
+Texts = list[tuple[str, list[str]]]  # kinds, such as during, each with its texts
+
+
+def state_texts(write: Writer, state: State) -> Texts:
+    """Return what a picture shows in a state.
+
+    Not shown are a variable that flows in no state and the timer behind ``after(T)``; nor, where
+    there are three states or more, a force that is the same in all of them: `chart_texts` has it.
+
+    Parameters
+    ----------
+    write : Writer
+        Its chart and notation.
+    state : State
+        A state of the chart.
+
+    Returns
+    -------
+    list of (str, list of str)
+        ``entry``, ``during``, ``force``, ``locked`` and ``exit``, each with its texts.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT
+    >>> write = Writer(GMS_ELEMENT["signed"], "stateflow")
+    >>> [(kind, texts) for kind, texts in state_texts(write, write.chart.states[0]) if texts]
+    [('during', ['dz = v;']), ('force', ['F = k * z + sigma * dz;'])]
+    """
+    chart = write.chart
+    actions = {
+        kind: [write.assignment(name, tree) for name, tree in trees.items() if name in given]
+        for kind, given in (("entry", state.entry), ("exit", state.exit))
+        for trees in (chart.assignments[kind, state.name],)
+    }
+    flowing = {name for each in chart.states for name in each.flow}
+    flows = [name for name in chart.variables if name in flowing]
+    forces = {} if _force_below(chart) else _forces(chart, state)
+    return [
+        ("entry", actions["entry"]),
+        ("during", [write.flow(name, chart.flows[state.name, name]) for name in flows]),
+        ("force", _equations(write, forces)),
+        ("locked", [write.held()] if state.locked else []),
+        ("exit", actions["exit"]),
+    ]
+
+
+def chart_texts(write: Writer) -> Texts:
+    """Return what a picture shows of the whole chart.
+
+    Parameters
+    ----------
+    write : Writer
+        Its chart and notation.
+
+    Returns
+    -------
+    list of (str, list of str)
+        Named expressions; the force of an element, if it is the same in three states or more; the
+        force of the contact, if it is not the sum over the elements.
+    """
+    chart = write.chart
+    shared = _forces(chart, chart.default_state) if _force_below(chart) else {}
+    return [
+        ("let", _equations(write, chart.lets)),
+        ("force in all states", _equations(write, shared)),
+        (
+            "force of the contact",
+            [write.total(name, tree) for name, tree in chart.totals.items()],
+        ),
+    ]
+
+
+def _equations(write: Writer, trees: Mapping[str, Value]) -> list[str]:
+    return [write.equation(name, tree) for name, tree in trees.items()]
+
+
+def _force_below(chart: Chart) -> bool:
+    """Return whether one force of many states is said once, below them."""
+    own = any(state.outputs or state.locked for state in chart.states)
+    return len(chart.states) >= SAID_ONCE and not own
+
+
+def _forces(chart: Chart, state: State) -> dict[str, Value]:
+    """Return the forces that a state gives, by name; none if it is locked."""
+    forces = {name: chart.forces[state.name, name] for name in chart.force_names}
+    return {name: tree for name, tree in forces.items() if tree is not None}
+
+
+def chart_in_words(chart: Chart) -> str:
+    """Return a chart as text for people: shown where no picture can be drawn.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+
+    Returns
+    -------
+    str
+        Name, states with their contents, and the edges that leave them, by priority.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT
+    >>> print(chart_in_words(GMS_ELEMENT["signed"]))
+    GMS element, signed law
+    stick (default)
+      during: dz = v;
+      force: F = k * z + sigma * dz;
+      1 -> slip [z >= s && v > v_c]
+      2 -> slip [z <= -s && v < -v_c]
+    slip
+      during: dz = C * (sgn(v) - z / s);
+      force: F = k * z + sigma * dz;
+      1 -> stick [|v| <= v_c && |z| < s]
+    """
+    write, lines = Writer(chart, "stateflow"), [chart.name]
+    for state in chart.states:
+        lines.append(f"{state.name}{' (default)' * (state == chart.default_state)}")
+        lines += [f"  {kind}: {text}" for kind, own in state_texts(write, state) for text in own]
+        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
+            actions = write.actions(chart.assignments["action", edge.name])
+            line = f"  {priority} -> {edge.target} [{chart.guard_text(edge.name)}] {actions}"
+            lines.append(line.rstrip())
+    lines += [f"{kind}: {text}" for kind, own in chart_texts(write) for text in own]
+    return "\n".join(lines)

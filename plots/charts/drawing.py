@@ -1,0 +1,186 @@
+"""Charts as drawings, whose labels and lines have positions: one element as a graph.
+
+Lengths are points; y points down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from plots.charts.cells import Label
+from plots.charts.labels import edge_id, element_id, part_id
+from plots.charts.layers import Link, Point, layered
+
+if TYPE_CHECKING:
+    from plots.charts.statechart import Sheet
+
+__all__ = ["Drawing", "Line", "Node", "graph_drawing", "thirds"]
+
+MARKED = "2.6"  # points; width of highlighted lines
+DOT_SIZE = 8.0  # diameter of the dot at the default state
+
+
+@dataclass(frozen=True)
+class Node:
+    """A label at a place.
+
+    Parameters
+    ----------
+    name : str
+        Its id.
+    kind : str
+        Its classes.
+    at : (float, float)
+        Its centre.
+    label : Label, optional
+        Its text; without one it is the dot of the default state.
+    """
+
+    name: str
+    kind: str
+    at: Point
+    label: Label | None = None
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line between two nodes.
+
+    Parameters
+    ----------
+    name : str
+        Its id.
+    ends : (str, str)
+        Names of the nodes.
+    points : tuple of (float, float)
+        A point, then three for each Bezier curve.
+    arrow : bool
+        Whether the last point is the tip of an arrow.
+    look : dict of str to str
+        Further attributes.
+    """
+
+    name: str
+    ends: tuple[str, str]
+    points: tuple[Point, ...]
+    arrow: bool
+    look: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Labels and lines, with the left upper corner at the origin.
+
+    Parameters
+    ----------
+    width, height : float
+        Points.
+    nodes, lines : tuple
+        What is drawn.
+    """
+
+    width: float
+    height: float
+    nodes: tuple[Node, ...]
+    lines: tuple[Line, ...]
+
+
+def graph_drawing(sheet: Sheet, number: int) -> Drawing:
+    """Return an element as states and arrows.
+
+    Parameters
+    ----------
+    sheet : Sheet
+        The chart and its options.
+    number : int
+        The element, from 0.
+
+    Returns
+    -------
+    Drawing
+        The drawing.
+    """
+    chart, element, cells = sheet.chart, element_id(number), sheet.cells
+    edges = [
+        (edge, priority)
+        for state in chart.states
+        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1)
+    ]
+    boxes = [
+        cells.guard(sheet.guard_rows(edge, priority, number), edge.name in sheet.marked)
+        for edge, priority in edges
+    ]
+    rows = [sheet.state_rows(state, number) for state in chart.states]
+    plain = [
+        cells.state(own, state.name in sheet.marked)
+        for own, state in zip(rows, chart.states, strict=True)
+    ]
+    links = [
+        Link(chart.state_index(edge.source), chart.state_index(edge.target), _roomy(box))
+        for (edge, _), box in zip(edges, boxes, strict=True)
+    ]
+    laid = layered([(box.width, box.height) for box in plain], links, sheet.direction)
+    names = [part_id(element, "state", state.name) for state in chart.states]
+    dot = f"{element}-default"
+    nodes = [Node(dot, "default", laid.dot)]
+    for state, name, at, size, own in zip(
+        chart.states, names, laid.states, laid.sizes, rows, strict=True
+    ):
+        marked = state.name in sheet.marked
+        kind = "state marked" if marked else "state"
+        nodes.append(Node(name, kind, at, cells.state(own, marked, size)))
+    lines = [_default_line(dot, names[0], laid.dot, laid.states[0], laid.sizes[0], sheet.direction)]
+    for (edge, _), box, link, at, (into, out) in zip(
+        edges, boxes, links, laid.labels, laid.lines, strict=True
+    ):
+        guard = edge_id(chart, element, "guard", edge)
+        name = edge_id(chart, element, "edge", edge)
+        look = {}
+        if sheet.tally is not None and not sheet.tally.times(number, edge):
+            look = {"style": "dashed"}
+        marked = edge.name in sheet.marked
+        if marked:
+            look |= {"class": "marked", "penwidth": MARKED}
+        nodes.append(Node(guard, "guard marked" if marked else "guard", at, box))
+        lines.append(Line(f"{name}-1", (names[link.source], guard), tuple(into), False, look))
+        lines.append(Line(f"{name}-2", (guard, names[link.target]), tuple(out), True, look))
+    return Drawing(laid.width, laid.height, tuple(nodes), tuple(lines))
+
+
+def _roomy(box: Label) -> tuple[float, float]:
+    """Return the size of a label with the gaps to its lines."""
+    return box.width + 3.0, box.height + 2.0
+
+
+def _default_line(
+    dot: str, state: str, at: Point, centre: Point, size: tuple[float, float], direction: str
+) -> Line:
+    (x, y), (to_x, to_y) = at, centre
+    if direction == "TB":
+        start, end = (x, y + DOT_SIZE / 2), (x, to_y - size[1] / 2)
+    else:
+        start, end = (x + DOT_SIZE / 2, y), (to_x - size[0] / 2, y)
+    name = f"{dot}-edge"
+    return Line(name, (dot, state), (start, *thirds(start, end)), True, {"class": "default"})
+
+
+def thirds(a: Point, b: Point) -> tuple[Point, ...]:
+    """Return the points that continue a Bezier curve straight from one point to another.
+
+    Parameters
+    ----------
+    a, b : (float, float)
+        The points.
+
+    Returns
+    -------
+    tuple of (float, float)
+        Two points between them, and the second one.
+
+    Examples
+    --------
+    >>> thirds((0.0, 0.0), (3.0, 6.0))
+    ((1.0, 2.0), (2.0, 4.0), (3.0, 6.0))
+    """
+    return tuple((a[0] + (b[0] - a[0]) * t / 3, a[1] + (b[1] - a[1]) * t / 3) for t in (1, 2, 3))

@@ -1,0 +1,449 @@
+"""Layout of a chart in layers: states in rows, and the labels of edges in rows between them.
+
+Every edge runs through its label. Lines are vertical within a row, each at a place of its own, and
+curve only in the channels between two rows, where there are no boxes. So no line crosses a box, no
+label touches another or an arrowhead, and no two edges end at the same point of a state. The labels
+of the edges that leave a state are ordered by priority, from left to right.
+
+A layout from left to right is the same with x and y exchanged. Lengths are points; y points down.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from plots.charts.places import Segment, places
+
+__all__ = ["ARROW", "Laid", "Link", "Point", "layered"]
+
+Point = tuple[float, float]
+Size = tuple[float, float]
+
+ARROW = 7.0  # length of an arrowhead
+STUB = 3.0  # straight part of a line at a state, between an arrowhead and the curve
+PORT = 13.0  # least distance of two ends at a state
+WIDEST_PORT = 58.0
+CORNER = 10.0  # of a state, where no line ends
+STATES_APART, LABELS_APART, LINES_APART = 26.0, 12.0, 9.0
+LINE = 2.0  # room of a line in a row
+LONELY = 640.0  # width of a row of states without edges
+DEFAULT, DOT = 30.0, 4.0  # from the dot to the default state; radius of the dot
+LOOP_OUT, LOOP_UP = 28.0, 9.0  # from a state to the label of its loop; from the label to the line
+SWEEPS = 12
+
+
+@dataclass(frozen=True)
+class Link:
+    """An edge of the layout.
+
+    Parameters
+    ----------
+    source, target : int
+        Numbers of the states.
+    size : (float, float)
+        Width and height of its label.
+    """
+
+    source: int
+    target: int
+    size: Size
+
+
+@dataclass
+class Laid:
+    """A finished layout, its left upper corner at the origin.
+
+    Parameters
+    ----------
+    width, height : float
+        Of all.
+    states, labels : list of (float, float)
+        Centres.
+    sizes : list of (float, float)
+        Of the states; at least the given ones.
+    lines : list of (list, list)
+        For every edge the line to its label, and the one from it to the tip of the arrow: a point,
+        then three more for each Bezier curve.
+    dot : (float, float)
+        Centre of the dot at the default state.
+    """
+
+    width: float = 0.0
+    height: float = 0.0
+    states: list[Point] = field(default_factory=list)
+    sizes: list[Size] = field(default_factory=list)
+    labels: list[Point] = field(default_factory=list)
+    lines: list[tuple[list[Point], list[Point]]] = field(default_factory=list)
+    dot: Point = (0.0, 0.0)
+
+
+def layered(sizes: Sequence[Size], links: Sequence[Link], direction: str = "TB") -> Laid:
+    """Lay out a chart.
+
+    Parameters
+    ----------
+    sizes : sequence of (float, float)
+        Width and height of each state; the first one is the default state.
+    links : sequence of Link
+        The edges; those of one state by priority.
+    direction : {"TB", "LR"}
+        Rows of states from top to bottom, or from left to right.
+
+    Returns
+    -------
+    Laid
+        The layout.
+
+    Examples
+    --------
+    >>> laid = layered([(80, 40), (80, 40)], [Link(0, 1, (60, 20)), Link(1, 0, (60, 20))])
+    >>> [x for x, _ in laid.states], [x for x, _ in laid.labels]
+    ([66.0, 66.0], [30.0, 102.0])
+    """
+    if direction == "TB":
+        return _Layers(sizes, links).laid()
+    turned = [Link(each.source, each.target, _turned(each.size)) for each in links]
+    laid = _Layers([_turned(size) for size in sizes], turned).laid()
+    return Laid(
+        width=laid.height,
+        height=laid.width,
+        states=[_turned(each) for each in laid.states],
+        sizes=[_turned(each) for each in laid.sizes],
+        labels=[_turned(each) for each in laid.labels],
+        lines=[([_turned(p) for p in one], [_turned(p) for p in two]) for one, two in laid.lines],
+        dot=_turned(laid.dot),
+    )
+
+
+def _turned(point: Point) -> Point:
+    return point[1], point[0]
+
+
+@dataclass(frozen=True)
+class _Loop:
+    """A self-loop: at which side of its state; its label and its ends, from the centre down."""
+
+    link: int
+    side: int
+    below: float
+    port: float
+
+
+class _Layers:
+    """The steps of a layout from top to bottom; even rows have states, odd rows labels."""
+
+    def __init__(self, sizes: Sequence[Size], links: Sequence[Link]) -> None:
+        self.links = links
+        self.crossing = [k for k, each in enumerate(links) if each.source != each.target]
+        self.layer = _layer_of(sizes, [links[k] for k in self.crossing])
+        self.sizes = list(sizes)
+        self.loops: list[list[_Loop]] = []
+        self.block: list[float] = []  # height of the loops of a state
+        self.beside: list[list[float]] = []  # room for loops at the left and right of each state
+        for state in range(len(sizes)):
+            self._add_loops(state)
+        # Items of the rows: the states, then labels and places where lines pass.
+        self.row = [2 * layer for layer in self.layer]
+        self.wide = [(0.0, 0.0)] * len(sizes)
+        self.label: dict[int, int] = {}
+        self.chain: dict[int, list[int]] = {}
+        self._add_chains()
+        self.segments = [
+            (upper, lower) for chain in self.chain.values() for upper, lower in pairwise(chain)
+        ]
+        self.above: list[list[int]] = [[] for _ in self.row]
+        self.below: list[list[int]] = [[] for _ in self.row]
+        for upper, lower in self.segments:
+            self.below[upper].append(lower)
+            self.above[lower].append(upper)
+        for state, (width, height) in enumerate(self.sizes):
+            ends = max(len(self.above[state]), len(self.below[state]))
+            width = max(width, ends * PORT + 2 * CORNER)
+            self.sizes[state] = width, height
+            left, right = self.beside[state]
+            self.wide[state] = width / 2 + left, width / 2 + right
+
+    # ----------------------------------------------------------------- rows
+    def _add_loops(self, state: int) -> None:
+        """Place the labels of loops: right of the state, or left if checked before other edges."""
+        own = [k for k, each in enumerate(self.links) if each.source == state]
+        others = [k for k in own if k in self.crossing]
+        loops, room, tallest = [], [0.0, 0.0], 0.0
+        width, height = self.sizes[state]
+        for side in (-1, 1):
+            here = [
+                k for k in own if k not in others and (side < 0) == (k < min(others, default=-1))
+            ]
+            levels = [self.links[k].size[1] + 2 * LOOP_UP + 6 for k in here]
+            at = -sum(levels) / 2
+            for place, (k, level) in enumerate(zip(here, levels, strict=True)):
+                port = (place - (len(here) - 1) / 2) * 2 * PORT
+                loops.append(_Loop(k, side, at + level / 2, port))
+                at += level
+            height = max(height, 2 * PORT * len(here) + 2 * CORNER * bool(here))
+            tallest = max(tallest, sum(levels))
+            if here:
+                room[side > 0] = LOOP_OUT + max(self.links[k].size[0] for k in here) + 4
+        self.sizes[state] = width, height
+        self.block.append(tallest)
+        self.loops.append(loops)
+        self.beside.append(room)
+
+    def _add_chains(self) -> None:
+        for k in self.crossing:
+            ends = self.links[k].source, self.links[k].target
+            upper, lower = sorted(ends, key=lambda state: self.layer[state])
+            # In the row next to the source, so that the ends at the source are ordered as well.
+            gap = 2 * self.layer[ends[0]] + (1 if ends[0] == upper else -1)
+            chain = [upper]
+            for row in range(2 * self.layer[upper] + 1, 2 * self.layer[lower]):
+                chain.append(len(self.row))
+                self.row.append(row)
+                half = self.links[k].size[0] / 2 if row == gap else LINE / 2
+                self.wide.append((half, half))
+                if row == gap:
+                    self.label[k] = chain[-1]
+            self.chain[k] = [*chain, lower]
+
+    def _ordered_rows(self) -> list[list[int]]:
+        """Order the items of every row so that few lines cross."""
+        rows: list[list[int]] = [[] for _ in range(max(self.row) + 1)]
+        for item, number in enumerate(self.row):
+            rows[number].append(item)
+        best, fewest = rows, None
+        x = [0.0] * len(self.row)
+        for row in rows:
+            self._pack(row, x)
+        for sweep in range(SWEEPS):
+            down = sweep % 2 == 0
+            near = self.above if down else self.below
+            order = list(enumerate(rows))
+            for r, row in order if down else reversed(order):
+                keys = {i: sum(x[j] for j in near[i]) / len(near[i]) for i in row if near[i]}
+                if r % 2 or sweep:  # states keep the chart's order at first
+                    row.sort(key=lambda i: keys.get(i, x[i]))
+                if r % 2:
+                    self._by_priority(row)
+                self._pack(row, x)
+            rank = self._agreed_order(x)
+            agreed = [
+                sorted(row, key=rank.__getitem__) if r % 2 else list(row)
+                for r, row in enumerate(rows)
+            ]
+            crossings = self._crossings(agreed)
+            if fewest is None or crossings < fewest:
+                best, fewest = agreed, crossings
+        return best
+
+    def _by_priority(self, row: list[int]) -> None:
+        """Sort the labels of each state's edges into the places that they take in a row."""
+        own: dict[int, list[int]] = {}
+        for k, item in sorted(self.label.items()):
+            if item in row:
+                own.setdefault(self.links[k].source, []).append(item)
+        for items in own.values():
+            places = sorted(row.index(item) for item in items)
+            for place, item in zip(places, items, strict=True):
+                row[place] = item
+
+    def _agreed_order(self, x: Sequence[float]) -> dict[int, int]:
+        """Return one order of all labels and lines, with the labels of each state by priority."""
+        chains: dict[int, list[int]] = {}
+        for k in self.crossing:
+            chains.setdefault(self.links[k].source, []).append(self.label[k])
+        labels = set(self.label.values())
+        lines = [[i] for i in range(len(self.sizes), len(self.row)) if i not in labels]
+        heads = [(x[chain[0]], chain[0], chain[1:]) for chain in [*chains.values(), *lines]]
+        heapq.heapify(heads)
+        rank: dict[int, int] = {}
+        while heads:
+            _, item, rest = heapq.heappop(heads)
+            rank[item] = len(rank)
+            if rest:
+                heapq.heappush(heads, (x[rest[0]], rest[0], rest[1:]))
+        return rank
+
+    def _pack(self, row: Sequence[int], x: list[float]) -> None:
+        at = 0.0
+        for before, item in zip([None, *row], row, strict=False):
+            at += 0.0 if before is None else self._apart(before, item)
+            x[item] = at
+        middle = (x[row[0]] + x[row[-1]]) / 2 if row else 0.0
+        for item in row:
+            x[item] -= middle
+
+    def _apart(self, left: int, right: int) -> float:
+        """Return the least distance of the centres of two neighbours."""
+        if left < len(self.sizes) and right < len(self.sizes):
+            gap = STATES_APART
+        elif self.wide[left][1] > LINE and self.wide[right][0] > LINE:
+            gap = LABELS_APART
+        else:
+            gap = LINES_APART
+        return self.wide[left][1] + self.wide[right][0] + gap
+
+    def _crossings(self, rows: Sequence[Sequence[int]]) -> int:
+        place = {item: i for row in rows for i, item in enumerate(row)}
+        between: dict[int, list[tuple[int, int]]] = {}
+        for upper, lower in self.segments:
+            between.setdefault(self.row[upper], []).append((place[upper], place[lower]))
+        return sum(
+            (a - c) * (b - d) < 0
+            for pairs in between.values()
+            for i, (a, b) in enumerate(pairs)
+            for c, d in pairs[:i]
+        )
+
+    # ----------------------------------------------------------------- places
+    def laid(self) -> Laid:
+        """Return the layout."""
+        rows = self._ordered_rows()
+        place = {item: i for row in rows for i, item in enumerate(row)}
+        offset: dict[Segment, float] = {}  # of the ends at a state from its centre
+        for state, (width, _) in enumerate(self.sizes):
+            for others, lower in ((self.above[state], False), (self.below[state], True)):
+                step = min((width - 2 * CORNER) / max(len(others), 1), WIDEST_PORT)
+                for i, other in enumerate(sorted(others, key=place.__getitem__)):
+                    segment = (state, other) if lower else (other, state)
+                    offset[segment] = (i - (len(others) - 1) / 2) * step
+        apart = [(a, b, self._apart(a, b)) for row in rows for a, b in pairwise(row)]
+        chains: dict[int, list[int]] = {}
+        for k in self.crossing:
+            chains.setdefault(self.links[k].source, []).append(self.label[k])
+        apart += [(a, b, 1.0) for own in chains.values() for a, b in pairwise(own)]
+        sides = [
+            (state, others)
+            for state in range(len(self.sizes))
+            for others in (self.above[state], self.below[state])
+            if len(others) > 1
+        ]
+        self.x = places(self.wide, apart, self.segments, offset, sides, len(self.sizes))
+        self.offset = offset
+        self._set_rows(rows)
+        return self._drawn()
+
+    def _set_rows(self, rows: Sequence[Sequence[int]]) -> None:
+        """Set the upper and lower end of every row; channels are higher where lines are flatter."""
+        heights = {self.label[k]: self.links[k].size[1] for k in self.crossing}
+        heights |= {state: height for state, (_, height) in enumerate(self.sizes)}
+        self.tall = heights
+        room = heights | {i: max(heights[i], block) for i, block in enumerate(self.block)}
+        self.span: list[tuple[float, float]] = []
+        at = DEFAULT + DOT
+        for r, row in enumerate(rows):
+            tall = max((room.get(item, 0.0) for item in row), default=0.0)
+            if r == 0:  # above a default state that is lower than its row, the dot is in the row
+                at -= min((tall - heights[0]) / 2, DEFAULT)
+            self.span.append((at, at + tall))
+            across = [self._slant(*each) for each in self.segments if self.row[each[0]] == r]
+            curve = 22.0 + min(max(0.12 * max(across, default=0.0), 4.0), 44.0)
+            at += tall + (curve + STUB + ARROW if across else 24.0 * (r % 2 == 0))
+
+    def _slant(self, upper: int, lower: int) -> float:
+        offset = self.offset.get((upper, lower), 0.0)
+        ahead = self.x[upper] - self.x[lower]
+        return abs(ahead + offset if upper < len(self.sizes) else ahead - offset)
+
+    def _drawn(self) -> Laid:
+        left = min(self.x[i] - self.wide[i][0] for i in range(len(self.x)))
+        right = max(self.x[i] + self.wide[i][1] for i in range(len(self.x)))
+        self.x = [x - left for x in self.x]
+        laid = Laid(width=right - left, height=self.span[-1][1], sizes=self.sizes)
+        middle = [sum(self.span[row]) / 2 for row in self.row]
+        laid.states = [(self.x[i], middle[i]) for i in range(len(self.sizes))]
+        laid.dot = self.x[0], middle[0] - self.sizes[0][1] / 2 - DEFAULT
+        loops = {loop.link: loop for own in self.loops for loop in own}
+        for k in range(len(self.links)):
+            if k in loops:
+                centre, lines = self._loop(laid.states[self.links[k].source], loops[k])
+            else:
+                centre = self.x[self.label[k]], middle[self.label[k]]
+                lines = self._lines(k)
+            laid.labels.append(centre)
+            laid.lines.append(lines)
+        return laid
+
+    def _lines(self, k: int) -> tuple[list[Point], list[Point]]:
+        chain, label = self.chain[k], self.label[k]
+        cut = chain.index(label)
+        down = self.links[k].source == chain[0]
+        upper = self._half(chain[: cut + 1], STUB if down else STUB + ARROW)
+        lower = self._half(chain[cut:], STUB + ARROW if down else STUB)
+        if down:
+            return upper, lower
+        return lower[::-1], upper[::-1]
+
+    def _half(self, chain: Sequence[int], stub: float) -> list[Point]:
+        """Return the line from the lower end of the first item to the upper end of the last.
+
+        At a state it is straight for the length of the stub.
+        """
+        spans = []
+        for i, item in enumerate(chain):
+            x, (top, bottom) = self.x[item], self.span[self.row[item]]
+            middle, half = (top + bottom) / 2, self.tall.get(item, 0.0) / 2
+            state = item < len(self.sizes)
+            if i == 0:
+                x += self.offset[item, chain[1]] if state else 0.0
+                spans.append((x, middle + half, bottom + stub * state))
+            elif i == len(chain) - 1:
+                x += self.offset[chain[-2], item] if state else 0.0
+                spans.append((x, top - stub * state, middle - half))
+            else:
+                spans.append((x, top, bottom))
+        points = [(spans[0][0], spans[0][1])]
+        for i, (x, top, bottom) in enumerate(spans):
+            if i:
+                x_before, y_before = points[-1]
+                bend = (y_before + top) / 2
+                points += [(x_before, bend), (x, bend), (x, top)]
+            if bottom > top:
+                points += [(x, top + (bottom - top) * part) for part in (1 / 3, 2 / 3, 1)]
+        return points
+
+    def _loop(self, state: Point, loop: _Loop) -> tuple[Point, tuple[list[Point], list[Point]]]:
+        """Return the centre of a loop's label, and its lines: out, and back."""
+        width, height = self.links[loop.link].size
+        edge = state[0] + loop.side * self.sizes[self.links[loop.link].source][0] / 2
+        x, y = edge + loop.side * (LOOP_OUT + width / 2), state[1] + loop.below
+        high, low = y - height / 2 - LOOP_UP, y + height / 2 + LOOP_UP
+        leaves, enters = state[1] + loop.port - PORT / 2, state[1] + loop.port + PORT / 2
+        corner, stub = edge + loop.side * LOOP_OUT, edge + loop.side * (ARROW + STUB)
+        bend = (stub + corner) / 2
+        out = [(edge, leaves), (bend, leaves), (bend, high), (corner, high)]
+        out += [(x, high), (x, high), (x, y - height / 2)]
+        back = [(x, y + height / 2), (x, low), (x, low), (corner, low)]
+        back += [(bend, low), (bend, enters), (stub, enters)]
+        return (x, y), (out, back + _straight((stub, enters), (edge, enters))[1:])
+
+
+def _straight(a: Point, b: Point) -> list[Point]:
+    """Return a straight line as a curve."""
+    return [tuple(p + (q - p) * t / 3 for p, q in zip(a, b, strict=True)) for t in range(4)]  # type: ignore[misc]
+
+
+def _layer_of(sizes: Sequence[Size], links: Sequence[Link]) -> list[int]:
+    """Return the layers of the states: states of an edge are in two layers, in their order."""
+    n = len(sizes)
+    pairs = {(min(each.source, each.target), max(each.source, each.target)) for each in links}
+    before: list[list[int]] = [[a for a, b in sorted(pairs) if b == i] for i in range(n)]
+    after: list[list[int]] = [[b for a, b in sorted(pairs) if a == i] for i in range(n)]
+    layer = [0] * n
+    for i in range(n):
+        layer[i] = max((layer[j] + 1 for j in before[i]), default=0)
+    for i in reversed(range(1, n)):
+        if after[i] and not before[i]:
+            layer[i] = min(layer[j] for j in after[i]) - 1
+    # States without edges fill rows of their own below the others.
+    lonely = [i for i in range(1, n) if not before[i] and not after[i]]
+    linked = n > len(lonely) + 1
+    row, room = max(layer) + linked, LONELY - (0 if linked else sizes[0][0])
+    for i in lonely:
+        if sizes[i][0] > room and room < LONELY:
+            row, room = row + 1, LONELY
+        layer[i] = row
+        room -= sizes[i][0] + STATES_APART
+    return layer

@@ -1,0 +1,540 @@
+"""Draw a friction chart in the style of Stateflow.
+
+Everything in the picture is read from the chart: states with their actions, edges with priority,
+guard and action. `plots.charts.layers` and `plots.charts.matrix` make the layout, and Graphviz only
+draws, so every Graphviz gives the same picture. A guard is a node on its edge's path. Ids and
+classes are stable, so that the SVG can be restyled without a new layout: class ``state``,
+``guard``, ``edge``, ``default`` and ``region``, and ids such as ``element1-state-slip``.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import graphviz
+
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import checked_kind, listed
+from gms_fsm.language import Both, Condition, Either, clauses
+from gms_fsm.traces.trace import Trace
+from plots.charts.arrange import arrange
+from plots.charts.cells import Cells
+from plots.charts.contents import Texts, chart_in_words, chart_texts, state_texts
+from plots.charts.drawing import graph_drawing
+from plots.charts.labels import (
+    DOT,
+    LONGEST_LINE,
+    TRUE,
+    Piece,
+    Row,
+    Tally,
+    printable,
+    warn_of_missing_glyphs,
+    with_indices,
+    wrapped,
+)
+from plots.charts.matrix import WIDEST
+from plots.charts.notation import NOTATIONS, Writer
+from plots.output.drawings import DrawnGraph
+from plots.style import CHART_THEMES, SANS, ChartTheme
+
+__all__ = ["ChartGraph", "statechart"]
+
+DIRECTIONS = {"TB": "top to bottom", "LR": "left to right"}
+
+FORMS = {
+    "auto": "graph or matrix",
+    "graph": "boxes and arrows",
+    "matrix": "a table of sources and targets",
+}
+
+MOST_EDGES = 20  # of a graph; a chart with more is drawn as a matrix
+MOST_LINES = 6  # of a guard on an edge; a longer one is written below the picture
+LONGEST_LABEL = 34  # characters of a line on an edge
+SMALLEST = 0.7  # smallest size of texts: 7 points instead of 10
+
+
+class ChartGraph(DrawnGraph):
+    """A picture of a state chart that refers to it, so that other formats can be written."""
+
+    chart: Chart
+
+
+def statechart(
+    chart: Chart,
+    elements: int | Sequence[int] = 1,
+    *,
+    notation: str = "stateflow",
+    direction: str = "TB",
+    theme: str = "light",
+    counts: Trace | None = None,
+    marked: Iterable[str] = (),
+    names: bool = False,
+    note: str = "",
+    form: str = "auto",
+) -> DrawnGraph:
+    """Draw a chart: one element, or a bank of elements as parallel states.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    elements : int or sequence of int, optional
+        How many elements, or which ones, counted from 0. They are drawn as parallel (AND) regions
+        in a grid, and the picture counts from 1; only the number 1 gives a chart without a region.
+    notation : {"stateflow", "math"}
+        ``z >= s && v > v_c``, or ``z ≥ s(v) ∧ v > v_c``.
+    direction : {"TB", "LR"}
+        States from top to bottom, or from left to right.
+    theme : {"light", "dark"}
+        Colours; what they mean is also shown by shapes.
+    counts : Trace, optional
+        A run of this chart. The picture then shows how long each element was in each state and how
+        often it took each edge; an edge never taken is dashed.
+    marked : iterable of str, optional
+        Names of states and edges to highlight: drawn thick, with a frame around the guard.
+    names : bool, optional
+        Whether each edge's name, which the log and the debugger use, is written above its guard.
+    note : str, optional
+        Text below the picture, line by line.
+    form : {"auto", "graph", "matrix"}
+        Boxes and arrows; or a matrix with a row for each source and a column for each target, whose
+        cells have the priority and the number of the guard. ``"auto"`` is a matrix above 20 edges,
+        or where a graph would be wider than two A4 pages. Long guards are numbered ``g1``, ``g2``,
+        ... and written below the picture.
+
+    Returns
+    -------
+    graphviz.Digraph
+        The picture as a Graphviz graph; `plots.render` writes it to a file.
+
+    Warns
+    -----
+    UserWarning
+        If the chart has characters that the font of charts cannot show.
+
+    Raises
+    ------
+    ParameterError
+        If an option is not one of those above, `counts` is a run of another chart, or the chart
+        has no such state or edge to mark.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT, LUGRE
+    >>> sum("class=state" in line for line in statechart(LUGRE).body)
+    1
+    >>> "z ≥ s(v)" in statechart(GMS_ELEMENT["signed"], notation="math").source
+    True
+    """
+    if not hasattr(chart, "guards"):
+        raise ParameterError(
+            f"chart is {chart!r:.60}", advice="give a Chart, of a model its .chart"
+        )
+    checked_kind("note", note, str, "a text")
+    if counts is not None:
+        checked_kind("counts", counts, Trace, "a Trace, a run of this chart")
+    if counts is not None and counts.model.chart != chart:
+        raise ParameterError(
+            f"counts is a run of the chart {counts.model.chart.name!r}",
+            advice=f"it must be one of the chart that is drawn, {chart.name!r}",
+        )
+    pointed = tuple(listed("marked", marked, "names of states and edges"))
+    parts = [*(state.name for state in chart.states), *(edge.name for edge in chart.transitions)]
+    for name in pointed:
+        one_of("marked", name, parts)
+    tally = Tally(counts) if counts else None
+    sheet = Sheet(
+        chart,
+        notation,
+        direction,
+        theme,
+        form,
+        tally,
+        marked=frozenset(pointed),
+        names=names,
+    )
+    warn_of_missing_glyphs(sheet.write, note)
+    numbers = chosen(elements, None if counts is None else counts.n)
+    bare = elements == 1 and (counts is None or counts.n == 1)
+    return sheet.graph(numbers, bare=bare, foot=note)
+
+
+def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ...]:
+    """Return the elements to draw, counted from 0.
+
+    Parameters
+    ----------
+    elements : int or sequence of int
+        How many, or which.
+    n : int, optional
+        How many exist.
+
+    Returns
+    -------
+    tuple of int
+        Their numbers, without repetition.
+
+    Raises
+    ------
+    ParameterError
+        If there are no such elements.
+
+    Examples
+    --------
+    >>> chosen(3), chosen([2, 0])
+    ((0, 1, 2), (2, 0))
+    """
+    limit = "" if n is None else f"; the run has {n}, counted from 0"
+    if isinstance(elements, Sequence):
+        numbers = tuple(_whole(number, "elements") for number in elements)
+        if not numbers or min(numbers) < 0 or len(set(numbers)) < len(numbers):
+            raise ParameterError(
+                f"it must be element numbers counted from 0, at least one and none twice{limit}",
+                place="elements",
+                value=elements,
+            )
+    else:
+        count = _whole(elements, "elements")
+        if count < 1:
+            raise ParameterError(
+                "the number of elements must be an integer of at least 1",
+                place="elements",
+                value=elements,
+            )
+        numbers = tuple(range(count))
+    if n is not None and max(numbers) >= n:
+        raise ParameterError(f"there is no such element{limit}", place="elements", value=elements)
+    return numbers
+
+
+def _whole(number: object, name: str) -> int:
+    try:
+        return operator.index(number)  # type: ignore[arg-type]  # may fail
+    except TypeError:
+        raise ParameterError(
+            "the number of elements must be an integer of at least 1", place=name, value=number
+        ) from None
+
+
+def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
+    """Return a value if it is allowed.
+
+    Parameters
+    ----------
+    name : str
+        Name of the option.
+    value : str
+        The given value.
+    allowed : iterable of str
+        The allowed values.
+
+    Returns
+    -------
+    str
+        The value.
+
+    Raises
+    ------
+    ParameterError
+        If it is not allowed.
+    """
+    words = tuple(allowed)
+    if value not in words:
+        listed = " or ".join(repr(word) for word in words)
+        raise ParameterError(f"it must be {listed}", place=name, value=value)
+    return value
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A chart and its drawing options.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    notation, direction, theme, form : str
+        See `statechart`.
+    tally : Tally, optional
+        Counts to show.
+    live : bool
+        Leave room for the dot of the active state and the marks of the clauses.
+    marked : frozenset of str
+        States and edges to highlight.
+    names : bool
+        Write each edge's name above its guard.
+    numbered : mapping of str to int
+        Edges whose guards are written below the picture, with their numbers.
+    scale : float
+        Size of the texts, 1 for the usual one.
+    among : int
+        Leave room in each state for "3 of 4": how many of so many elements are in it.
+    """
+
+    chart: Chart
+    notation: str = "stateflow"
+    direction: str = "TB"
+    theme: str = "light"
+    form: str = "auto"
+    tally: Tally | None = None
+    live: bool = False
+    marked: frozenset[str] = frozenset()
+    names: bool = False
+    numbered: Mapping[str, int] = field(default_factory=dict)
+    scale: float = 1.0
+    among: int = 0
+
+    def __post_init__(self) -> None:
+        one_of("notation", self.notation, NOTATIONS)
+        one_of("direction", self.direction, DIRECTIONS)
+        one_of("theme", self.theme, CHART_THEMES)
+        one_of("form", self.form, FORMS)
+
+    @property
+    def colours(self) -> ChartTheme:
+        """The theme."""
+        return CHART_THEMES[self.theme]
+
+    @property
+    def write(self) -> Writer:
+        """The notation."""
+        return Writer(self.chart, self.notation)
+
+    @property
+    def cells(self) -> Cells:
+        """What sets the labels."""
+        return Cells(self.colours, self.scale)
+
+    def fitted(self) -> Sheet:
+        """Return the sheet as it is drawn: a graph or a matrix, with or without numbers for guards.
+
+        Returns
+        -------
+        Sheet
+            The first of these whose picture of an element is at most `WIDEST` wide: guards on the
+            edges; guards of more than `MOST_LINES` lines as numbers; all guards as numbers; these
+            with the smallest texts; a matrix.
+        """
+        if self.scale < 1 or self.numbered:
+            return self
+        long, every = (self._numbers(all_of_them=flag) for flag in (False, True))
+        many = self.form == "auto" and not self.live and len(self._leaving) > MOST_EDGES
+        if self.form == "matrix" or many:
+            return replace(self, form="matrix", numbered=every)
+        for numbered, scale in ((long, 1.0), (every, 1.0), (every, SMALLEST)):
+            sheet = replace(self, form="graph", numbered=numbered, scale=scale)
+            if graph_drawing(sheet, 0).width <= WIDEST:
+                return sheet
+        if self.form == "graph" or self.live:
+            return sheet
+        return replace(self, form="matrix", numbered=every)
+
+    @property
+    def _leaving(self) -> list[Transition]:
+        states = self.chart.states
+        return [edge for state in states for _, edge in self.chart.leaving(state.name)]
+
+    def _numbers(self, all_of_them: bool) -> dict[str, int]:
+        """Return numbers for guards; edges with the same guard and action share one."""
+        texts: dict[str, int] = {}
+        numbers: dict[str, int] = {}
+        for edge in self._leaving:
+            if all_of_them or len(self._lines_of(edge)) > MOST_LINES:
+                numbers[edge.name] = texts.setdefault(self.legend_text(edge), len(texts) + 1)
+        return numbers
+
+    def _lines_of(self, edge: Transition) -> list[Row]:
+        return replace(self, tally=None, names=False, numbered={}).guard_rows(edge, 1, 0)
+
+    def graph(
+        self, numbers: Sequence[int], *, bare: bool, values: Sequence[Row] = (), foot: str = ""
+    ) -> DrawnGraph:
+        """Draw elements.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            Numbers of the elements, from 0.
+        bare : bool
+            Draw the only element without its region.
+        values : sequence of Row
+            Written below the title of each element.
+        foot : str
+            Written below the picture, line by line.
+
+        Returns
+        -------
+        graphviz.Digraph
+            The picture.
+        """
+        sheet = self.fitted()
+        graph = ChartGraph(
+            name=graphviz.escape(printable(self.chart.name)),
+            engine="neato",
+            graph_attr={
+                "fontname": SANS,
+                "bgcolor": self.colours.paper,
+                "pad": "0.15",
+                "layout": "nop2",  # all positions are given, and the DOT text is self-contained
+                "outputorder": "edgesfirst",
+            },
+            node_attr={"fontname": SANS, "shape": "plain"},
+            edge_attr={"color": self.colours.ink, "arrowsize": "0.7", "penwidth": "1.1"},
+        )
+        graph.chart, graph.text = self.chart, chart_in_words(self.chart)
+        below = self.definitions() + (list(values) if bare else [])
+        below += [[Piece(line, "value")] for line in foot.splitlines()]
+        arrange(graph, sheet, numbers, [] if bare else values, below, bare=bare)
+        return graph
+
+    def legend(self) -> list[Row]:
+        """Return the guards that stand below the picture: ``g1 = ...``, wrapped."""
+        rows: list[Row] = []
+        written = 0
+        for edge in self._leaving:
+            number = self.numbered.get(edge.name, 0)
+            if number > written:
+                written, head = number, f"g{number} = "
+                for line in wrapped(self.legend_text(edge)):
+                    rows.append([Piece(head, "word"), *self._indexed([Piece(line)])])
+                    head = " " * len(head)
+        return rows
+
+    def legend_text(self, edge: Transition) -> str:
+        """Return an edge's guard and action as one text."""
+        action = self.write.actions(self.chart.assignments["action", edge.name])
+        return f"{self.write.text(self.chart.guards[edge.name])} {action}".rstrip()
+
+    def _indexed(self, row: Row) -> Row:
+        return with_indices(row) if self.write.math else row
+
+    # ----------------------------------------------------------------- labels
+    def definitions(self) -> list[Row]:
+        """Return what is written below the picture: what all states share.
+
+        Returns
+        -------
+        list of Row
+            Named expressions and the force of the contact (see
+            `plots.charts.contents.chart_texts`).
+        """
+        return [self._indexed(row) for row in _rows(chart_texts(self.write))]
+
+    def state_rows(self, state: State, number: int) -> list[Row]:
+        """Return the text in a state's box.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+        number : int
+            The element, from 0.
+
+        Returns
+        -------
+        list of Row
+            The title first.
+        """
+        title = [Piece(state.name, "title")]
+        if self.live:
+            title.append(Piece(f" {DOT}", "dot"))
+        if self.among:
+            title += [Piece("  ", "note"), Piece(f"{self.among} of {self.among}", "among")]
+        narrow = self.direction == "LR" or self.form == "matrix"
+        limit = LONGEST_LABEL if narrow else LONGEST_LINE
+        texts = _rows(state_texts(self.write, state), limit)
+        rows = [title, *(self._indexed(row) for row in texts)]
+        if self.tally is not None:
+            rows.append([Piece(self.tally.of_state(number, state.name), "count")])
+        return rows
+
+    def guard_rows(self, edge: Transition, priority: int, number: int) -> list[Row]:
+        """Return the text on an edge, clause by clause.
+
+        Parameters
+        ----------
+        edge : Transition
+            The edge.
+        priority : int
+            1 is checked first.
+        number : int
+            The element, from 0.
+
+        Returns
+        -------
+        list of Row
+            The first piece of each is the priority, or a blank.
+        """
+        rows: list[Row] = [[Piece(edge.name, "word")]] if self.names else []
+        rows += self._number_row(edge) if edge.name in self.numbered else self._guard_lines(edge)
+        if self.tally is not None:
+            taken = bool(self.tally.times(number, edge))
+            rows.append([Piece(self.tally.of_edge(number, edge), "count" if taken else "never")])
+        return [
+            [Piece(str(priority) if i == 0 else " ", "priority"), *row]
+            for i, row in enumerate(rows)
+        ]
+
+    def _number_row(self, edge: Transition) -> list[Row]:
+        marks = range(len(clauses(self.chart.guards[edge.name]))) if self.live else ()
+        number = Piece(f"g{self.numbered[edge.name]}", "clause")
+        row = [Piece("[", "bracket"), number, *(Piece(TRUE, "mark", c) for c in marks)]
+        return [[*row, Piece("]", "bracket")]]
+
+    def _guard_lines(self, edge: Transition) -> list[Row]:
+        guard = self.chart.guards[edge.name]
+        lines = [
+            (line, clause)
+            for clause, part in enumerate(clauses(guard))
+            for line in self._clause_lines(part, inside=isinstance(guard, Both))
+        ] or [(self.write.text(guard), -1)]  # always true
+        rows: list[Row] = []
+        for i, (line, clause) in enumerate(lines):
+            last = i + 1 == len(lines) or lines[i + 1][1] != clause
+            row = [Piece("[" if i == 0 else " ", "bracket"), Piece(line, "clause", clause)]
+            if last and self.live and clause >= 0:
+                row.append(Piece(TRUE, "mark", clause))
+            if last and i + 1 < len(lines):
+                # The space is a separate text: some SVG readers drop leading spaces.
+                row += [Piece(" ", "bracket"), Piece(self.write.words[Both], "bracket")]
+            if i + 1 == len(lines):
+                row.append(Piece("]", "bracket"))
+            rows.append(self._indexed(row))
+        action = self.write.actions(self.chart.assignments["action", edge.name])
+        lines_of_action = wrapped(action, LONGEST_LABEL)
+        return rows + [self._indexed([Piece(line, "action")]) for line in lines_of_action]
+
+    def _clause_lines(self, part: Condition, inside: bool) -> list[str]:
+        """Return a clause as lines: each alternative on a new line, long texts wrapped."""
+        if not isinstance(part, Either):
+            text = self.write.text(part)
+            # The brackets around the guard when it is written as one text.
+            return wrapped(
+                f"({text})" if inside and isinstance(part, Both) else text, LONGEST_LABEL
+            )
+        texts = [self.write.text(operand) for operand in part.operands]
+        texts = [
+            f"({text})" if isinstance(operand, Either) else text
+            for text, operand in zip(texts, part.operands, strict=True)
+        ]
+        texts[:-1] = [f"{text} {self.write.words[Either]}" for text in texts[:-1]]
+        if inside:  # one of several clauses: && binds tighter than ||
+            texts[0], texts[-1] = f"({texts[0]}", f"{texts[-1]})"
+            if sum(map(len, texts)) < LONGEST_LABEL:
+                texts = [" ".join(texts)]
+        return [line for text in texts for line in wrapped(text, LONGEST_LABEL)]
+
+
+def _rows(texts: Texts, limit: int = LONGEST_LINE) -> list[Row]:
+    """Return texts as lines below one another, each kind before the first of its own."""
+    rows: list[Row] = []
+    for kind, own in texts:
+        head = f"{kind}: "
+        for line in (line for text in own for line in wrapped(text, limit)):
+            rows.append([Piece(head, "word"), Piece(line)])
+            head = " " * len(head)
+    return rows

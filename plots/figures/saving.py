@@ -1,0 +1,51 @@
+"""Figures as bytes, the same for the same trace."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from io import BytesIO
+
+from plots.style import RC
+from plots.style.matplotlib import Figure, rc_context
+
+__all__ = ["picture"]
+
+
+def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
+    """Return a figure as bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+        What.
+    form : str
+        A format of matplotlib, for example ``"png"``.
+    metadata : mapping of str to None
+        Metadata that matplotlib omits, such as the date.
+
+    Returns
+    -------
+    bytes
+        Identical for identical traces.
+    """
+    buffer = BytesIO()
+    # A journal's PDF has fonts that can be selected and edited: TrueType, Type 42.
+    with rc_context(RC | {"pdf.fonttype": 42}):
+        dpi = max(figure.dpi, RC["savefig.dpi"])
+        figure.savefig(buffer, format=form, metadata=metadata, dpi=dpi)
+    return _named_clips(buffer.getvalue()) if form == "svg" else buffer.getvalue()
+
+
+def _named_clips(svg: bytes) -> bytes:
+    """Return an SVG with its clip paths numbered, so that the same trace gives the same file.
+
+    matplotlib names them by a hash of their corners, but the layout is reproducible only to 13
+    digits.
+    """
+    names: dict[bytes, bytes] = {}
+
+    def name(match: re.Match[bytes]) -> bytes:
+        return names.setdefault(match[0], b"clip%d" % len(names))
+
+    return re.sub(rb'(?<=[#"])p[0-9a-f]{10}(?=[")])', name, svg)

@@ -1,0 +1,1 @@
+"""What pictures become: SVG, files, cells of notebooks, texts of other tools."""

@@ -1,0 +1,346 @@
+"use strict";
+// The view of one run: its head, the chart with marks, the tokens of the elements, the table of guards, the tabs.
+// A pane is what a tab shows. It is a class with: static side ("left" or "right"), static key and title,
+// constructor(view, box), show() for the row view.row and the element view.element, fit() after a change of size,
+// theme, contact or zoom, close() before it is thrown away. Only the pane in view is called. `static of(view)` is false where it has nothing to show.
+const PANES = [];
+const MARKS = { 1: "✓", 0: "✗", "-1": "?" };
+
+class RunView {
+  constructor(run) {
+    Object.assign(this, { run, place: run.place, row: 0, element: 0, contact: run.contacts[0], panes: {}, open: {} });
+    this.root = $("#run").content.cloneNode(true).firstElementChild;
+    $("#runs").append(this.root);
+    $("h2", this.root).textContent = (data.runs.length > 1 ? `Run ${this.place + 1}: ` : "") + run.title;
+    const which = $(".contact", this.root);
+    run.contacts.forEach(({ name }) => make("option", which, name));
+    $(".which", this.root).hidden = run.contacts.length < 2;
+    which.addEventListener("change", () => { this.choose(run.contacts[which.selectedIndex], 0); show(frame); });
+    $(".who", this.root).textContent = "";
+  }
+
+  // ---------------------------------------------------------------- tabs
+  addTabs() {
+    for (const side of ["left", "right"]) {
+      const list = $(`.${side} .tabs`, this.root), boxes = $(`.${side} .panes`, this.root);
+      for (const Pane of PANES.filter((each) => each.side === side && (each.of?.(this) ?? true))) {
+        const id = `run${this.place + 1}-${Pane.key}`, number = list.children.length;
+        const tab = make("button", list, Pane.title, { role: "tab", id: `${id}-tab`, "aria-controls": id, "data-key": Pane.key });
+        const box = make("div", boxes, "", { role: "tabpanel", id, "aria-labelledby": `${id}-tab`, class: `pane ${Pane.key}`, tabindex: 0 });
+        box.hidden = true;
+        tab.addEventListener("click", () => openPane(side, Pane.key));
+        tab.addEventListener("keydown", (event) => {
+          const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+          if (!way || event.shiftKey) return; // with Shift: the next transition
+          event.preventDefault();
+          event.stopPropagation();
+          const tabs = [...list.children], to = tabs[(number + way + tabs.length) % tabs.length];
+          to.click();
+          to.focus();
+        });
+        this.panes[Pane.key] = { Pane, tab, box };
+      }
+      list.hidden = list.children.length < 2;
+    }
+  }
+
+  openPane(side, key) {
+    const each = this.panes[key];
+    if (!each || each.Pane.side !== side) return;
+    for (const { Pane, tab, box } of Object.values(this.panes)) {
+      if (Pane.side !== side) continue;
+      const on = Pane.key === key;
+      tab.setAttribute("aria-selected", on);
+      tab.tabIndex = on ? 0 : -1;
+      box.hidden = !on;
+    }
+    each.pane ??= new each.Pane(this, each.box); // made when first opened
+    this.open[side] = each.pane;
+    each.pane.fit?.();
+    each.pane.show();
+  }
+
+  fit() {
+    this.fitTable();
+    for (const pane of Object.values(this.open)) pane.fit?.();
+  }
+
+  close() { for (const { pane } of Object.values(this.panes)) pane?.close?.(); }
+
+  // ---------------------------------------------------------------- the row
+  choose(contact, element) {
+    const other = contact !== this.contact;
+    this.contact = contact;
+    this.element = clamp(element, 0, contact.n - 1);
+    if (other || !this.listed) {
+      $(".contact", this.root).selectedIndex = this.run.contacts.indexOf(contact);
+      this.makeTokens();
+      this.listEdges();
+    }
+    for (const pane of Object.values(this.open)) { pane.choose?.(other); if (other) pane.fit?.(); }
+  }
+
+  show(row) {
+    this.row = row;
+    const { run } = this, fired = run.fired.get(row);
+    if (fired && following) this.choose(fired.contact, fired.element);
+    const { contact } = this;
+    const get = (name, unit) => eng(contact.value(name, 0, row), unit, 5);
+    const ended = run.ended(frames.t[frame]) && `ended at ${eng(run.t(row), "s", 5)}`;
+    $(".values", this.root).textContent = [
+      `F = ${get("F", "N")}`, `v = ${eng(contact.value(contact.velocity, 0, row), "m/s", 5)}`, `x = ${get("x", "m")}`,
+      run.rowName(row) + (run.between[row] ? "" : ` of ${run.of}`),
+      ended || (run.between[row] ? "" : `micro-step ${run.microstep[row]}`),
+    ].filter(Boolean).join("   ");
+    this.showTokens();
+    this.explain();
+    for (const pane of Object.values(this.open)) pane.show();
+  }
+
+  // Whether an element of the contact shown is in another state than in the other run, at the row shown.
+  differs(element) {
+    const other = views.find((each) => each !== this), { contact } = this;
+    const same = other?.run.contacts.find(({ name, n }) => name === contact.name && n > element);
+    if (!same || views.some(({ run }) => run.ended(frames.t[frame]))) return false;
+    return same.states[same.modes[element][frames.rows[other.place][frame]]] !== contact.states[contact.modes[element][this.row]];
+  }
+
+  happened() {
+    const { row, run } = this;
+    if (run.t(row) !== frames.t[frame]) return []; // the other run is further on, and this one has no row there
+    return [run.fired.get(row), ...(run.late.get(row) ?? [])].filter(Boolean);
+  }
+
+  // What happened at this row, and what the selected element waits for, if it did not just fire.
+  verdict() {
+    const { contact, element, row, run } = this;
+    if (run.ended(frames.t[frame])) return "ended";
+    const happened = this.happened();
+    const own = happened.some((entry) => entry.contact === contact && entry.element === element);
+    return [...happened.map((entry) => entry.contact.sentence(entry)), ...(own ? [] : [waiting(contact, element, row)])].join("; ");
+  }
+
+  // ---------------------------------------------------------------- tokens: the active state of every element
+  makeTokens() {
+    const box = $(".tokens", this.root), { contact } = this;
+    box.replaceChildren();
+    box.hidden = contact.n < 2;
+    this.tokens = contact.modes.map((_, i) => {
+      const token = make("button", box, "", { class: "token" });
+      make("b", token, `E${i + 1}`, { class: `swatch e${elementStep(i, contact.n)}` });
+      const track = make("span", token, "", { class: "track", "aria-hidden": "true" });
+      contact.states.forEach(() => make("i", track));
+      make("span", token, "", { class: "state" });
+      token.addEventListener("click", () => chooseElement(i));
+      return token;
+    });
+  }
+
+  showTokens() {
+    const { contact, row, run } = this, fired = run.fired.get(row);
+    if (contact.n < 2) return;
+    this.tokens.forEach((token, i) => {
+      const mode = contact.modes[i][row], now = fired && fired.contact === contact && fired.element === i, differs = this.differs(i);
+      const look = `${mode}/${Boolean(now)}/${i === this.element}/${differs}`;
+      if (token.dataset.look === look) return;
+      token.dataset.look = look;
+      token.classList.toggle("fired", Boolean(now));
+      token.classList.toggle("differs", differs);
+      token.title = differs ? "in another state than in the other run" : "";
+      token.setAttribute("aria-pressed", i === this.element);
+      [...token.children[1].children].forEach((cell, k) => { cell.className = k === mode ? `on state${k % STATES}` : ""; });
+      token.lastChild.textContent = contact.states[mode];
+      if (i === this.element) reveal(token, $(".tokens", this.root));
+    });
+  }
+
+  // ---------------------------------------------------------------- guards
+  listEdges() { // once per contact, so that the focus stays in the table
+    const body = $("tbody", this.root), { contact } = this;
+    this.listed = contact;
+    body.replaceChildren();
+    this.lines = contact.edges.map((edge, k) => edge.clauses.map((clause, c) => {
+      const line = make("tr", body), found = { line };
+      if (c === 0) {
+        const head = make("th", line, "", { rowspan: edge.clauses.length, scope: "rowgroup" });
+        found.button = make("button", head, "○", { "aria-label": `Breakpoint on ${edge.name}` });
+        found.button.addEventListener("click", () => toggleBreak(this, this.element, k));
+        head.append(` ${edge.priority} ${edge.name}`);
+        const small = make("small", head, `${contact.states[edge.source]} → ${contact.states[edge.target]} `);
+        found.word = make("em", small);
+      }
+      make("td", line, clause.text);
+      found.truth = make("td", line);
+      found.sides = [0, 1, 2].map(() => make("td", line, "", { class: "number" }));
+      return found;
+    }));
+    if (!contact.edges.length) make("td", make("tr", body), "this chart has no edges", { colspan: 6 });
+    this.explained = "";
+  }
+
+  explain() {
+    const { contact, element } = this, { fired, row } = contact.asked(element, this.row);
+    const key = [this.place, element, row, fired, breakpoints.size].join();
+    if (this.explained === key) return;
+    this.explained = key;
+    const state = contact.modes[element][row], scope = contact.scope(element, row);
+    $(".who", this.root).textContent = `Guards of ${nameOf(contact, element)}`;
+    $(".fact", this.root).textContent = `in ${contact.states[contact.modes[element][this.row]]}${fired < 0 ? "" : `, when checked in ${contact.states[state]}`}`;
+    contact.edges.forEach((edge, k) => contact.clauses(k, scope).forEach((clause, c) => {
+      const { line, button, word, sides, truth } = this.lines[k][c], asked = edge.source === state;
+      line.classList.toggle("asked", asked);
+      line.classList.toggle("fired", k === fired);
+      if (button) {
+        const on = breakpoints.has(keyOf(this, contact, element, k));
+        button.setAttribute("aria-pressed", on);
+        button.textContent = on ? "●" : "○";
+        word.textContent = k === fired ? "FIRED" : asked ? "" : "not checked";
+      }
+      const texts = [marginText(clause), eng(clause.left, clause.unit), eng(clause.right, clause.unit)];
+      sides.forEach((cell, i) => { cell.textContent = edge.clauses[c].compares ? texts[i] : ""; });
+      truth.textContent = { 1: "✓ true", 0: "✗ false" }[clause.truth] ?? "? unknown";
+      truth.className = clause.truth === 1 ? "true" : "";
+    }));
+    this.fitTable();
+  }
+
+  // The rows of the edge that fired, or else of the first that is checked, are in view.
+  fitTable() {
+    const lines = $$("tbody tr", this.root), first = lines.find((line) => line.matches(".fired")) ?? lines.find((line) => line.matches(".asked"));
+    if (first) reveal(first, $(".why", this.root), first.querySelector("th")?.rowSpan ?? 1, $("caption", this.root).offsetHeight);
+  }
+}
+
+// What an element waits for, in words.
+function waiting(contact, element, row) {
+  const state = contact.modes[element][row], leaving = contact.leaving(state);
+  const who = `${nameOf(contact, element)} is in ${contact.states[state]}`;
+  if (!leaving.length) return contact.edges.length ? `${who}; no edge leaves it` : who;
+  const scope = contact.scope(element, row), next = contact.firesNext(state, scope);
+  return `${who}; ${next >= 0 ? `${contact.edges[next].name} fires next` : heldBack(contact, leaving, scope)}`;
+}
+
+// Scrolls only the box, and only if needed: the page itself stays where it is.
+function reveal(node, box, lines = 1, covered = 0) {
+  const outer = box.getBoundingClientRect(), inner = node.getBoundingClientRect(), height = inner.height * lines, top = outer.top + covered;
+  if (inner.top < top || inner.top + height > outer.bottom) box.scrollTop += inner.top - top - 2;
+  if (inner.left < outer.left || inner.right > outer.right) box.scrollLeft += inner.left - outer.left;
+}
+
+// The clause that holds back an edge: the false one that is furthest from its boundary, relative to its sides. One without
+// a margin is named only if all others are true, as in the race of plots/panels/guards/racing.py.
+function worstClause(clauses) {
+  const place = (clause) => (Number.isNaN(clause.margin) ? Infinity : relative(clause));
+  return clauses.filter(({ truth }) => truth !== 1).reduce((worst, each) => (worst && place(worst) <= place(each) ? worst : each), null);
+}
+// From -1 to 1; a clause without a margin is further away than any other.
+function relative(clause) {
+  const { left, right, margin } = clause;
+  if (Number.isNaN(margin)) return -Infinity;
+  return isZero(clause) ? 0 : clamp(margin / Math.max(Math.abs(left), Math.abs(right)), -1, 1);
+}
+// A margin due to the clock and floats is zero, as in the debugger.
+function isZero({ left, right, margin }) { return Number.isFinite(margin) && Math.abs(margin) <= data.rounding * Math.max(Math.abs(left), Math.abs(right)); }
+function marginText(clause) {
+  const { margin, unit } = clause;
+  if (isZero(clause)) return "0";
+  return `${margin > 0 ? "+" : ""}${eng(margin, unit)}`;
+}
+// In words, of the edge that is nearest to firing.
+function heldBack(contact, leaving, scope) {
+  const each = leaving.map((k) => ({ k, worst: worstClause(contact.clauses(k, scope)) })).sort((a, b) => relative(b.worst) - relative(a.worst));
+  const { k, worst } = each[0], by = Number.isNaN(worst.margin) ? "" : ` by ${eng(Math.abs(worst.margin), worst.unit, 3)}`;
+  return `${contact.edges[k].name} is held back: ${worst.text} is ${worst.truth < 0 ? "not computable" : `false${by}`}`;
+}
+
+// ------------------------------------------------------------------ the chart: its SVG is laid out once and restyled
+class ChartPane {
+  static side = "left"; static key = "chart"; static title = "Chart";
+
+  constructor(view, box) {
+    Object.assign(this, { view, box, looks: [] });
+    this.fill();
+  }
+
+  fill() {
+    const { view, box } = this, { contact } = view;
+    this.filled = contact;
+    this.looks = [];
+    box.replaceChildren($(`#chart${contact.chart}`).content.cloneNode(true));
+    if (view.place > 0) for (const node of $$("[id]", box)) node.id = `run${view.place + 1}-${node.id}`;
+    this.svg = $("svg", box);
+    this.svg?.setAttribute("aria-label", `Chart of ${contact.name || "an element"}`);
+    this.whole = this.svg?.getAttribute("viewBox");
+    this.parts = [];
+    for (const node of $$("[data-slot]", box)) (this.parts[node.dataset.slot] ??= []).push(node);
+    for (const guard of $$(".guard", box)) {
+      const toggle = () => toggleBreak(view, this.elementIn(Number(guard.dataset.slot)), Number(guard.dataset.edge));
+      guard.addEventListener("click", (event) => { event.stopPropagation(); toggle(); });
+      guard.addEventListener("keydown", (event) => {
+        if (event.key !== "Enter" && event.key !== " ") return;
+        event.preventDefault();
+        toggle();
+      });
+    }
+    for (const region of $$(".region", box)) region.addEventListener("click", () => chooseElement(Number(region.dataset.slot)));
+  }
+
+  choose() { if (this.filled !== this.view.contact) this.fill(); this.fit(); }
+
+  // A large bank is drawn as one chart, which shows the selected element.
+  elementIn(slot) { return this.parts.length === this.view.contact.n ? slot : this.view.element; }
+
+  show() { for (let slot = 0; slot < this.parts.length; slot++) this.light(slot); }
+
+  light(slot) {
+    const { view } = this, { contact } = view, element = this.elementIn(slot), { fired, row } = contact.asked(element, view.row);
+    const active = contact.modes[element][view.row], asked = contact.modes[element][row], scope = contact.scope(element, row);
+    const truths = contact.edges.map((edge) => edge.clauses.map(({ holds }) => truthOf(holds, scope)));
+    const stops = contact.edges.map((_, k) => breakpoints.has(keyOf(view, contact, element, k)));
+    const differs = view.differs(element), look = [element, active, fired, truths, stops, view.element, differs].join();
+    if (this.looks[slot] === look) return; // most elements look the same as on the previous row
+    this.looks[slot] = look;
+    for (const node of this.parts[slot]) {
+      const { state, edge } = node.dataset, on = (name, yes) => node.classList.toggle(name, yes);
+      if (state) {
+        on("active", Number(state) === active);
+        on("differs", Number(state) === active && differs);
+      } else if (!edge) {
+        on("chosen", element === view.element);
+        on("differs", differs);
+      }
+      else {
+        const k = Number(edge), leaving = contact.edges[k].source === asked;
+        on("pale", !leaving);
+        on("fired", k === fired);
+        if (!node.matches(".guard")) continue;
+        on("break", stops[k]);
+        node.setAttribute("aria-pressed", stops[k]);
+        node.setAttribute("aria-label", `Breakpoint: ${nameOf(contact, element)}, ${contact.edges[k].name}`);
+        for (const text of $$("[data-clause]", node)) {
+          const truth = truths[k][text.dataset.clause];
+          text.classList.toggle("true", leaving && truth === 1);
+          text.classList.toggle("false", leaving && truth !== 1);
+          if (text.matches(".mark")) text.textContent = leaving ? MARKS[truth] : "";
+        }
+      }
+    }
+  }
+
+  // Where the whole chart would be too small to read, only the selected element is in view.
+  fit() {
+    if (!this.svg) return;
+    const region = $(`.region[data-slot="${this.view.element}"]`, this.svg), [, , width, height] = this.whole.split(" ").map(Number);
+    const room = Math.min(this.box.clientWidth / width, this.box.clientHeight / height);
+    let shown = this.whole;
+    if (region && room < READABLE) {
+      const box = region.getBBox(), { e, f } = region.parentNode.transform.baseVal.consolidate().matrix;
+      shown = [box.x + e - 4, box.y + f - 4, box.width + 8, box.height + 8].join(" ");
+    }
+    this.svg.setAttribute("viewBox", shown);
+    const [, , w, h] = shown.split(" ").map(Number), scale = Math.min(LARGEST, this.box.clientWidth / w, this.box.clientHeight / h || LARGEST);
+    place(this.svg, { width: w * scale, height: h * scale });
+  }
+}
+const READABLE = 0.85, LARGEST = 1.7; // px per point of the chart
+PANES.push(ChartPane);

@@ -1,0 +1,468 @@
+"""A run as a single web page to step, scrub and explain it, without a network.
+
+Python stores the values of the run, its transitions, charts as pictures and guards as trees.
+The page computes truths, margins and regions from these trees, with one function for all of them;
+it has no switching rules of its own. The only text it parses is the condition that a user types
+into its `until` box. The plot library (uPlot) is read from the installed package and written into
+the page with its licence.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+import html
+import importlib.util
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import checked_kind, listed
+from gms_fsm.foundation.extras import missing
+from gms_fsm.language import (
+    COMPARISONS,
+    CONSTANTS,
+    ELEMENTARY,
+    FUNCTIONS,
+    LEVELS,
+    OPERATIONS,
+    SEVERAL,
+)
+from gms_fsm.session.explain import ROUNDING
+from gms_fsm.traces.trace import Trace
+from gms_fsm.verification.prove import Report
+from integrators.machine_code.javascript import library_text
+from plots.output import formats
+from plots.page._rows import page_rows
+from plots.page._run import stored_run, views_of
+from plots.page.chart import chart_svg
+from plots.panels.window import window_of
+from plots.style import CHART_THEMES, ELEMENT_STEPS, PAGE_THEMES
+
+__all__ = ["Replay", "page_data", "page_html", "replay", "replay_html", "write_replay"]
+
+# In this order: later ones use what earlier ones define.
+SCRIPTS = (
+    "js/base.js",
+    "js/trees.js",
+    "js/run.js",
+    "js/until.js",
+    "js/panes/plane.js",
+    "js/panes/chart.js",
+    "js/plots.js",
+    "js/views.js",
+    "js/panes/phase.js",
+    "js/panes/regions.js",
+    "js/panes/landscape.js",
+    "js/panes/microscope.js",
+    "js/panes/bristles.js",
+    "js/host.js",
+    "js/page.js",
+)
+HATCH_ANGLES = (None, 45, 135, 0, 90)  # of the states' ribbons, degrees
+# uPlot's licence must accompany every copy, but the package's file only names it.
+MIT = """\
+Permission is hereby granted, free of charge, to any person obtaining a copy of this software and
+associated documentation files (the "Software"), to deal in the Software without restriction,
+including without limitation the rights to use, copy, modify, merge, publish, distribute,
+sublicense, and/or sell copies of the Software, and to permit persons to whom the Software is
+furnished to do so, subject to the following conditions:
+
+The above copyright notice and this permission notice shall be included in all copies or substantial
+portions of the Software.
+
+THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT
+NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES
+OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE."""
+
+
+@functools.cache
+def _elementary() -> str:
+    """Return the elementary functions of the expression language as JavaScript."""
+    return f"const ELEMENTARY = {library_text(ELEMENTARY)};\n"
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A replay page; a notebook shows it in an isolated frame.
+
+    Parameters
+    ----------
+    html : str
+        The whole page.
+
+    Examples
+    --------
+    >>> Replay("<p>a page</p>")._repr_html_()[:32]
+    '<iframe sandbox="allow-scripts" '
+    """
+
+    html: str
+
+    def __repr__(self) -> str:
+        return f"<Replay: a page of {len(self.html)} characters; .save(path) writes it to a file>"
+
+    def _repr_html_(self) -> str:
+        # Without allow-same-origin: the page may run its scripts but not touch the notebook.
+        return (
+            '<iframe sandbox="allow-scripts" title="Replay of a run" width="100%" height="900" '
+            f'style="border:0" srcdoc="{html.escape(self.html)}"></iframe>'
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write the page to a file.
+
+        Parameters
+        ----------
+        path : str or Path
+            Its ending must be that of a page format in `plots.output.formats.FORMATS`, such as
+            ``.html``.
+
+        Returns
+        -------
+        Path
+            The file, written atomically.
+
+        Raises
+        ------
+        ParameterError
+            If the file ending is not supported.
+        OutputError
+            If the folder cannot be written.
+        """
+        return formats.save(self, path, "page")
+
+
+def replay(
+    trace: Trace,
+    other: Trace | None = None,
+    *,
+    title: str = "",
+    names: Sequence[str] = (),
+    window: tuple[float, float] | None = None,
+    checks: Report | Sequence[Report] = (),
+) -> Replay:
+    """Make a replay page, for a notebook.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    other : Trace, optional
+        A second run, shown next to it on the same time axis.
+    title : str, optional
+        Title of the page; by default the names of the models.
+    names : sequence of str, optional
+        Names of the runs; the only distinction between two runs of one model on one rig.
+    window : (float, float), optional
+        Time interval to show, s; by default the whole run. A run with more transitions than a page
+        can hold needs one.
+    checks : Report or sequence of Report, optional
+        From `gms_fsm.verification.prove.prove`; the counterexamples are pinned in the landscapes of
+        their charts.
+
+    Returns
+    -------
+    Replay
+        The page; it displays itself in a notebook, and ``save`` writes it to a file.
+
+    Raises
+    ------
+    ParameterError
+        If there are names, but not one per run, the window is not inside the run, or it contains
+        too many transitions.
+    MissingExtraError
+        If uPlot is not installed.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 3.0)
+    >>> replay(trace).save("page.html")  # doctest: +SKIP
+    """
+    page = replay_html(trace, other, title=title, names=names, window=window, checks=checks)
+    return Replay(page)
+
+
+def write_replay(
+    path: str | Path,
+    trace: Trace,
+    other: Trace | None = None,
+    *,
+    title: str = "",
+    names: Sequence[str] = (),
+    window: tuple[float, float] | None = None,
+    checks: Report | Sequence[Report] = (),
+) -> Path:
+    """Write a replay page: a single file that needs neither a network nor a server.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; its folder must exist, and its ending selects the format, such as ``.html``.
+    trace, other, title, names, window, checks
+        See `replay`.
+
+    Returns
+    -------
+    Path
+        The file, written atomically.
+
+    Raises
+    ------
+    ParameterError
+        If there are names, but not one per run, or the file ending is not supported.
+    MissingExtraError
+        If uPlot is not installed.
+    OutputError
+        If the folder cannot be written.
+    """
+    formats.chosen(path, "page")  # before any work
+    page = replay(trace, other, title=title, names=names, window=window, checks=checks)
+    return page.save(path)
+
+
+def replay_html(
+    trace: Trace,
+    other: Trace | None = None,
+    *,
+    title: str = "",
+    names: Sequence[str] = (),
+    window: tuple[float, float] | None = None,
+    checks: Report | Sequence[Report] = (),
+) -> str:
+    """Return a replay page as text.
+
+    Parameters
+    ----------
+    trace, other, title, names, window, checks
+        See `replay`.
+
+    Returns
+    -------
+    str
+        HTML.
+
+    Raises
+    ------
+    ParameterError
+        See `replay`.
+    MissingExtraError
+        If uPlot is not installed.
+    """
+    traces = [trace] if other is None else [trace, other]
+    stored = page_data(traces, title=title, names=names, window=window, checks=checks)
+    return page_html(*stored)
+
+
+def page_data(
+    traces: Sequence[Trace],
+    *,
+    title: str = "",
+    names: Sequence[str] = (),
+    window: tuple[float, float] | None = None,
+    checks: Report | Sequence[Report] = (),
+    draw: Callable[[Chart, int], str] = chart_svg,
+) -> tuple[dict[str, Any], list[str]]:
+    """Return what a page shows: the data of one or two runs, and pictures of their charts.
+
+    Parameters
+    ----------
+    traces : sequence of Trace
+        One run, or two.
+    title, names, window, checks
+        See `replay`.
+    draw : callable, optional
+        Draws the chart of a number of elements, as `plots.page.chart.chart_svg` does.
+
+    Returns
+    -------
+    (dict, list of str)
+        Data for JSON, and SVG texts, to which the data refer by number.
+
+    Raises
+    ------
+    ParameterError
+        See `replay`.
+    """
+    for each in traces:
+        checked_kind("trace", each, Trace, "a Trace, from simulate(...) or Trace.load(path)")
+        window_of(each, window)
+    checked_kind("title", title, str, "a text")
+    reports = [checks] if isinstance(checks, Report) else listed("checks", checks, "Reports")
+    known = [view.model.chart for each in traces for view in views_of(each)]
+    for report in reports:
+        checked_kind("checks", report, Report, "a Report, from prove(chart)")
+        if report.chart not in known:
+            raise ParameterError(
+                f"checks has a Report of another chart, {report.chart.name!r}",
+                advice=f"these runs have {', '.join(sorted({chart.name for chart in known}))}",
+            )
+    names = [checked_kind("names", each, str, "texts") for each in listed("names", names, "texts")]
+    if len(names) not in (0, len(traces)):
+        raise ParameterError(
+            f"{len(traces)} run(s) but names = {list(names)!r}", advice="give one each"
+        )
+    charts: list[str] = []
+    runs = []
+    for i, each in enumerate(traces):
+        page = page_rows(each, window)
+        pictures = [draw(view.model.chart, view.n) for view in views_of(each)]
+        charts += [picture for picture in dict.fromkeys(pictures) if picture not in charts]
+        run = stored_run(page, [charts.index(picture) for picture in pictures], reports)
+        head = [*names[i : i + 1], each.title]
+        runs.append({"title": ": ".join(head), "of": len(each), **run})
+    data = {
+        "title": title or " and ".join(dict.fromkeys(_short(each) for each in traces)),
+        "runs": runs,
+        "language": _language(),
+        "rounding": ROUNDING,
+    }
+    return data, charts
+
+
+def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
+    """Return a page that shows data from `page_data`.
+
+    Parameters
+    ----------
+    data : mapping
+        The runs.
+    charts : sequence of str
+        The pictures of their charts.
+
+    Returns
+    -------
+    str
+        HTML.
+
+    Raises
+    ------
+    MissingExtraError
+        If uPlot is not installed.
+    """
+    plot_script, plot_style = _uplot()
+    script = "".join([_elementary(), *map(_part, SCRIPTS)])
+    style = _theme() + plot_style + _part("page.css")
+    scripts = " ".join(map(_hash, (plot_script, script)))
+    parts = {
+        # Only the scripts written here may run; text from a trace cannot, even as markup.
+        "policy": f"default-src 'none'; script-src {scripts}; style-src {_hash(style)}; "
+        "base-uri 'none'; form-action 'none'",
+        "style": style,
+        "charts": "".join(
+            f'<template id="chart{i}">{picture}</template>\n' for i, picture in enumerate(charts)
+        ),
+        "data": _inert(data),
+        "licence": f"uPlot, {_copyright(plot_script)}\n\n{MIT}",
+        "uplot": plot_script,
+        "script": script,
+    }
+    # In one pass, so that placeholders inside the parts are left unchanged.
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _part("template.html"))
+
+
+def _short(trace: Trace) -> str:
+    """Return the name of what runs."""
+    return trace.subject.title
+
+
+def _language() -> dict[str, Any]:
+    """Return the parts of the language that the page needs to parse a typed condition."""
+    binary = {op: LEVELS[op] for op in ("or", "and", *OPERATIONS, "**")}
+    return {
+        "levels": binary | dict.fromkeys(COMPARISONS, LEVELS["<"]),
+        "negation": LEVELS["not"],
+        "sign": LEVELS["neg"],
+        "functions": {name: "several" if name in SEVERAL else "one" for name in FUNCTIONS},
+        "constants": dict(CONSTANTS),
+    }
+
+
+# --------------------------------------------------------------------------- the page's parts
+def _uplot() -> tuple[str, str]:
+    """Return uPlot's script and style sheet from the installed package."""
+    # Not imported: its plotting functions need IPython, its files do not.
+    found = importlib.util.find_spec("uplot")
+    for folder in (found.submodule_search_locations or []) if found else []:
+        static = Path(folder, "static")
+        scripts = [*static.glob("uPlot.iife.min.js"), *static.glob("uPlot.iife.js")]
+        styles = list(static.glob("uPlot.min.css"))
+        if scripts and styles:
+            return _text(scripts[0]), _text(styles[0])
+    raise missing("uPlot", "replay")
+
+
+def _text(path: Path | Traversable) -> str:
+    # The page's policy contains hashes of scripts, and browsers hash them with plain line ends.
+    return path.read_text(encoding="utf-8").replace("\r\n", "\n")
+
+
+def _part(name: str) -> str:
+    return _text(resources.files("plots.page").joinpath(name))
+
+
+def _hash(text: str) -> str:
+    digest = hashlib.sha256(text.encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"
+
+
+def _copyright(script: str) -> str:
+    line = re.search(r"Copyright \(c\) [^\n]*", script[:1000])
+    return line[0].replace("--", "") if line else "MIT License"
+
+
+def _theme() -> str:
+    """Return the colours of both themes as variables, and the looks of states."""
+    texts = {}
+    for name, theme in CHART_THEMES.items():
+        page = PAGE_THEMES[name]
+        colours = {key.replace("_", "-"): value for key, value in vars(theme).items()}
+        colours |= {"panel": page.panel, "grid": page.grid, "chosen": page.chosen}
+        colours |= {"fired-text": page.fired_text, "fired-fill": page.fired_fill}
+        steps = (
+            ("e", page.elements),
+            ("fill", page.fills),
+            ("hatch", page.hatches),
+            ("slip", page.slipping),
+            ("edge", page.edges),
+        )
+        for key, values in steps:
+            colours |= {f"{key}{k}": value for k, value in enumerate(values)}
+        texts[name] = "".join(f"--{key}:{value};" for key, value in colours.items())
+    looks = "".join(
+        f".state{k}{{background:{_hatched(k, angle)}}}\n" for k, angle in enumerate(HATCH_ANGLES)
+    )
+    swatches = "".join(
+        f".e{k}{{border-color:var(--e{k})!important}}\n" for k in range(ELEMENT_STEPS)
+    )
+    dark = texts["dark"]
+    return (
+        f":root{{color-scheme:light dark;{texts['light']}}}\n"
+        f"@media(prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}\n"
+        f":root[data-theme=light]{{color-scheme:light}}\n"
+        f":root[data-theme=dark]{{color-scheme:dark;{dark}}}\n{looks}{swatches}"
+    )
+
+
+def _hatched(k: int, angle: int | None) -> str:
+    if angle is None:
+        return f"var(--fill{k})"
+    return f"repeating-linear-gradient({angle}deg,var(--hatch{k}) 0 1px,var(--fill{k}) 1px 6px)"
+
+
+def _inert(data: object) -> str:
+    """Write data as JSON that cannot be read as markup."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

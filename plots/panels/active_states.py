@@ -1,0 +1,184 @@
+"""The panel of active states: ribbons, as in a logic analyser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from gms_fsm.traces.trace import Trace
+from plots.panels.axes import MANY, VECTOR_ROWS, Artists, lanes, time_axis
+from plots.panels.selection import checked_elements, checked_window
+from plots.panels.window import Window
+from plots.style import INK, PAPER, state_look
+from plots.style.matplotlib import Axes, RendererBase, Text
+from plots.style.presets import font, pt, to_scale
+
+__all__ = ["ribbons"]
+
+LANE = 0.8  # height of a ribbon, in rows
+
+
+class _SpanName(Text):
+    """A state's name inside its span, drawn only if it fits.
+
+    Whether it fits is known only when the picture is drawn, and may change on resizing.
+    """
+
+    def __init__(self, ax: Axes, begin: float, end: float, height: float, name: str) -> None:
+        super().__init__(
+            (begin + end) / 2,
+            height,
+            name,
+            ha="center",
+            va="center",
+            fontsize=font(7.5),
+            color=INK,
+            bbox={
+                "boxstyle": "round,pad=0.12",
+                "facecolor": PAPER,
+                "edgecolor": "none",
+                "alpha": 0.85,
+            },
+        )
+        self.span = (begin, end)
+        self.set_in_layout(False)
+        ax.add_artist(self)
+        self.set_clip_on(True)
+
+    def fits(self, renderer: RendererBase) -> bool:
+        """Return whether the name is smaller than its span."""
+        assert self.axes is not None
+        row = self.get_position()[1]
+        corners = [
+            (t, row + half) for t, half in zip(self.span, (LANE / 2, -LANE / 2), strict=True)
+        ]
+        (left, low), (right, high) = self.axes.transData.transform(corners)
+        extent = self.get_window_extent(renderer)
+        return bool(extent.width + 4 < right - left and extent.height < high - low)
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw the name if it fits."""
+        if self.fits(renderer):
+            super().draw(renderer)
+
+
+def spans(trace: Trace, i: int, window: Window) -> Iterator[tuple[str, float, float]]:
+    """Yield the states of element i as (name, begin, end) [s], read from the transition log.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    i : int
+        Element, from 0.
+    window : (float, float)
+        s; spans are cut at its ends.
+
+    Yields
+    ------
+    (str, float, float)
+        States of zero duration are omitted.
+    """
+    log = trace.transitions[trace.transitions.element == i]
+    first = log.source[0] if log.size else trace.model.chart.states[trace.modes[0, i]].name
+    ends = np.clip(np.concatenate([[window[0]], log.t, [window[1]]]), *window)
+    for name, begin, end in zip([first, *log.target], ends[:-1], ends[1:], strict=True):
+        if end > begin:
+            yield str(name), float(begin), float(end)
+
+
+def ribbons(
+    ax: Axes,
+    trace: Trace,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+) -> Artists:
+    """Draw the active state of every element as a ribbon, as in a logic analyser.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes to draw on.
+    trace : Trace
+        The run.
+    window : (float, float), optional
+        Time interval to show, s.
+    elements : sequence of int, optional
+        Which elements, counted from 0; by default all.
+
+    Returns
+    -------
+    list of Artist
+        One collection per state and element; then the names, each drawn only if it fits, and none
+        of more than six elements; then a band for each interval in which a sign is held, for
+        example on v = 0, or in which an element is between two states.
+    """
+    chosen = checked_elements(trace, elements)
+    begin, end = checked_window(trace, window)
+    states = [state.name for state in trace.model.chart.states]
+    # Between many narrow rows there is no room for thicker outlines.
+    look = to_scale if len(chosen) <= MANY else dict
+    looks = [look(state_look(number)) for number in range(len(states))]
+    drawn: Artists = []
+    names: Artists = []
+    for row, i in enumerate(chosen):
+        found = list(spans(trace, i, (begin, end)))
+        for number, state in enumerate(states):
+            mine = [(a, b - a) for name, a, b in found if name == state]
+            drawn.append(
+                ax.broken_barh(
+                    mine,
+                    (row + 1.0 - LANE / 2, LANE),
+                    label=state if row == 0 else None,
+                    rasterized=len(mine) > VECTOR_ROWS // 20,
+                    **looks[number],
+                )
+            )
+        # A name never fits into less than one hundredth of the axis. In many narrow rows names
+        # would hide what they name: fill and hatch say it.
+        few = len(chosen) <= MANY
+        wide = [span for span in found if few and span[2] - span[1] > 0.01 * (end - begin)]
+        names += [_SpanName(ax, a, b, row + 1.0, name) for name, a, b in wide]
+    lanes(ax, chosen)
+    time_axis(ax, begin, end)
+    return [*drawn, *names, *_held_bands(ax, trace, chosen, (begin, end))]
+
+
+def _held_bands(ax: Axes, trace: Trace, chosen: Sequence[int], window: Window) -> Artists:
+    """Mark the intervals on a surface, of an element between two states in its row only.
+
+    If only microseconds long, they appear as a line.
+    """
+    drawn: dict[str, Artists] = {}
+    names, machines = trace.program.surface_names, trace.program.surfaces.machine
+    first, last = ax.get_ylim()
+    for stretch in trace.sliding:
+        begin, end = max(window[0], float(stretch.t_start)), min(window[1], float(stretch.t_end))
+        machine, low, high = machines[names.index(stretch.surface)], 0.0, 1.0
+        if machine >= 0:
+            element = machine - trace.places.first
+            if element not in chosen:
+                continue
+            row = [*chosen].index(element) + 1.0
+            ends = [(row + side * LANE / 2 - first) / (last - first) for side in (-1.0, 1.0)]
+            low, high = min(ends), max(ends)
+        if begin <= end:
+            label = f"held on {stretch.surface} = 0"
+            text = "" if label in drawn else label
+            drawn.setdefault(label, []).append(
+                ax.axvspan(
+                    begin,
+                    end,
+                    low,
+                    high,
+                    facecolor="none",
+                    edgecolor=INK,
+                    hatch="xxx",
+                    linewidth=pt(0.8),
+                    zorder=3,
+                    label=text,
+                )
+            )
+    return [band for bands in drawn.values() for band in bands]

@@ -1,0 +1,191 @@
+"""Names written on lines, placed when the picture is drawn so that none covers another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plots.style import PAPER
+from plots.style.matplotlib import Artist, Axes, Bbox, IdentityTransform, RendererBase, Text
+from plots.style.presets import font
+
+__all__ = ["LineNames", "NamedLine"]
+
+Floats = NDArray[np.float64]
+STEP, PAD, CLEAR = 7.0, 1.5, 9.0  # points: between candidates, around a name, around the dot
+CROSSING, OUTSIDE = 1.0, 0.6  # costs: of a covered point of a line, of the distance from an edge
+
+
+@dataclass(frozen=True, eq=False)
+class NamedLine:
+    """A line and its name.
+
+    Parameters
+    ----------
+    name : str
+        The text.
+    colour : str
+        Of the text.
+    pieces : tuple of ndarray, shape (points, 2)
+        The line, in the coordinates of the axes' data.
+    """
+
+    name: str
+    colour: str
+    pieces: tuple[Floats, ...]
+
+
+@dataclass(frozen=True)
+class _Spot:
+    """A place for a name, in pixels."""
+
+    x: float
+    y: float
+    upright: bool
+    box: Bbox
+    cost: float
+
+
+@dataclass
+class _Taken:
+    """What names must not cover, and what they should not, in pixels."""
+
+    boxes: list[Bbox] = field(default_factory=list)
+    points: list[Floats] = field(default_factory=list)
+
+
+class LineNames(Artist):
+    """The names of several lines; one that has no free place is left out.
+
+    Parameters
+    ----------
+    ax : Axes
+        The axes of the lines.
+
+    Attributes
+    ----------
+    lines : list of NamedLine
+        What to name.
+    avoid : list of (float, float)
+        Points that no name covers, in data coordinates.
+    curves : list of ndarray, shape (points, 2)
+        Further lines that names cover only if there is no other place.
+    """
+
+    def __init__(self, ax: Axes) -> None:
+        super().__init__()
+        self.lines: list[NamedLine] = []
+        self.avoid: list[tuple[float, float]] = []
+        self.curves: list[Floats] = []
+        self.size = font(8)  # when the names are drawn, another preset may be in use
+        self.set_zorder(9)
+        self.set_in_layout(False)
+        ax.add_artist(self)
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Place the names and draw them."""
+        for text in self.placed(renderer):
+            text.draw(renderer)
+
+    def placed(self, renderer: RendererBase) -> list[Text]:
+        """Return the names that have a place, in pixels of a renderer.
+
+        Parameters
+        ----------
+        renderer : RendererBase
+            Of the figure; it knows how large texts are.
+
+        Returns
+        -------
+        list of Text
+            No two of them overlap.
+        """
+        ax, unit = self._owner, float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
+        taken = _Taken()
+        for point in self.avoid:
+            x, y = ax.transData.transform(point)
+            size = CLEAR * unit
+            taken.boxes.append(Bbox.from_extents(x - size, y - size, x + size, y + size))
+        dense = [[_dense(ax, piece, unit) for piece in line.pieces] for line in self.lines]
+        others = [_dense(ax, curve, unit) for curve in self.curves]
+        found: list[Text] = []
+        for number, line in enumerate(self.lines):
+            taken.points = [
+                *others,
+                *(p for k, each in enumerate(dense) if k != number for p in each),
+            ]
+            text = self._text(line)
+            spots = self._spots(text, dense[number], taken, renderer)
+            if not spots:
+                continue
+            best = min(spots, key=lambda spot: spot.cost)
+            text.set(x=best.x, y=best.y, rotation=90 if best.upright else 0)
+            taken.boxes.append(best.box)
+            found.append(text)
+        return found
+
+    @property
+    def _owner(self) -> Axes:
+        assert isinstance(self.axes, Axes)
+        return self.axes
+
+    def _text(self, line: NamedLine) -> Text:
+        box = {"boxstyle": f"square,pad={PAD / 10}", "facecolor": PAPER, "edgecolor": "none"}
+        text = Text(
+            text=line.name,
+            color=line.colour,
+            fontsize=self.size,
+            ha="center",
+            va="center",
+            bbox=box,
+            transform=IdentityTransform(),
+        )
+        text.set_figure(self._owner.figure)
+        return text
+
+    def _spots(
+        self, text: Text, pieces: list[Floats], taken: _Taken, renderer: RendererBase
+    ) -> list[_Spot]:
+        """Return the free places on the pieces of a line."""
+        whole = self._owner.bbox
+        unit = float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
+        extent = text.get_window_extent(renderer)
+        long, tall = extent.width + 2 * PAD * unit, extent.height + 2 * PAD * unit
+        covered = np.concatenate([*taken.points, np.empty((0, 2))])
+        spots = []
+        for piece in pieces:
+            if len(piece) < 2:
+                continue
+            slope = np.abs(np.gradient(piece, axis=0))
+            for (x, y), (dx, dy) in zip(piece.tolist(), slope.tolist(), strict=True):
+                upright = dy > 1.5 * dx
+                w, h = (tall, long) if upright else (long, tall)
+                box = Bbox.from_bounds(x - w / 2, y - h / 2, w, h)
+                inside = whole.x0 <= box.x0 and box.x1 <= whole.x1
+                if not inside or not (whole.y0 <= box.y0 and box.y1 <= whole.y1):
+                    continue
+                if any(box.overlaps(other) for other in taken.boxes):
+                    continue
+                hit = np.abs(covered - (x, y)) < (w / 2, h / 2)
+                # Names are easiest to find at the ends of their lines, next to the frame.
+                edge = min(x - whole.x0, whole.x1 - x) / whole.width
+                side = min(y - whole.y0, whole.y1 - y) / whole.height
+                away = min(edge, side)
+                cost = CROSSING * float(hit.all(axis=1).sum()) + OUTSIDE * away
+                spots.append(_Spot(x, y, upright, box, cost))
+        return spots
+
+
+def _dense(ax: Axes, piece: Any, unit: float) -> Floats:
+    """Return points of a line in pixels, evenly spaced."""
+    pixels = ax.transData.transform(piece)
+    pixels = pixels[np.isfinite(pixels).all(axis=1)]
+    if len(pixels) < 2:
+        return np.asarray(pixels)
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
+    count = max(2, min(4000, int(length[-1] / (STEP * unit))))
+    even = np.linspace(0.0, length[-1], count)
+    return np.column_stack([np.interp(even, length, column) for column in pixels.T])

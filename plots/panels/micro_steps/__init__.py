@@ -1,0 +1,1 @@
+"""Panels of instants with several transitions."""

@@ -1,0 +1,1 @@
+"""Systems as pictures: block diagrams and mechanisms."""

@@ -1,0 +1,309 @@
+"""Draw the paper's Fig. 1: a slider on n Maxwell elements, each a spring and a damper in parallel.
+
+When a row of a run is drawn, the deflections give the positions of the contacts: z_i is the
+distance that the slider has moved relative to the rest position of the contact.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import ParameterError
+from gms_fsm.traces.trace import Trace, check_trace
+from plots.panels.selection import checked_row, scaled
+from plots.style import (
+    INK,
+    LINE_GREY,
+    PALE_GREY,
+    PANEL,
+    PAPER,
+    RC,
+    element_colour,
+    state_look,
+)
+from plots.style.matplotlib import Artist, Axes, FancyArrowPatch, Figure, Rectangle, rc_context
+from plots.systems.mechanical_symbols import damper_points, spring_points
+
+__all__ = ["elements_at", "elements_figure"]
+
+ROW = 1.35  # height of one element
+WALL = 6.0  # position of the slider's face, to which springs and dampers are attached
+REST = 3.0  # length of a spring at z = 0
+SWING = 1.4  # displacement of a contact by the largest deflection of a run
+CONTACT = 0.5  # width of a contact
+GROUND = 0.36  # its extent below the middle of its row
+MOST = 12  # elements
+INCHES, TALLEST = 0.82, 10.2  # of one unit of height; of all of them, on a page of A4
+
+STIFFNESS = {"k": r"$k_{{{}}}$", "sigma_0": r"$\sigma_0$"}
+DAMPING = {"sigma": r"$\sigma_{{{}}}$", "sigma_1": r"$\sigma_1$"}
+
+
+def elements_at(
+    ax: Axes, trace: Trace | None = None, row: int = -1, elements: int = 4
+) -> list[Artist]:
+    """Draw a slider on Maxwell elements, deflected as in one row of a run.
+
+    A contact in the default state (stick) is plain pale blue and held by a peg; in another state
+    (slip) it is hatched, with an arrow in the direction in which the slider moves.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes to draw on; its axis lines are hidden.
+    trace : Trace, optional
+        The run. By default the elements are drawn at rest, with symbols only.
+    row : int
+        Row of the run; negative rows count from the end.
+    elements : int
+        Number of elements drawn without a run.
+
+    Returns
+    -------
+    list of Artist
+        Everything drawn. Contacts have the group id ``contact i`` (i from 1), springs ``spring i``,
+        dampers ``damper i``.
+
+    Raises
+    ------
+    ParameterError
+        If the row does not exist, there are too many elements to draw, or the chart has no
+        variables.
+    """
+    if trace is not None:
+        check_trace(trace)
+        if not trace.model.chart.variables:
+            raise ParameterError(
+                "a schematic shows deflections, and this chart has no variables",
+                place=trace.model.title,
+                advice="draw the chart with plots.statechart, or the system with "
+                "plots.block_diagram",
+            )
+    n = elements if trace is None else trace.n
+    if not isinstance(n, (int, np.integer)) or isinstance(n, bool) or not 1 <= n <= MOST:
+        raise ParameterError(f"a schematic shows 1 to {MOST} elements", place="elements", value=n)
+    if trace is not None:
+        row = checked_row(trace, row)
+    drawn: list[Artist] = []
+    shift = np.zeros(n)
+    if trace is not None:
+        largest = np.nanmax(np.abs(trace.z))
+        if largest > 0:
+            shift = SWING * np.nan_to_num(trace.z[row]) / largest
+    for i in range(n):
+        drawn += _element(ax, ROW * (n - i - 0.5), i, n, WALL - REST - float(shift[i]), trace, row)
+    drawn += _slider(ax, n, trace, row)
+    ax.set(xlim=(-0.7, WALL + 3.6), ylim=(-0.15, ROW * n + 0.15), aspect="equal")
+    ax.set_axis_off()
+    return drawn
+
+
+def elements_figure(trace: Trace | None, row: int, elements: int, title: str) -> Figure:
+    """Draw the elements as a figure; see `plots.systems.mechanism.schematic_figure`."""
+    with rc_context(RC):
+        figure = Figure(layout="constrained")
+        ax = figure.subplots()
+        elements_at(ax, trace, row, elements)
+        n = elements if trace is None else trace.n
+        rows = ROW * n + 0.3
+        scale = min(INCHES, TALLEST / rows)  # no taller than a page, with type of the same size
+        figure.set_size_inches(10.3 * scale, 0.4 + scale * rows)
+        parts = [title] if title else []
+        if trace is not None:
+            parts += [trace.model.title, f"t = {trace.t[row]:.6g} s"]
+        if parts:
+            figure.suptitle(", ".join(parts), x=0.01, ha="left")
+    return figure
+
+
+def _element(
+    ax: Axes, y: float, i: int, n: int, contact: float, trace: Trace | None, row: int
+) -> list[Artist]:
+    """Draw element i at height y, its contact at x = contact."""
+    colour = element_colour(i, n)
+    top, bottom = y + 0.22, y - 0.14
+    left, right = contact + CONTACT / 2 + 0.2, WALL - 0.2
+    look: dict[str, Any] = {"color": colour, "linewidth": 1.3, "solid_capstyle": "round"}
+    look["linestyle"] = "-"
+    drawn: list[Artist] = []
+    # Frames that connect spring and damper, at the contact and at the slider.
+    for x, end in ((left, contact + CONTACT / 2), (right, WALL)):
+        drawn += ax.plot([x, x], [bottom, top], **look)
+        drawn += ax.plot([x, end], [y, y], **look)
+    spring, damper = spring_points(left, right, top), damper_points(left, right, bottom)
+    drawn += ax.plot(*spring.T, gid=f"spring {i + 1}", **look)
+    drawn += ax.plot(*damper.T, gid=f"damper {i + 1}", **look)
+    names = _numbers(trace, i)
+    middle = (left + right) / 2
+    text: dict[str, Any] = {"ha": "center", "fontsize": 8, "color": INK}
+    drawn.append(ax.text(middle, top + 0.16, names[0], va="bottom", **text))
+    drawn.append(ax.text(middle, y - GROUND - 0.2, names[1], va="center", **text))
+    drawn += _contact(ax, y, i, contact, trace, row)
+    drawn += _deflection(ax, y, i, contact, trace, row)
+    return drawn
+
+
+def _numbers(trace: Trace | None, i: int) -> tuple[str, str]:
+    """Return the texts next to spring and damper: symbols, and numbers if there is a run."""
+    if trace is None:
+        return STIFFNESS["k"].format(i + 1), DAMPING["sigma"].format(i + 1)
+    values = trace.model.values
+    texts = []
+    for symbols in (STIFFNESS, DAMPING):
+        name = next((name for name in symbols if name in values), None)
+        if name is None:
+            texts.append("")
+            continue
+        value = np.broadcast_to(values[name], trace.n)[i]
+        unit = trace.model.chart.unit(name)
+        texts.append(f"{symbols[name].format(i + 1)} = {value:.4g} {unit}".rstrip())
+    return texts[0], texts[1]
+
+
+def _contact(
+    ax: Axes, y: float, i: int, contact: float, trace: Trace | None, row: int
+) -> list[Artist]:
+    """Draw the contact on its piece of ground, and its state."""
+    ground = y - GROUND
+    low, high = WALL - REST - SWING - CONTACT, WALL - REST + SWING + CONTACT
+    drawn: list[Artist] = [
+        Rectangle(
+            (low, ground - 0.1),
+            high - low,
+            0.1,
+            facecolor=PAPER,
+            edgecolor=PALE_GREY,
+            hatch="/////",
+            linewidth=0,
+            zorder=0,
+        )
+    ]
+    ax.add_patch(drawn[0])  # type: ignore[arg-type]
+    drawn += ax.plot([low, high], [ground, ground], "-", color=LINE_GREY, linewidth=0.9, zorder=1)
+    chart = None if trace is None else trace.model.chart
+    name = "stick" if trace is None else str(trace.states[row, i])
+    held = chart is None or name == chart.default_state.name
+    alone = chart is not None and not chart.transitions  # one state: neither stick nor slip
+    mode = 0 if chart is None else chart.state_index(name)
+    look = {"facecolor": PALE_GREY, "edgecolor": LINE_GREY} if alone else state_look(mode)
+    box = Rectangle(
+        (contact - CONTACT / 2, ground),
+        CONTACT,
+        GROUND + 0.22,
+        zorder=3,
+        gid=f"contact {i + 1}",
+        **(look | {"linewidth": 1.4}),
+    )
+    drawn.append(ax.add_patch(box))
+    label = f"E{i + 1}" if trace is None else f"E{i + 1} {name}"
+    drawn.append(ax.text(low - 0.15, y, label, ha="right", va="center", fontsize=8.5, color=INK))
+    if held and not alone:  # a peg into the ground
+        drawn += ax.plot(
+            [contact, contact],
+            [ground + 0.1, ground - 0.16],
+            "-",
+            color=INK,
+            linewidth=2.0,
+            zorder=4,
+        )
+    elif trace is not None and not held:
+        way = 1.0 if trace.v[row] >= 0 else -1.0
+        drawn.append(_arrow(ax, (contact, y), (contact + 0.85 * way * CONTACT, y), INK))
+    return drawn
+
+
+def _deflection(
+    ax: Axes, y: float, i: int, contact: float, trace: Trace | None, row: int
+) -> list[Artist]:
+    """Draw the distance from the contact's rest position, and its symbol."""
+    rest, height = WALL - REST, y - GROUND - 0.22
+    drawn: list[Artist] = [
+        *ax.plot(
+            [rest, rest],
+            [y - GROUND, height - 0.08],
+            color=LINE_GREY,
+            linewidth=0.8,
+            linestyle=":",
+            zorder=1,
+        )
+    ]
+    label = f"$z_{{{i + 1}}}$"
+    if trace is not None:
+        factor, unit = scaled(trace.z[row], "m")
+        shown = factor * trace.z[row]
+        label += f" = {_signed(shown[i], _decimals(shown))} {unit}"
+    if abs(contact - rest) > 0.15:
+        drawn.append(_arrow(ax, (contact, height), (rest, height), INK, size=7))
+    drawn.append(
+        ax.text(
+            min(contact, rest) - 0.12, height, label, ha="right", va="center", fontsize=8, color=INK
+        )
+    )
+    return drawn
+
+
+def _decimals(values: FloatArray) -> int:
+    """Return how many decimals give the largest of some numbers three digits."""
+    largest = float(np.nanmax(np.abs(values), initial=0.0))
+    return max(0, 2 - math.floor(math.log10(largest))) if largest > 0.0 else 0
+
+
+def _signed(value: float, decimals: int) -> str:
+    """Write a number with a minus sign instead of a hyphen."""
+    return f"{value:.{min(decimals, 9)}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def _slider(ax: Axes, n: int, trace: Trace | None, row: int) -> list[Artist]:
+    """Draw the slider with its velocity and the friction on it."""
+    body = Rectangle(
+        (WALL, 0.05),
+        0.9,
+        ROW * n - 0.1,
+        facecolor=PANEL,
+        edgecolor=INK,
+        linewidth=1.3,
+        gid="slider",
+    )
+    drawn: list[Artist] = [ax.add_patch(body)]
+    drawn.append(
+        ax.text(
+            WALL + 0.45, ROW * n / 2, "slider", rotation=90, ha="center", va="center", fontsize=9
+        )
+    )
+    v, F = (0.0, 0.0) if trace is None else (float(trace.v[row]), float(trace.F[row]))
+    speed, push = "$v$", "$F$"
+    if trace is not None:
+        factor, unit = scaled(np.array([v]), "m/s")
+        speed += f" = {_signed(factor * v, _decimals(np.array([factor * v])))} {unit}"
+        push += f" = {_signed(F, _decimals(np.array([F])))} N"
+    edge = WALL + 0.9
+    # v to the right is positive; positive friction pulls the slider to the left.
+    for height, text, forward in (
+        (0.5 * ROW * n + 0.3, speed, v >= 0),
+        (0.5 * ROW * n - 0.3, push, trace is not None and F < 0),
+    ):
+        ends = ((edge + 0.1, height), (edge + 0.8, height))
+        drawn.append(_arrow(ax, *(ends if forward else ends[::-1]), INK))
+        drawn.append(ax.text(edge + 0.9, height, text, ha="left", va="center", fontsize=9))
+    return drawn
+
+
+def _arrow(
+    ax: Axes, start: tuple[float, float], end: tuple[float, float], colour: str, size: float = 11
+) -> Artist:
+    arrow = FancyArrowPatch(
+        start,
+        end,
+        arrowstyle="-|>",
+        mutation_scale=size,
+        color=colour,
+        linewidth=1.2,
+        shrinkA=0,
+        shrinkB=0,
+        zorder=5,
+    )
+    return ax.add_patch(arrow)

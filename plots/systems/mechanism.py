@@ -1,0 +1,100 @@
+"""Mechanical drawings: of a system, and of the elements of a friction model (Fig. 1 of the paper).
+
+Importing this module needs no matplotlib; drawing does.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.systems.system import System
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gms_fsm.traces.trace import Trace
+
+__all__ = ["schematic", "schematic_figure"]
+
+
+def schematic(system: System) -> Figure:
+    """Draw a system as a mechanism: masses, springs, dampers, and the contacts between them.
+
+    All of it is read from the system. Springs and dampers are those that it declares, between two
+    bodies, or a body and the ground or a point that moves; forces given as text are written at an
+    arrow. Friction has bristles; end stops, backlash and dog clutches have symbols of
+    their own; any other contact is a box. A driven body that others rub on is a belt. The number in
+    a box on a line is a gear ratio.
+
+    A system says neither directions nor which of its bodies turn, so all bodies are drawn as
+    masses in a row, in an order in which connections are short.
+
+    Parameters
+    ----------
+    system : System
+        The system; of a model on a rig, `gms_fsm.systems.system.system_of` gives it.
+
+    Returns
+    -------
+    Figure
+        A matplotlib figure, as large as the drawing. Its artists have group ids such as
+        ``body load``, ``contact pad``, ``spring k``, ``damper d`` and ``force load``.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    ParameterError
+        If it is no system.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, PulledSlider
+    >>> from gms_fsm.systems.system import system_of
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> figure = schematic(system_of(model, PulledSlider(1.0, 2.0, 0.1)))
+    >>> [each.get_gid() for each in figure.axes[0].lines if each.get_gid()]
+    ['contact friction', 'spring stiffness']
+    """
+    checked_kind("system", system, System, "a System")
+    from plots.systems.mechanical_drawing import mechanical_figure
+
+    return mechanical_figure(system)
+
+
+def schematic_figure(
+    trace: Trace | None = None, row: int = -1, elements: int = 4, *, title: str = ""
+) -> Figure:
+    """Draw a slider on Maxwell elements, deflected as in one row of a run.
+
+    A contact in the default state (stick) is plain pale blue and held by a peg; in another state
+    (slip) it is hatched, with an arrow in the direction in which the slider moves.
+
+    Parameters
+    ----------
+    trace : Trace, optional
+        The run; by default the elements are drawn at rest, with symbols only.
+    row : int
+        Row of the run; negative rows count from the end.
+    elements : int
+        Number of elements drawn without a run.
+    title : str
+        Of the figure; with a run, the model, its law and the time are added.
+
+    Returns
+    -------
+    Figure
+        One panel, no taller than a page of A4.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    ParameterError
+        If the row does not exist, there are too many elements to draw, or the chart has no
+        variables.
+    """
+    from plots.systems.elements import elements_figure
+
+    return elements_figure(trace, row, elements, title)
