@@ -48,7 +48,7 @@ from gms_fsm.language import (
     split,
 )
 from gms_fsm.lowering.generated import load
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.session.explain import explain
@@ -643,11 +643,11 @@ def _start_and_run(loaded: Any) -> None:
     where = {name: options.pop(name) for name in ("t_end", "t_start", "initial") if name in options}
     what = (loaded.model, loaded.rig) if loaded.system is None else (loaded.system, None)
     if np.size(options.get("t_eval", ())) < 10_000:
-        Start.of(*what, settings=Settings(**options), **where)
+        Problem.of(*what, settings=Settings(**options), **where)
     # With requested times an arc runs to the last of them, and hostile numbers make stiff runs.
     options.pop("t_eval", None)
     settings = Settings(**options)
-    run = Run(Start.of(*what, settings=settings, rows_at_once=20, **where))
+    run = Run(Problem.of(*what, settings=settings, rows_at_once=20, **where))
     for _ in range(5):
         if not run.advance():
             break

@@ -33,7 +33,7 @@ from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import GMSError
 from gms_fsm.exporters._quantities import outputs_of
 from gms_fsm.lowering import compiling
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording import compiled_run
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import system_of
@@ -218,7 +218,7 @@ def ran(program: Path, script: Sequence[str] = ("node",)) -> str:
 
 def expected(case: Case, trace: Trace) -> dict[str, Any]:
     """Return what JavaScript must give."""
-    start = Start.of(
+    start = Problem.of(
         case.system, None, case.t_end, Settings(**{**case.settings, "engine": "ifelse"}),
         t_start=case.t_start, initial=case.initial,
     )  # fmt: skip

@@ -21,7 +21,7 @@ from pydantic_core import CoreSchema, PydanticKnownError
 from pydantic_core.core_schema import literal_schema
 
 from gms_fsm.foundation.tables import LIST, ONE, TABLE, TEXT, Numbers, Table
-from gms_fsm.identification.problem.task import Options
+from gms_fsm.identification.problem.task import FitOptions
 from gms_fsm.records.record import Column, Record
 from gms_fsm.run.settings import ENGINES, EVENTS, Settings
 from gms_fsm.systems.files.model_tables import ModelTable
@@ -303,9 +303,9 @@ class FitTable(Table):
                 raise ValueError(f"{name} ends at {pair[1]:g} s, not after its start")
         return self
 
-    def options(self, smoothing: float | None) -> Options:
+    def options(self, smoothing: float | None) -> FitOptions:
         """Return the options of a fit, with the smoothing of the record."""
-        return Options(
+        return FitOptions(
             free=tuple(self.free),
             tied=tuple(self.tied),
             nuisance=tuple(self.nuisance),

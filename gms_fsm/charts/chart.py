@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
 from gms_fsm.charts.parts import State, Transition, texts_of
-from gms_fsm.charts.reader import Reader
+from gms_fsm.charts.reader import ChartReader
 from gms_fsm.errors import ChartError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path
 from gms_fsm.foundation.display import displayed
@@ -147,7 +147,7 @@ class Chart:
         self._check_names()
         self._check_rules()
         expanded = tuple(each for edge in self.transitions for each in edge.each())
-        for each, value in {**Reader(self).trees(), "transitions": expanded}.items():
+        for each, value in {**ChartReader(self).trees(), "transitions": expanded}.items():
             object.__setattr__(self, each, value)
 
     def __repr__(self) -> str:

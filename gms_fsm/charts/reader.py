@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
     from gms_fsm.charts.parts import State
 
-__all__ = ["AGE", "Reader"]
+__all__ = ["AGE", "ChartReader"]
 
 AGE = "age"  # s since the state was entered; a variable of every chart that reads it
 
 
-class Reader:
+class ChartReader:
     """Reads the texts of a chart whose names have been checked.
 
     Parameters

@@ -14,7 +14,7 @@ from gms_fsm.coupling.steppable import alone, begin, other_inputs
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
 from gms_fsm.lowering.program import Program
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Body, Contact, System
@@ -28,7 +28,7 @@ class Driven:
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         Their program, initial state and modes.
     velocities : tuple of int
         For each friction the place of its velocity in the program's state vector.
@@ -40,7 +40,7 @@ class Driven:
         The arguments of `of`.
     """
 
-    start: Start
+    start: Problem
     velocities: tuple[int, ...]
     own: tuple[int, ...]
     forces: tuple[int, ...]
@@ -92,7 +92,7 @@ class Driven:
         system = System("friction", bodies=tuple(bodies), contacts=tuple(contacts))
         settings = Settings(output="end")
         t, end = begin(t)
-        start = Start.of(system, None, end, settings, t_start=t, initial=initial)
+        start = Problem.of(system, None, end, settings, t_start=t, initial=initial)
         layout = start.program.layout
         velocities = tuple(layout.y.index(body.v) for body in bodies)
         return cls(

@@ -17,7 +17,7 @@ from gms_fsm.coupling.steppable import start_of
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.run.plausible import bounds_of
-from gms_fsm.run.problem import LATEST, Start
+from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.settings import MOST_STEPS
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
@@ -82,7 +82,7 @@ class Joint:
         self,
         given: Model | Contact,
         asked: Asked,
-        start: Start,
+        start: Problem,
         memory: JointMemory,
         place: str,
     ) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.ticks import EXACT, clocks_of, in_units
 from gms_fsm.systems.signals import Corners
 from integrators import hybrid
@@ -76,7 +76,7 @@ class ListMemory:
     Calling `run` advances it; see `step_to`.
     """
 
-    def __init__(self, starts: Sequence[Start]) -> None:
+    def __init__(self, starts: Sequence[Problem]) -> None:
         (start,) = starts
         program = start.program
         switch, observe = IfElse(program), program.ieee["observe"]
@@ -102,12 +102,12 @@ class ListMemory:
             getattr(self.sample, name)[:] = copy[f"log {name}"]
 
 
-def prepared(start: Start) -> tuple[Buffers, Sample]:
+def prepared(start: Problem) -> tuple[Buffers, Sample]:
     """Return the buffers of a run without an end, and its first sample.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The system, with its inputs as corner tables.
 
     Returns
@@ -150,7 +150,7 @@ def prepared(start: Start) -> tuple[Buffers, Sample]:
     return b, sample
 
 
-def _clocks(start: Start) -> Clocks:
+def _clocks(start: Problem) -> Clocks:
     """Return what ticks, in units that make periods whole numbers if doubles can hold these."""
     ticking = clocks_of(start.system)
     units = in_units(ticking)
@@ -173,7 +173,7 @@ class BlockMemory:
     item is a number if there is one joint, else one number per joint.
     """
 
-    def __init__(self, starts: Sequence[Start]) -> None:
+    def __init__(self, starts: Sequence[Problem]) -> None:
         from integrators.machine_code.layout import MemoryBlock
 
         code, count = machine_code(starts[0]), len(starts)
@@ -232,12 +232,12 @@ def _across(words: Any, count: int, array: Any) -> Any:
 _known: dict[int, tuple[MachineCode, Any]] = {}
 
 
-def machine_code(start: Start) -> MachineCode:
+def machine_code(start: Problem) -> MachineCode:
     """Return the steps of a system as machine code.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The system.
 
     Returns
@@ -266,12 +266,12 @@ def machine_code(start: Start) -> MachineCode:
     return made
 
 
-def arguments_of(start: Start) -> Any:
+def arguments_of(start: Problem) -> Any:
     """Return the arguments of `integrators.runners.stepping.step_to`, made of lists.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The system, with its inputs as corner tables.
 
     Returns

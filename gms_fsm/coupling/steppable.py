@@ -13,7 +13,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import CONSTANTS, FUNCTIONS
-from gms_fsm.run.problem import LATEST, Start
+from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners, Function
@@ -32,7 +32,7 @@ def start_of(
     rtol: float,
     values: Mapping[str, float] | None = None,
     settings: Settings | None = None,
-) -> Start:
+) -> Problem:
     """Return a friction model or a contact, moved by a velocity that is a straight line.
 
     Parameters
@@ -75,12 +75,12 @@ def start_of(
         signals=signals,
     )
     chosen = Settings(rtol=rtol) if settings is None else settings
-    return Start.of(system, None, end, _usable(chosen, "located"), t_start=t, initial=initial)
+    return Problem.of(system, None, end, _usable(chosen, "located"), t_start=t, initial=initial)
 
 
 def start_of_system(
     system: System, t: float, initial: Mapping[str, Any] | None, settings: Settings
-) -> Start:
+) -> Problem:
     """Return a system whose records are straight lines, which somebody else's loop gives.
 
     Parameters
@@ -118,7 +118,7 @@ def start_of_system(
             signals[name] = Corners(np.array([t, end]), np.full(2, value), held=True)
     moved = dataclasses.replace(system, signals=signals)
     chosen = _usable(settings, "located", "held")  # held events are periods of contacts
-    return Start.of(moved, None, end, chosen, t_start=t, initial=initial)
+    return Problem.of(moved, None, end, chosen, t_start=t, initial=initial)
 
 
 def _usable(settings: Settings, *events: str) -> Settings:

@@ -7,13 +7,13 @@ executes a command and answers in lines; `_terminal` reads and prints. The full-
 
 from gms_fsm.debugger._help import ALIASES, COMMANDS, help_of
 from gms_fsm.debugger._terminal import Debugger
-from gms_fsm.debugger._view import View, view
+from gms_fsm.debugger._view import Screen, view
 
 __all__ = [
     "ALIASES",
     "COMMANDS",
     "Debugger",
-    "View",
+    "Screen",
     "help_of",
     "view",
 ]

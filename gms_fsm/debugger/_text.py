@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from gms_fsm.debugger._over_time import Ribbons
-from gms_fsm.debugger._view import BranchView, ContactView, StateView, View
+from gms_fsm.debugger._view import BranchView, ContactView, Screen, StateView
 from gms_fsm.session.session import Breakpoint
 
 __all__ = [
@@ -46,13 +46,13 @@ DRAWN = Marks("✗✓", "░█", "─▓═┼▒┄", "┌─┐│└┘", "�
 
 
 def screen_lines(
-    view: View, ribbons: Ribbons, chosen: int, marks: Marks, width: int = WIDTH
+    view: Screen, ribbons: Ribbons, chosen: int, marks: Marks, width: int = WIDTH
 ) -> Iterator[str]:
     """Yield one screen: the position, each element with values and edges, the states over time.
 
     Parameters
     ----------
-    view, ribbons : View, Ribbons
+    view, ribbons : Screen, Ribbons
         The data to show.
     chosen : int
         The marked element, counted over all contacts from 0.
@@ -76,7 +76,7 @@ def screen_lines(
     yield from _ribbon_lines(ribbons, view.contacts, marks)
 
 
-def _body_lines(view: View) -> Iterator[str]:
+def _body_lines(view: Screen) -> Iterator[str]:
     """Yield the bodies and the further values of a system."""
     wide = max((len(body.name) for body in view.bodies), default=0)
     for body in view.bodies:
@@ -92,7 +92,7 @@ def _body_lines(view: View) -> Iterator[str]:
 
 
 def _contact_lines(
-    contact: ContactView, view: View, chosen: int, marks: Marks, width: int
+    contact: ContactView, view: Screen, chosen: int, marks: Marks, width: int
 ) -> Iterator[str]:
     """Yield a contact: its force, and each element with its values and edges."""
     more = "".join(f", {name} = {value:.6g}" for name, value in contact.more.items())
@@ -169,7 +169,7 @@ def _ribbon_lines(ribbons: Ribbons, contacts: Sequence[ContactView], marks: Mark
         yield f"      {who}{key}{last}"
 
 
-def ribbon_parts(view: View, width: int = WIDTH) -> int:
+def ribbon_parts(view: Screen, width: int = WIDTH) -> int:
     """Return the number of characters for the states over time."""
     return width - _lead(_labels(view.contacts))
 
@@ -198,7 +198,7 @@ def ending_lines(ending: str) -> Iterator[str]:
     Parameters
     ----------
     ending : str
-        As in `View`.
+        As in `Screen`.
 
     Yields
     ------

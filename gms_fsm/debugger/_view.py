@@ -18,9 +18,9 @@ __all__ = [
     "ContactView",
     "EdgeView",
     "ElementView",
+    "Screen",
     "StateView",
     "ValueView",
-    "View",
     "branches",
     "chart_states",
     "ending",
@@ -156,7 +156,7 @@ class ValueView:
 
 
 @dataclass(frozen=True)
-class View:
+class Screen:
     """One screen: the current position of the session.
 
     Parameters
@@ -254,7 +254,7 @@ class BranchView:
     edits: str
 
 
-def view(session: Session) -> View:
+def view(session: Session) -> Screen:
     """Return the screen at the cursor of a session.
 
     Parameters
@@ -289,7 +289,7 @@ def view(session: Session) -> View:
             for body in start.system.bodies
         )
         values = _values(session)
-    return View(
+    return Screen(
         session.current,
         here.row,
         here.microstep,

@@ -13,7 +13,7 @@ from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import names_in, spell
 from gms_fsm.lowering.adapting import FUNCTIONS, Adapting, adapt, bind, text_of
 from gms_fsm.lowering.compiling import functions
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout
 from integrators.runners.compiled import is_known
@@ -21,7 +21,7 @@ from integrators.runners.stepping import step_to
 
 __all__ = [
     "STEPS",
-    "StepArguments",
+    "ExportArguments",
     "adapting_of",
     "check_first_call",
     "step_arguments",
@@ -43,7 +43,7 @@ PLACES: Mapping[str, str] = {
 }
 
 
-class StepArguments(NamedTuple):
+class ExportArguments(NamedTuple):
     """The arguments of both functions."""
 
     functions: Any
@@ -53,10 +53,10 @@ class StepArguments(NamedTuple):
     adapting: Adapting
 
 
-def step_arguments(start: Start) -> tuple[StepArguments, BlockLayout]:
+def step_arguments(start: Problem) -> tuple[ExportArguments, BlockLayout]:
     """Return the contents of the block at a start, and where everything is in it."""
     step: tuple[Any, Any, Any, Any] = arguments_of(start)
-    made = StepArguments(*step, adapting_of(start))
+    made = ExportArguments(*step, adapting_of(start))
     return made, BlockLayout(made, is_known)
 
 
@@ -77,12 +77,12 @@ def word_of(layout: BlockLayout, each: Quantity) -> int:
     return layout.offset(PLACES[each.place]) + each.index
 
 
-def adapting_of(start: Start) -> Adapting:
+def adapting_of(start: Problem) -> Adapting:
     """Return the functions that follow a start's numbers, and what they need.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         What is exported.
 
     Returns

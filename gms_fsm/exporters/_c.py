@@ -20,7 +20,7 @@ from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import C_WORDS
-from gms_fsm.run.problem import LATEST, Start
+from gms_fsm.run.problem import LATEST, Problem
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout, MemoryBlock
@@ -120,7 +120,7 @@ def engine_of(subject: Subject) -> CEngine:
 class _Text:
     """Writes header and source."""
 
-    def __init__(self, made: CEngine, start: Start, title: str) -> None:
+    def __init__(self, made: CEngine, start: Problem, title: str) -> None:
         self.made, self.start, self.title, self.name = made, start, title, made.name
         self.arguments, self.layout = step_arguments(start)
 

@@ -10,7 +10,7 @@ from typing import Any
 from gms_fsm.charts.parameters import QUANTITIES, SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.system import Contact, System
 
@@ -62,12 +62,12 @@ class Quantity:
         return f"- `{self.name}` = {', '.join(map(repr, self.values))} {self.unit}".rstrip()
 
 
-def outputs_of(start: Start, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
+def outputs_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
     """Return what an export shows: states, forces and what else is observed.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         What is exported.
     alone : bool
         Whether it is one friction, whose name is then left out.
@@ -105,7 +105,7 @@ def outputs_of(start: Start, alone: bool, words: Iterable[str]) -> tuple[Quantit
     return tuple(found)
 
 
-def parameters_of(start: Start, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
+def parameters_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
     """Return the numbers of an export.
 
     Parameters

@@ -12,7 +12,7 @@ from gms_fsm.coupling.steppable import alone, begin, start_of, start_of_system
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import slug
 from gms_fsm.foundation.arguments import checked_kind
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners
@@ -136,7 +136,7 @@ class Subject:
         return self.start.system if self.whole is None else self.whole
 
     @functools.cached_property
-    def start(self) -> Start:
+    def start(self) -> Problem:
         """A system whose inputs are straight lines during each call: records, or the velocity.
 
         Raises

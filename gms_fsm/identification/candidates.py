@@ -28,7 +28,7 @@ __all__ = [
     "STIFFER_ONE_WAY",
     "Build",
     "Candidate",
-    "Start",
+    "FitStart",
     "behind_backlash",
     "gms",
     "stiffer_one_way",
@@ -104,7 +104,7 @@ BEHIND_BACKLASH = Chart(
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class FitStart:
     """What a candidate gives `fit`: a model with start values, and what to find.
 
     Parameters
@@ -125,7 +125,7 @@ class Start:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
-Build = Callable[[Sequence[Record], float | None], Start]
+Build = Callable[[Sequence[Record], float | None], FitStart]
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class Candidate:
     reason : str
         Why it is tried.
     build : callable
-        Makes the `Start` from records, of which it may read the force at the selected rows only,
+        Makes the `FitStart` from records, of which it may read the force at the selected rows only,
         and the time constant of the motion's smoothing spline.
 
     Examples
@@ -182,7 +182,7 @@ class _Seen:
         return NARROWEST * self.speed, self.fastest
 
 
-def gms(records: Sequence[Record], smoothing: float | None, *, n: int) -> Start:
+def gms(records: Sequence[Record], smoothing: float | None, *, n: int) -> FitStart:
     """Return a bank of GMS elements, signed law, with one C and a bounded Stribeck curve.
 
     Parameters
@@ -208,7 +208,7 @@ def gms(records: Sequence[Record], smoothing: float | None, *, n: int) -> Start:
         law="signed",
     )
     F_c = given.stribeck.F_c
-    return Start(
+    return FitStart(
         model,
         ("k", "weights", "C", "F_s", "v_s", "sigma_2"),
         tied=("C",),
@@ -221,7 +221,7 @@ def gms(records: Sequence[Record], smoothing: float | None, *, n: int) -> Start:
     )
 
 
-def stiffer_one_way(records: Sequence[Record], smoothing: float | None, *, n: int) -> Start:
+def stiffer_one_way(records: Sequence[Record], smoothing: float | None, *, n: int) -> FitStart:
     """Return a Maxwell-slip bank whose springs are stiffer in one direction.
 
     Parameters
@@ -241,14 +241,14 @@ def stiffer_one_way(records: Sequence[Record], smoothing: float | None, *, n: in
         "b": np.zeros(n),
         "z_c": bank.weights * bank.stribeck.F_c,
     }
-    return Start(
+    return FitStart(
         ChartModel(STIFFER_ONE_WAY, values, n=n),
         ("k", "b", "z_c", "sigma_2"),
         bounds={"z_c": (FINEST * seen.travel, seen.travel)},
     )
 
 
-def behind_backlash(records: Sequence[Record], smoothing: float | None, *, n: int) -> Start:
+def behind_backlash(records: Sequence[Record], smoothing: float | None, *, n: int) -> FitStart:
     """Return slipping springs behind gaps, with thresholds that differ by direction.
 
     Parameters
@@ -273,7 +273,7 @@ def behind_backlash(records: Sequence[Record], smoothing: float | None, *, n: in
         "rho": 0.05,
         "v_s": 0.5 * seen.speed,
     }
-    return Start(
+    return FitStart(
         ChartModel(BEHIND_BACKLASH, values, n=n),
         ("k", "b", "g", "r", "ratio", "rho", "v_s", "sigma_2"),
         bounds={

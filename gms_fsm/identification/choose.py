@@ -19,14 +19,14 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
 from gms_fsm.foundation.arguments import checked_kind, listed
-from gms_fsm.identification.candidates import CANDIDATES, Candidate, Start
+from gms_fsm.identification.candidates import CANDIDATES, Candidate, FitStart
 from gms_fsm.identification.certainty.statistics import correlation_time
 from gms_fsm.identification.fit import fitted, options_of, task_of, window_of
 from gms_fsm.identification.problem.experiment import Point
-from gms_fsm.identification.problem.runs import Pool
+from gms_fsm.identification.problem.runs import ThreadPool
 from gms_fsm.identification.problem.search import Best, refine
 from gms_fsm.identification.problem.task import (
-    Options,
+    FitOptions,
     Task,
     at_all_rows,
     bar,
@@ -134,7 +134,7 @@ def choose(
     results: list[_Tried] = []
     rows: list[ChoiceRow] = []
     stopped = ""
-    with Pool() as pool, bar("choose", progress) as told:
+    with ThreadPool() as pool, bar("choose", progress) as told:
         try:
             for done, candidate in enumerate(tried):
                 told(done / (len(tried) + 1))
@@ -202,7 +202,7 @@ def _checked_candidates(given: Any) -> list[Candidate]:
             unknowns_of(what, names, (), {})
         except GMSError as error:
             raise error.inside(f"candidate {shown(name)}") from None
-        found.append(Candidate(name, "given", _given(Start(model, names))))
+        found.append(Candidate(name, "given", _given(FitStart(model, names))))
     if not found:
         raise ParameterError("there is none", place="candidates", advice="give at least one")
     called = [each.name for each in found]
@@ -222,12 +222,12 @@ def _parts(name: object, given: Any, count: int) -> tuple[Any, ...]:
     return tuple(given)
 
 
-def _given(start: Start) -> Any:
+def _given(start: FitStart) -> Any:
     return lambda _records, _smoothing: start
 
 
 # --------------------------------------------------------------------------- rows and folds
-def _training_rows(record: Record, options: Options) -> Record:
+def _training_rows(record: Record, options: FitOptions) -> Record:
     """Return a record up to its last training row, of which only training rows are selected.
 
     Its motion is that of the whole record, smoothed.
@@ -264,7 +264,7 @@ class _Folds:
     parts: tuple[tuple[tuple[Record, ...], tuple[Record, ...]], ...]
 
 
-def _folds(records: Sequence[Record], fold: Any, options: Options) -> _Folds:
+def _folds(records: Sequence[Record], fold: Any, options: FitOptions) -> _Folds:
     if fold is None:
         fold = FOLDS[0] if len(records) > 1 else FOLDS[1]
     if not isinstance(fold, str) or fold not in FOLDS:
@@ -383,7 +383,7 @@ class _Tried:
     """A candidate, searched and scored."""
 
     candidate: Candidate
-    start: Start
+    start: FitStart
     task: Task
     point: Point
     squares: FloatArray  # of the errors on each fold left out, N^2, shape (folds,)
@@ -421,7 +421,11 @@ class _Tried:
 
 
 def _try(
-    candidate: Candidate, records: Sequence[Record], folds: _Folds, options: Options, pool: Pool
+    candidate: Candidate,
+    records: Sequence[Record],
+    folds: _Folds,
+    options: FitOptions,
+    pool: ThreadPool,
 ) -> _Tried | ChoiceRow:
     """Search a candidate on all training rows, then refine and score it fold by fold."""
     began = time.perf_counter()
@@ -467,7 +471,7 @@ def _try(
 
 
 def _scored(
-    task: Task, point: Point, kept: tuple[Record, ...], left: tuple[Record, ...], pool: Pool
+    task: Task, point: Point, kept: tuple[Record, ...], left: tuple[Record, ...], pool: ThreadPool
 ) -> tuple[float, float]:
     """Return the sum of squares and the number of rows on what was left out."""
     own = replace(task, records=kept)
@@ -499,7 +503,7 @@ def _chosen(results: Sequence[_Tried]) -> _Tried:
     return min(good, key=lambda each: (each.free, each.mean))
 
 
-def _final(best: _Tried, records: Sequence[Record], options: Options) -> Fit:
+def _final(best: _Tried, records: Sequence[Record], options: FitOptions) -> Fit:
     """Return the chosen model, refined on all training rows."""
     own = replace(
         options,

@@ -27,9 +27,9 @@ from gms_fsm.identification.certainty.assess import (
 )
 from gms_fsm.identification.problem.experiment import MASS, NUISANCE, Point, value_of
 from gms_fsm.identification.problem.linear import linear_names
-from gms_fsm.identification.problem.runs import BEGINS, Pool
+from gms_fsm.identification.problem.runs import BEGINS, ThreadPool
 from gms_fsm.identification.problem.search import SEARCHES, Best
-from gms_fsm.identification.problem.task import Options, Task, bar, inside, training_rows
+from gms_fsm.identification.problem.task import FitOptions, Task, bar, inside, training_rows
 from gms_fsm.identification.problem.unknowns import values_by_key
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.record import Record
@@ -169,7 +169,7 @@ def fit(
 
 
 # --------------------------------------------------------------------------- arguments
-def options_of(**given: Any) -> Options:
+def options_of(**given: Any) -> FitOptions:
     """Check the arguments that do not depend on model and records."""
     checked_integer("seed", given["seed"], 0)
     if given["most_steps"] is not None:
@@ -189,7 +189,7 @@ def options_of(**given: Any) -> Options:
         raise ParameterError(
             "nothing is to be found", place="free", advice="name parameters, for example ['k']"
         )
-    return Options(**given)
+    return FitOptions(**given)
 
 
 def _one_of(name: str, given: object, known: tuple[str, ...]) -> None:
@@ -228,7 +228,7 @@ def task_of(
     records: Record | Sequence[Record],
     model: Model | System,
     fixed: Mapping[str, ArrayLike],
-    options: Options,
+    options: FitOptions,
 ) -> Task:
     """Return what is fitted to what, checked.
 
@@ -236,7 +236,7 @@ def task_of(
     ----------
     records, model, fixed
         As in `fit`.
-    options : Options
+    options : FitOptions
         All other arguments.
 
     Returns
@@ -399,7 +399,7 @@ def fitted(task: Task, *, progress: bool | None = False, intervals: bool = True)
     """
     began, stopped = time.perf_counter(), ""
     coarse, fine = Best(), Best()
-    with Pool() as pool:
+    with ThreadPool() as pool:
         try:
             with bar("fit", progress) as told:
                 coarse.told = told
@@ -442,7 +442,9 @@ def fitted(task: Task, *, progress: bool | None = False, intervals: bool = True)
     return Fit(final, point, table, notes, task.ran[0], seconds, stopped)
 
 
-def _assessed(task: Task, point: Point, pool: Pool, again: int) -> tuple[Task, Point, Assessed]:
+def _assessed(
+    task: Task, point: Point, pool: ThreadPool, again: int
+) -> tuple[Task, Point, Assessed]:
     """Return the table of a fit; a better point met on the way is searched from, and assessed."""
     table = assessed(task, point, pool)
     for _ in range(again):

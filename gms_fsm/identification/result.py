@@ -18,7 +18,7 @@ from gms_fsm.foundation.arguments import checked_integer, checked_kind, checked_
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import missing
 from gms_fsm.identification.certainty.assess import Assessed, Estimate
-from gms_fsm.identification.certainty.compared import Choice, ChoiceRow, Comparison, score_of
+from gms_fsm.identification.certainty.compared import Choice, ChoiceRow, FitComparison, score_of
 from gms_fsm.identification.certainty.intervals import Bootstrap, bootstrapped, profiled
 from gms_fsm.identification.certainty.profile import Profile
 from gms_fsm.identification.certainty.statistics import phase_floor
@@ -30,7 +30,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Choice", "ChoiceRow", "Comparison", "Estimate", "Fit", "Residuals", "score_of"]
+__all__ = ["Choice", "ChoiceRow", "Estimate", "Fit", "FitComparison", "Residuals", "score_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -437,7 +437,7 @@ class Fit:
             seed=seed,
         )
 
-    def compare(self, others: Fit | Sequence[Fit] | Mapping[str, Fit]) -> Comparison:
+    def compare(self, others: Fit | Sequence[Fit] | Mapping[str, Fit]) -> FitComparison:
         """Return this fit beside others, the best on held-out rows first.
 
         Parameters
@@ -480,7 +480,7 @@ class Fit:
         # One number of rows for all, that of the best: else the order would depend on units.
         effective = min(every.values(), key=lambda each: each.point.cost).effective_rows
         rows = [each._compared(name, effective) for name, each in every.items()]
-        return Comparison(tuple(sorted(rows, key=lambda row: (bool(row.note), row.rmse))))
+        return FitComparison(tuple(sorted(rows, key=lambda row: (bool(row.note), row.rmse))))
 
     def _compared(self, name: str, effective: float) -> ChoiceRow:
         score = self.held_out or self.training

@@ -25,7 +25,7 @@ from gms_fsm.systems.system import Body, Contact, System
 from gms_fsm.traces.failures import StepLimitError
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Bench", "ForcePath", "Motion", "fastest_engine", "path", "run"]
+__all__ = ["Bench", "BenchMotion", "ForcePath", "fastest_engine", "path", "run"]
 
 MOST_STEPS = 1_000_000
 # A run that needs more is stiff, or chatters; it is then made with an implicit method, whose steps
@@ -121,7 +121,7 @@ class Bench:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class BenchMotion:
     """What pushes and pulls the slider.
 
     ``force + (vibration + growth * t) * sin(omega * (t - start))`` pushes it; a drive that moves
@@ -170,7 +170,7 @@ def fastest_engine() -> str:
 def run(
     contact: Contact,
     bench: Bench,
-    motion: Motion,
+    motion: BenchMotion,
     t_end: float,
     t_eval: FloatArray | None = None,
 ) -> Trace:
@@ -182,7 +182,7 @@ def run(
         Called ``friction``, on the velocity ``v``.
     bench : Bench
         Mass and tolerance.
-    motion : Motion
+    motion : BenchMotion
         What moves the slider.
     t_end : float
         s.

@@ -10,9 +10,9 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
-from gms_fsm.phenomena._bench import Motion
+from gms_fsm.phenomena._bench import BenchMotion
 from gms_fsm.phenomena.limits import LIMITS
-from gms_fsm.phenomena.results import Curve, Measured, Number, Phenomenon, Verdict
+from gms_fsm.phenomena.results import Curve, MeasuredNumber, Phenomenon, PhenomenonResult, Verdict
 
 if TYPE_CHECKING:
     from gms_fsm.phenomena.specimens import Specimen
@@ -66,7 +66,7 @@ def pulled(specimen: Specimen, rate: float) -> Pulled:
     """
     bench = specimen.bench
     speed = rate / bench.stiffness
-    motion = Motion(spring=bench.stiffness, velocity=((0.0, speed), (1.0, speed)))
+    motion = BenchMotion(spring=bench.stiffness, velocity=((0.0, speed), (1.0, speed)))
     reach = 1.2 * bench.F_s
     while reach <= LONGEST * bench.F_s:
         trace = specimen.run(motion, reach / rate + 0.2)
@@ -82,7 +82,7 @@ def pulled(specimen: Specimen, rate: float) -> Pulled:
     )
 
 
-def _break_away(specimen: Specimen) -> Measured:
+def _break_away(specimen: Specimen) -> PhenomenonResult:
     rates = np.array(RATES) * specimen.bench.F_s
     forces = np.array([specimen.break_away, *(pulled(specimen, r).force for r in rates[1:])])
     fall = float(forces[0] - forces[-1])
@@ -96,19 +96,21 @@ def _break_away(specimen: Specimen) -> Measured:
         "shows wrongly": "the break-away force rises with the force rate",
     }[verdict]
     numbers = (
-        Number("fall of the break-away force", fall, "N"),
+        MeasuredNumber("fall of the break-away force", fall, "N"),
         *(
-            Number(f"break-away force at {rate:.3g} N/s", float(force), "N")
+            MeasuredNumber(f"break-away force at {rate:.3g} N/s", float(force), "N")
             for rate, force in zip(rates, forces, strict=True)
         ),
     )
-    return Measured(verdict, numbers, said, (Curve("", rates, forces),))
+    return PhenomenonResult(verdict, numbers, said, (Curve("", rates, forces),))
 
 
-def _vibration(specimen: Specimen) -> Measured:
+def _vibration(specimen: Specimen) -> PhenomenonResult:
     bench, force = specimen.bench, specimen.break_away
     bias, growth = BIAS * force, MOST * force / GROWTH
-    motion = Motion(force=((0.0, 0.0), (0.5, bias), (1.0, bias)), growth=growth, omega=VIBRATION)
+    motion = BenchMotion(
+        force=((0.0, 0.0), (0.5, bias), (1.0, bias)), growth=growth, omega=VIBRATION
+    )
     trace = specimen.run(motion, GROWTH)
     gone = np.flatnonzero(trace.x > TRAVEL * bench.bristle)
     end = int(gone[0]) if gone.size else len(trace) - 1
@@ -126,11 +128,11 @@ def _vibration(specimen: Specimen) -> Measured:
     else:
         verdict, said = "shows", "it is released when the peak force reaches the break-away force"
     numbers = (
-        Number("peak force at the release over break-away force", ratio, "1"),
-        Number("amplitude at the release", growth * at, "N"),
-        Number("bias", bias, "N"),
+        MeasuredNumber("peak force at the release over break-away force", ratio, "1"),
+        MeasuredNumber("amplitude at the release", growth * at, "N"),
+        MeasuredNumber("bias", bias, "N"),
     )
-    return Measured(verdict, numbers, said, (curve,))
+    return PhenomenonResult(verdict, numbers, said, (curve,))
 
 
 PHENOMENA = (

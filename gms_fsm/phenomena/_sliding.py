@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.phenomena._bench import Bench, Motion
+from gms_fsm.phenomena._bench import Bench, BenchMotion
 from gms_fsm.phenomena.limits import LIMITS
-from gms_fsm.phenomena.results import Curve, Measured, Number, Phenomenon, Verdict
+from gms_fsm.phenomena.results import Curve, MeasuredNumber, Phenomenon, PhenomenonResult, Verdict
 
 if TYPE_CHECKING:
     from gms_fsm.phenomena.specimens import Specimen
@@ -30,12 +30,12 @@ CYCLE = ((0, 0), (10, -1), (100, -1), (110, 0), (115, 5), (130, 5), (135, 0), (1
 CYCLES = 3
 
 
-def _stiff(bench: Bench, **options: object) -> Motion:
+def _stiff(bench: Bench, **options: object) -> BenchMotion:
     spring, damper = bench.stiff
-    return Motion(spring=spring, damper=damper, **options)  # type: ignore[arg-type]
+    return BenchMotion(spring=spring, damper=damper, **options)  # type: ignore[arg-type]
 
 
-def _lag(specimen: Specimen) -> Measured:
+def _lag(specimen: Specimen) -> PhenomenonResult:
     bench = specimen.bench
     mean, swing = MEAN * bench.v_s, SWING * bench.v_s
     widths, curves = [], []
@@ -61,12 +61,13 @@ def _lag(specimen: Specimen) -> Measured:
         verdict, said = "does not show", "friction depends on the present speed only"
     order = (1, 0, 2)
     numbers = tuple(
-        Number(f"width of the loop at {OMEGAS[k]:g} rad/s", 1e3 * widths[k], "mN") for k in order
+        MeasuredNumber(f"width of the loop at {OMEGAS[k]:g} rad/s", 1e3 * widths[k], "mN")
+        for k in order
     )
-    return Measured(verdict, numbers, said, tuple(curves))
+    return PhenomenonResult(verdict, numbers, said, tuple(curves))
 
 
-def _stribeck(specimen: Specimen) -> Measured:
+def _stribeck(specimen: Specimen) -> PhenomenonResult:
     bench = specimen.bench
     speeds = np.array(SPEEDS) * bench.v_s
     corners: list[tuple[float, float]] = [(0.0, 0.0)]
@@ -86,17 +87,17 @@ def _stribeck(specimen: Specimen) -> Measured:
     else:
         verdict, said = "does not show", "friction does not fall with the speed"
     numbers = (
-        Number("fall of the friction", fall, "N"),
-        Number(f"friction at {1e3 * v[0]:.3g} mm/s", float(F[0]), "N"),
-        Number("least friction", float(F[lowest]), "N"),
-        Number(f"friction at {1e3 * v[-1]:.3g} mm/s", float(F[-1]), "N"),
+        MeasuredNumber("fall of the friction", fall, "N"),
+        MeasuredNumber(f"friction at {1e3 * v[0]:.3g} mm/s", float(F[0]), "N"),
+        MeasuredNumber("least friction", float(F[lowest]), "N"),
+        MeasuredNumber(f"friction at {1e3 * v[-1]:.3g} mm/s", float(F[-1]), "N"),
     )
-    return Measured(verdict, numbers, said, (Curve("", 1e3 * v, F),))
+    return PhenomenonResult(verdict, numbers, said, (Curve("", 1e3 * v, F),))
 
 
-def _stick_slip(specimen: Specimen) -> Measured:
+def _stick_slip(specimen: Specimen) -> PhenomenonResult:
     bench = specimen.bench
-    motion = Motion(spring=bench.stiffness, velocity=((0.0, bench.speed), (1.0, bench.speed)))
+    motion = BenchMotion(spring=bench.stiffness, velocity=((0.0, bench.speed), (1.0, bench.speed)))
     trace = specimen.run(motion, PULLED).refined(4000)
     t, pull = trace.t, bench.stiffness * (bench.speed * trace.t - trace.x)
     cycle = _last_cycle(t, trace.v, bench.speed)
@@ -114,11 +115,11 @@ def _stick_slip(specimen: Specimen) -> Measured:
     else:
         verdict, said = "shows", "it sticks and slips in a limit cycle"
     numbers = (
-        Number("amplitude of the spring force", amplitude, "N"),
-        Number("period", period, "s"),
-        Number("share of the period in stick", stuck, "1"),
+        MeasuredNumber("amplitude of the spring force", amplitude, "N"),
+        MeasuredNumber("period", period, "s"),
+        MeasuredNumber("share of the period in stick", stuck, "1"),
     )
-    return Measured(verdict, numbers, said, (Curve("", t, pull),))
+    return PhenomenonResult(verdict, numbers, said, (Curve("", t, pull),))
 
 
 def _last_cycle(t: FloatArray, v: FloatArray, speed: float) -> tuple[float, float] | None:
@@ -137,7 +138,7 @@ def _share(t: FloatArray, true: NDArray[np.bool_]) -> float:
     return float(steps[true[:-1] & true[1:]].sum() / steps.sum())
 
 
-def _passivity(specimen: Specimen) -> Measured:
+def _passivity(specimen: Specimen) -> PhenomenonResult:
     bench = specimen.bench
     length = 1e-3 * CYCLE[-1][0]
     corners = [(0.0, 0.0)] + [
@@ -154,12 +155,12 @@ def _passivity(specimen: Specimen) -> Measured:
     else:
         verdict, said = "shows", "it never gives back more energy than it has taken"
     numbers = (
-        Number("energy made", 1e3 * made, "mJ"),
-        Number("energy taken in all cycles", 1e3 * float(given[-1]), "mJ"),
-        Number("energy exchanged", 1e3 * exchanged, "mJ"),
-        Number("largest friction force", float(np.abs(trace.F).max()), "N"),
+        MeasuredNumber("energy made", 1e3 * made, "mJ"),
+        MeasuredNumber("energy taken in all cycles", 1e3 * float(given[-1]), "mJ"),
+        MeasuredNumber("energy exchanged", 1e3 * exchanged, "mJ"),
+        MeasuredNumber("largest friction force", float(np.abs(trace.F).max()), "N"),
     )
-    return Measured(verdict, numbers, said, (Curve("", 1e3 * trace.t, 1e3 * given),))
+    return PhenomenonResult(verdict, numbers, said, (Curve("", 1e3 * trace.t, 1e3 * given),))
 
 
 PHENOMENA = (

@@ -8,7 +8,7 @@ from gms_fsm.errors import GMSError, ParameterError, shown
 from gms_fsm.foundation.arguments import checked_kind, listed
 from gms_fsm.phenomena import _break_away, _sliding, presliding
 from gms_fsm.phenomena._bench import Bench
-from gms_fsm.phenomena.results import Cell, Measured, PhenomenaTable, Phenomenon
+from gms_fsm.phenomena.results import Cell, PhenomenaTable, Phenomenon, PhenomenonResult
 from gms_fsm.phenomena.specimens import Specimen, specimens_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
@@ -109,10 +109,10 @@ def chosen_phenomena(names: Iterable[str] | None) -> tuple[Phenomenon, ...]:
     return tuple(each for name, each in PHENOMENA.items() if name in wanted)
 
 
-def _measured(specimen: Specimen, phenomenon: Phenomenon) -> Measured:
+def _measured(specimen: Specimen, phenomenon: Phenomenon) -> PhenomenonResult:
     if specimen.contact is None:
-        return Measured("does not apply", (), specimen.why_not)
+        return PhenomenonResult("does not apply", (), specimen.why_not)
     try:
         return phenomenon.measure(specimen)
     except GMSError as error:  # the other experiments go on; the table says what happened
-        return Measured("failed", (), str(error))
+        return PhenomenonResult("failed", (), str(error))

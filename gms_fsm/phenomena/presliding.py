@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.phenomena._bench import ForcePath, Motion, path
+from gms_fsm.phenomena._bench import BenchMotion, ForcePath, path
 from gms_fsm.phenomena.limits import LIMITS
-from gms_fsm.phenomena.results import Curve, Measured, Number, Phenomenon, Verdict
+from gms_fsm.phenomena.results import Curve, MeasuredNumber, Phenomenon, PhenomenonResult, Verdict
 
 if TYPE_CHECKING:
     from gms_fsm.phenomena.specimens import Specimen
@@ -41,10 +41,10 @@ def work(force: FloatArray, x: FloatArray) -> float:
     return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x)))
 
 
-def _hysteresis(specimen: Specimen) -> Measured:
+def _hysteresis(specimen: Specimen) -> PhenomenonResult:
     force = specimen.break_away
     way = path(RATE * force, [each * force for each in OUTER], HOLD)
-    trace = specimen.run(Motion(force=way.corners), float(way.ends[-1]), way.times)
+    trace = specimen.run(BenchMotion(force=way.corners), float(way.ends[-1]), way.times)
     x = dict(zip(trace.t.tolist(), trace.x.tolist(), strict=True))
     applied = way.force(trace.t)
     down, up = (np.array([x[t] for t in branch.tolist()]) for branch in way.branches[1:])
@@ -64,23 +64,23 @@ def _hysteresis(specimen: Specimen) -> Measured:
     else:
         verdict, said = "shows", "unloading does not follow the line of loading"
     numbers = (
-        Number("width of the loop at F = 0", 1e6 * width, "µm"),
-        Number("stroke", 1e6 * stroke, "µm"),
-        Number("width over stroke", share, "1"),
-        Number("energy lost per cycle", 1e6 * loss, "µJ"),
+        MeasuredNumber("width of the loop at F = 0", 1e6 * width, "µm"),
+        MeasuredNumber("stroke", 1e6 * stroke, "µm"),
+        MeasuredNumber("width over stroke", share, "1"),
+        MeasuredNumber("energy lost per cycle", 1e6 * loss, "µJ"),
     )
-    return Measured(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
+    return PhenomenonResult(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
 
 
 def nested(specimen: Specimen) -> tuple[ForcePath, Trace]:
     """Return the force with nested reversals, and the run under it."""
     force = specimen.break_away
     way = path(RATE * force, [each * force for each in NESTED], HOLD, smooth=True)
-    trace: Trace = specimen.run(Motion(force=way.corners), float(way.ends[-1]), way.times)
+    trace: Trace = specimen.run(BenchMotion(force=way.corners), float(way.ends[-1]), way.times)
     return way, trace
 
 
-def _memory(specimen: Specimen) -> Measured:
+def _memory(specimen: Specimen) -> PhenomenonResult:
     way, trace = nested(specimen)
     x = dict(zip(trace.t.tolist(), trace.x.tolist(), strict=True))
     outer, inner, top, inner_again, outer_again = (x[t] for t in way.ends.tolist())
@@ -102,19 +102,19 @@ def _memory(specimen: Specimen) -> Measured:
     else:
         verdict, said = "shows", "the inner loops close where they began"
     numbers = (
-        Number("gap of the inner loops over their stroke", 100.0 * open_by, "%"),
-        Number("gap", 1e6 * abs(gap), "µm"),
-        Number("stroke of the inner loop", 1e6 * stroke, "µm"),
-        Number("width of the inner loop at F = 0", 1e6 * width, "µm"),
+        MeasuredNumber("gap of the inner loops over their stroke", 100.0 * open_by, "%"),
+        MeasuredNumber("gap", 1e6 * abs(gap), "µm"),
+        MeasuredNumber("stroke of the inner loop", 1e6 * stroke, "µm"),
+        MeasuredNumber("width of the inner loop at F = 0", 1e6 * width, "µm"),
     )
     applied = way.force(trace.t)
-    return Measured(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
+    return PhenomenonResult(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
 
 
-def _drift(specimen: Specimen) -> Measured:
+def _drift(specimen: Specimen) -> PhenomenonResult:
     bench, force = specimen.bench, specimen.break_away
     start = BIAS_RAMP[2][0]
-    motion = Motion(
+    motion = BenchMotion(
         force=[(t, share * force) for t, share in BIAS_RAMP],
         vibration=RIPPLE * force,
         start=start,
@@ -135,10 +135,10 @@ def _drift(specimen: Specimen) -> Measured:
     )
     said = "it stays in place" if verdict == "shows" else "it drifts, far below break-away"
     numbers = (
-        Number("drift per period", 1e6 * drift, "µm"),
-        Number("drift rate", 1e6 * drift * FREQUENCY, "µm/s"),
+        MeasuredNumber("drift per period", 1e6 * drift, "µm"),
+        MeasuredNumber("drift rate", 1e6 * drift * FREQUENCY, "µm/s"),
     )
-    return Measured(verdict, numbers, said, (Curve("", trace.t, 1e6 * trace.x),))
+    return PhenomenonResult(verdict, numbers, said, (Curve("", trace.t, 1e6 * trace.x),))
 
 
 PHENOMENA = (

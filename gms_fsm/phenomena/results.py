@@ -12,7 +12,15 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.phenomena.limits import LIMITS, Limit
 
-__all__ = ["MARKS", "VERDICTS", "Cell", "Curve", "Measured", "Number", "PhenomenaTable"]
+__all__ = [
+    "MARKS",
+    "VERDICTS",
+    "Cell",
+    "Curve",
+    "MeasuredNumber",
+    "PhenomenaTable",
+    "PhenomenonResult",
+]
 __all__ += ["Phenomenon", "Verdict"]
 
 Verdict = Literal["shows", "does not show", "shows wrongly", "does not apply", "failed"]
@@ -23,7 +31,7 @@ SMALLEST = 1e-3  # in its unit: a smaller number is printed as 0.000; tables in 
 
 
 @dataclass(frozen=True)
-class Number:
+class MeasuredNumber:
     """A measured number.
 
     Parameters
@@ -64,14 +72,14 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class PhenomenonResult:
     """What one model does in one experiment.
 
     Parameters
     ----------
     verdict : str
         One of `VERDICTS`.
-    numbers : tuple of Number
+    numbers : tuple of MeasuredNumber
         The measured numbers, the one that is shown in the table first. Empty only if the
         experiment does not apply or failed.
     said : str
@@ -81,7 +89,7 @@ class Measured:
     """
 
     verdict: Verdict
-    numbers: tuple[Number, ...]
+    numbers: tuple[MeasuredNumber, ...]
     said: str
     curves: tuple[Curve, ...] = field(default=(), repr=False)
 
@@ -127,7 +135,7 @@ class Phenomenon:
     axes : (str, str)
         Labels of the curves' axes, with units.
     measure : callable
-        ``measure(specimen)`` returns a `Measured`.
+        ``measure(specimen)`` returns a `PhenomenonResult`.
     log : bool
         Whether the horizontal axis is logarithmic.
     """
@@ -137,7 +145,7 @@ class Phenomenon:
     short: str
     experiment: str
     axes: tuple[str, str]
-    measure: Callable[..., Measured] = field(repr=False)
+    measure: Callable[..., PhenomenonResult] = field(repr=False)
     log: bool = False
 
     @property
@@ -156,13 +164,13 @@ class Cell:
         Name of the model.
     phenomenon : Phenomenon
         The experiment.
-    measured : Measured
+    measured : PhenomenonResult
         The result.
     """
 
     model: str
     phenomenon: Phenomenon
-    measured: Measured
+    measured: PhenomenonResult
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +196,7 @@ class PhenomenaTable:
         """Names of the models."""
         return tuple(self.titles)
 
-    def cell(self, model: str, phenomenon: str) -> Measured:
+    def cell(self, model: str, phenomenon: str) -> PhenomenonResult:
         """Return what was measured.
 
         Parameters
@@ -280,7 +288,7 @@ MARKS = {
 }
 
 
-def _brief(found: Measured) -> str:
+def _brief(found: PhenomenonResult) -> str:
     mark = MARKS[found.verdict]
     return f"{mark} {found.numbers[0]}" if found.numbers else mark
 

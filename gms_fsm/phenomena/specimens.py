@@ -15,7 +15,7 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ExpressionError, ParameterError, shown
 from gms_fsm.foundation.arguments import checked_kind, listed
 from gms_fsm.language import parse_value
-from gms_fsm.phenomena._bench import Bench, Motion, run
+from gms_fsm.phenomena._bench import Bench, BenchMotion, run
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import ChartModel, Model, demonstration, is_model
 from gms_fsm.systems.system import Contact
@@ -56,7 +56,7 @@ class Specimen:
     bench: Bench
     why_not: str = ""
 
-    def run(self, motion: Motion, t_end: float, t_eval: Any = None) -> Any:
+    def run(self, motion: BenchMotion, t_end: float, t_eval: Any = None) -> Any:
         """Run it; see `gms_fsm.phenomena._bench.run`."""
         assert self.contact is not None
         return run(self.contact, self.bench, motion, t_end, t_eval)

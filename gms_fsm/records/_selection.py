@@ -20,7 +20,7 @@ from gms_fsm.records._columns import LOADS, QUANTITIES
 from gms_fsm.records._table import Words
 from gms_fsm.records.units import convert_numbers
 
-__all__ = ["FEWEST", "MISSING", "Origin", "Part", "gaps_in", "selected"]
+__all__ = ["FEWEST", "MISSING", "Origin", "RecordRows", "gaps_in", "selected"]
 
 FEWEST = 5  # rows of a record
 GAP = 5.0  # time steps longer than this many median steps are reported
@@ -68,7 +68,7 @@ class Origin:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class RecordRows:
     """The rows of a record.
 
     Parameters
@@ -88,10 +88,10 @@ class Part:
     rows: Rows
     notes: list[str]
 
-    def only(self, kept: Chosen) -> Part:
+    def only(self, kept: Chosen) -> RecordRows:
         """Return some of the rows."""
         columns = {name: value[kept] for name, value in self.columns.items()}
-        return Part(columns, self.chosen[kept], self.rows[kept], self.notes)
+        return RecordRows(columns, self.chosen[kept], self.rows[kept], self.notes)
 
     def needed(self, quantity: str) -> Chosen:
         """Return the rows in which a quantity is needed.
@@ -109,7 +109,7 @@ def selected(
     words: Words,
     where: Any = "",
     missing: Any = "error",
-) -> Part:
+) -> RecordRows:
     """Select rows, treat gaps as asked, and check the result.
 
     Parameters
@@ -146,7 +146,7 @@ def selected(
         if words:
             _check_separator(origin, words)
         raise origin.error(f"no row satisfies where = {shown(where)}", "choose another condition")
-    part = _from_first_to_last(origin, Part(values, chosen, rows, []), words, where)
+    part = _from_first_to_last(origin, RecordRows(values, chosen, rows, []), words, where)
     part = _without_gaps(origin, part, words, missing)
     _check_finite(origin, part, tuple(values))
     _check_size(origin, part)
@@ -188,7 +188,7 @@ def _chosen(origin: Origin, values: Mapping[str, FloatArray], where: str, rows: 
         ) from None
 
 
-def _from_first_to_last(origin: Origin, part: Part, words: Words, where: str) -> Part:
+def _from_first_to_last(origin: Origin, part: RecordRows, words: Words, where: str) -> RecordRows:
     """Return the rows between the first and the last selected one that have a motion."""
     first, last = np.flatnonzero(part.chosen)[[0, -1]]
     moving = [value for quantity, value in part.columns.items() if quantity not in LOADS]
@@ -215,7 +215,7 @@ def _from_first_to_last(origin: Origin, part: Part, words: Words, where: str) ->
 
 
 # --------------------------------------------------------------------------- gaps
-def _without_gaps(origin: Origin, part: Part, words: Words, missing: str) -> Part:
+def _without_gaps(origin: Origin, part: RecordRows, words: Words, missing: str) -> RecordRows:
     """Return the rows without empty cells and NaN, as asked."""
     _check_words(origin, part, words, missing)
     gaps = {name: np.isnan(value) & part.needed(name) for name, value in part.columns.items()}
@@ -243,7 +243,7 @@ def _without_gaps(origin: Origin, part: Part, words: Words, missing: str) -> Par
     return part
 
 
-def _fill(origin: Origin, part: Part, quantity: str, gap: Chosen) -> None:
+def _fill(origin: Origin, part: RecordRows, quantity: str, gap: Chosen) -> None:
     time, value = part.columns["time"], part.columns[quantity]
     good = np.isfinite(value)
     inside = np.logical_or.accumulate(good) & np.logical_or.accumulate(good[::-1])[::-1]
@@ -258,7 +258,7 @@ def _fill(origin: Origin, part: Part, quantity: str, gap: Chosen) -> None:
 
 
 # --------------------------------------------------------------------------- checks
-def _check_words(origin: Origin, part: Part, words: Words, missing: str) -> None:
+def _check_words(origin: Origin, part: RecordRows, words: Words, missing: str) -> None:
     """Refuse cells that are not numbers in rows where they are needed."""
     if not words:
         return
@@ -293,7 +293,7 @@ def _check_separator(origin: Origin, words: Words) -> None:
         )
 
 
-def _check_finite(origin: Origin, part: Part, quantities: tuple[str, ...]) -> None:
+def _check_finite(origin: Origin, part: RecordRows, quantities: tuple[str, ...]) -> None:
     for quantity in quantities:
         value = part.columns[quantity]
         bad = np.flatnonzero(~np.isfinite(value) & part.needed(quantity))
@@ -310,7 +310,7 @@ def _check_finite(origin: Origin, part: Part, quantities: tuple[str, ...]) -> No
             )
 
 
-def _check_order(origin: Origin, part: Part) -> None:
+def _check_order(origin: Origin, part: RecordRows) -> None:
     time = part.columns["time"]
     back = np.flatnonzero(np.diff(time) <= 0)
     for i in back[:1].tolist():
@@ -322,7 +322,7 @@ def _check_order(origin: Origin, part: Part) -> None:
         )
 
 
-def _check_size(origin: Origin, part: Part) -> None:
+def _check_size(origin: Origin, part: RecordRows) -> None:
     if part.rows.size < FEWEST:
         raise origin.error(
             f"only {part.rows.size} rows are used",

@@ -21,7 +21,7 @@ from gms_fsm.foundation.files import write_whole
 from gms_fsm.lowering.log_columns import CONTACT, LOG_TEXTS
 from gms_fsm.run._identity import identity
 from gms_fsm.run.plausible import check_ranges, check_state, last_edges, last_states
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import Contact
 from gms_fsm.traces.files.archives import member
@@ -36,7 +36,7 @@ _FORMAT = "gms-fsm checkpoint 2"
 class Resumable(Protocol):
     """A run whose state can be saved and restored."""
 
-    start: Start
+    start: Problem
 
     @property
     def buffers(self) -> hybrid.Buffers:
@@ -157,7 +157,7 @@ def _program() -> str:
     return f"gms-fsm {__version__} ({edition()[:8]}) on Python {platform.python_version()}"
 
 
-def _identity(start: Start) -> str:
+def _identity(start: Problem) -> str:
     """Return a hash of everything that determines a run."""
     from gms_fsm.traces.files.header import Header  # only files need pydantic
 

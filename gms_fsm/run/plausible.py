@@ -8,26 +8,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from integrators import FOR_A_GUARD, FOR_A_SIGN, LET_GO, WAITING, hybrid, loop
 from integrators.runners import states
 
 __all__ = ["bounds_of", "check_ranges", "check_state", "last_edges", "last_states"]
 
 
-def last_states(start: Start) -> NDArray[np.int64]:
+def last_states(start: Problem) -> NDArray[np.int64]:
     """Return of each machine the number of its last state."""
     return np.array([len(chart.states) - 1 for chart in _charts(start)])
 
 
-def last_edges(start: Start) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def last_edges(start: Problem) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return of each machine its first and its last edge, which are counted over all contacts."""
     banks = start.program.layout.banks
     first = np.array([bank.first_edge for bank in banks for _ in range(bank.n)])
     return first, first + [len(chart.transitions) - 1 for chart in _charts(start)]
 
 
-def _charts(start: Start) -> list[Any]:
+def _charts(start: Problem) -> list[Any]:
     contacts = {each.name: each for each in start.system.contacts}
     return [contacts[b.name].chart for b in start.program.layout.banks for _ in range(b.n)]
 
@@ -35,12 +35,12 @@ def _charts(start: Start) -> list[Any]:
 Bounds = tuple[Any, Any]  # the least and the largest value, numbers or arrays
 
 
-def bounds_of(start: Start, b: hybrid.Buffers, t_end: float = np.inf) -> dict[str, Bounds]:
+def bounds_of(start: Problem, b: hybrid.Buffers, t_end: float = np.inf) -> dict[str, Bounds]:
     """Return between which values the state of a run is.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The run.
     b : Buffers
         Its buffers.
@@ -89,7 +89,7 @@ def _bounds(names: Sequence[str], **bounds: Bounds) -> Bounds:
     return found[:, 0], found[:, 1]
 
 
-def check_state(start: Start, b: hybrid.Buffers, state: Mapping[str, Any], t_end: float) -> None:
+def check_state(start: Problem, b: hybrid.Buffers, state: Mapping[str, Any], t_end: float) -> None:
     """Raise a ValueError unless a run like this one can have reached such a state.
 
     Parameters

@@ -6,7 +6,7 @@ from pprint import pformat
 from typing import Any
 
 from gms_fsm.lowering.generated import standalone
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.ticks import clocks_of
 
 __all__ = ["printed"]
@@ -14,12 +14,12 @@ __all__ = ["printed"]
 FIRST, MOST = 1000, 128_000  # steps of a demonstration
 
 
-def printed(start: Start) -> str:
+def printed(start: Problem) -> str:
     """Return a program that takes a run's steps and prints its switches.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         What runs, from when to when.
 
     Returns
@@ -36,7 +36,7 @@ def printed(start: Start) -> str:
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> text = printed(Start.of(model, Prescribed("0.1*t"), 1.0))
+    >>> text = printed(Problem.of(model, Prescribed("0.1*t"), 1.0))
     >>> text.splitlines()[-2:]
     ['if __name__ == "__main__":', '    _main()']
     """
@@ -44,7 +44,7 @@ def printed(start: Start) -> str:
     return f"{standalone(start.program.source)}\n\n{HEAD}_demonstration = {data}\n\n\n{LOOP}"
 
 
-def _data(start: Start) -> dict[str, Any]:
+def _data(start: Problem) -> dict[str, Any]:
     program, layout = start.program, start.program.layout
     several = len(layout.banks) > 1
     return {
@@ -69,7 +69,7 @@ def _data(start: Start) -> dict[str, Any]:
     }
 
 
-def _components(start: Start) -> list[tuple[str, int, int]]:
+def _components(start: Problem) -> list[tuple[str, int, int]]:
     """Return name, number of elements and element of every component of the state vector."""
     y = start.program.layout.y
     found: dict[int, tuple[str, int, int]] = {y.index(name): (name, 1, 0) for name in y.shared}

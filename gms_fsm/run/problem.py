@@ -32,14 +32,14 @@ from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import LoopOptions
 
-__all__ = ["STEPS_A_TICK", "Start"]
+__all__ = ["STEPS_A_TICK", "Problem"]
 
 STEPS_A_TICK = 4  # after each tick the steps begin anew
 LATEST = 1e9  # s; one tick of a double is then 1e-7 s
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class Problem:
     """A system ready to run.
 
     Parameters
@@ -159,7 +159,7 @@ class Start:
         t_end: float,
         settings: Settings | None = None,
         **more: Any,
-    ) -> Start:
+    ) -> Problem:
         """Return the start of a model on a rig, or of a system; the rest is as for `on`."""
         chosen = Settings() if settings is None else settings
         return cls.on(mounted(model, rig, chosen.held_period), t_end, chosen, **more)
@@ -175,7 +175,7 @@ class Start:
         initial: Mapping[str, Any] | None = None,
         rows_at_once: int = integrators.ROWS_AT_ONCE,
         ticks_from: float | None = None,
-    ) -> Start:
+    ) -> Problem:
         """Check the arguments of `gms_fsm.simulate`.
 
         Parameters
@@ -255,7 +255,7 @@ class Start:
             initial=initial,
         )
 
-    def with_numbers(self, what: Mounted) -> Start:
+    def with_numbers(self, what: Mounted) -> Problem:
         """Return the same start with different numbers; signals and initial values stay.
 
         Parameters

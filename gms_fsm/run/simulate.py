@@ -12,7 +12,7 @@ from gms_fsm.foundation.arguments import checked_path
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.recording.moment import Moment
 from gms_fsm.run.recording.own_machines import engine_of, own_machines
@@ -136,7 +136,7 @@ def simulate(
     path = None if checkpoint is None else checked_path("checkpoint", checkpoint)
     if machines is not None and chosen.engine == "ifelse":
         raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")
-    start = Start.of(model, on, end, chosen, t_start=t_start, initial=initial)
+    start = Problem.of(model, on, end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, start.what, start.output).values() if monitors else ()
     own = {} if machines is None else own_machines(machines, start)
     run: CompiledRun | Run
@@ -171,7 +171,7 @@ class Run:
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The run to perform; for the engine ``"compiled"``, machines run it, with the same result.
     machines : mapping of str to ElementMachines, optional
         The user's own machines, by contact.
@@ -180,12 +180,14 @@ class Run:
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> run = Run(Start.of(model, Prescribed("0.2"), 3.0, rows_at_once=1))
+    >>> run = Run(Problem.of(model, Prescribed("0.2"), 3.0, rows_at_once=1))
     >>> run.advance(), len(run.recorder.trace())
     (True, 1)
     """
 
-    def __init__(self, start: Start, machines: Mapping[str, ElementMachines] | None = None) -> None:
+    def __init__(
+        self, start: Problem, machines: Mapping[str, ElementMachines] | None = None
+    ) -> None:
         self.start = start
         switch: MachineEngine | IfElse = IfElse(start.program)
         self.engine: MachineEngine | None = None

@@ -24,7 +24,7 @@ from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program, same_text
 from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
@@ -232,8 +232,10 @@ class _Common:
     initial: Mapping[str, Any] | None
     settings: Settings
 
-    def start(self, what: Mounted) -> Start:
-        return Start.on(what, self.t_end, self.settings, t_start=self.t_start, initial=self.initial)
+    def start(self, what: Mounted) -> Problem:
+        return Problem.on(
+            what, self.t_end, self.settings, t_start=self.t_start, initial=self.initial
+        )
 
 
 def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:

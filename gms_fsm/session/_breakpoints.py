@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gms_fsm.errors import SessionError
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.session._conditions import holds_at, read
 from gms_fsm.session.elements import chart_of, contact_named, machine_of, source_of
 from gms_fsm.session.explain import holds
@@ -50,7 +50,7 @@ class Breakpoint:
 
 
 def new_breakpoint(
-    start: Start, kind: str, name: str, element: int | str | None, condition: str, hits: int
+    start: Problem, kind: str, name: str, element: int | str | None, condition: str, hits: int
 ) -> Breakpoint:
     """Return a breakpoint; raise an error if one of its parts is invalid."""
     if kind not in KINDS:
@@ -102,7 +102,7 @@ def hits(point: Breakpoint, branch: Branch, row: int) -> bool:
     return not point.condition or holds_at(read(start, point.condition), branch, branch.raw(row))
 
 
-def _machines(point: Breakpoint, start: Start) -> list[int]:
+def _machines(point: Breakpoint, start: Problem) -> list[int]:
     """Return the elements that a breakpoint watches, counted over all contacts."""
     found: list[int] = []
     for bank in start.program.layout.banks:

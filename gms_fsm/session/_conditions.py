@@ -8,7 +8,7 @@ from typing import Any
 
 from gms_fsm.errors import ExpressionError, SessionError
 from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.session.explain import holds
 from gms_fsm.session.tree.branch import Branch, BranchRow
 from gms_fsm.traces.scope import watch_names
@@ -17,12 +17,12 @@ from gms_fsm.traces.system_scope import owners_of, system_names
 __all__ = ["holds_at", "names_of", "read", "value_of"]
 
 
-def names_of(start: Start) -> list[str]:
+def names_of(start: Problem) -> list[str]:
     """Return the names allowed in conditions and watches."""
     return watch_names(start.model) if start.given is None else system_names(start.system)
 
 
-def read(start: Start, text: str) -> Condition:
+def read(start: Problem, text: str) -> Condition:
     """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``."""
     states, n, owners = [], 0, {}
     if len(start.system.contacts) == 1:
@@ -38,7 +38,7 @@ def holds_at(condition: Condition, branch: Branch, row: BranchRow) -> bool:
     return holds(condition, branch.watches(row))
 
 
-def value_of(start: Start, text: str, values: Mapping[str, Any]) -> float:
+def value_of(start: Problem, text: str, values: Mapping[str, Any]) -> float:
     """Return the value of a watch expression, given the values of its names."""
     with _explained(start):
         tree = parse_value(text, names_of(start))
@@ -49,7 +49,7 @@ def value_of(start: Start, text: str, values: Mapping[str, Any]) -> float:
 
 
 @contextmanager
-def _explained(start: Start) -> Iterator[None]:
+def _explained(start: Problem) -> Iterator[None]:
     """Say how to write a name that lacks the number of an element, or its contact."""
     try:
         yield
@@ -61,7 +61,7 @@ def _explained(start: Start) -> Iterator[None]:
         raise
 
 
-def _complete(start: Start) -> dict[str, str]:
+def _complete(start: Problem) -> dict[str, str]:
     """Return how to complete names that are incomplete."""
     known, found = names_of(start), dict[str, str]()
     for contact in start.system.contacts:

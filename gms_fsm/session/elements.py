@@ -13,12 +13,12 @@ import numpy as np
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.lowering.layout import BankPlaces
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 
 __all__ = ["chart_of", "contact_named", "element_name", "machine_of", "source_of", "title_of"]
 
 
-def machine_of(element: int | str, start: Start) -> int:
+def machine_of(element: int | str, start: Problem) -> int:
     """Return the machine that an argument means.
 
     Parameters
@@ -26,7 +26,7 @@ def machine_of(element: int | str, start: Start) -> int:
     element : int or str
         Index of the element, from 0, if there is one contact; or its text, such as ``"gear 1"``,
         in which the number may be left out if the contact has one element.
-    start : Start
+    start : Problem
         The run.
 
     Returns
@@ -53,7 +53,7 @@ def machine_of(element: int | str, start: Start) -> int:
     return int(element)
 
 
-def _of_text(text: str, start: Start) -> int:
+def _of_text(text: str, start: Problem) -> int:
     banks = start.program.layout.banks
     form = re.fullmatch(r"\s*(\w+?)(?:\s+(\d{1,9}))?\s*", text)
     named = {bank.name: bank for bank in banks}
@@ -91,7 +91,7 @@ def _known(banks: Sequence[BankPlaces]) -> str:
     return f"the contacts are {', '.join(bank.name for bank in banks)}"
 
 
-def contact_named(name: str, start: Start) -> BankPlaces:
+def contact_named(name: str, start: Problem) -> BankPlaces:
     """Return the contact with a name; raise `SessionError` if there is none."""
     for bank in start.program.layout.banks:
         if bank.name == name and start.given is not None:
@@ -99,20 +99,20 @@ def contact_named(name: str, start: Start) -> BankPlaces:
     raise SessionError(f"no contact {shown(name)}", advice=_known(start.program.layout.banks))
 
 
-def element_name(start: Start, machine: int) -> str:
+def element_name(start: Problem, machine: int) -> str:
     """Return what an element is called in text: ``element 2``, or in a system ``gear 2``."""
     bank = start.program.layout.bank(machine)
     return start.what.element(bank.name, machine - bank.first)
 
 
-def title_of(start: Start) -> str:
+def title_of(start: Problem) -> str:
     """Return what runs: titles of model and rig, or of a system and its contacts."""
     if start.given is None:
         return f"{start.model.title}; {start.rig.title}"
     return f"{start.system.name}; {'; '.join(each.title for each in start.system.contacts)}"
 
 
-def chart_of(start: Start, bank: BankPlaces) -> Chart:
+def chart_of(start: Problem, bank: BankPlaces) -> Chart:
     """Return the chart of a contact."""
     return start.system.contact(bank.name).chart
 

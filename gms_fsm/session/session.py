@@ -14,7 +14,7 @@ from typing import Any, Unpack
 from gms_fsm.foundation.arguments import checked_path
 from gms_fsm.foundation.display import displayed
 from gms_fsm.language import Condition
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.session import _breakpoints, _conditions, _session_file
 from gms_fsm.session._breakpoints import KINDS, Breakpoint
@@ -102,7 +102,7 @@ class Session:
 
     # ------------------------------------------------------------------ what runs
     @property
-    def start(self) -> Start:
+    def start(self) -> Problem:
         """The run of the current branch, ready to start: its system, program and settings."""
         return self.branch.start
 

@@ -21,14 +21,14 @@ from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.rigs import with_numbers as with_numbers_of_rig
 
-__all__ = ["Number", "column_name", "joined", "known_in", "law_of", "number_of", "numbers_of"]
+__all__ = ["NamedNumber", "column_name", "joined", "known_in", "law_of", "number_of", "numbers_of"]
 __all__ += ["parts_of", "value_in", "varied", "with_law", "with_numbers"]
 
 NUMBERS = "numbers"  # the owner of those that belong to no contact
 
 
 @dataclass(frozen=True)
-class Number:
+class NamedNumber:
     """A number that can be changed by itself.
 
     Parameters
@@ -166,18 +166,18 @@ def _known(contact: Contact) -> dict[str, tuple[Parameter, int]]:
 
 
 # --------------------------------------------------------------------------- single numbers
-def _parts(what: Mounted, whole: str, parameter: Parameter, n: int) -> list[Number]:
+def _parts(what: Mounted, whole: str, parameter: Parameter, n: int) -> list[NamedNumber]:
     """Return a parameter as numbers: one, or one for each element."""
     values = np.ravel(np.broadcast_to(np.asarray(value_in(what, whole), dtype=float), n or ()))
     if not n:
-        return [Number(whole, parameter, float(values[0]), whole, None)]
+        return [NamedNumber(whole, parameter, float(values[0]), whole, None)]
     return [
-        Number(column_name(whole, i), parameter, each, whole, i)
+        NamedNumber(column_name(whole, i), parameter, each, whole, i)
         for i, each in enumerate(values.tolist())
     ]
 
 
-def parts_of(what: Mounted, name: object) -> list[Number]:
+def parts_of(what: Mounted, name: object) -> list[NamedNumber]:
     """Return the numbers that a name stands for: k1, k2 ... for k; none if nothing is called so."""
     for whole, (parameter, n) in known_in(what).items():
         parts = _parts(what, whole, parameter, n)
@@ -186,12 +186,12 @@ def parts_of(what: Mounted, name: object) -> list[Number]:
     return []
 
 
-def numbers_of(what: Mounted) -> dict[str, Number]:
+def numbers_of(what: Mounted) -> dict[str, NamedNumber]:
     """Return the numbers by name, such as ``"F_s"``, ``"k2"`` and ``"stiffness"``.
 
     A name without the number of an element stands for all elements; it is absent if they differ.
     """
-    found: dict[str, Number] = {}
+    found: dict[str, NamedNumber] = {}
     for whole, (parameter, n) in known_in(what).items():
         parts = _parts(what, whole, parameter, n)
         if len({each.value for each in parts}) == 1:
@@ -201,7 +201,7 @@ def numbers_of(what: Mounted) -> dict[str, Number]:
     return found
 
 
-def number_of(what: Mounted, name: object) -> Number:
+def number_of(what: Mounted, name: object) -> NamedNumber:
     """Return the number of this name; raise `ParameterError` if there is none."""
     numbers = numbers_of(what)
     if isinstance(name, str) and name in numbers:

@@ -16,7 +16,7 @@ from gms_fsm.foundation.logs import Log
 from gms_fsm.lowering.observing import armed, rate, sigmas
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.system import Body
-from gms_fsm.traces.files.parts import Parts, Ran, checked
+from gms_fsm.traces.files.parts import Parts, RunDescription, checked
 from gms_fsm.traces.rows import Rows, merged
 
 if TYPE_CHECKING:
@@ -205,7 +205,8 @@ def write_trace(trace: Trace, path: Path) -> Path:
         if trace.what.system.body(name).driven:
             stored[trace.what.system.body(name).v] = trace.body(name).v
     return npz_files.write(
-        path, Parts(header, Ran(trace.what), trace.rows, trace.stops, trace.firings, stored)
+        path,
+        Parts(header, RunDescription(trace.what), trace.rows, trace.stops, trace.firings, stored),
     )
 
 

@@ -33,7 +33,7 @@ from gms_fsm.verification._prover import (
     refuted,
     shown,
 )
-from gms_fsm.verification._subject import Subject
+from gms_fsm.verification._subject import ChartSubject
 from gms_fsm.verification.findings import Finding
 
 __all__ = ["after", "chattering", "determinism", "livelock", "moving", "moving_names"]
@@ -143,7 +143,9 @@ def after(prover: Prover, reading: Reading, edge: Transition, here: Duals) -> di
     return there | dict.fromkeys(subject.landed(edge), Dual(zero, zero))
 
 
-def _comes_back(subject: Subject, cycle: Sequence[Transition], point: Mapping[str, float]) -> bool:
+def _comes_back(
+    subject: ChartSubject, cycle: Sequence[Transition], point: Mapping[str, float]
+) -> bool:
     """Return whether the cycle also returns to the same point in floats."""
     here = dict(point)
     for edge in cycle:
@@ -352,7 +354,7 @@ def moving(prover: Prover, reading: Reading, state: str, here: Duals) -> Duals:
     return {**here, **{name: Dual(here[name].value, rate) for name, rate in rates.items()}}
 
 
-def _velocity(subject: Subject) -> str:
+def _velocity(subject: ChartSubject) -> str:
     """Return the name of the rate of x; empty if the chart has none."""
     v = subject.chart.velocities[0]
     return v if v in (*subject.inputs, *subject.variables) else ""

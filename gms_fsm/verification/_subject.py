@@ -16,14 +16,14 @@ from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.language import Binary, Condition, Name, Number, Value, names_in, renamed
 from gms_fsm.language.normal import renamed_in
 
-__all__ = ["Subject", "subject_of"]
+__all__ = ["ChartSubject", "subject_of"]
 
 ZERO = Number(0.0)
 AGE = "age"
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class ChartSubject:
     """A chart as the checks read it.
 
     Parameters
@@ -88,7 +88,7 @@ class Subject:
         return frozenset[str]().union(*map(names_in, [*edges, *self.flows.values()]))
 
 
-def subject_of(chart: Chart) -> Subject:
+def subject_of(chart: Chart) -> ChartSubject:
     """Return a chart as the checks read it.
 
     Parameters
@@ -150,7 +150,7 @@ def subject_of(chart: Chart) -> Subject:
     else:
         named = read | _names(flows.values())
         inputs += [name for name in chart.velocities if name in named and name not in inputs]
-    return Subject(
+    return ChartSubject(
         chart=chart,
         moves=moves,
         inputs=tuple(inputs),

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import graphviz
 
 from plots.charts.cells import Label
-from plots.charts.drawing import DOT_SIZE, Drawing, Line, Node, graph_drawing, thirds
+from plots.charts.drawing import DOT_SIZE, Drawing, DrawnLine, Node, graph_drawing, thirds
 from plots.charts.labels import Piece, Row, element_id
 from plots.charts.layers import ARROW, Point
 from plots.charts.matrix import matrix_drawing
 
 if TYPE_CHECKING:
-    from plots.charts.statechart import Sheet
+    from plots.charts.statechart import ChartSheet
 
 __all__ = ["arrange"]
 
@@ -33,7 +33,7 @@ MOST_ALIKE = 6  # regions; more that are all alike are drawn as one
 
 def arrange(
     graph: graphviz.Digraph,
-    sheet: Sheet,
+    sheet: ChartSheet,
     numbers: Sequence[int],
     values: Sequence[Row],
     below: Sequence[Row],
@@ -46,7 +46,7 @@ def arrange(
     ----------
     graph : graphviz.Digraph
         Empty.
-    sheet : Sheet
+    sheet : ChartSheet
         A fitted sheet.
     numbers : sequence of int
         The elements, from 0.
@@ -140,7 +140,7 @@ class _Region:
 
 
 def _title(
-    sheet: Sheet, numbers: Sequence[int], number: int, shared: bool, values: Sequence[Row]
+    sheet: ChartSheet, numbers: Sequence[int], number: int, shared: bool, values: Sequence[Row]
 ) -> Label:
     if not shared:
         row = [Piece(f"Element {number + 1}  ", "region"), Piece(f"AND {number + 1}", "note")]
@@ -153,7 +153,7 @@ def _title(
     return sheet.cells.text([row, note])
 
 
-def _legend(sheet: Sheet, whole: float, bottom: float) -> list[tuple[Node, Label]]:
+def _legend(sheet: ChartSheet, whole: float, bottom: float) -> list[tuple[Node, Label]]:
     """Return the legend of guards, in as many columns as the picture is wide."""
     rows = sheet.legend()
     if not rows:
@@ -218,7 +218,7 @@ class _Paper:
         look |= {"shape": "circle", "style": "filled", "fillcolor": ink, "color": ink}
         graph.node(node.name, "", width=size, height=size, fixedsize="true", **look)
 
-    def line(self, graph: graphviz.Digraph, line: Line, corner: Point) -> None:
+    def line(self, graph: graphviz.Digraph, line: DrawnLine, corner: Point) -> None:
         points, tip = line.points, ""
         look = dict(line.look)
         if line.arrow:

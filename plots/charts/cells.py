@@ -14,7 +14,7 @@ from plots.charts.labels import Piece, Row, escape, printable
 from plots.style import MONO, SANS, ChartTheme
 from plots.style.fonts import width
 
-__all__ = ["Cells", "Label"]
+__all__ = ["CellWriter", "Label"]
 
 PLAIN = 10  # points, of formulas
 LEAST = 7  # points, of every text but an index
@@ -55,7 +55,7 @@ class Label:
 
 
 @dataclass(frozen=True)
-class Cells:
+class CellWriter:
     """Sets rows of pieces as tables.
 
     Parameters

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from gms_fsm.charts.chart import Chart, State
 from gms_fsm.language import Value
-from plots.charts.notation import Writer
+from plots.charts.notation import ChartWriter
 
 __all__ = ["Texts", "chart_texts", "state_texts"]
 
@@ -15,7 +15,7 @@ SAID_ONCE = 3  # states: where so many have the same force, it is said once for 
 Texts = list[tuple[str, list[str]]]  # kinds, such as during, each with its texts
 
 
-def state_texts(write: Writer, state: State) -> Texts:
+def state_texts(write: ChartWriter, state: State) -> Texts:
     """Return what a picture shows in a state.
 
     Not shown are a variable that flows in no state and the timer behind ``after(T)``; nor, where
@@ -23,7 +23,7 @@ def state_texts(write: Writer, state: State) -> Texts:
 
     Parameters
     ----------
-    write : Writer
+    write : ChartWriter
         Its chart and notation.
     state : State
         A state of the chart.
@@ -36,7 +36,7 @@ def state_texts(write: Writer, state: State) -> Texts:
     Examples
     --------
     >>> from gms_fsm.charts import GMS_ELEMENT
-    >>> write = Writer(GMS_ELEMENT["signed"], "stateflow")
+    >>> write = ChartWriter(GMS_ELEMENT["signed"], "stateflow")
     >>> [(kind, texts) for kind, texts in state_texts(write, write.chart.states[0]) if texts]
     [('during', ['dz = v;']), ('force', ['F = k * z + sigma * dz;'])]
     """
@@ -58,12 +58,12 @@ def state_texts(write: Writer, state: State) -> Texts:
     ]
 
 
-def chart_texts(write: Writer) -> Texts:
+def chart_texts(write: ChartWriter) -> Texts:
     """Return what a picture shows of the whole chart.
 
     Parameters
     ----------
-    write : Writer
+    write : ChartWriter
         Its chart and notation.
 
     Returns
@@ -84,7 +84,7 @@ def chart_texts(write: Writer) -> Texts:
     ]
 
 
-def _equations(write: Writer, trees: Mapping[str, Value]) -> list[str]:
+def _equations(write: ChartWriter, trees: Mapping[str, Value]) -> list[str]:
     return [write.equation(name, tree) for name, tree in trees.items()]
 
 
@@ -128,7 +128,7 @@ def chart_in_words(chart: Chart) -> str:
       force: F = k * z + sigma * dz;
       1 -> stick [|v| <= v_c && |z| < s]
     """
-    write, lines = Writer(chart, "stateflow"), [chart.name]
+    write, lines = ChartWriter(chart, "stateflow"), [chart.name]
     for state in chart.states:
         lines.append(f"{state.name}{' (default)' * (state == chart.default_state)}")
         lines += [f"  {kind}: {text}" for kind, own in state_texts(write, state) for text in own]

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 from plots.charts.cells import Label
 from plots.charts.labels import edge_id, element_id, part_id
-from plots.charts.layers import Link, Point, layered
+from plots.charts.layers import LayerEdge, Point, layered
 
 if TYPE_CHECKING:
-    from plots.charts.statechart import Sheet
+    from plots.charts.statechart import ChartSheet
 
-__all__ = ["Drawing", "Line", "Node", "graph_drawing", "thirds"]
+__all__ = ["Drawing", "DrawnLine", "Node", "graph_drawing", "thirds"]
 
 MARKED = "2.6"  # points; width of highlighted lines
 DOT_SIZE = 8.0  # diameter of the dot at the default state
@@ -44,7 +44,7 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Line:
+class DrawnLine:
     """A line between two nodes.
 
     Parameters
@@ -83,15 +83,15 @@ class Drawing:
     width: float
     height: float
     nodes: tuple[Node, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[DrawnLine, ...]
 
 
-def graph_drawing(sheet: Sheet, number: int) -> Drawing:
+def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
     """Return an element as states and arrows.
 
     Parameters
     ----------
-    sheet : Sheet
+    sheet : ChartSheet
         The chart and its options.
     number : int
         The element, from 0.
@@ -117,7 +117,7 @@ def graph_drawing(sheet: Sheet, number: int) -> Drawing:
         for own, state in zip(rows, chart.states, strict=True)
     ]
     links = [
-        Link(chart.state_index(edge.source), chart.state_index(edge.target), _roomy(box))
+        LayerEdge(chart.state_index(edge.source), chart.state_index(edge.target), _roomy(box))
         for (edge, _), box in zip(edges, boxes, strict=True)
     ]
     laid = layered([(box.width, box.height) for box in plain], links, sheet.direction)
@@ -143,8 +143,8 @@ def graph_drawing(sheet: Sheet, number: int) -> Drawing:
         if marked:
             look |= {"class": "marked", "penwidth": MARKED}
         nodes.append(Node(guard, "guard marked" if marked else "guard", at, box))
-        lines.append(Line(f"{name}-1", (names[link.source], guard), tuple(into), False, look))
-        lines.append(Line(f"{name}-2", (guard, names[link.target]), tuple(out), True, look))
+        lines.append(DrawnLine(f"{name}-1", (names[link.source], guard), tuple(into), False, look))
+        lines.append(DrawnLine(f"{name}-2", (guard, names[link.target]), tuple(out), True, look))
     return Drawing(laid.width, laid.height, tuple(nodes), tuple(lines))
 
 
@@ -155,14 +155,14 @@ def _roomy(box: Label) -> tuple[float, float]:
 
 def _default_line(
     dot: str, state: str, at: Point, centre: Point, size: tuple[float, float], direction: str
-) -> Line:
+) -> DrawnLine:
     (x, y), (to_x, to_y) = at, centre
     if direction == "TB":
         start, end = (x, y + DOT_SIZE / 2), (x, to_y - size[1] / 2)
     else:
         start, end = (x + DOT_SIZE / 2, y), (to_x - size[0] / 2, y)
     name = f"{dot}-edge"
-    return Line(name, (dot, state), (start, *thirds(start, end)), True, {"class": "default"})
+    return DrawnLine(name, (dot, state), (start, *thirds(start, end)), True, {"class": "default"})
 
 
 def thirds(a: Point, b: Point) -> tuple[Point, ...]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.traces.trace import Trace, dwell_times
 from plots.charts.contents import chart_texts, state_texts
-from plots.charts.notation import Writer
+from plots.charts.notation import ChartWriter
 from plots.style.fonts import missing_glyphs
 
 __all__ = [
@@ -199,12 +199,12 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-def warn_of_missing_glyphs(write: Writer, note: str = "") -> None:
+def warn_of_missing_glyphs(write: ChartWriter, note: str = "") -> None:
     """Warn of characters that the font of charts cannot show, and say where they stand.
 
     Parameters
     ----------
-    write : Writer
+    write : ChartWriter
         The chart and its notation.
     note : str
         Text below the picture.

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 from plots.charts.places import Segment, places
 
-__all__ = ["ARROW", "Laid", "Link", "Point", "layered"]
+__all__ = ["ARROW", "Laid", "LayerEdge", "Point", "layered"]
 
 Point = tuple[float, float]
 Size = tuple[float, float]
@@ -36,7 +36,7 @@ SWEEPS = 12
 
 
 @dataclass(frozen=True)
-class Link:
+class LayerEdge:
     """An edge of the layout.
 
     Parameters
@@ -80,14 +80,14 @@ class Laid:
     dot: Point = (0.0, 0.0)
 
 
-def layered(sizes: Sequence[Size], links: Sequence[Link], direction: str = "TB") -> Laid:
+def layered(sizes: Sequence[Size], links: Sequence[LayerEdge], direction: str = "TB") -> Laid:
     """Lay out a chart.
 
     Parameters
     ----------
     sizes : sequence of (float, float)
         Width and height of each state; the first one is the default state.
-    links : sequence of Link
+    links : sequence of LayerEdge
         The edges; those of one state by priority.
     direction : {"TB", "LR"}
         Rows of states from top to bottom, or from left to right.
@@ -99,13 +99,13 @@ def layered(sizes: Sequence[Size], links: Sequence[Link], direction: str = "TB")
 
     Examples
     --------
-    >>> laid = layered([(80, 40), (80, 40)], [Link(0, 1, (60, 20)), Link(1, 0, (60, 20))])
+    >>> laid = layered([(80, 40), (80, 40)], [LayerEdge(0, 1, (60, 20)), LayerEdge(1, 0, (60, 20))])
     >>> [x for x, _ in laid.states], [x for x, _ in laid.labels]
     ([66.0, 66.0], [30.0, 102.0])
     """
     if direction == "TB":
         return _Layers(sizes, links).laid()
-    turned = [Link(each.source, each.target, _turned(each.size)) for each in links]
+    turned = [LayerEdge(each.source, each.target, _turned(each.size)) for each in links]
     laid = _Layers([_turned(size) for size in sizes], turned).laid()
     return Laid(
         width=laid.height,
@@ -135,7 +135,7 @@ class _Loop:
 class _Layers:
     """The steps of a layout from top to bottom; even rows have states, odd rows labels."""
 
-    def __init__(self, sizes: Sequence[Size], links: Sequence[Link]) -> None:
+    def __init__(self, sizes: Sequence[Size], links: Sequence[LayerEdge]) -> None:
         self.links = links
         self.crossing = [k for k, each in enumerate(links) if each.source != each.target]
         self.layer = _layer_of(sizes, [links[k] for k in self.crossing])
@@ -425,7 +425,7 @@ def _straight(a: Point, b: Point) -> list[Point]:
     return [tuple(p + (q - p) * t / 3 for p, q in zip(a, b, strict=True)) for t in range(4)]  # type: ignore[misc]
 
 
-def _layer_of(sizes: Sequence[Size], links: Sequence[Link]) -> list[int]:
+def _layer_of(sizes: Sequence[Size], links: Sequence[LayerEdge]) -> list[int]:
     """Return the layers of the states: states of an edge are in two layers, in their order."""
     n = len(sizes)
     pairs = {(min(each.source, each.target), max(each.source, each.target)) for each in links}

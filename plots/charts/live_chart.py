@@ -25,7 +25,7 @@ from gms_fsm.session.explain import values_at
 from gms_fsm.traces.trace import Trace, check_trace
 from gms_fsm.traces.views import steps_of
 from plots.charts.labels import FALSE, TRUE, UNKNOWN, Piece, Row, edge_id, element_id, part_id
-from plots.charts.statechart import Sheet, chosen
+from plots.charts.statechart import ChartSheet, chosen
 from plots.output.drawings import Svg, image
 from plots.output.graphviz import picture
 
@@ -135,7 +135,7 @@ class LiveChart:
         self.elements = chosen(trace.n if elements is None else elements, trace.n)
         self.values = values
         chart = trace.model.chart
-        self._sheet = Sheet(chart, notation, direction, theme, live=True).fitted()
+        self._sheet = ChartSheet(chart, notation, direction, theme, live=True).fitted()
         read = frozenset[str]().union(*map(names_in, chart.guards.values()))
         late = [name for name in (*chart.force_names, *chart.rate_names) if name in read]
         names = dict.fromkeys([*chart.variables, *chart.inputs, *chart.velocities, *late])
@@ -422,7 +422,7 @@ class ElementParts:
     """The parts of one element in the SVG, and how they are painted."""
 
     def __init__(
-        self, sheet: Sheet, number: int, groups: Mapping[str, ElementTree.Element]
+        self, sheet: ChartSheet, number: int, groups: Mapping[str, ElementTree.Element]
     ) -> None:
         chart, element = sheet.chart, element_id(number)
         self.colours = sheet.colours
@@ -482,7 +482,7 @@ class ElementParts:
             self._paint_text(piece, node, marks, plain, colour)
 
     def write_count(self, state: str, count: str) -> None:
-        """Write how many elements are in a state (`Sheet.among`)."""
+        """Write how many elements are in a state (`ChartSheet.among`)."""
         for piece, node in self.states[state][1]:
             if piece.role == "among":
                 node.text = count

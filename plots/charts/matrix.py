@@ -7,12 +7,12 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from plots.charts.cells import Label
-from plots.charts.drawing import Drawing, Line, Node
+from plots.charts.drawing import Drawing, DrawnLine, Node
 from plots.charts.labels import DOT, Piece, edge_id, element_id, part_id
 from plots.charts.layers import Point
 
 if TYPE_CHECKING:
-    from plots.charts.statechart import Sheet
+    from plots.charts.statechart import ChartSheet
 
 __all__ = ["matrix_drawing"]
 
@@ -22,12 +22,12 @@ NARROWEST = 26.0  # column
 HEAD = 8  # characters of a name above a column
 
 
-def matrix_drawing(sheet: Sheet, number: int) -> Drawing:
+def matrix_drawing(sheet: ChartSheet, number: int) -> Drawing:
     """Return an element as a matrix.
 
     Parameters
     ----------
-    sheet : Sheet
+    sheet : ChartSheet
         The chart and its options, with numbers for all guards.
     number : int
         The element, from 0.
@@ -66,7 +66,7 @@ def matrix_drawing(sheet: Sheet, number: int) -> Drawing:
 Entries = dict[tuple[int, int], list[tuple[str, str, Label]]]
 
 
-def _boxes(sheet: Sheet, number: int) -> list[Label]:
+def _boxes(sheet: ChartSheet, number: int) -> list[Label]:
     """Return the boxes of the states, numbered; the default state has a dot."""
     boxes = []
     for k, state in enumerate(sheet.chart.states, start=1):
@@ -77,7 +77,7 @@ def _boxes(sheet: Sheet, number: int) -> list[Label]:
     return boxes
 
 
-def _entries(sheet: Sheet, number: int) -> Entries:
+def _entries(sheet: ChartSheet, number: int) -> Entries:
     """Return id, classes and label of the edges in each cell."""
     chart, entries = sheet.chart, Entries()
     for state in chart.states:
@@ -92,7 +92,7 @@ def _entries(sheet: Sheet, number: int) -> Entries:
 
 
 def _heads(
-    sheet: Sheet, boxes: Sequence[Label], entries: Entries
+    sheet: ChartSheet, boxes: Sequence[Label], entries: Entries
 ) -> tuple[list[Label], list[float]]:
     """Return what stands above the columns, and the widths of all columns.
 
@@ -118,13 +118,15 @@ def _height(own: Sequence[tuple[str, str, Label]]) -> float:
     return sum(label.height for *_, label in own)
 
 
-def _rules(xs: Sequence[float], ys: Sequence[float], node: str, colour: str) -> tuple[Line, ...]:
+def _rules(
+    xs: Sequence[float], ys: Sequence[float], node: str, colour: str
+) -> tuple[DrawnLine, ...]:
     """Return the lines between rows and columns."""
     ends: list[tuple[Point, Point]] = [((x, 0.0), (x, ys[-1])) for x in xs]
     ends += [((0.0, y), (xs[-1], y)) for y in ys]
     look = {"class": "rule", "color": colour, "penwidth": "0.8"}
     return tuple(
-        Line(f"{node}-rule{k}", (node, node), (a, a, b, b), False, look)
+        DrawnLine(f"{node}-rule{k}", (node, node), (a, a, b, b), False, look)
         for k, (a, b) in enumerate(ends)
     )
 

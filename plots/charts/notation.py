@@ -19,7 +19,7 @@ from gms_fsm.language import (
     spell,
 )
 
-__all__ = ["NOTATIONS", "Writer"]
+__all__ = ["NOTATIONS", "ChartWriter"]
 
 NOTATIONS = ("stateflow", "math")
 
@@ -31,7 +31,7 @@ _GREEK = {
 
 
 @dataclass(frozen=True)
-class Writer:
+class ChartWriter:
     """Writes the texts of a chart in one notation, from the checked trees.
 
     Parameters
@@ -45,7 +45,7 @@ class Writer:
     --------
     >>> from gms_fsm.charts import GMS_ELEMENT
     >>> chart = GMS_ELEMENT["signed"]
-    >>> Writer(chart, "math").text(chart.guards["arrest"])
+    >>> ChartWriter(chart, "math").text(chart.guards["arrest"])
     '|v| ≤ v_c ∧ |z| < s(v)'
     """
 

@@ -21,7 +21,7 @@ from gms_fsm.foundation.arguments import checked_kind, listed
 from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
 from plots.charts.arrange import arrange
-from plots.charts.cells import Cells
+from plots.charts.cells import CellWriter
 from plots.charts.contents import Texts, chart_in_words, chart_texts, state_texts
 from plots.charts.drawing import graph_drawing
 from plots.charts.labels import (
@@ -37,7 +37,7 @@ from plots.charts.labels import (
     wrapped,
 )
 from plots.charts.matrix import WIDEST
-from plots.charts.notation import NOTATIONS, Writer
+from plots.charts.notation import NOTATIONS, ChartWriter
 from plots.output.drawings import DrawnGraph
 from plots.style import CHART_THEMES, SANS, ChartTheme
 
@@ -147,7 +147,7 @@ def statechart(
     for name in pointed:
         one_of("marked", name, parts)
     tally = Tally(counts) if counts else None
-    sheet = Sheet(
+    sheet = ChartSheet(
         chart,
         notation,
         direction,
@@ -250,7 +250,7 @@ def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class ChartSheet:
     """A chart and its drawing options.
 
     Parameters
@@ -300,16 +300,16 @@ class Sheet:
         return CHART_THEMES[self.theme]
 
     @property
-    def write(self) -> Writer:
+    def write(self) -> ChartWriter:
         """The notation."""
-        return Writer(self.chart, self.notation)
+        return ChartWriter(self.chart, self.notation)
 
     @property
-    def cells(self) -> Cells:
+    def cells(self) -> CellWriter:
         """What sets the labels."""
-        return Cells(self.colours, self.scale)
+        return CellWriter(self.colours, self.scale)
 
-    def fitted(self) -> Sheet:
+    def fitted(self) -> ChartSheet:
         """Return the sheet as it is drawn: a graph or a matrix, with or without numbers for guards.
 
         Returns

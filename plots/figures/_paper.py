@@ -14,7 +14,7 @@ from plots import panels
 from plots.figures._layout import fitted, legend_below, low, narrow, sheet
 from plots.figures._parts import element_legend, lanes_height, letter_panels
 from plots.panels.axes import MANY, first_variable
-from plots.panels.held_outputs import Lag
+from plots.panels.held_outputs import HeldLag
 from plots.panels.selection import checked_elements, checked_window, scaled, shown
 from plots.panels.window import Window
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
@@ -301,7 +301,7 @@ def residuals(
 
 
 def held_residuals(
-    lags: Sequence[Lag],
+    lags: Sequence[HeldLag],
     papers: tuple[float, float],
     *,
     title: str,
@@ -313,7 +313,7 @@ def held_residuals(
 
     Parameters
     ----------
-    lags : sequence of Lag
+    lags : sequence of HeldLag
         Differences for at most three sample times, the longest first.
     papers : (float, float)
         Residuals that the paper reports, N and m.

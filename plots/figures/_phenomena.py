@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.phenomena.results import MARKS, VERDICTS, Measured, PhenomenaTable, Phenomenon
+from gms_fsm.phenomena.results import MARKS, VERDICTS, PhenomenaTable, Phenomenon, PhenomenonResult
 from plots.figures._layout import fitted, sheet
 from plots.style import (
     INK,
@@ -72,7 +72,7 @@ def phenomenon_figure(table: PhenomenaTable, name: str) -> Figure | None:
 def _panel(
     ax: Axes,
     model: str,
-    found: Measured,
+    found: PhenomenonResult,
     phenomenon: Phenomenon,
     limits: Sequence[tuple[float, float] | None],
 ) -> None:
@@ -113,14 +113,14 @@ def _panel(
     )
 
 
-def _range(found: Sequence[Measured], axis: str) -> tuple[float, float]:
+def _range(found: Sequence[PhenomenonResult], axis: str) -> tuple[float, float]:
     values = np.concatenate([getattr(curve, axis) for one in found for curve in one.curves])
     values = values[np.isfinite(values)]
     return float(values.min()), float(values.max())
 
 
 def _common(
-    shown: Sequence[tuple[str, Measured]], axis: str, phenomenon: Phenomenon
+    shown: Sequence[tuple[str, PhenomenonResult]], axis: str, phenomenon: Phenomenon
 ) -> tuple[float, float] | None:
     """Return the limits of all panels that are of about the same size; None on a log axis."""
     if phenomenon.log and axis == "x":

@@ -10,7 +10,7 @@ import numpy as np
 
 from gms_fsm.session.explain import values_at
 from plots.charts.live_chart import ElementParts, LiveChart, Marks, marks_of, plain_tree
-from plots.charts.statechart import Sheet, chosen
+from plots.charts.statechart import ChartSheet, chosen
 from plots.film._pace import Frame, Pace
 from plots.output.graphviz import picture as rendered
 from plots.style import CHART_THEMES
@@ -62,7 +62,7 @@ class FilmChart:
             self.live = LiveChart(self.trace, elements, notation=notation, theme=theme)
             self.root, self.parts = self.live.root, self.live.parts[self.elements[0]]
             return
-        sheet = Sheet(self.chart, notation, "TB", theme, live=True, among=len(self.elements))
+        sheet = ChartSheet(self.chart, notation, "TB", theme, live=True, among=len(self.elements))
         sheet = sheet.fitted()
         self.root = plain_tree(rendered(sheet.graph([0], bare=True), "svg"))
         self.root.set("style", f"background:{self.colours.paper}")

@@ -12,7 +12,7 @@ from typing import cast
 
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
-from plots.charts.statechart import Sheet, chosen
+from plots.charts.statechart import ChartSheet, chosen
 from plots.film._chart import FilmChart
 from plots.film._movie import Movie
 from plots.film._pace import paced
@@ -109,7 +109,7 @@ def animate(
     if not 0 < fps <= FASTEST:
         raise ParameterError(f"it must be above 0 and at most {FASTEST}", place="fps", value=fps)
     count = _frames(frames, seconds, fps)
-    Sheet(trace.model.chart, notation, "TB", theme)  # refuses wrong options before any work
+    ChartSheet(trace.model.chart, notation, "TB", theme)  # refuses wrong options before any work
     chosen(trace.n if elements is None else elements, trace.n)
     first, last = float(trace.t.min()), float(trace.t.max())
     begin = first if t_start is None else t_start

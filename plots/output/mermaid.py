@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.arguments import checked_kind
 from plots.charts.contents import Texts, chart_texts, state_texts
-from plots.charts.notation import Writer
+from plots.charts.notation import ChartWriter
 from plots.output.drawings import MermaidText
 
 __all__ = ["mermaid"]
@@ -54,7 +54,7 @@ def mermaid(chart: Chart) -> str:
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
     ids = {state.name: _id(i, state.name) for i, state in enumerate(chart.states, start=1)}
     title = json.dumps(_printable(chart.name), ensure_ascii=False)
-    write, lines = Writer(chart, "stateflow"), [f"[*] --> {ids[chart.default_state.name]}"]
+    write, lines = ChartWriter(chart, "stateflow"), [f"[*] --> {ids[chart.default_state.name]}"]
     for state in chart.states:
         own = ids[state.name]
         lines.append(f'state "{_escape(state.name)}" as {own}')

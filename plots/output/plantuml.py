@@ -12,7 +12,7 @@ import re
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.arguments import checked_kind
 from plots.charts.contents import chart_texts, state_texts
-from plots.charts.notation import Writer
+from plots.charts.notation import ChartWriter
 from plots.output.drawings import PlantUMLText
 
 __all__ = ["plantuml"]
@@ -49,7 +49,7 @@ def plantuml(chart: Chart) -> str:
     """
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
     ids = {state.name: _id(i, state.name) for i, state in enumerate(chart.states, start=1)}
-    write = Writer(chart, "stateflow")
+    write = ChartWriter(chart, "stateflow")
     lines = ["@startuml", f"title {_escape(chart.name)}"]
     lines += ["hide empty description", f"[*] --> {ids[chart.default_state.name]}"]
     for state in chart.states:

@@ -17,7 +17,7 @@ import numpy as np
 
 from plots.style.matplotlib import Artist, Axes, Curve, Figure, patches
 
-__all__ = ["EXACT", "Part", "drawn", "smallest"]
+__all__ = ["EXACT", "SvgPart", "drawn", "smallest"]
 
 # matplotlib's fonts are wider than those used for the layout.
 WIDE, MONO = 0.88, 0.975
@@ -26,7 +26,7 @@ EXACT: Any = {"text.hinting": "none"}
 INDEX = 0.75  # an index is smaller than that, relative to the text before it
 
 
-class Part:
+class SvgPart:
     """One part of the SVG and its artist.
 
     Parameters
@@ -63,7 +63,7 @@ class Part:
 
 def drawn(
     ax: Axes, root: ElementTree.Element, *, scale: float = 1.0, animated: bool = False
-) -> Iterator[Part]:
+) -> Iterator[SvgPart]:
     """Make an artist for each part of the SVG, in its order.
 
     Parameters
@@ -89,7 +89,7 @@ def drawn(
         artist = _artist(ax, node, dx, dy, scale)
         if artist is not None:
             artist.set_animated(animated)
-            part = Part(node, artist, scale)
+            part = SvgPart(node, artist, scale)
             part.update()
             yield part
 

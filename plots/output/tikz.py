@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.arguments import checked_kind
 from plots.charts.contents import chart_texts, state_texts
-from plots.charts.notation import Writer
+from plots.charts.notation import ChartWriter
 from plots.output.drawings import TikzText
 
 __all__ = ["tikz"]
@@ -68,7 +68,7 @@ def tikz(chart: Chart) -> str:
     ['  \\draw[->] (s1) to[bend left=20] node[guard, auto]']
     """
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
-    write, names = Writer(chart, "stateflow"), [state.name for state in chart.states]
+    write, names = ChartWriter(chart, "stateflow"), [state.name for state in chart.states]
     contents = {
         state.name: [
             f"{kind}: {text}" for kind, texts in state_texts(write, state) for text in texts
@@ -105,7 +105,7 @@ def tikz(chart: Chart) -> str:
     return TikzText(head + "".join(f"  {line}\n" for line in lines) + "\\end{tikzpicture}\n")
 
 
-def _labels(chart: Chart, write: Writer) -> dict[tuple[str, str], list[str]]:
+def _labels(chart: Chart, write: ChartWriter) -> dict[tuple[str, str], list[str]]:
     """Return the texts of the edges, by source and target."""
     found: dict[tuple[str, str], list[str]] = {}
     for state in chart.states:

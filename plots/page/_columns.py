@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Pool", "packed"]
+__all__ = ["ColumnStore", "packed"]
 
 UNSIGNED = ("u1", "u2", "u4")
 
@@ -51,7 +51,7 @@ def _base64(values: NDArray[Any]) -> str:
     return base64.b64encode(values.tobytes()).decode()
 
 
-class Pool:
+class ColumnStore:
     """The columns of a run; equal ones are stored once.
 
     Parameters

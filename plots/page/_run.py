@@ -26,7 +26,7 @@ from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from gms_fsm.verification.prove import Report
-from plots.page._columns import Pool, packed
+from plots.page._columns import ColumnStore, packed
 from plots.page._rows import PageRows
 from plots.page._trees import Stored, tree_of
 from plots.panels.guards.plane import Plane, linear_threshold, plane_axes
@@ -55,7 +55,7 @@ def stored_run(page: PageRows, charts: Sequence[int], reports: Sequence[Report])
     """
     trace = page.trace
     instants = np.cumsum(np.diff(trace.t, prepend=trace.t[0]) > 0, dtype=np.int64)
-    pool = Pool(instants)
+    pool = ColumnStore(instants)
     views = views_of(trace)
     contacts = [
         _contact(view, pool, picture, reports) for view, picture in zip(views, charts, strict=True)
@@ -82,7 +82,9 @@ def views_of(trace: Trace) -> list[Trace]:
 
 
 # --------------------------------------------------------------------------- a contact
-def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) -> dict[str, Any]:
+def _contact(
+    trace: Trace, pool: ColumnStore, picture: int, reports: Sequence[Report]
+) -> dict[str, Any]:
     chart, model, n = trace.model.chart, trace.model, trace.n
     stored: Stored = {}
     edges = _edges(chart, stored)
@@ -161,7 +163,7 @@ def _clause(chart: Chart, part: Condition, stored: Stored) -> dict[str, Any]:
     }
 
 
-def _values(trace: Trace, stored: Stored, pool: Pool) -> dict[str, Any]:
+def _values(trace: Trace, stored: Stored, pool: ColumnStore) -> dict[str, Any]:
     """Return the columns of what guards read and plots show, by name: one, or one per element."""
     chart, n = trace.model.chart, trace.n
     read = _read(chart)
@@ -205,7 +207,7 @@ def _read(chart: Chart) -> set[str]:
     return read | {name for tree in inner for name in names_in(tree)} - chart.lets.keys()
 
 
-def _thresholds(trace: Trace, pool: Pool) -> list[Any]:
+def _thresholds(trace: Trace, pool: ColumnStore) -> list[Any]:
     """Return the columns of s of each element: its weight times the curve, if that is exact."""
     curve, weights = trace.model.stribeck, trace.model.weights.tolist()
     if curve is None:
@@ -278,7 +280,7 @@ def _log(trace: Trace, edges: Sequence[Mapping[str, Any]]) -> list[Any]:
 
 
 # --------------------------------------------------------------------------- names for `until`
-def _watched(trace: Trace, pool: Pool) -> dict[str, Any]:
+def _watched(trace: Trace, pool: ColumnStore) -> dict[str, Any]:
     values = Scope.over(trace).watches()
     found = {}
     thresholds = _thresholds(trace, pool)
@@ -291,7 +293,7 @@ def _watched(trace: Trace, pool: Pool) -> dict[str, Any]:
     return found
 
 
-def _watched_in_system(trace: Trace, pool: Pool) -> dict[str, Any]:
+def _watched_in_system(trace: Trace, pool: ColumnStore) -> dict[str, Any]:
     values = SystemScope.over(trace).watches()
     return {
         name: pool.add(column, exact=not name.rpartition(".")[2].startswith(FORCE))
@@ -301,7 +303,7 @@ def _watched_in_system(trace: Trace, pool: Pool) -> dict[str, Any]:
 
 
 # --------------------------------------------------------------------------- a system
-def _system(trace: Trace, pool: Pool) -> dict[str, Any]:
+def _system(trace: Trace, pool: ColumnStore) -> dict[str, Any]:
     """Return the motion of bodies, further states, sampled values and signals."""
     system, bodies = trace.what.system, []
     for body in system.bodies:

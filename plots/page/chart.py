@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 from gms_fsm.charts.chart import Chart
 from plots.charts.labels import Row, edge_id, element_id, part_id
-from plots.charts.statechart import Sheet
+from plots.charts.statechart import ChartSheet
 from plots.output.graphviz import drawn
 
 __all__ = ["chart_svg"]
@@ -19,7 +19,7 @@ COLOURING = ("fill", "stroke", "stroke-dasharray", "stroke-width")
 
 def chart_svg(chart: Chart, n: int) -> str:
     """Return the chart's SVG, prepared for restyling with roles and numbers instead of colours."""
-    sheet = Sheet(chart, live=True).fitted()
+    sheet = ChartSheet(chart, live=True).fitted()
     numbers = range(n if n <= MOST_CHARTS else 1)
     picture = drawn(sheet.graph(numbers, bare=len(numbers) == 1), "svg")
     if picture is None:

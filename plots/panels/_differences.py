@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 COLUMNS = 500  # of an envelope
 
 
-class Forces(Protocol):
+class ForceOverTime(Protocol):
     """Friction over time: a trace or a measurement."""
 
     @property
@@ -98,7 +98,7 @@ def _envelope(times: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
 def residual(
     ax: Axes,
     trace: Trace,
-    reference: Forces,
+    reference: ForceOverTime,
     floor: float = 1e-12,
     *,
     window: Window | None = None,

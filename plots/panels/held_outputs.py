@@ -18,7 +18,7 @@ __all__ = ["lag_between_ticks", "lag_over_period", "lag_over_time"]
 MILLI, MICRO = 1e3, 1e6
 
 
-class Lag(Protocol):
+class HeldLag(Protocol):
     """Differences of two runs at the ticks of one of them; see `gms_fsm.app.paper.held.Lag`."""
 
     @property
@@ -43,7 +43,12 @@ class Lag(Protocol):
 
 
 def lag_over_time(
-    ax: Axes, lags: Sequence[Lag], paper: float, *, window: tuple[float, float], place: bool = False
+    ax: Axes,
+    lags: Sequence[HeldLag],
+    paper: float,
+    *,
+    window: tuple[float, float],
+    place: bool = False,
 ) -> Artists:
     """Draw the differences at the ticks over time, one line per sample time.
 
@@ -51,7 +56,7 @@ def lag_over_time(
     ----------
     ax : Axes
         Axes to draw on.
-    lags : sequence of Lag
+    lags : sequence of HeldLag
         The differences, the longest sample time first.
     paper : float
         Residual that the paper reports, N or m: dashed lines.
@@ -79,14 +84,14 @@ def lag_over_time(
     return lines
 
 
-def lag_between_ticks(ax: Axes, lags: Sequence[Lag], *, window: tuple[float, float]) -> Artists:
+def lag_between_ticks(ax: Axes, lags: Sequence[HeldLag], *, window: tuple[float, float]) -> Artists:
     """Draw the difference of F within a few sample times: held, it falls behind until a tick.
 
     Parameters
     ----------
     ax : Axes
         Axes to draw on.
-    lags : sequence of Lag
+    lags : sequence of HeldLag
         The differences, the longest sample time first.
     window : (float, float)
         Time interval to show, s.
@@ -115,7 +120,7 @@ def lag_between_ticks(ax: Axes, lags: Sequence[Lag], *, window: tuple[float, flo
 
 def lag_over_period(
     ax: Axes,
-    lags: Sequence[Lag],
+    lags: Sequence[HeldLag],
     papers: tuple[float, float],
     *,
     phases: Mapping[str, tuple[float, float]],
@@ -126,7 +131,7 @@ def lag_over_period(
     ----------
     ax : Axes
         Axes to draw on.
-    lags : sequence of Lag
+    lags : sequence of HeldLag
         The differences.
     papers : (float, float)
         Residuals that the paper reports, N and m.

@@ -13,10 +13,10 @@ from plots.systems.mechanical_layout import (
     ABOVE,
     BRISTLE,
     STUB,
-    Column,
+    BodyColumn,
+    DrawnSpring,
     Item,
-    Layout,
-    Link,
+    MechanismLayout,
     Touch,
     arranged,
     force_of,
@@ -98,7 +98,7 @@ def _extent(pen: Pen) -> tuple[float, float, float, float]:
 
 
 # --------------------------------------------------------------------------- bodies
-def _columns(pen: Pen, layout: Layout) -> None:
+def _columns(pen: Pen, layout: MechanismLayout) -> None:
     for column in layout.columns:
         body, high = column.body, layout.high
         fill = PAPER if body.driven else PANEL
@@ -116,7 +116,7 @@ def _columns(pen: Pen, layout: Layout) -> None:
         _below(pen, slot.touch, x, x + slot.width, y, belt=bool(slot.belt))
 
 
-def _motion(pen: Pen, column: Column, high: float) -> None:
+def _motion(pen: Pen, column: BodyColumn, high: float) -> None:
     """Draw the direction in which the position of a body counts, or how a driven body moves."""
     x, y = column.left + 0.3, high + 0.35
     if not column.body.driven:
@@ -126,7 +126,7 @@ def _motion(pen: Pen, column: Column, high: float) -> None:
     pen.text(x + 0.8, y, column.motion, ha="left")
 
 
-def _force(pen: Pen, column: Column, high: float) -> None:
+def _force(pen: Pen, column: BodyColumn, high: float) -> None:
     """Draw what acts on a body besides springs, dampers and contacts, to the right if positive."""
     if not column.force:
         return
@@ -156,7 +156,7 @@ def _below(pen: Pen, touch: Touch, left: float, right: float, y: float, *, belt:
         pen.text(middle, under - LINE * (k + 1), line, colour=TEXT_GREY)
 
 
-def _belts(pen: Pen, layout: Layout) -> None:
+def _belts(pen: Pen, layout: MechanismLayout) -> None:
     for name, y in layout.belts.items():
         own = ((slot, x) for slot, x in slots_of(layout.columns) if slot.belt == name)
         spans = [(x, x + slot.width) for slot, x in own]
@@ -169,7 +169,7 @@ def _belts(pen: Pen, layout: Layout) -> None:
 
 
 # --------------------------------------------------------------------------- between bodies
-def _gap(pen: Pen, layout: Layout, place: int, items: list[Item]) -> None:
+def _gap(pen: Pen, layout: MechanismLayout, place: int, items: list[Item]) -> None:
     """Draw what lies to the left of a column, one above the other."""
     if not items:
         return
@@ -205,7 +205,7 @@ def _anchor(pen: Pen, item: Item, x: float, y: float, low: float, high: float, w
     pen.text(text_x, y, item.drive, ha="left" if way > 0 else "right")
 
 
-def _over(pen: Pen, layout: Layout) -> None:
+def _over(pen: Pen, layout: MechanismLayout) -> None:
     """Draw what passes above other bodies."""
     y = layout.high + layout.head + 0.3
     for k, item in enumerate(layout.over):
@@ -264,7 +264,7 @@ def _gear(pen: Pen, ratio: str, x: float, y: float, way: int) -> float:
     return near + wide * way
 
 
-def _links(pen: Pen, links: tuple[Link, ...], left: float, right: float, y: float) -> None:
+def _links(pen: Pen, links: tuple[DrawnSpring, ...], left: float, right: float, y: float) -> None:
     """Draw a spring, a damper, or both in parallel."""
     heights = {"spring": y + 0.25, "damper": y - 0.25} if len(links) == 2 else {links[0].kind: y}
     inner_left, inner_right = left, right

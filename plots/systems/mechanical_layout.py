@@ -34,10 +34,10 @@ __all__ = [
     "ABOVE",
     "BRISTLE",
     "STUB",
-    "Column",
+    "BodyColumn",
+    "DrawnSpring",
     "Item",
-    "Layout",
-    "Link",
+    "MechanismLayout",
     "Slot",
     "Touch",
     "arranged",
@@ -62,7 +62,7 @@ SHOWN = {"stop": ("x_s",), "backlash": ("gap",)}
 
 
 @dataclass(frozen=True)
-class Link:
+class DrawnSpring:
     """A spring or a damper: ``kind`` says which; the label is a formula."""
 
     kind: str
@@ -89,7 +89,7 @@ class Item:
         The bodies at its ends; `GROUND` is the ground, or a point that moves by itself.
     ratios : (str, str)
         The gear ratios there, as formulas; empty for 1.
-    links : tuple of Link
+    links : tuple of DrawnSpring
         At most one spring and one damper.
     drive : str
         How an end that is no body moves, as a formula; empty for the ground.
@@ -100,7 +100,7 @@ class Item:
     left: str
     right: str
     ratios: tuple[str, str] = ("", "")
-    links: tuple[Link, ...] = ()
+    links: tuple[DrawnSpring, ...] = ()
     drive: str = ""
     touch: Touch | None = None
 
@@ -138,7 +138,7 @@ class Slot:
 
 
 @dataclass
-class Column:
+class BodyColumn:
     """A body of the row, and where it is.
 
     Parameters
@@ -193,12 +193,12 @@ class Column:
 
 
 @dataclass
-class Layout:
+class MechanismLayout:
     """A mechanical drawing as places.
 
     Parameters
     ----------
-    columns : list of Column
+    columns : list of BodyColumn
         Bodies from left to right.
     gaps : dict of int to list of Item
         What lies to the left of each column, from above; the last one is to the right of all.
@@ -214,7 +214,7 @@ class Layout:
         Of the gaps.
     """
 
-    columns: list[Column]
+    columns: list[BodyColumn]
     gaps: dict[int, list[Item]]
     over: list[Item]
     belts: dict[str, float]
@@ -233,7 +233,7 @@ class Layout:
         return 0.75 + (0.35 + LINE * lines if lines else 0.0)
 
 
-def arranged(system: System) -> Layout:
+def arranged(system: System) -> MechanismLayout:
     """Return where everything is: each spring, force and contact once."""
     bodies = {each.name: each for each in system.bodies}
     touches = [_touch(system, each) for each in system.contacts]
@@ -242,10 +242,10 @@ def arranged(system: System) -> Layout:
     level = [*_sprung(system), *_touching(touches, belts)]
     row = _ordered([name for name in bodies if name not in belts], level)
     columns = [
-        Column(bodies[name], tuple(below[name]), _lines(force_of(system, bodies[name])))
+        BodyColumn(bodies[name], tuple(below[name]), _lines(force_of(system, bodies[name])))
         for name in row
     ]
-    layout = Layout(columns, defaultdict(list), [], {}, bodies)
+    layout = MechanismLayout(columns, defaultdict(list), [], {}, bodies)
     for item in level:
         _put(layout, item)
     _place(layout)
@@ -374,8 +374,10 @@ def _sprung(system: System) -> Iterator[Item]:
         ends, ratios = (spring.first, spring.second or GROUND), ("", _ratio(spring.ratio))
         rest, moves = _rest(system, spring)
         label = written(spring.k) + (f", rest {rest}" if rest and not moves else "")
-        links = [Link("spring", str(spring.k), label)] if spring.k != 0.0 else []
-        damper = [Link("damper", str(spring.d), written(spring.d))] if spring.d != 0.0 else []
+        links = [DrawnSpring("spring", str(spring.k), label)] if spring.k != 0.0 else []
+        damper = (
+            [DrawnSpring("damper", str(spring.d), written(spring.d))] if spring.d != 0.0 else []
+        )
         if moves and links:  # the damper does not see the end that moves
             yield Item(*ends, links=tuple(links), drive=rest)
             links = []
@@ -415,7 +417,7 @@ def _ordered(row: list[str], items: Iterable[Item]) -> list[str]:
     return list(min(lengths.items(), key=lambda each: each[1])[0])
 
 
-def _put(layout: Layout, item: Item) -> None:
+def _put(layout: MechanismLayout, item: Item) -> None:
     """Put an item into a gap, with its ends from left to right."""
     last, here = len(layout.columns) - 1, layout.place(item.left)
     if item.right:
@@ -449,7 +451,7 @@ def _lines(force: Value) -> tuple[str, ...]:
 
 
 # --------------------------------------------------------------------------- places
-def _place(layout: Layout) -> None:
+def _place(layout: MechanismLayout) -> None:
     """Set the height of the boxes, the widths of the gaps and where the boxes are."""
     stubs = STUB * len(layout.over)
     lanes = [sum(each.height for each in gap) for gap in layout.gaps.values()]
@@ -475,7 +477,7 @@ def _place(layout: Layout) -> None:
     layout.widths[end] = wide
 
 
-def _place_belts(layout: Layout, belts: Sequence[str]) -> None:
+def _place_belts(layout: MechanismLayout, belts: Sequence[str]) -> None:
     """Set the height of each belt: as high as nothing is in its way."""
     spans: dict[str, list[tuple[float, float]]] = defaultdict(list)
     for slot, left in slots_of(layout.columns):
@@ -497,7 +499,7 @@ def _place_belts(layout: Layout, belts: Sequence[str]) -> None:
         layout.belts[name] = -BRISTLE - BELOW * level
 
 
-def slots_of(columns: Iterable[Column]) -> Iterable[tuple[Slot, float]]:
+def slots_of(columns: Iterable[BodyColumn]) -> Iterable[tuple[Slot, float]]:
     """Yield the contacts below bodies, with the left side of the room of each."""
     for column in columns:
         left = column.left + 0.5 * (column.width - sum(each.width for each in column.slots))

@@ -39,7 +39,7 @@ from gms_fsm.systems.system import Body, Contact, Spring, System
 from plots.charts.labels import escape, printable, wrapped
 from plots.output.drawings import DrawnGraph
 from plots.style import INK, MONO, PANEL, PAPER, SANS, TEXT_GREY
-from plots.systems.system_routes import Box, Join, Sheet, routed
+from plots.systems.system_routes import Box, DiagramSheet, Join, routed
 from plots.systems.wires import PLACED, caption, draw_wire, joint, position, sides
 
 __all__ = ["signal_text", "system_diagram"]
@@ -70,7 +70,7 @@ ACTS = 2.2  # width of a line between body and contact
 
 
 @dataclass(frozen=True)
-class Block:
+class DiagramBlock:
     """One part of a system, as it is drawn.
 
     Parameters
@@ -138,16 +138,16 @@ def system_diagram(system: System) -> DrawnGraph:
     return graph
 
 
-def _in_words(block: Block) -> str:
+def _in_words(block: DiagramBlock) -> str:
     return "\n    ".join([f"  {block.note} {block.name}", *block.texts])
 
 
 # --------------------------------------------------------------------------- what is drawn
-def _blocks(system: System) -> Iterator[Block]:
+def _blocks(system: System) -> Iterator[DiagramBlock]:
     """Yield every part, from what drives to what is driven."""
     names = system.names
     for name, signal in system.signals.items():
-        yield Block("signal", name, "signal", (signal_text(name, signal),), ())
+        yield DiagramBlock("signal", name, "signal", (signal_text(name, signal),), ())
     for part in system.sampled:
         trees = {each: parse_value(t, [*names, "period"]) for each, t in part.updates.items()}
         note = f"every {_seconds(part.period)}"
@@ -155,10 +155,12 @@ def _blocks(system: System) -> Iterator[Block]:
             note += f", first after {_seconds(part.offset)}"
         texts = tuple(_equation(each, tree) for each, tree in trees.items())
         reads = _read(system, trees.values())
-        yield Block("sampled", part.name, note, texts, reads, "hold")
+        yield DiagramBlock("sampled", part.name, note, texts, reads, "hold")
     for name, text in system.flow.items():
         tree = parse_value(text, names)
-        yield Block("flow", name, "state", (_equation(f"d{name}/dt", tree),), _read(system, [tree]))
+        yield DiagramBlock(
+            "flow", name, "state", (_equation(f"d{name}/dt", tree),), _read(system, [tree])
+        )
     for body in system.bodies:
         yield _body(system, body)
     for index, spring in enumerate(system.springs):
@@ -167,11 +169,11 @@ def _blocks(system: System) -> Iterator[Block]:
         yield _contact(system, contact)
 
 
-def _body(system: System, body: Body) -> Block:
+def _body(system: System, body: Body) -> DiagramBlock:
     if body.velocity is not None:
         tree = _tree(body.velocity, system.names)
         texts = () if tree == Name(body.v) else (_equation(body.v, tree),)
-        return Block("body", body.name, "driven body", texts, _read(system, [tree]))
+        return DiagramBlock("body", body.name, "driven body", texts, _read(system, [tree]))
     inertia, force = (_tree(each, system.names) for each in (body.inertia or 0.0, body.force))
     total = force
     for spring in system.springs:
@@ -185,19 +187,19 @@ def _body(system: System, body: Body) -> Block:
     rate = Name(f"d{body.v}/dt")
     left = rate if inertia == Number(1.0) else Binary("*", inertia, rate)
     texts = (_equation(spell(left, MATLAB_LIKE), total),)
-    return Block("body", body.name, "body", texts, _read(system, [inertia, force]))
+    return DiagramBlock("body", body.name, "body", texts, _read(system, [inertia, force]))
 
 
-def _spring(system: System, index: int, spring: Spring) -> Block:
+def _spring(system: System, index: int, spring: Spring) -> DiagramBlock:
     bodies = {body.name: body for body in system.bodies}
     terms = pull(spring, bodies, partial(field_of, system, index))
     kind = "damper" if spring.k == 0.0 else "spring"
     text = _equation("F", summed(terms))
     reads = _read(system, [field_of(system, index, "rest")])
-    return Block("spring", spring.name, kind, (text,), reads, kind)
+    return DiagramBlock("spring", spring.name, kind, (text,), reads, kind)
 
 
-def _contact(system: System, contact: Contact) -> Block:
+def _contact(system: System, contact: Contact) -> DiagramBlock:
     chart, bound = contact.chart, {n: _tree(t, system.names) for n, t in contact.inputs.items()}
     for name in chart.inputs:  # one of the same name in the system is bound without being named
         if name not in (*bound, *chart.velocities, "t", "x", "s") and name in system.names:
@@ -215,7 +217,7 @@ def _contact(system: System, contact: Contact) -> Block:
         title = contact.model.title
     mark = "" if contact.period is None else "hold"
     reads = _read(system, bound.values())
-    return Block("contact", contact.name, note, (title, *texts), reads, mark)
+    return DiagramBlock("contact", contact.name, note, (title, *texts), reads, mark)
 
 
 def _forces(system: System) -> Iterator[tuple[str, str]]:
@@ -290,7 +292,7 @@ def _acting(system: System) -> Iterator[Join]:
                 yield Join(name, f"body-{body.name}", f"contact-{contact.name}")
 
 
-def _reading(blocks: Iterable[Block], owners: Mapping[str, str]) -> Iterator[Join]:
+def _reading(blocks: Iterable[DiagramBlock], owners: Mapping[str, str]) -> Iterator[Join]:
     for block in blocks:
         carried: dict[str, list[str]] = {}
         for name in block.reads:
@@ -302,7 +304,7 @@ def _reading(blocks: Iterable[Block], owners: Mapping[str, str]) -> Iterator[Joi
 
 
 # --------------------------------------------------------------------------- drawing
-def _draw_block(graph: graphviz.Digraph, block: Block, box: Box) -> None:
+def _draw_block(graph: graphviz.Digraph, block: DiagramBlock, box: Box) -> None:
     _, style, fill, line = LOOKS[block.kind]
     graph.node(
         block.id,
@@ -359,7 +361,7 @@ def _draw_join(
         caption(graph, f"{join.id}-name", at, text, width=wide, height="0.17")
 
 
-def _draw_title(graph: graphviz.Digraph, system: System, sheet: Sheet) -> None:
+def _draw_title(graph: graphviz.Digraph, system: System, sheet: DiagramSheet) -> None:
     key = "thick: motion one way, force back to the body; thin: values that are read"
     if system.sampled:
         key += "; dashed: at ticks only"
@@ -390,7 +392,7 @@ def _seconds(value: float) -> str:
     return f"{1e3 * value:g} ms" if value < 1.0 else f"{value:g} s"
 
 
-def _lines(block: Block) -> list[str]:
+def _lines(block: DiagramBlock) -> list[str]:
     title = f"{_text(block.name, bold=True)}&#160; {_text(block.note, colour=TEXT_GREY, size=10)}"
     boundary = 1 if block.kind == "contact" else 0  # the name of its chart
     rows = [title]
@@ -400,7 +402,7 @@ def _lines(block: Block) -> list[str]:
     return rows
 
 
-def _size(block: Block) -> tuple[float, float]:
+def _size(block: DiagramBlock) -> tuple[float, float]:
     """Return the width and the height of a block."""
     shown = [line for text in block.texts for line in wrapped(text, LONGEST)]
     title = (

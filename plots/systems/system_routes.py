@@ -13,7 +13,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-__all__ = ["Box", "Join", "Sheet", "routed"]
+__all__ = ["Box", "DiagramSheet", "Join", "routed"]
 
 Point = tuple[float, float]
 
@@ -73,7 +73,7 @@ class Join:
 
 
 @dataclass
-class Sheet:
+class DiagramSheet:
     """A diagram as places.
 
     Parameters
@@ -114,7 +114,7 @@ class _Wire:
     lane: float = 0.0
 
 
-def routed(boxes: Sequence[Box], joins: Sequence[Join]) -> Sheet:
+def routed(boxes: Sequence[Box], joins: Sequence[Join]) -> DiagramSheet:
     """Return places for blocks and wires.
 
     Parameters
@@ -135,7 +135,7 @@ def routed(boxes: Sequence[Box], joins: Sequence[Join]) -> Sheet:
     >>> [len(path) for path in sheet.paths.values()]
     [2]
     """
-    sheet = Sheet({each.id: each for each in boxes})
+    sheet = DiagramSheet({each.id: each for each in boxes})
     wires = [_wire(sheet.boxes, join) for join in joins]
     ports = _ports(wires)
     for (name, _), found in ports.items():

@@ -12,7 +12,7 @@ from gms_fsm import Contact, System
 from gms_fsm.app.phenomena import write_table
 from gms_fsm.charts import CHARTS
 from gms_fsm.phenomena.measure import PHENOMENA
-from gms_fsm.phenomena.results import Cell, Curve, Measured, Number, PhenomenaTable
+from gms_fsm.phenomena.results import Cell, Curve, MeasuredNumber, PhenomenaTable, PhenomenonResult
 from gms_fsm.systems.system import Body
 from tests.scenario_files import CommandLine
 
@@ -24,12 +24,14 @@ def small_table() -> PhenomenaTable:
     cells, points = [], np.linspace(1.0, 2.0, 5)
     for phenomenon in PHENOMENA.values():
         curve = Curve("", points, points)
-        numbers = (Number("what", 0.25, "N"), Number("other", 1e-9, "1"))
+        numbers = (MeasuredNumber("what", 0.25, "N"), MeasuredNumber("other", 1e-9, "1"))
         cells += [
-            Cell("one", phenomenon, Measured("shows", numbers, "it does", (curve,))),
-            Cell("two", phenomenon, Measured("shows wrongly", numbers, "it errs", (curve,))),
-            Cell("three", phenomenon, Measured("failed", (), "t = 1 s: it chatters")),
-            Cell("four", phenomenon, Measured("does not apply", (), "it is a gear")),
+            Cell("one", phenomenon, PhenomenonResult("shows", numbers, "it does", (curve,))),
+            Cell(
+                "two", phenomenon, PhenomenonResult("shows wrongly", numbers, "it errs", (curve,))
+            ),
+            Cell("three", phenomenon, PhenomenonResult("failed", (), "t = 1 s: it chatters")),
+            Cell("four", phenomenon, PhenomenonResult("does not apply", (), "it is a gear")),
         ]
     titles = {name: name for name in ("one", "two", "three", "four")}
     return PhenomenaTable(titles, tuple(PHENOMENA.values()), tuple(cells))

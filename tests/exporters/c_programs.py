@@ -17,7 +17,7 @@ import numpy as np
 from gms_fsm import GMSError, Model, Prescribed, Settings, System, Trace, export, simulate
 from gms_fsm.exporters import Subject
 from gms_fsm.exporters._c import CEngine, engine_of
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.systems.signals import Corners
 
 FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
@@ -61,7 +61,7 @@ def known_floors(
     system: System, t: np.ndarray, initial: Mapping[str, Any] | None = None
 ) -> Settings:
     """Return settings whose tolerances are what a run knows of forces to come, and a step not."""
-    places = Start.of(system, None, t[-1], t_start=t[0], initial=initial)
+    places = Problem.of(system, None, t[-1], t_start=t[0], initial=initial)
     floor = places.options.floor
     if floor is None:
         return Settings()

@@ -9,7 +9,7 @@ import pytest
 
 from gms_fsm import GMSError, Record, choose, initial_bank
 from gms_fsm.identification.bank import stop_operators
-from gms_fsm.identification.candidates import Candidate, Start
+from gms_fsm.identification.candidates import Candidate, FitStart
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
 
@@ -21,7 +21,7 @@ ONE = {"one": (initial_bank(RECORD, 1), ["k", "weights"])}
 
 
 def test_a_candidate_that_fails_is_noted_and_the_others_are_compared() -> None:
-    def failing(_: Sequence[Record], __: float | None) -> Start:
+    def failing(_: Sequence[Record], __: float | None) -> FitStart:
         raise GMSError("it has no spring")
 
     found = choose(RECORD, candidates=[Candidate("bad", "", failing), ("one", *ONE["one"])])
@@ -33,7 +33,7 @@ def test_a_candidate_that_fails_is_noted_and_the_others_are_compared() -> None:
 
 
 def test_interrupted_it_chooses_among_those_compared() -> None:
-    def interrupted(_: Sequence[Record], __: float | None) -> Start:
+    def interrupted(_: Sequence[Record], __: float | None) -> FitStart:
         raise KeyboardInterrupt
 
     last = Candidate("never", "", interrupted)

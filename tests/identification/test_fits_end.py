@@ -87,7 +87,7 @@ def test_nothing_that_runs_is_said_so() -> None:
 def test_interrupt_keeps_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
     record = measured(bank([2e4], [5e-5]), sine(2e-4, 1.0, 3.0), 0.01, 0)
     called = 0
-    own = runs.Pool.map
+    own = runs.ThreadPool.map
 
     def interrupted(self: Any, call: Any, given: Any) -> Any:
         nonlocal called
@@ -96,7 +96,7 @@ def test_interrupt_keeps_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
             raise KeyboardInterrupt
         return own(self, call, given)
 
-    monkeypatch.setattr(runs.Pool, "map", interrupted)
+    monkeypatch.setattr(runs.ThreadPool, "map", interrupted)
     found = fit(record, bank([1e4], [4e-5]), free=("k", "weights"))
     assert found.stopped == "The search was interrupted: this is the best so far."
     assert found.stopped in str(found)

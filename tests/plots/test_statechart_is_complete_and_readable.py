@@ -19,7 +19,7 @@ from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.language import MATLAB_LIKE, clauses, spell
 from plots.charts.labels import edge_id, part_id
-from plots.charts.notation import Writer
+from plots.charts.notation import ChartWriter
 from plots.charts.statechart import statechart
 from tests.helpers import matrix
 from tests.plots.charts_to_draw import (
@@ -160,7 +160,7 @@ def assert_line(drawn: Picture, element: str, edge: Transition) -> None:
 @pytest.mark.parametrize("name", ["hostile", "hostile, math"])
 def test_every_look_shows_the_whole_hostile_chart(name: str, direction: str) -> None:
     drawn, notation = picture(name, direction), CASES[name][2].get("notation", "stateflow")
-    write = Writer(HOSTILE, notation)
+    write = ChartWriter(HOSTILE, notation)
 
     def plain(text: str) -> str:  # the index of a name is a text of its own, lowered
         return squeezed(text).replace("_", "") if notation == "math" else squeezed(text)

@@ -23,8 +23,8 @@ from gms_fsm.systems.models import ChartModel
 from gms_fsm.systems.system import Body, Contact, System
 from plots import LiveChart, mermaid
 from plots.charts.labels import LONGEST_LINE, Tally, edge_id, wrapped
-from plots.charts.notation import Writer
-from plots.charts.statechart import MOST_EDGES, Sheet, statechart
+from plots.charts.notation import ChartWriter
+from plots.charts.statechart import MOST_EDGES, ChartSheet, statechart
 from plots.page._rows import page_rows
 from plots.page._run import stored_run
 from plots.page.chart import chart_svg
@@ -64,16 +64,16 @@ def test_formulas(text: str, formula: str) -> None:
     names = ("v", "s", "z", "v_c", "sigma_0", "omega")
     chart = Chart("names", inputs=("v", "s"), variables=("z",), parameters=names[3:],
                   states=(State("a", flow={"z": "0"}),), outputs={"F": "z"})  # fmt: skip
-    assert Writer(chart, "math").text(parse_condition(text, names)) == formula
+    assert ChartWriter(chart, "math").text(parse_condition(text, names)) == formula
 
 
 def test_rates_and_assignments() -> None:
-    write, value = Writer(LUGRE, "math"), parse_value("v", ["v"])
+    write, value = ChartWriter(LUGRE, "math"), parse_value("v", ["v"])
     assert write.flow("z", value) == "ż = v"
     assert write.flow("Δζ", value) == "dΔζ/dt = v"
     assert write.assignment("z", value) == "z := v"
     assert write.actions({"z": value, "Δζ": value}) == "/ z := v, Δζ := v"
-    assert Writer(LUGRE, "stateflow").actions({"z": value}) == "{z = v;}"
+    assert ChartWriter(LUGRE, "stateflow").actions({"z": value}) == "{z = v;}"
 
 
 # --------------------------------------------------------------------------- lines
@@ -122,12 +122,12 @@ def plain(rows: Any) -> list[str]:
 def lines_of(chart: Chart, state: str) -> list[str]:
     """Return the lines in the box of a state, without the title."""
     (found,) = (each for each in chart.states if each.name == state)
-    return plain(Sheet(chart).state_rows(found, 0)[1:])
+    return plain(ChartSheet(chart).state_rows(found, 0)[1:])
 
 
 def guards(chart: Chart, notation: str = "stateflow") -> list[tuple[str, str]]:
     """Return the source and the text of every edge."""
-    sheet = Sheet(chart, notation)
+    sheet = ChartSheet(chart, notation)
     return [
         (edge.source, " ".join(plain(sheet.guard_rows(edge, n, 0))))
         for state in chart.states
@@ -169,17 +169,17 @@ def test_timers_impulses_and_guards_that_always_hold() -> None:
 
 
 def test_named_expressions_and_common_forces_are_below() -> None:
-    assert plain(Sheet(SHARED).definitions()) == [
+    assert plain(ChartSheet(SHARED).definitions()) == [
         "let: limit = F_c / k;",
         "     far = |z| / limit;",
         "force of the contact: F = sum(F) + b * v;",
     ]
-    below = plain(Sheet(SHARED, "math").definitions())
+    below = plain(ChartSheet(SHARED, "math").definitions())
     assert below[-1] == "force of the contact: F = ΣF + b · v"
-    below = plain(Sheet(CHARTS["elasto-plastic"]).definitions())
+    below = plain(ChartSheet(CHARTS["elasto-plastic"]).definitions())
     assert below[-1] == "force in all states: F = sigma_0 * z + sigma_1 * dz;"
     for chart in (*GMS_ELEMENT.values(), LUGRE):  # of two states it stands in each
-        assert Sheet(chart).definitions() == []
+        assert ChartSheet(chart).definitions() == []
         for state in chart.states:
             found = [each for each in lines_of(chart, state.name) if "force: F = " in each]
             assert len(found) == 1
@@ -191,7 +191,7 @@ def test_named_expressions_and_common_forces_are_below() -> None:
 
 def test_every_chart_says_every_force() -> None:
     for name, chart in CHARTS.items():
-        below = " ".join(plain(Sheet(chart).definitions()))
+        below = " ".join(plain(ChartSheet(chart).definitions()))
         for state in chart.states:
             own = " ".join(lines_of(chart, state.name))
             for force in chart.force_names:
@@ -345,7 +345,7 @@ def test_an_edge_with_several_sources_is_one_line_for_each() -> None:
 def test_a_chart_with_many_edges_or_on_demand_is_a_matrix(
     chart: Chart, form: str, matrix: bool
 ) -> None:
-    assert (Sheet(chart, form=form).fitted().form == "matrix") == matrix
+    assert (ChartSheet(chart, form=form).fitted().form == "matrix") == matrix
     source = statechart(chart, form=form).source
     assert ("element1-target-1" in source) == matrix
     assert ("element1-default" in source) == (not matrix)
@@ -364,9 +364,9 @@ def test_a_wide_graph_becomes_a_matrix() -> None:
         ),
         outputs={"F": "v"},
     )
-    assert Sheet(chart, direction="TB").fitted().form == "graph"
-    assert Sheet(chart, direction="LR").fitted().form == "matrix"
-    assert Sheet(chart, direction="LR", form="graph").fitted().form == "graph"
+    assert ChartSheet(chart, direction="TB").fitted().form == "graph"
+    assert ChartSheet(chart, direction="LR").fitted().form == "matrix"
+    assert ChartSheet(chart, direction="LR", form="graph").fitted().form == "graph"
 
 
 @pytest.mark.slow
@@ -392,8 +392,8 @@ def test_every_edge_is_in_the_cell_of_its_source_and_target() -> None:
             assert ys[row] <= shown.box.top
             assert shown.box.bottom <= ys[row + 1]
     assert len(found.of_class("guard")) == len(chart.transitions)
-    assert list(Sheet(SIGNED, form="matrix").fitted().numbered.values()) == [1, 2, 3]
-    many = Sheet(MANY_EDGES).fitted()
+    assert list(ChartSheet(SIGNED, form="matrix").fitted().numbered.values()) == [1, 2, 3]
+    many = ChartSheet(MANY_EDGES).fitted()
     texts = {many.legend_text(edge) for edge in MANY_EDGES.transitions}
     assert len(set(many.numbered.values())) == len(texts) < len(MANY_EDGES.transitions)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import simulate, sweep
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.mounted import mounted
@@ -18,7 +18,7 @@ TIMES = np.linspace(0.0, 20.0, 501)
 
 def test_the_next_run_does_not_write_into_the_rows_of_the_one_before() -> None:
     model, rig = pulled_mass()
-    run = CompiledRun(Start.of(model, rig, 20.0, Settings(engine="compiled", t_eval=TIMES)))
+    run = CompiledRun(Problem.of(model, rig, 20.0, Settings(engine="compiled", t_eval=TIMES)))
     while run.advance():
         pass
     first = run.recorder.trace()

@@ -15,7 +15,7 @@ from gms_fsm import simulate
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.fmi.model import both_of
 from gms_fsm.run.printed import printed
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.ticks import Clock, clocks_of, ticks_of
 from gms_fsm.systems.system import Body, Contact, Sampled, System
 from integrators.loop import Buffers
@@ -149,7 +149,7 @@ def test_an_fmu_ticks_when_a_run_does(name: str, t_start: float) -> None:
 
 
 def test_the_printed_program_ticks_when_a_run_does() -> None:
-    start = Start.of(counting(SEVERAL["66 of one"], (0, 1, 2)), None, 0.17, t_start=0.1)
+    start = Problem.of(counting(SEVERAL["66 of one"], (0, 1, 2)), None, 0.17, t_start=0.1)
     names: dict[str, Any] = {}
     exec(printed(start), names)
     found: list[tuple[float, int]] = []

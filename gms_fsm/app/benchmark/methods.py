@@ -14,10 +14,10 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.charts.zoo.bristles.bouc_wen import BOUC_WEN
 from gms_fsm.charts.zoo.bristles.dahl import DAHL
 from gms_fsm.identification.bank import initial_bank, stop_operators, thresholds
-from gms_fsm.identification.candidates import Start, gms
+from gms_fsm.identification.candidates import FitStart, gms
 from gms_fsm.identification.choose import choose
 from gms_fsm.identification.fit import fitted, task_of
-from gms_fsm.identification.problem.task import Options
+from gms_fsm.identification.problem.task import FitOptions
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.parts import thinned
 from gms_fsm.records.record import Record
@@ -129,40 +129,40 @@ def _bank_numbers(records: Sequence[Record], smoothing: float | None) -> tuple[f
     return float(bank.parameters.k[0]), bank.stribeck.F_c
 
 
-def _dahl(records: Sequence[Record], smoothing: float | None) -> Start:
+def _dahl(records: Sequence[Record], smoothing: float | None) -> FitStart:
     k, F_c = _bank_numbers(records, smoothing)
-    return Start(ChartModel(DAHL, {"sigma_0": k, "F_c": F_c}), ("sigma_0", "F_c"))
+    return FitStart(ChartModel(DAHL, {"sigma_0": k, "F_c": F_c}), ("sigma_0", "F_c"))
 
 
-def _lugre(records: Sequence[Record], smoothing: float | None) -> Start:
+def _lugre(records: Sequence[Record], smoothing: float | None) -> FitStart:
     k, F_c = _bank_numbers(records, smoothing)
     speed = np.concatenate([np.abs(each.motion(smoothing).velocity) for each in records])
     middle = float(np.median(speed[speed > 0.1 * np.quantile(speed, 0.99)]))
     model = LuGre(
         sigma_0=k, sigma_1=0.0, sigma_2=0.0, stribeck=Stribeck(F_c, 1.05 * F_c, 0.5 * middle)
     )
-    return Start(
+    return FitStart(
         model,
         ("sigma_0", "sigma_2", "F_c", "F_s", "v_s"),
         bounds={"v_s": (0.05 * middle, 20.0 * middle)},
     )
 
 
-def _bouc_wen(records: Sequence[Record], smoothing: float | None) -> Start:
+def _bouc_wen(records: Sequence[Record], smoothing: float | None) -> FitStart:
     k, F_c = _bank_numbers(records, smoothing)
     values = {"k": k, "alpha": 0.01, "D": F_c / k, "A": 1.0, "beta": 0.5, "gamma": 0.5, "p": 2.0}
-    return Start(
+    return FitStart(
         ChartModel(BOUC_WEN, values),
         ("k", "alpha", "D", "gamma", "p"),
         bounds={"alpha": (1e-6, 0.5), "gamma": (-0.5, 0.499), "p": (1.0, 10.0)},
     )
 
 
-def _gms(n: int) -> Callable[[Sequence[Record], float | None], Start]:
+def _gms(n: int) -> Callable[[Sequence[Record], float | None], FitStart]:
     return lambda records, smoothing: gms(records, smoothing, n=n)
 
 
-def _fitted(build: Callable[[Sequence[Record], float | None], Start]) -> Train:
+def _fitted(build: Callable[[Sequence[Record], float | None], FitStart]) -> Train:
     """Fit by hops; later splits are refined from the previous one."""
 
     def train(
@@ -191,19 +191,19 @@ def _chosen(
 
 def _refined(records: Sequence[Record], smoothing: float | None, before: Fit) -> Predictor:
     given = before.task.options
-    start = Start(before.model, given.free, given.tied, given.bounds)
+    start = FitStart(before.model, given.free, given.tied, given.bounds)
     return _predictor(_fit(records, start, smoothing, "local", before.begin))
 
 
 def _fit(
     records: Sequence[Record],
-    start: Start,
+    start: FitStart,
     smoothing: float | None,
     search: str,
     begin: str | None,
 ) -> Fit:
     """Fit without intervals, which predictions do not need."""
-    options = Options(
+    options = FitOptions(
         free=start.free,
         tied=start.tied,
         bounds=start.bounds,

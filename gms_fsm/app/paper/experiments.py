@@ -25,13 +25,13 @@ from gms_fsm.systems.models import GMS, LuGre, Model
 from gms_fsm.systems.rigs import Prescribed, Rig, Slider
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Experiment", "Progress", "experiments", "lugre_like", "run", "run_one"]
+__all__ = ["PaperExperiment", "Progress", "experiments", "lugre_like", "run", "run_one"]
 
 Progress = Callable[[str, float], object]
 
 
 @dataclass(frozen=True)
-class Experiment:
+class PaperExperiment:
     """One run of the reproduction: name, system and settings.
 
     Parameters
@@ -61,7 +61,7 @@ class Experiment:
     held: float | None = None
 
 
-def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experiment, ...]:
+def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[PaperExperiment, ...]:
     """Return every run of the reproduction.
 
     Parameters
@@ -73,7 +73,7 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
 
     Returns
     -------
-    tuple of Experiment
+    tuple of PaperExperiment
         The runs, those of Fig. 3 first, and those with held outputs last.
 
     Examples
@@ -87,25 +87,27 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
     fig3, fig4 = GMS(slow, law="published"), GMS(slip, law="published")
     signed3, signed4 = GMS(earned, law="signed"), GMS(slip, law="signed")
     return (
-        Experiment("fig3_chart", fig3, push, FIG3_END),
-        Experiment("fig3_ifelse", fig3, push, FIG3_END, engine="ifelse"),
-        Experiment("fig3_lugre", lugre_like(slow), push, FIG3_END),
-        Experiment("fig3_slipping_chart", signed3, push, FIG3_END),
-        Experiment("fig3_slipping_ifelse", signed3, push, FIG3_END, engine="ifelse"),
-        Experiment("fig3_step", fig3, push, FIG3_END, engine="ifelse", paper_settings=True),
-        Experiment("fig4_chart", fig4, move, FIG4_END),
-        Experiment("fig4_ifelse", fig4, move, FIG4_END, engine="ifelse"),
-        Experiment("fig4_lugre", lugre_like(slip), move, FIG4_END),
-        Experiment("fig4_signed_chart", signed4, move, FIG4_END),
-        Experiment("fig4_signed_ifelse", signed4, move, FIG4_END, engine="ifelse"),
-        Experiment("fig4_step", fig4, move, FIG4_END, engine="ifelse", paper_settings=True),
+        PaperExperiment("fig3_chart", fig3, push, FIG3_END),
+        PaperExperiment("fig3_ifelse", fig3, push, FIG3_END, engine="ifelse"),
+        PaperExperiment("fig3_lugre", lugre_like(slow), push, FIG3_END),
+        PaperExperiment("fig3_slipping_chart", signed3, push, FIG3_END),
+        PaperExperiment("fig3_slipping_ifelse", signed3, push, FIG3_END, engine="ifelse"),
+        PaperExperiment("fig3_step", fig3, push, FIG3_END, engine="ifelse", paper_settings=True),
+        PaperExperiment("fig4_chart", fig4, move, FIG4_END),
+        PaperExperiment("fig4_ifelse", fig4, move, FIG4_END, engine="ifelse"),
+        PaperExperiment("fig4_lugre", lugre_like(slip), move, FIG4_END),
+        PaperExperiment("fig4_signed_chart", signed4, move, FIG4_END),
+        PaperExperiment("fig4_signed_ifelse", signed4, move, FIG4_END, engine="ifelse"),
+        PaperExperiment("fig4_step", fig4, move, FIG4_END, engine="ifelse", paper_settings=True),
         *(
-            Experiment(f"fig3_held_chart_{1e6 * h:g}us", fig3, push, FIG3_END, held=h)
+            PaperExperiment(f"fig3_held_chart_{1e6 * h:g}us", fig3, push, FIG3_END, held=h)
             for h in HELD_STEPS
         ),
-        Experiment("fig3_held_ifelse", fig3, push, FIG3_END, engine="ifelse", held=PAPER_STEP),
-        Experiment("fig4_held_chart", fig4, move, FIG4_HELD_END, held=PAPER_STEP),
-        Experiment("fig4_held_ifelse", fig4, move, FIG4_HELD_END, engine="ifelse", held=PAPER_STEP),
+        PaperExperiment("fig3_held_ifelse", fig3, push, FIG3_END, engine="ifelse", held=PAPER_STEP),
+        PaperExperiment("fig4_held_chart", fig4, move, FIG4_HELD_END, held=PAPER_STEP),
+        PaperExperiment(
+            "fig4_held_ifelse", fig4, move, FIG4_HELD_END, engine="ifelse", held=PAPER_STEP
+        ),
     )
 
 
@@ -140,12 +142,12 @@ def run(
     return {e.name: run_one(e, progress) for e in experiments(force, velocity)}
 
 
-def run_one(experiment: Experiment, progress: Progress | None = None) -> Trace:
+def run_one(experiment: PaperExperiment, progress: Progress | None = None) -> Trace:
     """Run one experiment.
 
     Parameters
     ----------
-    experiment : Experiment
+    experiment : PaperExperiment
         The experiment.
     progress : callable, optional
         ``progress(name, done)`` with done from 0 to 1.

@@ -17,7 +17,7 @@ from gms_fsm.foundation.files import output_folder, write_whole
 if TYPE_CHECKING:
     from gms_fsm import Model, Report, Rig
     from gms_fsm.app._own_files import OwnFile
-    from gms_fsm.run.problem import Start
+    from gms_fsm.run.problem import Problem
 
 SECONDS = 10.0  # of a demonstration of a system, whose file has no [run]
 
@@ -307,7 +307,7 @@ def code_command(
     from gms_fsm.app.verbs.catalogue import chosen
     from gms_fsm.exporters.alone import PERIOD, slow_velocity
     from gms_fsm.run.printed import printed
-    from gms_fsm.run.problem import Start
+    from gms_fsm.run.problem import Problem
     from gms_fsm.systems.models import demonstration
 
     own = own_file(name, law)
@@ -329,10 +329,10 @@ def code_command(
         chart = own.only_chart()
     try:
         model = demonstration(found, law) if own is None else any_model(chart)
-        start = Start.of(model, rigs[rig or RigName.prescribed], PERIOD)
+        start = Problem.of(model, rigs[rig or RigName.prescribed], PERIOD)
         if rig in (None, RigName.prescribed):  # slower, if the model is stiff
             slow = Prescribed(slow_velocity(Contact("friction", model)))
-            start = Start.of(model, slow, PERIOD)
+            start = Problem.of(model, slow, PERIOD)
     except ParameterError as error:
         if rig is not None:
             raise
@@ -344,11 +344,11 @@ def code_command(
     typer.echo(printed(start), nl=False)
 
 
-def _start_of_file(own: OwnFile) -> Start:
+def _start_of_file(own: OwnFile) -> Problem:
     """Return the run of a scenario file, or ten seconds of a system."""
-    from gms_fsm.run.problem import Start
+    from gms_fsm.run.problem import Problem
 
     assert own.system is not None
     given = own.run or {"t_start": 0.0, "t_end": SECONDS}
     t_start, initial = given["t_start"], given.get("initial")
-    return Start.of(own.system, None, given["t_end"], t_start=t_start, initial=initial)
+    return Problem.of(own.system, None, given["t_end"], t_start=t_start, initial=initial)

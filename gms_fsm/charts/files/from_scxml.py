@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-from gms_fsm.charts.files.imported import Edge, Texts, built
+from gms_fsm.charts.files.imported import ImportedEdge, Texts, built
 from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
 from gms_fsm.errors import ChartError, why
 from gms_fsm.language import ECMASCRIPT
@@ -29,7 +29,7 @@ TOKEN = re.compile(r"[!=]=+|&&|\|\||!|\bMath\.\w+|\btrue\b")
 
 
 @dataclass(frozen=True)
-class Row:
+class ScxmlTransition:
     """A transition of the document that stands for an edge, in one state."""
 
     name: str
@@ -188,7 +188,7 @@ def _states(root: ET.Element, here: str) -> list[ET.Element]:
     return sorted(states, key=lambda each: each.get("id") != first)
 
 
-def _rows(state: ET.Element, here: str) -> Iterator[Row]:
+def _rows(state: ET.Element, here: str) -> Iterator[ScxmlTransition]:
     """Yield the transitions of a state that are edges."""
     source = str(state.get("id"))
     for number, each in enumerate(_all(state, "transition"), start=1):
@@ -215,7 +215,7 @@ def _rows(state: ET.Element, here: str) -> Iterator[Row]:
         if cond is None and event is None:
             cond = ECMASCRIPT.true
         order = _own(each, "order")
-        yield Row(
+        yield ScxmlTransition(
             name,
             source,
             target,
@@ -245,7 +245,7 @@ def _assigned(parents: list[ET.Element], place: str) -> dict[str, tuple[str, str
 
 
 # --------------------------------------------------------------------------- edges
-def _ordered(rows: list[Row], here: str) -> list[Row]:
+def _ordered(rows: list[ScxmlTransition], here: str) -> list[ScxmlTransition]:
     """Return the rows in the chart's own order, if the document keeps it."""
     if any(row.order is None for row in rows):
         return rows
@@ -259,7 +259,7 @@ def _ordered(rows: list[Row], here: str) -> list[Row]:
     return sorted(rows, key=lambda row: row.order or 0)
 
 
-def _named(rows: list[Row]) -> list[Row]:
+def _named(rows: list[ScxmlTransition]) -> list[ScxmlTransition]:
     """Give every row the name of its edge; rows of one edge differ in their source only."""
     kinds: dict[str, set[tuple[str, str | None, str]]] = {}
     for row in rows:
@@ -273,15 +273,15 @@ def _named(rows: list[Row]) -> list[Row]:
             made = f"{row.source}_{row.target}"
             used[made] = used.get(made, 0) + 1
             name = made if used[made] == 1 else f"{made}_{used[made]}"
-        named.append(Row(**{**vars(row), "name": name}))
+        named.append(ScxmlTransition(**{**vars(row), "name": name}))
     return named
 
 
-def _edges(rows: list[Row]) -> list[Edge]:
-    found: dict[str, Edge] = {}
+def _edges(rows: list[ScxmlTransition]) -> list[ImportedEdge]:
+    found: dict[str, ImportedEdge] = {}
     for row in rows:
         sources = (*found[row.name].sources, row.source) if row.name in found else (row.source,)
-        found[row.name] = Edge(row.name, sources, row.target, row.place)
+        found[row.name] = ImportedEdge(row.name, sources, row.target, row.place)
     return [*found.values()]
 
 
@@ -340,7 +340,7 @@ def _own_texts(root: ET.Element) -> dict[str, Any]:
 
 
 def _check_kept(
-    chart: Chart, rows: list[Row], states: list[ET.Element], given: Texts, here: str
+    chart: Chart, rows: list[ScxmlTransition], states: list[ET.Element], given: Texts, here: str
 ) -> None:
     """Refuse a document whose conditions are not what the texts kept beside them say."""
     texts = conditions(chart)

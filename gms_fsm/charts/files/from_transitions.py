@@ -8,7 +8,7 @@ from transitions import Machine
 from transitions.extensions.asyncio import AsyncMachine
 from transitions.extensions.nesting import HierarchicalMachine
 
-from gms_fsm.charts.files.imported import Edge
+from gms_fsm.charts.files.imported import ImportedEdge
 from gms_fsm.errors import ChartError
 
 __all__ = ["read"]
@@ -25,7 +25,7 @@ MACHINE_CALLBACKS = (
 )
 
 
-def read(machine: object) -> tuple[list[str], list[Edge]]:
+def read(machine: object) -> tuple[list[str], list[ImportedEdge]]:
     """Return the states, the default state first, and the edges in the order of their priority.
 
     Parameters
@@ -35,7 +35,7 @@ def read(machine: object) -> tuple[list[str], list[Edge]]:
 
     Returns
     -------
-    (list of str, list of Edge)
+    (list of str, list of ImportedEdge)
         One edge for each trigger.
 
     Raises
@@ -111,7 +111,7 @@ def _state(state: Any) -> str:
     return name
 
 
-def _edge(trigger: str, event: Any) -> Edge:
+def _edge(trigger: str, event: Any) -> ImportedEdge:
     place = f"{HERE}, trigger {trigger!r}"
     rows = [row for each in event.transitions.values() for row in each]
     for row in rows:
@@ -144,7 +144,7 @@ def _edge(trigger: str, event: Any) -> Edge:
             place=place,
             advice="give each edge a trigger of its own, which is its name in the chart",
         )
-    return Edge(trigger, sources, targets.pop(), place)
+    return ImportedEdge(trigger, sources, targets.pop(), place)
 
 
 def _no_callbacks(given: list[Any], kind: str, place: str, advice: str) -> None:

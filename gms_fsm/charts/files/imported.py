@@ -13,11 +13,11 @@ from gms_fsm.errors import ChartError, shown
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
 
-__all__ = ["Edge", "GivenTexts", "Texts", "built"]
+__all__ = ["GivenTexts", "ImportedEdge", "Texts", "built"]
 
 
 @dataclass(frozen=True)
-class Edge:
+class ImportedEdge:
     """An edge as another program has it.
 
     Parameters
@@ -97,7 +97,7 @@ class GivenTexts(TypedDict, total=False):
 
 
 def built(
-    kind: type[Chart], states: list[str], edges: list[Edge], given: Texts, here: str
+    kind: type[Chart], states: list[str], edges: list[ImportedEdge], given: Texts, here: str
 ) -> Chart:
     """Return the chart.
 
@@ -107,7 +107,7 @@ def built(
         The class, which imports this module.
     states : list of str
         The first one is the default state.
-    edges : list of Edge
+    edges : list of ImportedEdge
         In the order of their priority.
     given : Texts
         The texts.

@@ -24,12 +24,12 @@ from gms_fsm.debugger._help import overview
 from gms_fsm.debugger._over_time import curves, ribbons
 from gms_fsm.debugger._over_time import events as events_of
 from gms_fsm.debugger._text import DRAWN
-from gms_fsm.debugger._view import View, branches, chart_states, view
+from gms_fsm.debugger._view import Screen, branches, chart_states, view
 from gms_fsm.debugger.tui import _guards, _time
 from gms_fsm.debugger.tui import _panels as drawn
 from gms_fsm.debugger.tui._chart import chart_art
 from gms_fsm.debugger.tui._keys import KEYS, help_rows, with_number
-from gms_fsm.debugger.tui._spans import DARK, LIGHT, Row, line, painted
+from gms_fsm.debugger.tui._spans import DARK, LIGHT, PanelLine, line, painted
 from gms_fsm.debugger.tui._widgets import Help, Keys, Panel, Prompt, Ribbon
 from gms_fsm.session.session import Session
 
@@ -90,7 +90,7 @@ class FullScreen(App[int]):
         self.last = 0  # line of the transcript at which the last answer begins
         self.waiting: deque[str] = deque()
         self.busy = self.stopping = False
-        self.seen: View = view(session)
+        self.seen: Screen = view(session)
         names = ("chart", "elements", "why", "events", "session", "answers")
         self.panels = {name: Panel(TITLES.get(name, name), name) for name in names}
         self.ribbon, self.top = Ribbon("states over time", "ribbons"), Horizontal(id="top")
@@ -157,7 +157,7 @@ class FullScreen(App[int]):
         self._draw_ribbons()
         self._draw_keys()
 
-    def _contents(self) -> dict[str, Callable[[int], Sequence[Row]]]:
+    def _contents(self) -> dict[str, Callable[[int], Sequence[PanelLine]]]:
         """Return what each panel shows, as functions of its width."""
         commands, session, element = self.commands, self.commands.session, self.commands.element
         address = commands.elements.short(element)
@@ -198,7 +198,7 @@ class FullScreen(App[int]):
         self.highest = max(self.highest, min(most, rest))
         self.top.styles.height = self.highest
 
-    def _show(self, name: str, rows: Callable[[int], Sequence[Row]]) -> None:
+    def _show(self, name: str, rows: Callable[[int], Sequence[PanelLine]]) -> None:
         panel = self.panels[name]
         if not panel.display or not panel.size.width:
             return
@@ -206,7 +206,7 @@ class FullScreen(App[int]):
             panel.show(rows(panel.columns), self.palette)
         except Exception as error:  # a value that cannot be computed must not end the session
             text = f"cannot be shown here: {error}"
-            panel.show([Row(line((text, "error")))], self.palette)
+            panel.show([PanelLine(line((text, "error")))], self.palette)
         if name == "answers":
             self.call_after_refresh(self.call_after_refresh, self._show_last_answer, panel)
         elif name != "chart":
@@ -228,7 +228,7 @@ class FullScreen(App[int]):
         """Whether there is room for two lines of answers only."""
         return self.small and self.page != ANSWERS
 
-    def _answers(self, width: int) -> list[Row]:
+    def _answers(self, width: int) -> list[PanelLine]:
         """Return the transcript; where there is room for two lines, the last answer."""
         panel, begin = self.panels["answers"], 0
         panel.border_title = "answers"
@@ -238,7 +238,7 @@ class FullScreen(App[int]):
                 panel.border_title, begin = self.said[begin], begin + 1
         return drawn.answer_rows(self.said[begin:], width)
 
-    def _chart(self, width: int) -> list[Row]:
+    def _chart(self, width: int) -> list[PanelLine]:
         """Draw the chart of the chosen element, with the names of edges if they take no lines."""
         commands, panel = self.commands, self.panels["chart"]
         states = chart_states(commands.session, commands.element)
@@ -252,7 +252,7 @@ class FullScreen(App[int]):
             art = shorter
         active = next((i for i, each in enumerate(art) if "ACTIVE" in str(each)), 0)
         self.call_after_refresh(panel.keep_visible, active + 1)
-        return [Row(each) for each in art]
+        return [PanelLine(each) for each in art]
 
     def _draw_status(self) -> None:
         several = len(self.commands.session.branches) > 1
@@ -287,7 +287,7 @@ class FullScreen(App[int]):
         axis = " " * lead + _time.axis(*span, parts)
         panel.lead, panel.span, panel.parts = lead, span, parts
         panel.border_title = title
-        panel.show([*rows, Row(line((axis, "dim")))], self.palette)
+        panel.show([*rows, PanelLine(line((axis, "dim")))], self.palette)
         self.call_after_refresh(panel.keep_visible, 0)
 
     def _key(self) -> list[str]:

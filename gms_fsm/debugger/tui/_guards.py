@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from gms_fsm.debugger._text import wrapped
 from gms_fsm.debugger.tui._chart import MARKS
-from gms_fsm.debugger.tui._spans import Line, Row, Span, line
+from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line
 from gms_fsm.foundation.quantities import quantity
 from gms_fsm.session.explain import Clause, Why
 from gms_fsm.session.session import Breakpoint
@@ -50,7 +50,7 @@ def margin_bar(relative: float, half: int) -> str:
     return f"{' ' * half}│{'█' * full + '▌' * rest:<{half}}"
 
 
-def why_rows(why: Why, address: str, points: Sequence[Breakpoint], width: int) -> list[Row]:
+def why_rows(why: Why, address: str, points: Sequence[Breakpoint], width: int) -> list[PanelLine]:
     """Return the edges of an element clause by clause; a click sets a breakpoint at a guard.
 
     Parameters
@@ -66,14 +66,16 @@ def why_rows(why: Why, address: str, points: Sequence[Breakpoint], width: int) -
 
     Returns
     -------
-    list of Row
+    list of PanelLine
         Heading, edges with their clauses, and one sentence per edge.
     """
-    rows = [Row(line((part, "head"))) for text in why.heading for part in wrapped(text, width)]
+    rows = [
+        PanelLine(line((part, "head"))) for text in why.heading for part in wrapped(text, width)
+    ]
     texts = [len(clause.text) for each in why for clause in each.clauses]
     if texts:
-        table = Table.fitting(max(texts), width)
-        rows.append(Row(line((table.head, "dim"))))
+        table = ClauseTable.fitting(max(texts), width)
+        rows.append(PanelLine(line((table.head, "dim"))))
     for each in why:
         edge = each.edge
         command = f"break valid {edge.name} element {address}"
@@ -83,15 +85,17 @@ def why_rows(why: Why, address: str, points: Sequence[Breakpoint], width: int) -
         fired = "  FIRED" if each.fired else ""
         text = f"{each.priority} {edge.name}: {edge.source} → {edge.target}{fired}{marks}"
         role = "fired" if each.fired else "head"
-        rows += [Row(line((part, role)), command) for part in wrapped(text, width)]
-        rows += [Row(each, command) for clause in each.clauses for each in table.lines(clause)]
+        rows += [PanelLine(line((part, role)), command) for part in wrapped(text, width)]
+        rows += [
+            PanelLine(each, command) for clause in each.clauses for each in table.lines(clause)
+        ]
     for each in why:
         role = "fired" if each.fired else "true" if each.holds else ""
-        rows += [Row(line((part, role))) for part in wrapped(each.verdict, width)]
+        rows += [PanelLine(line((part, role))) for part in wrapped(each.verdict, width)]
     return rows
 
 
-class Table(NamedTuple):
+class ClauseTable(NamedTuple):
     """How clauses are laid out: widths of the text and of half a bar, and what there is room for.
 
     Where a text leaves no room for its margin, the margin is on the next line.
@@ -103,7 +107,7 @@ class Table(NamedTuple):
     apart: bool
 
     @classmethod
-    def fitting(cls, wide: int, width: int) -> Table:
+    def fitting(cls, wide: int, width: int) -> ClauseTable:
         """Return the layout for texts and a panel of given widths."""
         sides = width >= wide + VALUES + 2 * VALUE + 2 * 6
         apart = width < wide + VALUES + 2 * 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from gms_fsm.debugger.tui._spans import Row, line
+from gms_fsm.debugger.tui._spans import PanelLine, line
 
 __all__ = ["KEYS", "Key", "help_rows", "with_number"]
 
@@ -69,7 +69,7 @@ def with_number(number: str) -> list[tuple[str, str, str]]:
     return found
 
 
-def help_rows(overview: str) -> list[Row]:
+def help_rows(overview: str) -> list[PanelLine]:
     """Return the page of the help: the keys, then the commands of the prompt.
 
     Parameters
@@ -79,15 +79,17 @@ def help_rows(overview: str) -> list[Row]:
 
     Returns
     -------
-    list of Row
+    list of PanelLine
         The rows.
     """
-    rows = [Row(line(("Keys. A number before a key is its argument.", "head")))]
-    rows += [Row(line((f"  {each.shown:<4}", "command"), each.says)) for each in KEYS]
+    rows = [PanelLine(line(("Keys. A number before a key is its argument.", "head")))]
+    rows += [PanelLine(line((f"  {each.shown:<4}", "command"), each.says)) for each in KEYS]
     rows += [
-        Row(line("Esc stops a long move, or leaves the command line. The mouse: an element,")),
-        Row(line("a time, a transition or a branch goes there; a guard sets a breakpoint.")),
-        Row(line("")),
-        Row(line(("Commands", "head"))),
+        PanelLine(
+            line("Esc stops a long move, or leaves the command line. The mouse: an element,")
+        ),
+        PanelLine(line("a time, a transition or a branch goes there; a guard sets a breakpoint.")),
+        PanelLine(line("")),
+        PanelLine(line(("Commands", "head"))),
     ]
-    return rows + [Row(line(text)) for text in overview.splitlines()]
+    return rows + [PanelLine(line(text)) for text in overview.splitlines()]

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 
 from gms_fsm.debugger._over_time import EventView
 from gms_fsm.debugger._text import breakpoint_text, progress, wrapped
-from gms_fsm.debugger._view import BranchView, ContactView, ElementView, View
+from gms_fsm.debugger._view import BranchView, ContactView, ElementView, Screen
 from gms_fsm.debugger.tui._chart import MARKS
-from gms_fsm.debugger.tui._spans import Line, Row, Span, line, state_role
+from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line, state_role
 from gms_fsm.foundation.quantities import quantity
 from gms_fsm.session.session import Breakpoint, Fired
 
@@ -30,13 +30,13 @@ TIME = " " * 16  # columns of the time of a transition
 
 
 def status_lines(
-    view: View, title: str, width: int, *, several: bool = False, busy: bool = False
+    view: Screen, title: str, width: int, *, several: bool = False, busy: bool = False
 ) -> list[Line]:
     """Return time, place and the main values: what is shown above everything.
 
     Parameters
     ----------
-    view : View
+    view : Screen
         The screen.
     title : str
         What runs.
@@ -94,12 +94,12 @@ def fitted(parts: Sequence[Span], width: int, gap: str = "  ") -> list[Line]:
     return list(lines)
 
 
-def element_rows(view: View, chosen: int, width: int) -> list[Row]:
+def element_rows(view: Screen, chosen: int, width: int) -> list[PanelLine]:
     """Return a table of the elements; a click chooses one.
 
     Parameters
     ----------
-    view : View
+    view : Screen
         The screen.
     chosen : int
         The marked element, counted over all contacts from 0.
@@ -108,28 +108,28 @@ def element_rows(view: View, chosen: int, width: int) -> list[Row]:
 
     Returns
     -------
-    list of Row
+    list of PanelLine
         A heading per contact and a row per element; then bodies and further values of a system.
     """
-    rows: list[Row] = []
+    rows: list[PanelLine] = []
     for contact in view.contacts:
         if contact.name:
-            rows += [Row(line((part, "head"))) for part in wrapped(contact.title, width)]
+            rows += [PanelLine(line((part, "head"))) for part in wrapped(contact.title, width)]
         rows += _table(contact, chosen, width)
     for body in view.bodies:
         given = " (given)" if body.driven else ""
         (x, position), (v, velocity) = body.x, body.v
         text = f"{body.name}: {x} = {quantity(position)}, {v} = {quantity(velocity)}{given}"
-        rows += [Row(line((part, "dim"))) for part in wrapped(text, width)]
+        rows += [PanelLine(line((part, "dim"))) for part in wrapped(text, width)]
     for each in view.values:
         values = ", ".join(f"{name} = {quantity(value)}" for name, value in each.values.items())
         tick = "" if each.tick is None else f"; next tick at t = {each.tick:.9g} s"
         text = f"{each.title}: {values}{tick}"
-        rows += [Row(line((part, "dim"))) for part in wrapped(text, width)]
+        rows += [PanelLine(line((part, "dim"))) for part in wrapped(text, width)]
     return rows
 
 
-def _table(contact: ContactView, chosen: int, width: int) -> list[Row]:
+def _table(contact: ContactView, chosen: int, width: int) -> list[PanelLine]:
     """Return the elements of a contact: columns as far as there is room, edges last."""
     chart, lead = contact.chart, f"{contact.name} " if contact.name else ""
     names = [state.name for state in chart.states]
@@ -158,7 +158,7 @@ def _table(contact: ContactView, chosen: int, width: int) -> list[Row]:
     edges = all(edges_at + len(_edges(each)) <= width for each in contact.elements)
     text = "  ".join(_cell(heads[j], wide[j], j) for j in kept)
     text += f"  {'0':<{BAR - 1}}1" if bar else ""
-    rows = [Row(line((f"{text}  {'edges' if edges else ''}".rstrip(), "dim")))]
+    rows = [PanelLine(line((f"{text}  {'edges' if edges else ''}".rstrip(), "dim")))]
     for i, (each, row) in enumerate(zip(contact.elements, cells, strict=True), contact.first):
         spans = [
             Span(f"{_cell(row[j], wide[j], j)}  ", _element_role(j, names, each, i == chosen))
@@ -168,7 +168,7 @@ def _table(contact: ContactView, chosen: int, width: int) -> list[Row]:
             spans.append(Span(f"{_ratio_bar(each.ratio)}  ", state_role(names.index(each.state))))
         if edges:
             spans.append(Span(_edges(each)))
-        rows.append(Row(spans, f"element {lead}{each.number}"))
+        rows.append(PanelLine(spans, f"element {lead}{each.number}"))
     return rows
 
 
@@ -200,7 +200,7 @@ def _ratio_bar(ratio: float | None) -> str:
     return ("█" * filled + "░" * (BAR - filled))[: BAR - over] + "▶" * over
 
 
-def event_rows(events: Sequence[EventView], cursor: int, width: int) -> list[Row]:
+def event_rows(events: Sequence[EventView], cursor: int, width: int) -> list[PanelLine]:
     """Return the firings computed so far; a click goes there.
 
     Parameters
@@ -214,21 +214,21 @@ def event_rows(events: Sequence[EventView], cursor: int, width: int) -> list[Row
 
     Returns
     -------
-    list of Row
+    list of PanelLine
         One per firing; the last at or before the cursor is marked.
     """
     if not events:
-        return [Row(line(("no transition so far", "dim")))]
+        return [PanelLine(line(("no transition so far", "dim")))]
     here = max((i for i, each in enumerate(events) if each.row <= cursor), default=-1)
     forms = [_forms(each.fired) for each in events]
     room = width - len(TIME)
     fitting = (i for i in range(len(forms[0])) if max(len(form[i]) for form in forms) <= room)
-    form, rows = next(fitting, len(forms[0]) - 1), list[Row]()
+    form, rows = next(fitting, len(forms[0]) - 1), list[PanelLine]()
     for i, each in enumerate(events):
         role = "head" if i == here else "dim" if each.row > cursor else ""
         lead = f"{'▶' if i == here else ' '}{each.t:>11.9g} s  "
         for part in textwrap.wrap(forms[i][form], max(8, room)):
-            rows.append(Row(line((lead + part, role)), _move(each.row - cursor)))
+            rows.append(PanelLine(line((lead + part, role)), _move(each.row - cursor)))
             lead = TIME
     return rows
 
@@ -251,7 +251,7 @@ def session_rows(
     points: Sequence[Breakpoint],
     watches: Sequence[str],
     width: int,
-) -> list[Row]:
+) -> list[PanelLine]:
     """Return branches as a tree, breakpoints and watches; a click switches to a branch.
 
     Parameters
@@ -267,22 +267,22 @@ def session_rows(
 
     Returns
     -------
-    list of Row
+    list of PanelLine
         The rows.
     """
-    rows, numbered = list[Row](), {each.number: each for each in branches}
+    rows, numbered = list[PanelLine](), {each.number: each for each in branches}
     for each in branches:
         mark, indent = ("▶" if each.current else " "), "  " * _depth(each, numbered)
         fork = "" if each.parent is None else f" from {each.parent} at {each.t_fork:.9g} s:"
         text = f"{mark}{indent}branch {each.number}{fork} {each.edits}".rstrip()
         role, command = ("head" if each.current else "", f"branch {each.number}")
-        rows += [Row(line((part, role)), command) for part in wrapped(text, width)]
+        rows += [PanelLine(line((part, role)), command) for part in wrapped(text, width)]
         detail = f"  {indent}{progress(each)}"
-        rows += [Row(line((part, "dim")), command) for part in wrapped(detail, width)]
+        rows += [PanelLine(line((part, "dim")), command) for part in wrapped(detail, width)]
     for number, point in enumerate(points, start=1):
         text = f"● {number} {breakpoint_text(point)}; hits: {point.seen}"
-        rows += [Row(line((part, "false"))) for part in wrapped(text, width)]
-    rows += [Row(line(part)) for text in watches for part in wrapped(text, width)]
+        rows += [PanelLine(line((part, "false"))) for part in wrapped(text, width)]
+    rows += [PanelLine(line(part)) for text in watches for part in wrapped(text, width)]
     return rows
 
 
@@ -290,7 +290,7 @@ def _depth(each: BranchView, branches: Mapping[int, BranchView]) -> int:
     return 0 if each.parent is None else 1 + _depth(branches[each.parent], branches)
 
 
-def answer_rows(lines: Sequence[str], width: int) -> list[Row]:
+def answer_rows(lines: Sequence[str], width: int) -> list[PanelLine]:
     """Return lines of a transcript, wrapped; commands and errors stand out.
 
     Parameters
@@ -302,11 +302,11 @@ def answer_rows(lines: Sequence[str], width: int) -> list[Row]:
 
     Returns
     -------
-    list of Row
+    list of PanelLine
         The rows.
     """
     rows = []
     for each in lines:
         role = "command" if each.startswith("(t=") else "error" if each.startswith("error:") else ""
-        rows += [Row(line((part, role))) for part in wrapped(each, width)]
+        rows += [PanelLine(line((part, role))) for part in wrapped(each, width)]
     return rows

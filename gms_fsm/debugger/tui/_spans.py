@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from rich.text import Text
 
-__all__ = ["DARK", "LIGHT", "Line", "Row", "Span", "line", "painted", "plain", "state_role"]
+__all__ = ["DARK", "LIGHT", "Line", "PanelLine", "Span", "line", "painted", "plain", "state_role"]
 
 STATES = 6  # colours of states; the ribbons' marks repeat in the same rhythm
 
@@ -25,7 +25,7 @@ class Span(NamedTuple):
 Line = Sequence[Span]
 
 
-class Row(NamedTuple):
+class PanelLine(NamedTuple):
     """A line of a panel, and the command that a click on it gives; empty for none."""
 
     line: Line

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from gms_fsm.debugger._over_time import Ribbons
 from gms_fsm.debugger._text import short
-from gms_fsm.debugger._view import ContactView, View
-from gms_fsm.debugger.tui._spans import Line, Row, Span, line, state_role
+from gms_fsm.debugger._view import ContactView, Screen
+from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line, state_role
 from gms_fsm.foundation.quantities import quantity, sparkline
 
 __all__ = ["RIBBON", "axis", "curve_rows", "labels", "ranges", "ribbon_rows"]
@@ -46,8 +46,8 @@ def axis(start: float, end: float, width: int) -> str:
 
 
 def ribbon_rows(
-    ribbons: Ribbons, parent: Ribbons | None, view: View, chosen: int, lead: int
-) -> list[Row]:
+    ribbons: Ribbons, parent: Ribbons | None, view: Screen, chosen: int, lead: int
+) -> list[PanelLine]:
     """Return the states of all elements over time; the cursor is a column.
 
     Parameters
@@ -56,7 +56,7 @@ def ribbon_rows(
         Of the current branch.
     parent : Ribbons or None
         Of the branch to compare with, over the same time.
-    view : View
+    view : Screen
         The screen.
     chosen : int
         The marked element.
@@ -65,7 +65,7 @@ def ribbon_rows(
 
     Returns
     -------
-    list of Row
+    list of PanelLine
         One per element; with a parent, a last one that marks where any state differs.
     """
     rows = []
@@ -86,13 +86,13 @@ def ribbon_rows(
             shown = " " if mode is None else RIBBON[mode[i] % len(RIBBON)]
             role = "dim" if mode is None else state_role(mode[i])
             spans.append(Span("┃", "now") if part == ribbons.now else Span(shown, role))
-        rows.append(Row(_joined(spans)))
+        rows.append(PanelLine(_joined(spans)))
     if parent is not None:
         marks = [
             "≠" if None not in (a, b) and a != b else " "
             for a, b in zip(ribbons.modes, parent.modes, strict=True)
         ]
-        rows.append(Row(line((f"{' differs':<{lead}}", "dim"), ("".join(marks), "fired"))))
+        rows.append(PanelLine(line((f"{' differs':<{lead}}", "dim"), ("".join(marks), "fired"))))
     return rows
 
 
@@ -122,7 +122,9 @@ def ranges(values: Mapping[str, Sequence[float | None]]) -> str:
     return "  ".join(found)
 
 
-def curve_rows(values: Mapping[str, Sequence[float | None]], lead: int, now: int) -> list[Row]:
+def curve_rows(
+    values: Mapping[str, Sequence[float | None]], lead: int, now: int
+) -> list[PanelLine]:
     """Return velocity and force over time as sparklines; `ranges` says what they span.
 
     Parameters
@@ -136,12 +138,14 @@ def curve_rows(values: Mapping[str, Sequence[float | None]], lead: int, now: int
 
     Returns
     -------
-    list of Row
+    list of PanelLine
         One per name.
     """
     rows = []
     for name, each in values.items():
         text = sparkline(each)
         spans = [Span(f" {name:<{lead - 1}}"), Span(text[:now], "dim")]
-        rows.append(Row([*spans, Span(text[now : now + 1], "now"), Span(text[now + 1 :], "dim")]))
+        rows.append(
+            PanelLine([*spans, Span(text[now : now + 1], "now"), Span(text[now + 1 :], "dim")])
+        )
     return rows

@@ -20,7 +20,7 @@ from textual.message import Message
 from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
-from gms_fsm.debugger.tui._spans import Row, painted
+from gms_fsm.debugger.tui._spans import PanelLine, painted
 
 __all__ = ["Help", "Keys", "Panel", "Prompt", "Ribbon"]
 
@@ -44,7 +44,7 @@ class Panel(ScrollableContainer, can_focus=True, inherit_bindings=False):
         super().__init__(id=name)
         self.border_title = title
         self.body = Static(expand=True)
-        self.rows: Sequence[Row] = ()
+        self.rows: Sequence[PanelLine] = ()
 
     def compose(self) -> ComposeResult:
         """Add the text."""
@@ -55,7 +55,7 @@ class Panel(ScrollableContainer, can_focus=True, inherit_bindings=False):
         """Columns for text, beside a scroll bar."""
         return max(10, self.outer_size.width - self.styles.gutter.width - 1)
 
-    def show(self, rows: Sequence[Row], palette: Mapping[str, str]) -> None:
+    def show(self, rows: Sequence[PanelLine], palette: Mapping[str, str]) -> None:
         """Show lines instead of those shown."""
         self.rows = rows
         self.body.update(painted([row.line for row in rows], palette))
@@ -221,7 +221,7 @@ class Help(ModalScreen[None]):
         Binding("down", "scroll(1)", show=False),
     ]
 
-    def __init__(self, rows: Sequence[Row], palette: Mapping[str, str]) -> None:
+    def __init__(self, rows: Sequence[PanelLine], palette: Mapping[str, str]) -> None:
         super().__init__()
         self.panel, self.lines, self.palette = Panel("help (Esc closes)", "help"), rows, palette
 

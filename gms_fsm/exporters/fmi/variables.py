@@ -14,7 +14,7 @@ from gms_fsm.language import Binary, comparisons, names_in, split
 from gms_fsm.lowering.adapting import SHARE
 from gms_fsm.lowering.printing.plan import plan_of
 from gms_fsm.lowering.scales import scales_of_system
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from integrators.sliding import MOST_SLIDING
 
 __all__ = ["FmuVariable", "Indicator", "indicators_of", "nominals_of", "types_of", "variables_of"]
@@ -138,7 +138,7 @@ def variables_of(subject: Subject, *, exchange: bool) -> tuple[FmuVariable, ...]
     return tuple(_different(found))
 
 
-def types_of(start: Start) -> dict[str, tuple[str, ...]]:
+def types_of(start: Problem) -> dict[str, tuple[str, ...]]:
     """Return the states of the elements by the name of their enumeration, one for each contact."""
     return {
         f"{contact.name} states": tuple(state.name for state in contact.chart.states)
@@ -232,12 +232,12 @@ def _different(found: list[FmuVariable]) -> Iterator[FmuVariable]:
 
 
 # --------------------------------------------------------------------------- event indicators
-def indicators_of(start: Start, alone: bool) -> tuple[Indicator, ...]:
+def indicators_of(start: Problem, alone: bool) -> tuple[Indicator, ...]:
     """Return the event indicators: one for each comparison that may be watched.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         What is exported.
     alone : bool
         Whether it is one friction, whose name is then left out.
@@ -282,13 +282,13 @@ def _free(name: str, taken: Iterable[str]) -> str:
     return next(each for each in itertools.chain([name], numbered) if each not in used)
 
 
-def _sizes(start: Start) -> Mapping[str, float]:
+def _sizes(start: Problem) -> Mapping[str, float]:
     """Return the smallest scale of each name of the state vector, and of the velocities."""
     sizes = scales_of_system(start.program).sizes
     return {name: min((u for u in row if u > 0.0), default=0.0) for name, row in sizes.items()}
 
 
-def nominals_of(start: Start) -> list[float]:
+def nominals_of(start: Problem) -> list[float]:
     """Return the scales of the state vector, 1 where there is none."""
     options = start.options
     return [u / (SHARE * options.rtol) or 1.0 for u in options.atol]

@@ -36,7 +36,7 @@ from gms_fsm.language import (
 )
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall, both_sides, plan_of
-from gms_fsm.systems.reading.assembly import CURVE_LOAD, Assembly, Bank, Edge, assembled, of
+from gms_fsm.systems.reading.assembly import CURVE_LOAD, Assembly, Bank, ContactEdge, assembled, of
 
 __all__ = ["NamedFriction"]
 
@@ -430,7 +430,7 @@ class PlanReader:
         }
         return renamed(value, inside) if inside else value
 
-    def edge(self, number: int, edge: Edge) -> Leaving:
+    def edge(self, number: int, edge: ContactEdge) -> Leaving:
         return Leaving(
             edge.name,
             number,

@@ -15,7 +15,6 @@ from gms_fsm.exporters.plain.parts import Leaving, Let
 from gms_fsm.language import Binary, Name, Number, Value
 
 __all__ = [
-    "Assign",
     "ByState",
     "Declare",
     "Enter",
@@ -24,6 +23,7 @@ __all__ = [
     "Keep",
     "PlainForm",
     "Recall",
+    "SetTo",
     "Statement",
     "TwoWays",
     "Verbatim",
@@ -33,7 +33,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class Assign:
+class SetTo:
     """An assignment; `new` if it declares the name, which is then never changed."""
 
     name: str
@@ -109,7 +109,7 @@ class ForEach:
 
 
 Statement: TypeAlias = (
-    "Assign | Declare | Recall | Keep | Enter | Verbatim | Guards | ByState | TwoWays | ForEach"
+    "SetTo | Declare | Recall | Keep | Enter | Verbatim | Guards | ByState | TwoWays | ForEach"
 )
 
 
@@ -179,26 +179,26 @@ def plain_form(element: NamedFriction, dt: str = "dt") -> PlainForm:
     rows = []
     for state, lets in zip(states, inside, strict=True):
         row = [_let(each) for each in lets]
-        row += [Assign(each.rate, state.rates[each.name].tree) for each in element.variables]
-        row += [] if same else [Assign(part, state.force.tree)]
+        row += [SetTo(each.rate, state.rates[each.name].tree) for each in element.variables]
+        row += [] if same else [SetTo(part, state.force.tree)]
         rows.append(tuple(row))
     flows += [ByState(tuple(rows))] if any(rows) else []
-    flows += [Assign(part, states[0].force.tree, new=True)] if same else []
+    flows += [SetTo(part, states[0].force.tree, new=True)] if same else []
     force = Name("F")
     body = (
         *(Recall(each.name) for each in element.variables),
         *guards,
         *flows,
-        Assign("F", Binary("+", force, Name(part))),
+        SetTo("F", Binary("+", force, Name(part))),
         *(Keep(e.name, _after(e.name, dt, Name(e.rate))) for e in element.variables),
     )
     shared = map(_let, element.needed(every, per_element=False))
-    step: list[Statement] = [Declare(("F",)), Assign("F", Number(0.0)), *shared, ForEach(body)]
+    step: list[Statement] = [Declare(("F",)), SetTo("F", Number(0.0)), *shared, ForEach(body)]
     if element.total.tree != force:
-        step.append(Assign("F", element.total.tree))
+        step.append(SetTo("F", element.total.tree))
     if element.position:
         (velocity, _), x = element.inputs[0], element.position
-        step.append(Assign(x, _after(x, dt, Name(velocity))))
+        step.append(SetTo(x, _after(x, dt, Name(velocity))))
     return PlainForm(element=element, dt=dt, force="F", part=part, step=tuple(step))
 
 
@@ -207,7 +207,7 @@ def declared(statements: Iterable[Statement]) -> list[str]:
     found = dict[str, None]()
     for each in statements:
         match each:
-            case Assign(name, _, _, True):
+            case SetTo(name, _, _, True):
                 found[name] = None
             case Declare(names):
                 found |= dict.fromkeys(names)
@@ -218,8 +218,8 @@ def declared(statements: Iterable[Statement]) -> list[str]:
     return [*found]
 
 
-def _let(let: Let) -> Assign:
-    return Assign(let.name, let.value.tree, let.about, new=True)
+def _let(let: Let) -> SetTo:
+    return SetTo(let.name, let.value.tree, let.about, new=True)
 
 
 def _after(name: str, dt: str, rate: Value) -> Value:
@@ -228,5 +228,5 @@ def _after(name: str, dt: str, rate: Value) -> Value:
 
 
 def _taken(edge: Leaving, several: bool) -> tuple[Statement, ...]:
-    steps = tuple(Assign(name, tree) for name, tree in edge.steps)
+    steps = tuple(SetTo(name, tree) for name, tree in edge.steps)
     return (*steps, Enter(edge.target)) if several else steps

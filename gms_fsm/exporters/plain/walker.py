@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from gms_fsm.exporters.plain.form import (
-    Assign,
     ByState,
     Declare,
     Enter,
@@ -15,6 +14,7 @@ from gms_fsm.exporters.plain.form import (
     Guards,
     Keep,
     Recall,
+    SetTo,
     Statement,
     TwoWays,
     Verbatim,
@@ -116,7 +116,7 @@ class Walker:
     def _statement(self, statement: Statement) -> Iterator[str]:
         forms = self.forms
         match statement:
-            case Assign(name, tree, note, new):
+            case SetTo(name, tree, note, new):
                 form = forms.new if new else forms.assign
                 yield form.format(self.texts.get(name, name), self.spell(tree)) + forms.note(note)
             case Declare(names) if names and forms.declare:

@@ -31,7 +31,7 @@ from gms_fsm.formats import Format, register
 from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.lowering.compiling import packed
 from gms_fsm.lowering.program import equations
-from gms_fsm.run.problem import LATEST, Start
+from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.recording.compiled_run import example_of
 from gms_fsm.systems.signals import Function
 from integrators import hybrid, loop
@@ -107,7 +107,7 @@ class _Module(ABC):
     errors = ""
     switch_fields = ""
 
-    def __init__(self, subject: Subject, start: Start, arguments: Any, alone: bool) -> None:
+    def __init__(self, subject: Subject, start: Problem, arguments: Any, alone: bool) -> None:
         self.subject, self.start, self.arguments = subject, start, arguments
         self.layout = BlockLayout(arguments, is_known)
         self.outputs = outputs_of(start, alone, ())
@@ -279,7 +279,7 @@ class _Run(_Module):
             raise ParameterError(
                 "a run needs its end", place="t_end", advice="for example t_end=10.0 (s)"
             )
-        start = Start.of(
+        start = Problem.of(
             given, None, t_end, subject.settings, t_start=subject.t_start, initial=subject.initial
         )
         if not isinstance(start.chosen.method, str) or start.output == "end":

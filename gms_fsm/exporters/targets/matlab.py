@@ -12,11 +12,11 @@ from gms_fsm.exporters._readme import about_friction
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.element import NamedFriction
 from gms_fsm.exporters.plain.form import (
-    Assign,
     ByState,
     Enter,
     ForEach,
     Guards,
+    SetTo,
     Statement,
     TwoWays,
     Verbatim,
@@ -235,8 +235,8 @@ class FunctionFile:
     def assign(self, target: str, value: Expression, held: bool) -> list[Statement]:
         """Assign a value, with held signs or with those of now."""
         if not held:
-            return [Assign(target, value.tree)]
-        return [*map(self.call, value.calls), Assign(target, value.smooth)]
+            return [SetTo(target, value.tree)]
+        return [*map(self.call, value.calls), SetTo(target, value.smooth)]
 
     def call(self, rough: RoughCall) -> Statement:
         """Assign a call that has a corner or a jump, with the sign that is held."""
@@ -247,7 +247,7 @@ class FunctionFile:
             case "abs":
                 return Verbatim(f"{rough.name} = {sign} * ({self.spell(call.arguments[0])});")
             case function:
-                first, other = (Assign(rough.name, each) for each in call.arguments)
+                first, other = (SetTo(rough.name, each) for each in call.arguments)
                 test = f"{sign} {'<=' if function == 'min' else '>='} 0"
                 return TwoWays(test, (first,), (other,))
 
@@ -311,14 +311,14 @@ class FunctionFile:
             row = self.rates(state, held=False, wanted=wanted)
             rows.append([*row, *self.assign(self.part, state.force, held=False)])
         every = element.total.names.union(*reads)
-        added = Assign("F", Binary("+", Name("F"), Name(self.part)))
+        added = SetTo("F", Binary("+", Name("F"), Name(self.part)))
         return [
             Verbatim("% The force of all elements."),
             *self.head(every),
             *self.zeros(each.rate for each in element.variables if each.rate in every),
             Verbatim("F = 0;"),
             *self.loop(reads, rows, after=[added]),
-            Assign("F", element.total.tree),
+            SetTo("F", element.total.tree),
         ]
 
     def guards(self) -> list[Statement]:
@@ -364,7 +364,7 @@ class FunctionFile:
         lines.append(Verbatim(f"switch {self.edge}"))
         for edge in sorted(edges, key=lambda each: each.number):
             lines.append(Verbatim(f"    case {edge.number + 1}  % {edge.name}"))
-            steps = (Assign(name, tree) for name, tree in edge.steps)
+            steps = (SetTo(name, tree) for name, tree in edge.steps)
             row: list[Statement] = [*steps, Enter(edge.target)]
             lines += [Verbatim(f"        {line}") for line in self.walker.lines(row)]
         lines.append(Verbatim("end"))

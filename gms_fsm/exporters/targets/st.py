@@ -77,7 +77,7 @@ FORMS = Forms(
 )
 
 
-class _Words(frozenset[str]):
+class _Keywords(frozenset[str]):
     """Words that are the same in capitals and in small letters."""
 
     def __contains__(self, word: object) -> bool:
@@ -274,7 +274,7 @@ register(
         "IEC 61131-3 structured text, the plain form",
         "gms-fsm",
         structured_text,
-        words=_Words(WORDS),
+        words=_Keywords(WORDS),
         takes=("initial", "t_start"),
     )
 )

@@ -20,7 +20,7 @@ from gms_fsm.identification.certainty.statistics import (
     correlation_time,
 )
 from gms_fsm.identification.problem.experiment import NUISANCE, Experiment, Point
-from gms_fsm.identification.problem.runs import LOST, Pool
+from gms_fsm.identification.problem.runs import LOST, ThreadPool
 from gms_fsm.identification.problem.task import Task, stretches
 from gms_fsm.identification.problem.unknowns import Unknown
 from gms_fsm.systems.mounted import Mounted
@@ -158,7 +158,7 @@ class _Entry:
         return abs(self.value - self.low) <= near or abs(self.value - self.high) <= near
 
 
-def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
+def assessed(task: Task, point: Point, pool: ThreadPool) -> Assessed:
     """Return the table of a fit.
 
     Parameters
@@ -167,7 +167,7 @@ def assessed(task: Task, point: Point, pool: Pool) -> Assessed:
         Whose start values are the fitted ones.
     point : Point
         These, evaluated with all rows.
-    pool : Pool
+    pool : ThreadPool
         To evaluate slopes side by side.
 
     Returns
@@ -249,7 +249,9 @@ def unassessed(task: Task, point: Point) -> Assessed:
     return Assessed(table, sure.covariance, sure, "No interval was computed.")
 
 
-def _region(task: Task, entries: Sequence[_Entry], sure: Certainty, pool: Pool) -> Region | None:
+def _region(
+    task: Task, entries: Sequence[_Entry], sure: Certainty, pool: ThreadPool
+) -> Region | None:
     """Walk through the likelihood region on few rows; None if nothing was searched."""
     experiment = task.coarse
     point = experiment.start_point()
@@ -304,7 +306,7 @@ def _basis(experiment: Experiment, point: Point) -> FloatArray:
 
 
 def _searched_slopes(
-    experiment: Experiment, point: Point, steps: FloatArray, pool: Pool
+    experiment: Experiment, point: Point, steps: FloatArray, pool: ThreadPool
 ) -> FloatArray:
     """Return secants of the force by each searched coordinate, linear parameters held."""
 

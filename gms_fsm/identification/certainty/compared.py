@@ -9,7 +9,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 
-__all__ = ["Choice", "ChoiceRow", "Comparison", "score_of"]
+__all__ = ["Choice", "ChoiceRow", "FitComparison", "score_of"]
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class FitComparison:
     """Fits side by side, the best on held-out rows first.
 
     Parameters

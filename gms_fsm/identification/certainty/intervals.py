@@ -16,7 +16,7 @@ from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from gms_fsm.identification.certainty.region import values_of
 from gms_fsm.identification.certainty.statistics import BLOCK
 from gms_fsm.identification.problem.experiment import Experiment, Point
-from gms_fsm.identification.problem.runs import Pool
+from gms_fsm.identification.problem.runs import ThreadPool
 from gms_fsm.identification.problem.search import Best, hops, refine
 from gms_fsm.identification.problem.task import Task, at_all_rows
 from gms_fsm.identification.problem.unknowns import Unknown
@@ -75,7 +75,7 @@ class Bootstrap:
 
 
 def _searched_again(
-    experiment: Experiment, start: FloatArray, pool: Pool, *, restarts: bool, seed: int
+    experiment: Experiment, start: FloatArray, pool: ThreadPool, *, restarts: bool, seed: int
 ) -> Point | None:
     """Refine from a start and hop from there; None if everything is lost."""
     best = Best()
@@ -93,7 +93,7 @@ def profiled(
     unknown = next(each for each in task.unknowns if each.name == estimate.name)
     centre = values_of(task.fine, point)[unknown.name]
     rows = task.coarse.target.size
-    with Pool() as pool:
+    with ThreadPool() as pool:
         start = task.coarse.coordinates.start
         best = _searched_again(task.coarse, start, pool, restarts=restarts, seed=seed)
         if best is None:
@@ -164,7 +164,7 @@ def _moved(unknown: Unknown, centre: float, by: float) -> float | None:
 
 
 def _cost_at(
-    task: Task, name: str, value: float, pool: Pool, *, restarts: bool, seed: int
+    task: Task, name: str, value: float, pool: ThreadPool, *, restarts: bool, seed: int
 ) -> float | None:
     """Return the least cost with one parameter at a value."""
     held = task.without(name, value)
@@ -190,7 +190,7 @@ def bootstrapped(
     rng = np.random.default_rng(seed)
     modelled = [at_all_rows(task.fine, point, course) for course in task.courses]
     found = np.full((draws, len(names)), np.nan)
-    with Pool() as pool:
+    with ThreadPool() as pool:
         for draw in range(draws):
             replaced = []
             for course, model in zip(task.courses, modelled, strict=True):

@@ -16,7 +16,7 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from gms_fsm.identification.problem.experiment import Experiment, Point
-from gms_fsm.identification.problem.runs import Pool
+from gms_fsm.identification.problem.runs import ThreadPool
 
 __all__ = ["Region", "values_of", "walked"]
 
@@ -112,7 +112,7 @@ def walked(
     directions: dict[str, FloatArray],
     shape: FloatArray,
     effective: float,
-    pool: Pool,
+    pool: ThreadPool,
     seed: int,
 ) -> Region:
     """Walk through the likelihood region, towards both ends of each parameter.
@@ -130,7 +130,7 @@ def walked(
         A square root of the covariance of the searched coordinates.
     effective : float
         Effective rows of the whole fit.
-    pool : Pool
+    pool : ThreadPool
         To evaluate points side by side.
     seed : int
         Of the random parts.

@@ -16,7 +16,14 @@ from scipy.optimize import nnls
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError
-from gms_fsm.identification.problem.runs import LOST, Course, Driver, Measured, Ran, with_numbers
+from gms_fsm.identification.problem.runs import (
+    LOST,
+    ComparedColumn,
+    Course,
+    Driver,
+    FinishedRun,
+    with_numbers,
+)
 from gms_fsm.identification.problem.unknowns import Coordinates, Unknown, values_by_key
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import value_in, varied
@@ -78,7 +85,7 @@ class Experiment:
         The records.
     driver : Driver
         Runs them.
-    measured : Measured
+    measured : ComparedColumn
         What is compared.
     ran : list of int
         One number: how many runs were made.
@@ -91,7 +98,7 @@ class Experiment:
     nuisance: tuple[str, ...]
     courses: tuple[Course, ...]
     driver: Driver
-    measured: Measured
+    measured: ComparedColumn
     ran: list[int]
 
     @property
@@ -126,7 +133,9 @@ class Experiment:
         columns = [known[name] for name in self.nuisance]
         return np.stack(columns, axis=1) if columns else np.empty((course.t.size, 0))
 
-    def columns(self, subject: Mounted, course: Course) -> tuple[Ran, FloatArray, FloatArray]:
+    def columns(
+        self, subject: Mounted, course: Course
+    ) -> tuple[FinishedRun, FloatArray, FloatArray]:
         """Run a course; return the force without its linear parts, and one column for each part.
 
         The columns are differences of the force between two values of a parameter: exact, because

@@ -23,7 +23,7 @@ from gms_fsm.errors import GMSError, MissingExtraError, ParameterError, shown
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.program import Program, arguments, same_text
 from gms_fsm.records.record import Record
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import Run
@@ -35,11 +35,11 @@ from gms_fsm.traces.trace import Trace
 __all__ = [
     "BEGINS",
     "LOST",
+    "ComparedColumn",
     "Course",
     "Driver",
-    "Measured",
-    "Pool",
-    "Ran",
+    "FinishedRun",
+    "ThreadPool",
     "course_of",
     "driver_of",
     "engine",
@@ -64,7 +64,7 @@ def engine() -> str:
 
 
 @dataclass(frozen=True)
-class Measured:
+class ComparedColumn:
     """What of a run is compared with which column of the record.
 
     Parameters
@@ -85,7 +85,7 @@ class Measured:
     body: str = ""
 
     @classmethod
-    def of(cls, text: Any, subject: Mounted) -> Measured:
+    def of(cls, text: Any, subject: Mounted) -> ComparedColumn:
         """Read what is measured; a `ParameterError` if the subject has no such thing."""
         contacts, bodies = subject.contacts, subject.bodies
         owner, _, which = text.rpartition(".") if isinstance(text, str) else ("", "", "")
@@ -110,7 +110,7 @@ class Measured:
         """Its unit."""
         return {"force": "N", "position": "m", "velocity": "m/s"}[self.column]
 
-    def values(self, ran: Ran, program: Program | None = None) -> FloatArray:
+    def values(self, ran: FinishedRun, program: Program | None = None) -> FloatArray:
         """Return its values at the rows of a run, with the numbers of a program."""
         program = ran.program if program is None else program
         if self.body:
@@ -271,7 +271,7 @@ def _run_in(t: FloatArray, x: FloatArray, v: FloatArray) -> tuple[FloatArray, Fl
 
 
 @dataclass(frozen=True, eq=False)
-class Ran:
+class FinishedRun:
     """A run that reached its end.
 
     Parameters
@@ -314,7 +314,7 @@ class Driver:
     budgets: int
     _own: threading.local = field(default_factory=threading.local, repr=False)
 
-    def run(self, subject: Mounted, course: Course) -> Ran:
+    def run(self, subject: Mounted, course: Course) -> FinishedRun:
         """Run; a `GMSError` if the numbers break a rule or the run fails."""
         kept, what = self._runs.get(id(course)), self.driven(subject, course)
         if kept is not None and same_text(kept.run.start.system, what.system):
@@ -332,7 +332,7 @@ class Driver:
         while run.advance():
             pass
         trace = run.recorder.trace()
-        return Ran(run.recorder.start.program, trace)
+        return FinishedRun(run.recorder.start.program, trace)
 
     @property
     def _runs(self) -> dict[int, _Kept]:
@@ -343,14 +343,14 @@ class Driver:
         """Return a subject that the motion of a course drives."""
         return subject.driven(self.drive, course.signal) if self.drive else subject
 
-    def start(self, subject: Mounted, course: Course) -> Start:
+    def start(self, subject: Mounted, course: Course) -> Problem:
         """Return the start of a run along a course."""
         settings = Settings(
             engine=engine(), rtol=self.rtol, t_eval=course.t, max_steps=course.budget * self.budgets
         )
         first = course.signal.times[0] if self.drive else course.t[0]
         what = self.driven(subject, course)
-        return Start.on(what, float(course.t[-1]), settings, t_start=float(first))
+        return Problem.on(what, float(course.t[-1]), settings, t_start=float(first))
 
 
 def driver_of(subject: Mounted, drive: str | None, rtol: float, budgets: int) -> Driver:
@@ -417,7 +417,7 @@ Given = TypeVar("Given")
 Result = TypeVar("Result")
 
 
-class Pool:
+class ThreadPool:
     """Calls side by side in threads; results come in order, whatever ends first.
 
     Parameters
@@ -430,7 +430,7 @@ class Pool:
         self._threads = ThreadPoolExecutor(workers or os.cpu_count() or 1)
         self._limits: contextlib.AbstractContextManager[object] = contextlib.nullcontext()
 
-    def __enter__(self) -> Pool:
+    def __enter__(self) -> ThreadPool:
         self._limits = _alone()
         self._limits.__enter__()
         return self

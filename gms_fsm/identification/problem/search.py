@@ -16,7 +16,7 @@ from scipy.optimize import Bounds, differential_evolution, least_squares
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.identification.problem.experiment import Experiment, Point
-from gms_fsm.identification.problem.runs import Pool
+from gms_fsm.identification.problem.runs import ThreadPool
 
 __all__ = ["SEARCHES", "Best", "de", "hops", "refine"]
 
@@ -56,7 +56,7 @@ def refine(
     u: FloatArray,
     step: float,
     most: int = MOST_EVALUATIONS,
-    pool: Pool | None = None,
+    pool: ThreadPool | None = None,
     kept: Best | None = None,
 ) -> Point:
     """Refine a proposal by Levenberg-Marquardt steps within the bounds.
@@ -72,7 +72,7 @@ def refine(
         runs makes of the force: near 1e-3 where the loop is closed.
     most : int
         Evaluations, without those of the slopes.
-    pool : Pool, optional
+    pool : ThreadPool, optional
         To evaluate the slopes side by side.
     kept : Best, optional
         Takes each point as it is found, for the case of an interrupt.
@@ -138,7 +138,7 @@ def hops(
     experiment: Experiment,
     seed: int,
     best: Best,
-    pool: Pool,
+    pool: ThreadPool,
     many: int = HOPS,
     spread: int = SPREAD,
 ) -> None:
@@ -152,7 +152,7 @@ def hops(
         Of the perturbations.
     best : Best
         Takes what is found.
-    pool : Pool
+    pool : ThreadPool
         To refine side by side.
     many : int
         Number of hops.
@@ -191,7 +191,7 @@ def hops(
         best.told((2 + done // AT_ONCE + 1) / parts)
 
 
-def de(experiment: Experiment, seed: int, best: Best, pool: Pool) -> None:
+def de(experiment: Experiment, seed: int, best: Best, pool: ThreadPool) -> None:
     """Search by differential evolution.
 
     Parameters

@@ -15,9 +15,9 @@ from gms_fsm.identification.problem.experiment import Experiment, Point, split_u
 from gms_fsm.identification.problem.linear import linear_names
 from gms_fsm.identification.problem.runs import (
     BEGINS,
+    ComparedColumn,
     Course,
-    Measured,
-    Pool,
+    ThreadPool,
     course_of,
     driver_of,
 )
@@ -27,7 +27,7 @@ from gms_fsm.records.record import Record
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import varied
 
-__all__ = ["Options", "Task", "Window", "inside", "training_rows"]
+__all__ = ["FitOptions", "Task", "Window", "inside", "training_rows"]
 
 Window = tuple[float, float]
 COARSE_ROWS, FEWEST_ROWS = 3000, 300  # of all records together, and of each
@@ -40,7 +40,7 @@ DISTANT = 0.02  # relative: how much better the other beginning must be
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Options:
+class FitOptions:
     """The arguments of a fit, checked."""
 
     free: tuple[str, ...]
@@ -70,7 +70,7 @@ class Task:
         With the start values.
     records : tuple of Record
         The records.
-    options : Options
+    options : FitOptions
         The arguments.
     begin : str
         What is before the first row of a record.
@@ -80,14 +80,14 @@ class Task:
 
     subject: Mounted
     records: tuple[Record, ...]
-    options: Options
+    options: FitOptions
     begin: str = BEGINS[1]
     ran: list[int] = field(default_factory=lambda: [0])
 
     @cached_property
-    def measured(self) -> Measured:
+    def measured(self) -> ComparedColumn:
         """What is compared."""
-        return Measured.of(self.options.measured, self.subject)
+        return ComparedColumn.of(self.options.measured, self.subject)
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -174,7 +174,7 @@ class Task:
         return replace(self, subject=subject, options=options)
 
     # ------------------------------------------------------------------ searching
-    def coarse_search(self, best: Best, pool: Pool) -> Task:
+    def coarse_search(self, best: Best, pool: ThreadPool) -> Task:
         """Search on few rows; return the task with the beginning that suits the data."""
         given = self.options
         {"hops": hops, "de": de, "local": _local}[given.search](self.coarse, given.seed, best, pool)
@@ -193,14 +193,14 @@ class Task:
             return other
         return self
 
-    def polish(self, u: FloatArray, best: Best, pool: Pool) -> None:
+    def polish(self, u: FloatArray, best: Best, pool: ThreadPool) -> None:
         """Refine on all rows, with smaller and smaller steps."""
         for step in FINE_STEPS:
             found = refine(self.fine, u, step, pool=pool, kept=best)
             u = found.u if found.lost is None else u
 
 
-def training_rows(record: Record, options: Options) -> NDArray[np.bool_]:
+def training_rows(record: Record, options: FitOptions) -> NDArray[np.bool_]:
     """Return which rows of a record may be trained on: without `train`, all but those of `test`."""
     time = record.columns["time"]
     if options.train is not None:
@@ -214,7 +214,7 @@ def inside(time: FloatArray, window: Window) -> NDArray[np.bool_]:
     return found
 
 
-def _local(experiment: Experiment, _: int, best: Best, pool: Pool) -> None:
+def _local(experiment: Experiment, _: int, best: Best, pool: ThreadPool) -> None:
     best.take([experiment.start_point()])
     refine(experiment, experiment.coordinates.start, 1e-2, 30, pool, best)
 

@@ -17,7 +17,7 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray, Parameter, checked_scalar
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.systems.mounted import Mounted
-from gms_fsm.systems.numbers import Number, joined, known_in, parts_of, value_in
+from gms_fsm.systems.numbers import NamedNumber, joined, known_in, parts_of, value_in
 
 __all__ = ["Coordinates", "Unknown", "unknowns_of", "values_by_key"]
 
@@ -163,7 +163,7 @@ def _named(subject: Mounted, name: str, tied: Sequence[str]) -> list[Unknown]:
     ]
 
 
-def _lower_bound(subject: Mounted, number: Number) -> str:
+def _lower_bound(subject: Mounted, number: NamedNumber) -> str:
     """Return the name of the number that is the lower bound of another, if there is one."""
     lead, dot, _ = number.whole.rpartition(".")
     names = known_in(subject)

@@ -23,7 +23,7 @@ from gms_fsm.lowering.printing.lines import CodeLine, Signs, indented, one_line,
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
 from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sides
-from gms_fsm.systems.reading.assembly import Bank, Edge, of
+from gms_fsm.systems.reading.assembly import Bank, ContactEdge, of
 from integrators import FOR_A_GUARD, FOR_A_SIGN, JUMPED, LIVE, WAITING
 
 __all__ = ["FUNCTIONS", "python"]
@@ -157,7 +157,7 @@ class _PythonPrinter(LockFunctions):
             "live",
         )
 
-    def leaving(self, bank: Bank, state: str) -> list[tuple[Edge, str]]:
+    def leaving(self, bank: Bank, state: str) -> list[tuple[ContactEdge, str]]:
         """Return the edges that leave a state, highest priority first, with their constants."""
         constants = self.names.edges[bank.index]
         return [
@@ -223,7 +223,7 @@ class _PythonPrinter(LockFunctions):
             lines += body
         return lines
 
-    def phases(self, bank: Bank, edge: Edge) -> list[Phase]:
+    def phases(self, bank: Bank, edge: ContactEdge) -> list[Phase]:
         """Write what happens when an edge is taken; every impulse ends a phase."""
         lines: list[CodeLine] = []
         found: list[Phase] = []
@@ -439,7 +439,7 @@ class _PythonPrinter(LockFunctions):
         sizes = frozenset(f"#{size}" for size in relations.sizes(relation))
         return CodeLine(f"watch[{relations.text(relation)}] |= {why}", sizes)
 
-    def waits(self, bank: Bank, state: str, edge: Edge) -> bool:
+    def waits(self, bank: Bank, state: str, edge: ContactEdge) -> bool:
         """Return whether a guard can change while nothing that it reads moves.
 
         So can the force that holds a contact, and an input.

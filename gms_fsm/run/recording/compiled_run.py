@@ -13,7 +13,7 @@ from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import Interference, MachineEngine
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.moment import Place, Recording
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.run.recording.recording import check_end, explained, interference_error
@@ -44,13 +44,13 @@ class CompiledRun:
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The run to perform.
     machines : MachineEngine, optional
         With the user's own machines: each firing is replayed through them.
     """
 
-    def __init__(self, start: Start, machines: MachineEngine | None = None) -> None:
+    def __init__(self, start: Problem, machines: MachineEngine | None = None) -> None:
         self.start = start
         self.columns = Columns(start)
         self.recorder: Recording = self.columns
@@ -153,13 +153,13 @@ class Columns:
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The run.
     p : tuple of ndarray, optional
         Parameters that replace the program's own.
     """
 
-    def __init__(self, start: Start, p: compiled.Packed | None = None) -> None:
+    def __init__(self, start: Problem, p: compiled.Packed | None = None) -> None:
         self.start = start
         layout = start.program.layout
         size, modes = layout.y.size, layout.modes
@@ -389,7 +389,7 @@ class Columns:
 _known: dict[Any, compiled.Prepared] = {}
 
 
-def _prepared(start: Start) -> compiled.Prepared:
+def _prepared(start: Problem) -> compiled.Prepared:
     """Return what a run has in common with others: what moves, the method, and the sizes."""
     program = start.program
     flow = "flow" if start.options.located else "flow_live"
@@ -403,12 +403,12 @@ def _prepared(start: Start) -> compiled.Prepared:
     return _known[key]
 
 
-def example_of(start: Start) -> RecordArguments:
+def example_of(start: Problem) -> RecordArguments:
     """Return the arguments of `integrators.runners.columns.record`, with columns that may grow.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The run.
 
     Returns

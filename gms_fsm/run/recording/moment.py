@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from gms_fsm.lowering.log_columns import LogRecord
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.traces.between import interpolated
 from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
@@ -23,7 +23,7 @@ class Recording(Protocol):
     """What listeners may read from a run in progress."""
 
     @property
-    def start(self) -> Start:
+    def start(self) -> Problem:
         """The model, rig and settings of the run."""
 
     @property
@@ -131,7 +131,7 @@ class Moment:
 
 
 def scope_of(
-    start: Start, t: float, y: list[float], mode: Sequence[int], contact: str = ""
+    start: Problem, t: float, y: list[float], mode: Sequence[int], contact: str = ""
 ) -> Scope:
     """Return the values of a contact at a state of a run; without a name of the only one."""
     bank = start.program.layout.contact(contact)

@@ -8,19 +8,19 @@ from typing import Any
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.run.machines import ElementMachines, MachineEngine
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 
 __all__ = ["engine_of", "own_machines"]
 
 
-def own_machines(given: Any, start: Start) -> dict[str, ElementMachines]:
+def own_machines(given: Any, start: Problem) -> dict[str, ElementMachines]:
     """Return the user's machines by contact.
 
     Parameters
     ----------
     given : ElementMachines or mapping of str to ElementMachines
         As passed to `simulate`.
-    start : Start
+    start : Problem
         The run.
 
     Returns
@@ -58,7 +58,7 @@ def own_machines(given: Any, start: Start) -> dict[str, ElementMachines]:
     return found
 
 
-def engine_of(start: Start, machines: Mapping[str, ElementMachines]) -> MachineEngine:
+def engine_of(start: Problem, machines: Mapping[str, ElementMachines]) -> MachineEngine:
     """Return the machines of all contacts: the user's, and new ones for the others."""
     contacts = start.system.contacts
     parts = [machines.get(each.name) or ElementMachines(each) for each in contacts]

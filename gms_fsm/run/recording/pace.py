@@ -17,7 +17,7 @@ from gms_fsm.errors import SignalError
 from gms_fsm.lowering.observing import armed, rate
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.moment import Place, Recording
 from gms_fsm.traces.failures import StepLimitError
 from integrators import Arc, HybridError, hybrid
@@ -76,7 +76,7 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
     )
 
 
-def _fastest(start: Start, place: Place, floor: Any) -> float:
+def _fastest(start: Problem, place: Place, floor: Any) -> float:
     """Return the fastest rate of the flow [1/s], by a power iteration; 0 if there is none."""
     program, (t, y, mode) = start.program, place
     held = armed(program, t, y, mode)
@@ -93,7 +93,7 @@ def _fastest(start: Start, place: Place, floor: Any) -> float:
     return fastest
 
 
-def _steps_ahead(start: Start, place: Place, floor: Any) -> float:
+def _steps_ahead(start: Problem, place: Place, floor: Any) -> float:
     """Return how many steps stability asks for until the end, at least; 0 if that is not known."""
     from scipy.integrate import Radau
 

@@ -18,7 +18,7 @@ from gms_fsm.language import rough_points
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LogRecord
 from gms_fsm.run.machines import Interference
-from gms_fsm.run.problem import STEPS_A_TICK, Start
+from gms_fsm.run.problem import STEPS_A_TICK, Problem
 from gms_fsm.run.recording.moment import Place, Recording, scope_of
 from gms_fsm.traces.failures import (
     CallbackError,
@@ -90,11 +90,11 @@ class Recorder:
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The run.
     """
 
-    def __init__(self, start: Start) -> None:
+    def __init__(self, start: Problem) -> None:
         self.start = start
         self.rows = _Columns([], [], [], [])
         self.stops = _Columns([], [], [], [])
@@ -273,7 +273,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     return _livelock(error, recorder.start, trace)
 
 
-def _refused(error: Refused, start: Start, trace: Trace) -> LockError:
+def _refused(error: Refused, start: Problem, trace: Trace) -> LockError:
     """Say which lock would take a velocity, or cannot let go of it."""
     bank = start.program.layout.bank(error.machine)
     chart = start.system.contact(bank.name).chart
@@ -301,7 +301,7 @@ def _refused(error: Refused, start: Start, trace: Trace) -> LockError:
     )
 
 
-def _livelock(error: Livelock, start: Start, trace: Trace) -> LivelockError:
+def _livelock(error: Livelock, start: Problem, trace: Trace) -> LivelockError:
     """Say which element switches without progress, and why."""
     layout, machine = start.program.layout, error.machine
     if machine is None:
@@ -383,7 +383,7 @@ def _shrinking(times: FloatArray) -> tuple[float, float] | None:
     return None
 
 
-def _pushed_back(error: Livelock, start: Start) -> int:
+def _pushed_back(error: Livelock, start: Problem) -> int:
     """Return the first machine whose flow jumps or has a corner; the first one if none has."""
     for bank in start.program.layout.banks:
         chart = start.system.contact(bank.name).chart

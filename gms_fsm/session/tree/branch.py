@@ -22,7 +22,7 @@ from gms_fsm.errors import SessionError
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.lowering.observing import sigmas
 from gms_fsm.lowering.program import Program
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.simulate import Run
 from gms_fsm.session.results import Fired
@@ -53,7 +53,7 @@ class Continuation(NamedTuple):
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         The run, from the start of the branch.
     past : Branch or None
         The branch that was poked.
@@ -63,7 +63,7 @@ class Continuation(NamedTuple):
         The point of the poke, if it was between two rows; it is a row of this branch.
     """
 
-    start: Start
+    start: Problem
     past: Branch | None = None
     fork: int = -1
     begin: BranchRow | None = None

@@ -14,14 +14,14 @@ from typing import Any
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.foundation.arguments import checked_integer, checked_kind
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
 from gms_fsm.session.results import BranchComparison, compared
 from gms_fsm.session.tree.branch import Branch, BranchRow, Continuation
 from gms_fsm.session.tree.export import save_scenario
 from gms_fsm.session.tree.poking import Edits, initial_with
 from gms_fsm.systems.mounted import Mounted
-from gms_fsm.systems.numbers import Number, number_of, numbers_of, with_law, with_numbers
+from gms_fsm.systems.numbers import NamedNumber, number_of, numbers_of, with_law, with_numbers
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace
 
@@ -171,11 +171,11 @@ class Tree:
         """Return model and rig, or the system, of a branch, by default of the current one."""
         return self._subject(*self._given(self.checked(branch)))
 
-    def numbers(self, branch: int | None = None) -> dict[str, Number]:
+    def numbers(self, branch: int | None = None) -> dict[str, NamedNumber]:
         """Return the numbers of a branch that `set` can change, by name."""
         return numbers_of(self.made_of(branch))
 
-    def number(self, name: str, branch: int | None = None) -> Number:
+    def number(self, name: str, branch: int | None = None) -> NamedNumber:
         """Return one of them; raise `ParameterError` if there is none of this name."""
         return number_of(self.made_of(branch), name)
 
@@ -411,9 +411,9 @@ class Tree:
         start = self._start(was.what, here.t, initial_with(edits, was, here))
         return Continuation(start, past, row, here if between else None)
 
-    def _start(self, subject: Mounted, t: float, initial: Mapping[str, Any] | None) -> Start:
+    def _start(self, subject: Mounted, t: float, initial: Mapping[str, Any] | None) -> Problem:
         options: Any = {"t_start": t, "initial": initial, "ticks_from": self.t_start}
-        return Start.on(subject, self.t_end, self.settings, rows_at_once=1, **options)
+        return Problem.on(subject, self.t_end, self.settings, rows_at_once=1, **options)
 
 
 def _then(before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:

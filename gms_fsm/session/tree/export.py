@@ -11,7 +11,7 @@ from gms_fsm.errors import OutputError
 from gms_fsm.foundation.arguments import checked_path
 from gms_fsm.foundation.files import write_whole
 from gms_fsm.foundation.toml import written
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
 from gms_fsm.session.tree.branch import BranchRow
 from gms_fsm.session.tree.poking import initial_values
@@ -21,14 +21,14 @@ __all__ = ["save_scenario"]
 NAMES = ("step", "rtol", "atol", "max_step", "max_steps")  # any engine gives the same run
 
 
-def save_scenario(path: str | Path, start: Start, title: str, notes: str) -> Path:
+def save_scenario(path: str | Path, start: Problem, title: str, notes: str) -> Path:
     """Write a run as a scenario file of its system.
 
     Parameters
     ----------
     path : str or Path
         The file; its ending must be ``.toml``.
-    start : Start
+    start : Problem
         The run.
     title, notes : str
         For people.
@@ -57,7 +57,7 @@ def save_scenario(path: str | Path, start: Start, title: str, notes: str) -> Pat
     return write_whole(path, lambda file: file.write(text.encode()))
 
 
-def _run(start: Start) -> dict[str, Any]:
+def _run(start: Problem) -> dict[str, Any]:
     """Return the settings that are not the defaults, and the times."""
     chosen, usual = start.chosen, Settings()
     table: dict[str, Any] = {"t_start": float(start.t_start), "t_end": float(start.t_end)}

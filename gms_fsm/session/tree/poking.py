@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from gms_fsm.errors import SessionError, shown
-from gms_fsm.run.problem import Start
+from gms_fsm.run.problem import Problem
 from gms_fsm.session.elements import element_name, machine_of
 from gms_fsm.systems.models import parameter_names
 
@@ -42,7 +42,7 @@ class Edits:
     @classmethod
     def of(
         cls,
-        start: Start,
+        start: Problem,
         variables: Mapping[str, Any] | None,
         v: float | None,
         state: Mapping[int | str, str] | None,
@@ -88,7 +88,7 @@ class Edits:
         return ", ".join(parts)
 
 
-def pokeable(start: Start) -> list[str]:
+def pokeable(start: Problem) -> list[str]:
     """Return the names in the state vector of a system that a poke can change."""
     layout, system = start.program.layout, start.system
     updated = (name for each in system.sampled for name in each.updates)
@@ -98,7 +98,7 @@ def pokeable(start: Start) -> list[str]:
     return [*shared, *own]
 
 
-def _of_model(start: Start, given: Mapping[str, Any]) -> dict[str, float | Mapping[int, float]]:
+def _of_model(start: Problem, given: Mapping[str, Any]) -> dict[str, float | Mapping[int, float]]:
     """Return the new values of the variables of a model on a rig, checked."""
     known = [name for name in start.model.chart.variables if name != AGE]
     found: dict[str, float | Mapping[int, float]] = {}
@@ -118,7 +118,7 @@ def _of_model(start: Start, given: Mapping[str, Any]) -> dict[str, float | Mappi
     return found
 
 
-def _of_system(start: Start, given: Mapping[str, Any]) -> dict[str, float | Mapping[int, float]]:
+def _of_system(start: Problem, given: Mapping[str, Any]) -> dict[str, float | Mapping[int, float]]:
     """Return the new values of the state vector of a system, checked."""
     found: dict[str, float | Mapping[int, float]] = {}
     for key, value in given.items():
@@ -133,7 +133,7 @@ def _of_system(start: Start, given: Mapping[str, Any]) -> dict[str, float | Mapp
     return found
 
 
-def _resolved(start: Start, key: object) -> tuple[str, int | None]:
+def _resolved(start: Problem, key: object) -> tuple[str, int | None]:
     """Return the name in the state vector that a key means, and the element if it has a number."""
     layout, known = start.program.layout, pokeable(start)
     keys = {each: name for each, name in layout.keys.items() if name in known}
@@ -188,14 +188,14 @@ def _by_element(key: object, value: Any, n: int) -> dict[int, float]:
     )
 
 
-def initial_with(edits: Edits, start: Start, here: BranchRow) -> dict[str, Any]:
+def initial_with(edits: Edits, start: Problem, here: BranchRow) -> dict[str, Any]:
     """Return the ``initial`` of a run that continues from a point with edits.
 
     Parameters
     ----------
     edits : Edits
         The changes.
-    start : Start
+    start : Problem
         Of the run.
     here : BranchRow
         The point.
@@ -223,12 +223,12 @@ def initial_with(edits: Edits, start: Start, here: BranchRow) -> dict[str, Any]:
     return initial if edits.v is None else initial | {"v": edits.v}
 
 
-def initial_values(start: Start, here: BranchRow) -> dict[str, Any]:
+def initial_values(start: Problem, here: BranchRow) -> dict[str, Any]:
     """Return the whole state at a point of a run as the ``initial`` of another.
 
     Parameters
     ----------
-    start : Start
+    start : Problem
         Of the run.
     here : BranchRow
         The point.

@@ -36,8 +36,8 @@ from gms_fsm.systems.models import GMS, ChartModel, LuGre
 __all__ = [
     "BY_CHART",
     "BY_KIND",
-    "ChartTable",
     "GMSTable",
+    "IncludedChartTable",
     "LuGreTable",
     "ModelTable",
 ]
@@ -158,7 +158,7 @@ class LuGreTable(Table):
 
 
 # --------------------------------------------------------------------------- any chart
-class ChartTable(Table):
+class IncludedChartTable(Table):
     """An included chart; the table of each has its parameters as further keys."""
 
     chart: str
@@ -167,7 +167,7 @@ class ChartTable(Table):
     )
 
     @model_validator(mode="after")
-    def _fits(self) -> ChartTable:
+    def _fits(self) -> IncludedChartTable:
         self.build()
         return self
 
@@ -193,7 +193,7 @@ class ChartTable(Table):
 _FIELD = "parameter_{}"  # internal name of a parameter; pydantic reserves some names
 
 
-def _chart_table(entry: Entry) -> type[ChartTable]:
+def _chart_table(entry: Entry) -> type[IncludedChartTable]:
     """Return the table of a chart, with its parameters as keys."""
     kind: Any = Literal[entry.name]
     fields: dict[str, Any] = {"chart": (kind, Field(description=entry.title))}
@@ -219,18 +219,20 @@ def _chart_table(entry: Entry) -> type[ChartTable]:
         if each.name not in entry.parameter_names:
             optional: Any = (list[float] if each.per_element else float) | None
             fields[each.name] = (optional, Field(None, description=_DESCRIBED[each.name]))
-    return create_model(f"Chart {entry.name}", __base__=ChartTable, __doc__=entry.title, **fields)
+    return create_model(
+        f"Chart {entry.name}", __base__=IncludedChartTable, __doc__=entry.title, **fields
+    )
 
 
 def _model_form(given: Any) -> str:
-    by_chart = isinstance(given, ChartTable) or (
+    by_chart = isinstance(given, IncludedChartTable) or (
         isinstance(given, dict) and "chart" in given and "kind" not in given
     )
     return BY_CHART if by_chart else BY_KIND
 
 
 if TYPE_CHECKING:
-    ModelTable: TypeAlias = GMSTable | LuGreTable | ChartTable
+    ModelTable: TypeAlias = GMSTable | LuGreTable | IncludedChartTable
 else:
     _CHARTS = functools.reduce(operator.or_, map(_chart_table, registered().values()))
     ModelTable = Annotated[

@@ -33,7 +33,7 @@ from gms_fsm.language import (
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.systems.given import derivative_free, is_positive
 from gms_fsm.systems.parts import LEAST_LOAD, LOAD, Body, Contact
-from gms_fsm.systems.reading.definitions import Definition, Edge
+from gms_fsm.systems.reading.definitions import ContactEdge, Definition
 from gms_fsm.systems.reading.values import numbers_of, of
 from gms_fsm.systems.signals import Formula
 from gms_fsm.systems.springs import added, spring_forces
@@ -45,9 +45,9 @@ __all__ = [
     "CURVE_LOAD",
     "Assembly",
     "Bank",
+    "ContactEdge",
     "Definition",
-    "Edge",
-    "Reader",
+    "SystemReader",
     "assembled",
     "of",
 ]
@@ -82,7 +82,7 @@ class Bank:
         By state and force, of an element; None in a locked state.
     totals : mapping of str to Value
         By force: that of the contact over the sum, where it is not the sum itself.
-    edges : tuple of Edge
+    edges : tuple of ContactEdge
         In the chart's order.
     start : tuple of (str, Value)
         The assignments at the start of a run.
@@ -102,7 +102,7 @@ class Bank:
     flows: Mapping[tuple[str, str], Value]
     outputs: Mapping[tuple[str, str], Value | None]
     totals: Mapping[str, Value]
-    edges: tuple[Edge, ...]
+    edges: tuple[ContactEdge, ...]
     start: tuple[tuple[str, Value], ...]
     means: Mapping[str, Value]
 
@@ -131,12 +131,12 @@ class Bank:
         """Names of the states that lock it."""
         return tuple(state.name for state in self.chart.states if state.locked)
 
-    def is_impulse(self, edge: Edge) -> bool:
+    def is_impulse(self, edge: ContactEdge) -> bool:
         """Return whether an edge changes velocities by an impulse."""
         sets = any(name in self.velocities for name, _ in edge.steps)
         return sets or (edge.locks and not edge.arrests and edge.source not in self.locked)
 
-    def changes_others(self, edge: Edge) -> int:
+    def changes_others(self, edge: ContactEdge) -> int:
         """Return 1 for an impulse, 2 for an edge that lets go of a lock: forces change at once."""
         if self.is_impulse(edge):
             return 1
@@ -268,10 +268,10 @@ def assembled(system: System) -> Assembly:
         If a text cannot be read, a velocity is not linear, an inertia is not positive, or locks
         that always hold depend on each other.
     """
-    return Reader(system).read()
+    return SystemReader(system).read()
 
 
-class Reader:
+class SystemReader:
     """Reads the texts of a system into trees, and says what each text may name."""
 
     def __init__(self, system: System) -> None:
@@ -418,7 +418,7 @@ class Reader:
             },
             totals=totals,
             edges=tuple(
-                Edge(
+                ContactEdge(
                     edge.name,
                     edge.source,
                     edge.target,

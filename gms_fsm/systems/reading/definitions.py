@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from gms_fsm.language import Condition, Value
 from gms_fsm.systems.signals import Signal
 
-__all__ = ["Definition", "Edge"]
+__all__ = ["ContactEdge", "Definition"]
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Definition:
 
 
 @dataclass(frozen=True)
-class Edge:
+class ContactEdge:
     """An edge of a chart.
 
     Parameters

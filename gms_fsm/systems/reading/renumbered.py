@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from gms_fsm.systems.reading.assembly import Assembly, Reader
+from gms_fsm.systems.reading.assembly import Assembly, SystemReader
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.springs import check_springs
 
@@ -55,7 +55,7 @@ def check_numbers(read: Assembly, system: System) -> None:
         If an inertia is not positive, a spring pushes away, or locks that always hold depend on
         each other.
     """
-    reader = Reader(system)
+    reader = SystemReader(system)
     reader.check_inertias(read.inertias)
     check_springs(system)
     reader.check_locks(read.banks)

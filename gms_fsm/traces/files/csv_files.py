@@ -25,7 +25,7 @@ from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS
 from gms_fsm.systems.numbers import column_name
 from gms_fsm.traces.files.columns import column_title
 from gms_fsm.traces.files.header import Header
-from gms_fsm.traces.files.parts import Parts, Ran
+from gms_fsm.traces.files.parts import Parts, RunDescription
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
 
@@ -105,7 +105,7 @@ def read(path: Path) -> Parts:
     with folder_lock(path.parent, shared=True):  # rows and log must come from the same run
         with path.open(encoding="utf-8", newline="") as file:
             header = _header(path, file.readline())
-            ran = Ran(header.to_mounted())
+            ran = RunDescription(header.to_mounted())
             table = _read_columns(file, path, 2, lambda head: _kinds(ran, head))
         text = io.StringIO(_log_of(path, header.log))
         log = _read_columns(text, log_path(path), 1, _log_kinds)
@@ -133,7 +133,7 @@ def _header(path: Path, line: str) -> Header:
     return Header.model_validate_json(line[2:])
 
 
-def _kinds(ran: Ran, head: Sequence[str]) -> dict[str, Kind]:
+def _kinds(ran: RunDescription, head: Sequence[str]) -> dict[str, Kind]:
     """Return the columns of a trace that are read."""
     layout, short = ran.layout, not ran.what.named
     kinds: dict[str, Kind] = {"t": NUMBER, "microstep": INTEGER}
@@ -167,7 +167,7 @@ def _log_kinds(head: Sequence[str]) -> dict[str, Kind]:
     return kinds | {name: TEXT for name in (*LOG_TEXTS, CONTACT) if name != CONTACT or name in head}
 
 
-def _rows(table: Mapping[str, NDArray[Any]], ran: Ran) -> Rows:
+def _rows(table: Mapping[str, NDArray[Any]], ran: RunDescription) -> Rows:
     layout, short = ran.layout, not ran.what.named
     titles = {name: column_title(layout, name, short=short) for name, _ in layout.y}
     y = [table[titles[name] if i is None else column_name(titles[name], i)] for name, i in layout.y]

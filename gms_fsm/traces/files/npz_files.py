@@ -19,7 +19,7 @@ from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRecord
 from gms_fsm.traces.files.archives import member, write_arrays
 from gms_fsm.traces.files.header import FORMATS, Header
-from gms_fsm.traces.files.parts import Parts, Ran
+from gms_fsm.traces.files.parts import Parts, RunDescription
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
 
@@ -56,7 +56,7 @@ def read(path: Path) -> Parts:
     with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
         array = partial(member, file)
         header = Header.model_validate_json(str(array("header")))
-        ran = Ran(header.to_mounted())
+        ran = RunDescription(header.to_mounted())
         layout = ran.layout
         rows = _table(array, "rows", layout)
         stops = _table(array, "stops", layout) if "stops_t" in file.files else rows
@@ -81,14 +81,14 @@ def _width(layout: SystemLayout) -> int:
     return 8 * max(layout.y.size, layout.observed.size, layout.modes)
 
 
-def _firings(array: Member, ran: Ran) -> Firings:
+def _firings(array: Member, ran: RunDescription) -> Firings:
     t = array("log_t")
     machine, edge = (array(f"log_{name}", 8 * t.size) for name in ("machine", "edge"))
     numbers = array("log_numbers", 8 * len(LOG_NUMBERS) * t.size)
     return Firings(t, machine, edge, numbers, ran.layout, ran.what.named and t.size > 0)
 
 
-def _coded(log: Any, ran: Ran) -> Firings:
+def _coded(log: Any, ran: RunDescription) -> Firings:
     """Return the firings in the log of a file of format 1, whose names are texts of one width."""
     fields = log.dtype.fields or {}
     width = fields["edge"][0].itemsize // 4 if "edge" in fields else 1

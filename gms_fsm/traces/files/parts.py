@@ -21,11 +21,11 @@ from gms_fsm.traces.rows import Rows
 if TYPE_CHECKING:
     from gms_fsm.traces.files.header import Header
 
-__all__ = ["Parts", "Ran", "checked", "stored_names"]
+__all__ = ["Parts", "RunDescription", "checked", "stored_names"]
 
 
 @dataclass(frozen=True, eq=False)
-class Ran:
+class RunDescription:
     """What ran, as a file describes it.
 
     Parameters
@@ -81,7 +81,7 @@ class Parts:
     ----------
     header : Header
         Description of what ran, and the settings.
-    ran : Ran
+    ran : RunDescription
         What ran.
     rows, stops : Rows
         The rows, and both sides of every stop; one object if they are the same.
@@ -92,7 +92,7 @@ class Parts:
     """
 
     header: Header
-    ran: Ran
+    ran: RunDescription
     rows: Rows
     stops: Rows
     firings: Firings

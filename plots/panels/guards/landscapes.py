@@ -54,7 +54,7 @@ DASHED: Any = (0, (2, 1.4))  # the path after the row
 Floats = NDArray[np.float64]
 
 
-class View(NamedTuple):
+class PlaneWindow(NamedTuple):
     """The part of a plane that is drawn."""
 
     linear: float  # below this speed the axis is linear, m/s
@@ -66,7 +66,7 @@ class View(NamedTuple):
 
 
 # --------------------------------------------------------------------------- what is shown
-def view_of(trace: Trace, element: int, plane: Plane) -> View:
+def view_of(trace: Trace, element: int, plane: Plane) -> PlaneWindow:
     """Return the part of a plane that shows the run of an element and the turns of its guards."""
     chart, (velocity, second) = trace.model.chart, plane.names
     v = _column(trace, velocity, element)
@@ -87,7 +87,7 @@ def view_of(trace: Trace, element: int, plane: Plane) -> View:
     low, high = float(reach.min()), float(reach.max())
     pad = 0.14 * (high - low) or 0.5 * abs(high) or 1.0
     factor, title = _axis_title(chart, second, np.array([low - pad, high + pad]))
-    return View(linear, speed, low - pad, high + pad, factor, title)
+    return PlaneWindow(linear, speed, low - pad, high + pad, factor, title)
 
 
 def _column(trace: Trace, name: str, element: int) -> Floats:
@@ -220,7 +220,7 @@ def landscape(
     return [*drawn, dot, names]
 
 
-def grid_of(ax: Axes, view: View, size: tuple[int, int]) -> tuple[Floats, Floats]:
+def grid_of(ax: Axes, view: PlaneWindow, size: tuple[int, int]) -> tuple[Floats, Floats]:
     """Return the points of a grid that is even in the picture: v in a row, z in a column, SI."""
     scale = ax.xaxis.get_transform()
     end = float(scale.transform(np.array([view.speed]))[0])
@@ -233,7 +233,7 @@ def _power(value: float) -> str:
     return f"10{raised(str(round(np.log10(value))))}"
 
 
-def _speed_ticks(ax: Axes, view: View) -> None:
+def _speed_ticks(ax: Axes, view: PlaneWindow) -> None:
     """Label 0 and every decade, or every second or third of many."""
     first, last = round(np.log10(view.linear)), int(np.floor(np.log10(view.speed)))
     step = -(-(last - first) // 3) or 1
@@ -349,7 +349,7 @@ def _path(
     plane: Plane,
     element: int,
     window: Window,
-    view: View,
+    view: PlaneWindow,
     names: LineNames,
 ) -> Artists:
     """Draw the path around the row: solid before it, dashed after it."""
@@ -369,7 +369,7 @@ def _path(
     return drawn
 
 
-def _flow(ax: Axes, trace: Trace, plane: Plane, view: View) -> Artists:
+def _flow(ax: Axes, trace: Trace, plane: Plane, view: PlaneWindow) -> Artists:
     """Draw the direction of the flow; lengths of arrows mean nothing."""
     tree = plane.chart.flows.get((plane.state, plane.names[1]))
     dv = acceleration(trace, plane.row)

@@ -34,7 +34,7 @@ BOLD = 1.1  # width of a bold letter of 8.5 points, of that of 8 points
 
 
 @dataclass(frozen=True)
-class Column:
+class MicroStep:
     """One micro-step.
 
     Parameters
@@ -76,7 +76,7 @@ class Unfolded:
         Elements shown, counted from 0.
     times : ndarray, shape (instants,), s
         Instants with transitions of these elements.
-    columns : tuple of Column
+    columns : tuple of MicroStep
         In order: for each instant the state before, then after each firing.
     log : recarray
         The transitions, in order.
@@ -85,7 +85,7 @@ class Unfolded:
     trace: Trace
     elements: tuple[int, ...]
     times: NDArray[np.float64]
-    columns: tuple[Column, ...]
+    columns: tuple[MicroStep, ...]
     log: Any
 
     @property
@@ -93,7 +93,7 @@ class Unfolded:
         """Width of all columns and gaps."""
         return self.columns[-1].left + 1.0
 
-    def of(self, instant: int) -> tuple[Column, ...]:
+    def of(self, instant: int) -> tuple[MicroStep, ...]:
         """Return the columns of an instant."""
         return tuple(each for each in self.columns if each.instant == instant)
 
@@ -149,7 +149,7 @@ def unfolded(
     steps, where = steps_of(trace), np.flatnonzero(mine)
     modes = {i: _mode_before(trace, i, int(where[0])) for i in chosen}
     times = np.unique(log.t[mine])
-    columns: list[Column] = []
+    columns: list[MicroStep] = []
     left = 0.0
     for instant, t in enumerate(times.tolist()):
         previous = 0
@@ -157,13 +157,15 @@ def unfolded(
             record, step = log[k], int(steps[k])
             if previous == 0 or step > previous + 1:  # before the instant; after others
                 columns.append(
-                    Column(instant, step - 1, left, float(record.F_before), tuple(modes.values()))
+                    MicroStep(
+                        instant, step - 1, left, float(record.F_before), tuple(modes.values())
+                    )
                 )
                 left += 1.0
             i = int(record.element)
             modes[i] = trace.model.chart.state_index(str(record.target))
             F, edge = float(record.F_after), str(record.edge)
-            columns.append(Column(instant, step, left, F, tuple(modes.values()), i, edge))
+            columns.append(MicroStep(instant, step, left, F, tuple(modes.values()), i, edge))
             previous, left = step, left + 1.0
         left += GAP
     found = Unfolded(trace, tuple(chosen), times, tuple(columns), log[mine])
