@@ -9,13 +9,7 @@ __all__ = ["check_neighbours"]
 
 
 def check_neighbours() -> None:
-    """Refuse to start if another file or folder shadows one of our packages.
-
-    Raises
-    ------
-    ImportError
-        In one sentence: which file hides which package, and what to do.
-    """
+    """Refuse to start if another file or folder shadows one of our packages."""
     home = Path(__file__).resolve().parents[1]
     for name in ("integrators", "plots"):
         spec = find_spec(name)

@@ -120,31 +120,7 @@ class Buffers(NamedTuple):
 def run_to_event(
     functions: Functions, switch: Switching, motion: ArcMotion, b: Buffers, most_steps: int
 ) -> int:
-    """Run until the next event.
-
-    Parameters
-    ----------
-    functions : Functions
-        The system.
-    switch : Switching
-        Its machines.
-    motion : ArcMotion
-        The flow and what is watched: `flow_on`, `margins_on` and a `Held`. While nothing slides,
-        the functions of the system itself do the same in less time.
-    b : Buffers
-        The state of the run, changed in place.
-    most_steps : int
-        Return after at most this many steps.
-
-    Returns
-    -------
-    int
-        ROWS (to be taken, all with the present mode; possibly none if the steps are used up),
-        FIRING (before) and FIRED (after an edge), STOPPED (a crossing, either side of a jump),
-        SLID (sliding started or ended), ADVANCE (a foreign solver must continue), PAUSED (settled
-        at the time ``now.pause``), DONE; or the error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK,
-        RELATION_LIVELOCK, TOO_MANY_STEPS, ENTANGLED.
-    """
+    """Run until the next event."""
     plan, now, memory = b.plan, b.now, b.memory
     relations, sliding, scratch = b.relations, b.sliding, b.scratch
     out, p = b.out, functions.p

@@ -90,20 +90,6 @@ def scaled_size(u: Vector, y: Vector, control: Control, floor: Vector) -> float:
 
     A component without a scale may only just have left 0. Steps chosen from its size would then be
     so short that the error is all rounding, which no shorter step makes smaller.
-
-    Parameters
-    ----------
-    u, y : list of float, shape (m,)
-        What is measured, and the state.
-    control : Control
-        Tolerances.
-    floor : list of float, shape (m,)
-        Absolute tolerances.
-
-    Returns
-    -------
-    float
-        -1 if no component has a scale; infinity if one is not finite.
     """
     largest = -1.0
     for j in range(len(y)):

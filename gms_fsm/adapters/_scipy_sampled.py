@@ -49,16 +49,6 @@ class Solver:
 def samples(start: float, end: float, length: float) -> list[float]:
     """Return the ends of the samples; the last one may be shorter.
 
-    Parameters
-    ----------
-    start, end, length : float
-        s.
-
-    Returns
-    -------
-    list of float
-        Increasing up to the end.
-
     Examples
     --------
     >>> samples(1.0, 2.0, 0.4)
@@ -78,26 +68,7 @@ def samples(start: float, end: float, length: float) -> list[float]:
 def sampled(
     caller: Caller, stepped: SteppedFriction, y: FloatArray, ends: list[float], how: Solver
 ) -> Solution:
-    """Integrate from sample to sample.
-
-    Parameters
-    ----------
-    caller : Caller
-        The caller's functions.
-    stepped : SteppedFriction
-        The frictions at the start.
-    y : ndarray, shape (n,)
-        The caller's state at the start.
-    ends : list of float
-        s: the ends of the samples.
-    how : Solver
-        How to integrate.
-
-    Returns
-    -------
-    Solution
-        A row for each sample.
-    """
+    """Integrate from sample to sample."""
     stepper = stepped.stepper
     v = _velocity(caller, y)
     t, rows, forces = [stepper.t], [y], [stepper.peek(v, v, 0.0)]

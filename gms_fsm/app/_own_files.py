@@ -50,24 +50,7 @@ class OwnFile:
         return {}
 
     def charts(self, contact: str = "") -> dict[str, Chart]:
-        """Return its charts.
-
-        Parameters
-        ----------
-        contact : str
-            Which contact's; empty for all of them.
-
-        Returns
-        -------
-        dict of str to Chart
-            By the names of the contacts that have it, such as ``"pad1, pad2"``; a chart file has
-            one, by the name of the file.
-
-        Raises
-        ------
-        ParameterError
-            If there is no such contact.
-        """
+        """Return its charts."""
         if self.chart is not None:
             if contact:
                 raise ParameterError(
@@ -88,23 +71,7 @@ class OwnFile:
         return {", ".join(names): chart for names, chart in found}
 
     def only_model(self, contact: str = "") -> Model:
-        """Return the model of its contact.
-
-        Parameters
-        ----------
-        contact : str
-            Which contact's; empty if there is only one.
-
-        Returns
-        -------
-        Model
-            With its numbers.
-
-        Raises
-        ------
-        ParameterError
-            If there are several contacts, or it is a chart file.
-        """
+        """Return the model of its contact."""
         if self.system is None:
             raise ParameterError(
                 "it is a chart file, which has no numbers",
@@ -124,23 +91,7 @@ class OwnFile:
         return single
 
     def only_chart(self, contact: str = "") -> Chart:
-        """Return its chart.
-
-        Parameters
-        ----------
-        contact : str
-            Which contact's; empty if all have the same.
-
-        Returns
-        -------
-        Chart
-            That one.
-
-        Raises
-        ------
-        ParameterError
-            If there are several.
-        """
+        """Return its chart."""
         found = self.charts(contact)
         if len(found) > 1:
             assert self.system is not None
@@ -154,25 +105,7 @@ class OwnFile:
 
 
 def own_file(name: str, law: str = "") -> OwnFile | None:
-    """Return what a file describes, if a name on the command line is that of a file.
-
-    Parameters
-    ----------
-    name : str
-        The name of an included chart, or of a file: ending in ``.toml``, or an existing path.
-    law : str
-        Value of ``--law``, which a file does not take.
-
-    Returns
-    -------
-    OwnFile or None
-        None for the name of an included chart.
-
-    Raises
-    ------
-    GMSError
-        If the file is none of these; naming file, line, key, text and column.
-    """
+    """Return what a file describes, if a name on the command line is that of a file."""
     path = Path(name)
     if path.suffix != ".toml" and not (len(path.parts) > 1 and path.exists()):
         return None
@@ -189,18 +122,7 @@ def own_file(name: str, law: str = "") -> OwnFile | None:
 
 
 def domain_of(chart: Chart) -> tuple[str, ...] | None:
-    """Return what a proof of a chart assumes, if it is an included one that says so.
-
-    Parameters
-    ----------
-    chart : Chart
-        Any chart.
-
-    Returns
-    -------
-    tuple of str or None
-        None for the default.
-    """
+    """Return what a proof of a chart assumes, if it is an included one that says so."""
     for each in registered().values():
         if chart in [each.chart(law) for law in each.laws or ("",)]:
             return each.domain
@@ -209,21 +131,6 @@ def domain_of(chart: Chart) -> tuple[str, ...] | None:
 
 def any_model(chart: Chart) -> ChartModel:
     """Return a model of a chart with some numbers; a program has them as arguments.
-
-    Parameters
-    ----------
-    chart : Chart
-        Any chart.
-
-    Returns
-    -------
-    ChartModel
-        With one element.
-
-    Raises
-    ------
-    ParameterError
-        If no numbers that satisfy the rules were found.
 
     Examples
     --------

@@ -162,18 +162,7 @@ class LiveView:
 
     # ------------------------------------------------------------------ the picture
     def picture(self, moment: Moment) -> list[RenderableType]:
-        """Return tables, curves and the last transitions.
-
-        Parameters
-        ----------
-        moment : Moment
-            What to show.
-
-        Returns
-        -------
-        list
-            For a `rich` console.
-        """
+        """Return tables, curves and the last transitions."""
         self._read(moment)
         slow = "; computing is slower than that" * self.behind
         pace = "" if self.pace is None else f"{self.pace:g} simulated seconds per second{slow}"
@@ -186,18 +175,7 @@ class LiveView:
         ]
 
     def curves(self, moment: Moment) -> list[Text]:
-        """Return v and F of each contact over time: since the start, or the last frames.
-
-        Parameters
-        ----------
-        moment : Moment
-            The end of the curves.
-
-        Returns
-        -------
-        list of rich.text.Text
-            Two lines per contact, with their ranges.
-        """
+        """Return v and F of each contact over time: since the start, or the last frames."""
         start = self.t_start
         if self.pace is not None:
             start = max(start, moment.t - self.pace * CURVE * BETWEEN_FRAMES)
@@ -216,18 +194,7 @@ class LiveView:
         return [*lines, Text(f"over the last {quantity(span, 's')}")]
 
     def tables(self, moment: Moment) -> list[Table]:
-        """Return the table of each contact.
-
-        Parameters
-        ----------
-        moment : Moment
-            The latest row.
-
-        Returns
-        -------
-        list of rich.table.Table
-            One, if there are not several contacts.
-        """
+        """Return the table of each contact."""
         values, states, found = moment.values, moment.states, list[Table]()
         for name in _leads(values):
             own = {each: values[name + each] for each in ("v", "F", "z", "s")}
@@ -239,24 +206,7 @@ class LiveView:
     def table(
         self, t: float, states: Sequence[str], values: Mapping[str, Any], lead: str = ""
     ) -> Table:
-        """Return a table with one line per element.
-
-        Parameters
-        ----------
-        t : float
-            Time, s.
-        states : sequence of str
-            State of each element.
-        values : mapping
-            ``v`` and ``F``; ``z`` and ``s``, one per element.
-        lead : str
-            Put in front of the title.
-
-        Returns
-        -------
-        rich.table.Table
-            State, |z|/s and z of each element; v and F in the title.
-        """
+        """Return a table with one line per element."""
         title = (
             f"{lead}t = {quantity(t, 's', digits=5):<9}   v = {quantity(values['v'], 'm/s'):>11}   "
             f"F = {quantity(values['F'], 'N'):>9}"

@@ -451,20 +451,7 @@ def velocity_note(trace: Trace, motion: Motion) -> str:
 
 
 def what_it_cannot_tell(trace: Trace, motion: Motion) -> list[str]:
-    """Return the parameters that a record does not identify, each with the reason.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run with the motion of the record.
-    motion : Motion
-        The motion of the record.
-
-    Returns
-    -------
-    list of str
-        Sentences; empty if nothing was found.
-    """
+    """Return the parameters that a record does not identify, each with the reason."""
     doubts = []
     speed = np.abs(motion.velocity)
     moving = speed[speed > 0.1 * np.quantile(speed, 0.99)]

@@ -187,18 +187,7 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
 
 
 def kind_of(data: Mapping[str, Any]) -> str:
-    """Return what a file describes, by its tables.
-
-    Parameters
-    ----------
-    data : mapping
-        Contents of the file.
-
-    Returns
-    -------
-    str
-        ``"system"``, ``"chart"``, ``"rig"`` for a model on a rig; empty if it cannot be told.
-    """
+    """Return what a file describes, by its tables."""
     for kind, tables in _TABLES.items():
         if data.keys() & tables:
             return kind
@@ -249,25 +238,7 @@ def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
 
 
 def read_system(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, System]:
-    """Return the contents of a scenario file of a system, and the system.
-
-    Parameters
-    ----------
-    path : Path
-        A TOML file.
-    overrides : sequence of str
-        As in `load_scenario`.
-
-    Returns
-    -------
-    SystemScenario, System
-        Checked.
-
-    Raises
-    ------
-    ScenarioError
-        As `load_system` does.
-    """
+    """Return the contents of a scenario file of a system, and the system."""
 
     def build(table: SystemScenario) -> tuple[SystemScenario, System]:
         return table, table.chosen(path.parent, System)
@@ -375,25 +346,7 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
 
 
 def find_file(scenario: Path, name: str) -> Path:
-    """Return the path of a file named in a scenario, in its folder or in the data folder.
-
-    Parameters
-    ----------
-    scenario : Path
-        The scenario file.
-    name : str
-        A relative path inside the folder.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    ScenarioError
-        If the path leads outside the folder, or there is no such file.
-    """
+    """Return the path of a file named in a scenario, in its folder or in the data folder."""
     folders = [scenario.parent]
     if os.environ.get(DATA_VARIABLE):
         folders.append(Path(os.environ[DATA_VARIABLE]))
@@ -491,25 +444,7 @@ def session_of(loaded: Loaded) -> Session:
 
 
 def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
-    """Open a scenario in the debugger.
-
-    Parameters
-    ----------
-    loaded : Loaded
-        As for `session_of`.
-    stdin, stdout : text files, optional
-        The terminal by default.
-
-    Returns
-    -------
-    int
-        Exit code: 0 at `quit` and at the end of input.
-
-    Raises
-    ------
-    ScenarioError
-        If the run of the scenario cannot be set up.
-    """
+    """Open a scenario in the debugger."""
     from gms_fsm.debugger import Debugger
 
     return Debugger(session_of(loaded), loaded.title, stdin, stdout).run()

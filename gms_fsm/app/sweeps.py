@@ -259,19 +259,6 @@ def _varied(one: Axis, unit: str) -> str:
 
 
 def failures(result: Sweep, most: int = 5) -> list[tuple[int, str]]:
-    """Return the first runs that failed, with their messages.
-
-    Parameters
-    ----------
-    result : Sweep
-        The sweep.
-    most : int
-        Largest number of runs to return.
-
-    Returns
-    -------
-    list of (int, str)
-        Run index, from 0, and message.
-    """
+    """Return the first runs that failed, with their messages."""
     runs = np.flatnonzero(result.outcome != "ok")[:most].tolist()
     return [(run, f"{result.outcome[run]}: {result.message[run]}") for run in runs]

@@ -66,39 +66,13 @@ class Bound:
     text: str
 
     def holds(self, value: Any, limit: Any) -> Any:
-        """Return whether a number satisfies the bound, or an array of such truth values.
-
-        Parameters
-        ----------
-        value, limit : float or ndarray
-        The two sides of the comparison.
-
-        Returns
-        -------
-        bool or ndarray of bool
-            The truth value.
-        """
+        """Return whether a number satisfies the bound, or an array of such truth values."""
         return _HOLDS[self.op](value, limit)
 
 
 @functools.lru_cache(maxsize=256)
 def bounds_of(rule: str) -> tuple[Bound, ...]:
     """Return the comparisons in a rule; none for ``"finite"``.
-
-    Parameters
-    ----------
-    rule : str
-        ``"finite"``, or comparisons with a number or a name, joined by ``and``.
-
-    Returns
-    -------
-    tuple of Bound
-        In the order in which they are written.
-
-    Raises
-    ------
-    ChartError
-        If the text is not a rule.
 
     Examples
     --------
@@ -239,18 +213,6 @@ STRIBECK = (
 def with_shared(own: Iterable[Parameter], *, curve: bool) -> tuple[Parameter, ...]:
     """Return a chart's parameters and those shared by all models.
 
-    Parameters
-    ----------
-    own : iterable of Parameter
-        The chart's; they take precedence over shared ones of the same name.
-    curve : bool
-        Whether there is a Stribeck curve, and therefore weights.
-
-    Returns
-    -------
-    tuple of Parameter
-        The chart's own first.
-
     Examples
     --------
     >>> [each.name for each in with_shared((Parameter("k"), Parameter("F_c")), curve=False)]
@@ -265,27 +227,7 @@ def with_shared(own: Iterable[Parameter], *, curve: bool) -> tuple[Parameter, ..
 
 # --------------------------------------------------------------------------- checks
 def checked_scalar(name: str, value: Any, rule: str) -> float:
-    """Return a value as a float if it is finite and satisfies a rule.
-
-    Parameters
-    ----------
-    name : str
-        The name to use in the message.
-    value : float
-        The value to check.
-    rule : str
-        As in `Parameter`; bounds that name other parameters are left to `checked_values`.
-
-    Returns
-    -------
-    float
-        The value.
-
-    Raises
-    ------
-    ParameterError
-        Naming the parameter, its value and the rule.
-    """
+    """Return a value as a float if it is finite and satisfies a rule."""
     try:
         if isinstance(value, str | bytes):  # float("100") is a number
             raise TypeError
@@ -303,29 +245,7 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
 
 
 def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> FloatArray:
-    """Return a read-only copy, shape (n,), if every entry is finite and satisfies a rule.
-
-    Parameters
-    ----------
-    name : str
-        The name to use in the message.
-    values : array_like, shape (n,)
-        The values to check.
-    n : int or None
-        The required number of entries; None for any number.
-    rule : str
-        As in `checked_scalar`.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        A copy.
-
-    Raises
-    ------
-    ParameterError
-        Naming the parameter, the entry, its value and the rule.
-    """
+    """Return a read-only copy, shape (n,), if every entry is finite and satisfies a rule."""
     array = as_numbers(name, values)
     if array.ndim != 1 or array.size == 0:
         raise ParameterError(
@@ -343,20 +263,7 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
 
 
 def as_numbers(name: str, values: ArrayLike) -> FloatArray:
-    """Return a copy as an array of floats of any shape; raise a `ParameterError` if impossible.
-
-    Parameters
-    ----------
-    name : str
-        The name to use in the message.
-    values : array_like
-        The value to convert.
-
-    Returns
-    -------
-    ndarray
-        A copy.
-    """
+    """Return a copy as an array of floats of any shape; raise a `ParameterError` if impossible."""
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -371,25 +278,6 @@ def checked_values(
     parameters: Iterable[Parameter], values: Mapping[str, Any], n: int = 1
 ) -> dict[str, float | FloatArray]:
     """Return the values of parameters if all of them satisfy their rules.
-
-    Parameters
-    ----------
-    parameters : iterable of Parameter
-        The parameters.
-    values : mapping of str to float or array_like, shape (n,)
-        A value for each parameter, by name.
-    n : int
-        Number of elements.
-
-    Returns
-    -------
-    dict of str to float or ndarray, shape (n,)
-        Floats and read-only copies.
-
-    Raises
-    ------
-    ParameterError
-        Naming the parameter, its value and the rule.
 
     Examples
     --------

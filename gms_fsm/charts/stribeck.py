@@ -44,24 +44,6 @@ def stribeck_text(
 ) -> str:
     """Return the text ``F_c + (F_s - F_c) * exp(-(abs(v) / v_s)**delta)`` of a Stribeck curve.
 
-    Parameters
-    ----------
-    F_c, F_s, v_s, v : str
-        Names or texts: friction at high speed and at rest, Stribeck velocity, velocity.
-    delta : str or float
-        The exponent: a name, or a number; 2 gives the text of eq. (2), without ``abs``.
-    load : str, optional
-        A factor: the normal force if F_c and F_s are coefficients, ``"N"``; or the dependence on it
-        if they are forces, ``"(N / N_0)**n"``.
-    stops : bool
-        Whether to limit the exponent of e, which makes the run stop where the curve becomes flat,
-        so that no step misses it. A chart with the input ``s`` does so without.
-
-    Returns
-    -------
-    str
-        For a chart's `let`, or anywhere else in the expression language.
-
     Examples
     --------
     >>> stribeck_text()
@@ -158,18 +140,6 @@ class Stribeck:
 def dip_of(v_s: float, delta: float) -> float:
     """Return the speed beyond which a curve is flat, `Stribeck.dip`.
 
-    Parameters
-    ----------
-    v_s : float
-        Stribeck velocity, m/s.
-    delta : float
-        Exponent.
-
-    Returns
-    -------
-    float
-        m/s.
-
     Examples
     --------
     >>> round(dip_of(1e-3, 2.0), 6)
@@ -183,20 +153,6 @@ def flat_of(F_c: float, F_s: float, v_s: float, delta: float) -> float:
     """Return the speed beyond which a curve is F_c to the last bit, `Stribeck.flat`.
 
     There the rest is less than a quarter of the distance from F_c to the next number.
-
-    Parameters
-    ----------
-    F_c, F_s : float
-        Coulomb friction and stiction, N.
-    v_s : float
-        Stribeck velocity, m/s.
-    delta : float
-        Exponent.
-
-    Returns
-    -------
-    float
-        m/s.
 
     Examples
     --------

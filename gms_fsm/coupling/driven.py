@@ -55,30 +55,7 @@ class Driven:
         *,
         several: bool,
     ) -> Driven:
-        """Lower some frictions.
-
-        Parameters
-        ----------
-        frictions : sequence of Model or Contact
-            What rubs; of a contact of a system its velocity text is left out.
-        t : float
-            s: when they start.
-        initial : mapping, optional
-            As for `gms_fsm.simulate`, without velocities.
-        several : bool
-            Whether names are numbered: ``friction1`` instead of ``friction``, ``x_friction1``
-            instead of ``x``.
-
-        Returns
-        -------
-        Driven
-            Complete.
-
-        Raises
-        ------
-        ParameterError
-            If one of them cannot be run by a velocity alone, or a value breaks its rule.
-        """
+        """Lower some frictions."""
         contacts = [_contact(each, k, several) for k, each in enumerate(frictions, start=1)]
         bodies = [_body(each, several) for each in contacts]
         for body in bodies:
@@ -118,20 +95,7 @@ class Driven:
         return [self.start.y[k] for k in self.own]
 
     def full(self, own: Sequence[float], v: Sequence[float]) -> list[float]:
-        """Return the program's state vector.
-
-        Parameters
-        ----------
-        own : sequence of float
-            The frictions' own state.
-        v : sequence of float
-            For each friction its velocity, m/s.
-
-        Returns
-        -------
-        list of float
-            Both.
-        """
+        """Return the program's state vector."""
         y = [0.0] * (len(self.own) + len(self.velocities))
         for k, value in zip(self.own, own, strict=True):
             y[k] = value

@@ -103,18 +103,7 @@ class ListMemory:
 
 
 def prepared(start: Problem) -> tuple[Buffers, Sample]:
-    """Return the buffers of a run without an end, and its first sample.
-
-    Parameters
-    ----------
-    start : Problem
-        The system, with its inputs as corner tables.
-
-    Returns
-    -------
-    (Buffers, Sample)
-        Made of lists. The only knot is the end of the sample; what ticks goes on forever.
-    """
+    """Return the buffers of a run without an end, and its first sample."""
     program, layout = start.program, start.program.layout
     made, size = equations(program), layout.y.size
     b = hybrid.buffers(
@@ -233,23 +222,7 @@ _known: dict[int, tuple[MachineCode, Any]] = {}
 
 
 def machine_code(start: Problem) -> MachineCode:
-    """Return the steps of a system as machine code.
-
-    Parameters
-    ----------
-    start : Problem
-        The system.
-
-    Returns
-    -------
-    integrators.runners.compiled.CompiledStepper
-        The same one for systems that differ in numbers only.
-
-    Raises
-    ------
-    MissingExtraError
-        If llvmlite is not installed.
-    """
+    """Return the steps of a system as machine code."""
     from integrators.runners import compiled as machine
 
     compiled.check_llvmlite()
@@ -267,18 +240,7 @@ def machine_code(start: Problem) -> MachineCode:
 
 
 def arguments_of(start: Problem) -> Any:
-    """Return the arguments of `integrators.runners.stepping.step_to`, made of lists.
-
-    Parameters
-    ----------
-    start : Problem
-        The system, with its inputs as corner tables.
-
-    Returns
-    -------
-    integrators.runners.compiled.StepArguments
-        An example for `integrators.machine_code.layout.BlockLayout`.
-    """
+    """Return the arguments of `integrators.runners.stepping.step_to`, made of lists."""
     from integrators.runners.compiled import StepArguments
 
     made = compiled.functions(start.program)

@@ -33,33 +33,7 @@ def start_of(
     values: Mapping[str, float] | None = None,
     settings: Settings | None = None,
 ) -> Problem:
-    """Return a friction model or a contact, moved by a velocity that is a straight line.
-
-    Parameters
-    ----------
-    given : Model or Contact
-        What steps.
-    t : float
-        s.
-    initial : mapping, optional
-        As for `gms_fsm.simulate`.
-    rtol : float
-        Relative tolerance.
-    values : mapping of str to float, optional
-        The velocity and the other inputs at t; 0 if omitted.
-    settings : Settings, optional
-        Method and tolerances; the default method with rtol if omitted.
-
-    Returns
-    -------
-    Start
-        Its signals are the inputs: ``v``, then those that the texts of a contact name.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be stepped, or an argument violates its rule.
-    """
+    """Return a friction model or a contact, moved by a velocity that is a straight line."""
     contact = alone(given)
     t, end = begin(t)
     others = other_inputs(contact)
@@ -81,29 +55,7 @@ def start_of(
 def start_of_system(
     system: System, t: float, initial: Mapping[str, Any] | None, settings: Settings
 ) -> Problem:
-    """Return a system whose records are straight lines, which somebody else's loop gives.
-
-    Parameters
-    ----------
-    system : System
-        What steps.
-    t : float
-        s.
-    initial : mapping, optional
-        As for `gms_fsm.simulate`.
-    settings : Settings
-        Method and tolerances.
-
-    Returns
-    -------
-    Start
-        With each record replaced by its value at t.
-
-    Raises
-    ------
-    ParameterError
-        If a signal is a Python function, or the settings are those of SciPy or without location.
-    """
+    """Return a system whose records are straight lines, which somebody else's loop gives."""
     t, end = begin(t)
     signals = dict(system.signals)
     for name, signal in system.signals.items():

@@ -55,18 +55,7 @@ class Commands:
         self.left = False  # whether the last line was `quit`
 
     def reply(self, line: str) -> Iterator[str]:
-        """Execute a line as a person types it; a mistake is answered and changes nothing.
-
-        Parameters
-        ----------
-        line : str
-            A command or its short name, and its argument. Comments and empty lines do nothing.
-
-        Yields
-        ------
-        str
-            The lines of the answer; those of a mistake begin with ``error:``.
-        """
+        """Execute a line as a person types it; a mistake is answered and changes nothing."""
         name, rest = ([*line.split(None, 1), "", ""])[:2]
         name, self.left = ALIASES.get(name, name), False
         if not name or name.startswith("#"):
@@ -88,25 +77,7 @@ class Commands:
             self.left = name == "quit"
 
     def answer(self, name: str, arg: str) -> Iterator[str]:
-        """Execute a command.
-
-        Parameters
-        ----------
-        name : str
-            Full name of the command.
-        arg : str
-            The rest of the line.
-
-        Yields
-        ------
-        str
-            The lines of the answer.
-
-        Raises
-        ------
-        GMSError
-            On a mistake; the session is unchanged.
-        """
+        """Execute a command."""
         if name not in COMMANDS:
             near = difflib.get_close_matches(name, COMMANDS, 1)
             hint = f"did you mean {near[0]}? " if near else ""
@@ -121,39 +92,13 @@ class Commands:
         return f"(t={session.here.t:.4f} s{branch}) "
 
     def complete(self, text: str, before: str = "") -> list[str]:
-        """Return how a word can be completed.
-
-        Parameters
-        ----------
-        text : str
-            Its beginning.
-        before : str
-            The line up to the word.
-
-        Returns
-        -------
-        list of str
-            Commands at the beginning of a line, else arguments of its command.
-        """
+        """Return how a word can be completed."""
         typed = before.split(None, 1)
         words = self.words(ALIASES.get(typed[0], typed[0]), before) if typed else COMMANDS
         return [word for word in words if word.startswith(text)]
 
     def words(self, name: str, before: str) -> Sequence[str]:
-        """Return the possible arguments of a command: edges, states, names, numbers.
-
-        Parameters
-        ----------
-        name : str
-            Full name of the command.
-        before : str
-            The line up to the word to complete.
-
-        Returns
-        -------
-        sequence of str
-            The words.
-        """
+        """Return the possible arguments of a command: edges, states, names, numbers."""
         session, states, edges = self.session, self.states, self._edges
         elements, inside, values = completions(session)
         names = [*session.names, *inside]
@@ -223,13 +168,7 @@ class Commands:
             raise SessionError("this is the end of the run", advice="go back first")
 
     def here(self) -> Iterator[str]:
-        """Show the current position, after a move.
-
-        Yields
-        ------
-        str
-            The position, the outcome if it is the last row, the watches.
-        """
+        """Show the current position, after a move."""
         yield str(self.session.here)
         yield from text_of.ending_lines(ending(self.session))
         if self.session.watches:

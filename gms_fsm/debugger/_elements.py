@@ -91,18 +91,7 @@ class Elements:
 
 
 def completions(session: Session) -> tuple[list[str], list[str], list[str]]:
-    """Return how elements, their states in conditions, and values to poke are written.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-
-    Returns
-    -------
-    tuple of list of str
-        Such as ``gear 1``, ``gear.state(1)`` and ``gear.z1``.
-    """
+    """Return how elements, their states in conditions, and values to poke are written."""
     start, elements = session.start, Elements(session, 0)
     layout = start.program.layout
     words, states, values = [], [], []
@@ -121,29 +110,7 @@ def completions(session: Session) -> tuple[list[str], list[str], list[str]]:
 
 
 def read_edits(session: Session, arg: str, usage: str, states: Iterable[str]) -> Edits:
-    """Read the changes that a person asks for.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-    arg : str
-        Such as ``z1=0.2 state2=slip``, or ``x_l=0 gear.state1=left``.
-    usage : str
-        How the command is used, for messages.
-    states : iterable of str
-        Names of states.
-
-    Returns
-    -------
-    Edits
-        As the arguments of ``Session.poke``; checked there.
-
-    Raises
-    ------
-    SessionError
-        If something cannot be poked.
-    """
+    """Read the changes that a person asks for."""
     variables: dict[str, Any] = {}
     named: dict[int | str, str] = {}
     v: float | None = None

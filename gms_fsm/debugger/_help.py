@@ -159,18 +159,7 @@ Ctrl-C interrupts a long move."""
 
 
 def names_for(session: Session) -> dict[str, str]:
-    """Return the replacements for the names in braces, as far as the chart has them.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-
-    Returns
-    -------
-    dict
-        Replacement text by name.
-    """
+    """Return the replacements for the names in braces, as far as the chart has them."""
     start, system = session.start, session.system
     given, several = start.what.named, len(system.contacts) > 1
     contact = system.contacts[0]
@@ -253,18 +242,7 @@ def help_of(name: str, session: Session) -> Command:
 
 
 def overview(session: Session) -> str:
-    """Return the first page of the help.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-
-    Returns
-    -------
-    str
-        The lines.
-    """
+    """Return the first page of the help."""
     groups: dict[str, list[str]] = {}
     for name, each in COMMANDS.items():
         short = f"{name} ({each.alias})" if each.alias else name

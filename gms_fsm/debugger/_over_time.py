@@ -57,24 +57,7 @@ def ribbons(
     branch: int | None = None,
     span: tuple[float, float] | None = None,
 ) -> Ribbons:
-    """Return the states of all elements over time.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-    parts : int
-        Number of equal parts of the time span.
-    branch : int, optional
-        Number of the branch; the current one if omitted.
-    span : tuple of float, optional
-        Start and end time, s; those of the run if omitted.
-
-    Returns
-    -------
-    Ribbons
-        The states in the middle of each part.
-    """
+    """Return the states of all elements over time."""
     start, end = span or (session.branch.raw(0).t, session.t_end)
     shown = session.tree.branch(branch)
     rows = _sampled(shown, start, end, parts)
@@ -97,25 +80,7 @@ def _sampled(branch: Branch, start: float, end: float, parts: int) -> list[int |
 def curves(
     session: Session, machine: int, parts: int, span: tuple[float, float]
 ) -> dict[str, tuple[float | None, ...]]:
-    """Return velocity and force of a contact over time.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-    machine : int
-        An element of the contact, counted over all contacts from 0.
-    parts : int
-        Number of equal parts of the time span.
-    span : tuple of float
-        Start and end time, s.
-
-    Returns
-    -------
-    dict of str to tuple
-        ``v``, m/s, and ``F``, N: the last row before the middle of each part; None where the
-        branch has not been computed.
-    """
+    """Return velocity and force of a contact over time."""
     branch, contact = session.branch, session.start.program.layout.bank(machine).name
     found: dict[str, list[float | None]] = {"v": [], "F": []}
     for row in _sampled(branch, *span, parts):
@@ -126,20 +91,7 @@ def curves(
 
 
 def events(session: Session, *, ahead: bool = False) -> tuple[EventView, ...]:
-    """Return the firings of the current branch, in the order of their rows.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-    ahead : bool
-        Whether to include those computed after the cursor.
-
-    Returns
-    -------
-    tuple of EventView
-        All firings up to the cursor.
-    """
+    """Return the firings of the current branch, in the order of their rows."""
     branch = session.branch
     rows = branch.firing_rows(len(branch) if ahead else branch.cursor + 1)
     log = branch.log()  # one record for each of these rows

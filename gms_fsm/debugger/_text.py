@@ -48,24 +48,7 @@ DRAWN = Marks("✗✓", "░█", "─▓═┼▒┄", "┌─┐│└┘", "�
 def screen_lines(
     view: Screen, ribbons: Ribbons, chosen: int, marks: Marks, width: int = WIDTH
 ) -> Iterator[str]:
-    """Yield one screen: the position, each element with values and edges, the states over time.
-
-    Parameters
-    ----------
-    view, ribbons : Screen, Ribbons
-        The data to show.
-    chosen : int
-        The marked element, counted over all contacts from 0.
-    marks : Marks
-        Drawing characters.
-    width : int
-        Columns.
-
-    Yields
-    ------
-    str
-        Lines.
-    """
+    """Yield one screen: the position, each element with values and edges, the states over time."""
     step = f", micro-step {view.microstep}" if view.microstep else ""
     yield f"t = {view.t:.9g} s, row {view.row}{step}, branch {view.branch}"
     yield from _body_lines(view)
@@ -193,18 +176,7 @@ def _lead(labels: Sequence[str]) -> int:
 
 
 def ending_lines(ending: str) -> Iterator[str]:
-    """Yield a note at the last row.
-
-    Parameters
-    ----------
-    ending : str
-        As in `Screen`.
-
-    Yields
-    ------
-    str
-        Lines; none before the last row.
-    """
+    """Yield a note at the last row."""
     if ending == "end":
         yield "  end of the run"
     elif ending:
@@ -213,22 +185,7 @@ def ending_lines(ending: str) -> Iterator[str]:
 
 
 def chart_lines(states: Sequence[StateView], marks: Marks, width: int = WIDTH) -> Iterator[str]:
-    """Yield a chart as boxes, the active one marked, with the edges below each.
-
-    Parameters
-    ----------
-    states : sequence of StateView
-        The states of the chart.
-    marks : Marks
-        Drawing characters.
-    width : int
-        Columns.
-
-    Yields
-    ------
-    str
-        Lines.
-    """
+    """Yield a chart as boxes, the active one marked, with the edges below each."""
     for state in states:
         lines = [state.name + ("  ACTIVE" if state.active else "")]
         lines += [f"  d{name} = {text}" for name, text in state.flow]
@@ -254,18 +211,7 @@ def _boxed(lines: Sequence[str], box: str, lead: str, width: int) -> Iterator[st
 
 
 def branch_lines(branches: Sequence[BranchView]) -> Iterator[str]:
-    """Yield the branches of a session.
-
-    Parameters
-    ----------
-    branches : sequence of BranchView
-        All branches.
-
-    Yields
-    ------
-    str
-        Lines.
-    """
+    """Yield the branches of a session."""
     for each in branches:
         yield f"{'>' if each.current else ' '} {each.number}  {progress(each)}"
         if each.parent is not None:
@@ -273,18 +219,7 @@ def branch_lines(branches: Sequence[BranchView]) -> Iterator[str]:
 
 
 def progress(branch: BranchView) -> str:
-    """Return how far a branch has been computed.
-
-    Parameters
-    ----------
-    branch : BranchView
-        One of the session.
-
-    Returns
-    -------
-    str
-        Rows, transitions, time.
-    """
+    """Return how far a branch has been computed."""
     how = {"": "not at its end", "end": "at its end"}.get(branch.outcome, "it cannot continue")
     return (
         f"{branch.rows} rows, {branch.transitions} transitions, computed to "
@@ -293,18 +228,7 @@ def progress(branch: BranchView) -> str:
 
 
 def breakpoint_text(point: Breakpoint) -> str:
-    """Return the description of a breakpoint.
-
-    Parameters
-    ----------
-    point : Breakpoint
-        One of the session.
-
-    Returns
-    -------
-    str
-        One line.
-    """
+    """Return the description of a breakpoint."""
     who = "all elements" if point.element is None else f"element {point.element + 1}"
     if point.contact:
         who = point.contact if point.element is None else f"{point.contact} {point.element + 1}"

@@ -336,18 +336,7 @@ def _values(session: Session) -> tuple[ValueView, ...]:
 
 
 def ending(session: Session) -> str:
-    """Return the outcome at the last row of a branch.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-
-    Returns
-    -------
-    str
-        ``"end"`` at the end of the run, the reason at a failure; empty before that.
-    """
+    """Return the outcome at the last row of a branch."""
     here, branch = session.here, session.branch
     at_last = here.row + 1 == len(branch) and not here.located
     return _outcome(branch) if at_last else ""
@@ -390,20 +379,7 @@ def _element(session: Session, machine: int) -> ElementView:
 
 
 def chart_states(session: Session, machine: int) -> tuple[StateView, ...]:
-    """Return the chart for an element: the active state, and the guards evaluated.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-    machine : int
-        The element, counted over all contacts from 0.
-
-    Returns
-    -------
-    tuple of StateView
-        In the order of the chart.
-    """
+    """Return the chart for an element: the active state, and the guards evaluated."""
     start, element = session.start, _element(session, machine)
     chart = chart_of(start, start.program.layout.bank(machine))
     asked = {each.name: each for each in element.edges}
@@ -428,18 +404,7 @@ def chart_states(session: Session, machine: int) -> tuple[StateView, ...]:
 
 
 def branches(session: Session) -> tuple[BranchView, ...]:
-    """Return all branches of a session.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-
-    Returns
-    -------
-    tuple of BranchView
-        All branches, in the order of their numbers.
-    """
+    """Return all branches of a session."""
     return tuple(
         BranchView(
             number,

@@ -78,18 +78,7 @@ def word_of(layout: BlockLayout, each: Quantity) -> int:
 
 
 def adapting_of(start: Problem) -> Adapting:
-    """Return the functions that follow a start's numbers, and what they need.
-
-    Parameters
-    ----------
-    start : Problem
-        What is exported.
-
-    Returns
-    -------
-    Adapting
-        Made of lists.
-    """
+    """Return the functions that follow a start's numbers, and what they need."""
     program = start.program
     made = bind(text_of(program.plan), functions(program))
     y, given = start.before_entry()
@@ -106,20 +95,7 @@ def adapting_of(start: Problem) -> Adapting:
 
 
 def check_first_call(subject: Subject, words: Collection[str]) -> None:
-    """Refuse inputs that the language cannot name, and initial values that depend on them.
-
-    Parameters
-    ----------
-    subject : Subject
-        What is exported.
-    words : collection of str
-        Of the language.
-
-    Raises
-    ------
-    ParameterError
-        Naming the contact and the variable.
-    """
+    """Refuse inputs that the language cannot name, and initial values that depend on them."""
     start = subject.start
     for contact in start.system.contacts:
         chart = contact.chart

@@ -81,23 +81,7 @@ class CEngine:
 
 
 def engine_of(subject: Subject) -> CEngine:
-    """Return the engine of what is exported.
-
-    Parameters
-    ----------
-    subject : Subject
-        A friction or a system.
-
-    Returns
-    -------
-    CEngine
-        Its text.
-
-    Raises
-    ------
-    ParameterError
-        If a name cannot be one in C, or a default state is entered with what is not known yet.
-    """
+    """Return the engine of what is exported."""
     start, alone = subject.start, subject.alone
     check_first_call(subject, WORDS)
     states: dict[str, int] = {}
@@ -238,20 +222,7 @@ class _Text:
 
 
 def image_of(layout: BlockLayout, arguments: Any) -> str:
-    """Return C text that sets all words of a block that are not zero at the start.
-
-    Parameters
-    ----------
-    layout : BlockLayout
-        Of the block, which the text calls ``w``.
-    arguments : named tuple
-        Its contents.
-
-    Returns
-    -------
-    str
-        One assignment a line.
-    """
+    """Return C text that sets all words of a block that are not zero at the start."""
     names = {offset: name for name, offset in layout.offsets.items()}
     lines = []
     for k, value in MemoryBlock(layout, arguments).set_words():
@@ -286,20 +257,7 @@ def _codes() -> list[tuple[int, str]]:
 
 
 def filled(template: str, **holes: object) -> str:
-    """Return a template of this folder with its holes filled.
-
-    Parameters
-    ----------
-    template : str
-        File name in ``_templates``.
-    **holes : object
-        By name.
-
-    Returns
-    -------
-    str
-        The text.
-    """
+    """Return a template of this folder with its holes filled."""
     text = (TEMPLATES / template).read_text(encoding="utf-8")
     return Template(text).substitute(holes)
 
@@ -314,18 +272,7 @@ def _comment(each: Quantity) -> str:
 
 
 def safe(text: str) -> str:
-    """Return a text that does not end a comment.
-
-    Parameters
-    ----------
-    text : str
-        For a comment.
-
-    Returns
-    -------
-    str
-        In one line.
-    """
+    """Return a text that does not end a comment."""
     return text.replace("*/", "* /").replace("/*", "/ *").replace("\n", " ")
 
 

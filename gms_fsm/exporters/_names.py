@@ -16,23 +16,6 @@ LONGEST = 63  # characters that C99 compilers and MATLAB tell apart
 def slug(text: str, place: str) -> str:
     """Return a name for files and functions, made from a title.
 
-    Parameters
-    ----------
-    text : str
-        For example the name of a chart.
-    place : str
-        For the message.
-
-    Returns
-    -------
-    str
-        Lower-case letters, digits and underscores.
-
-    Raises
-    ------
-    ParameterError
-        If the title looks like a path, or has no letters.
-
     Examples
     --------
     >>> slug("Karnopp's model", "chart")
@@ -50,25 +33,6 @@ def slug(text: str, place: str) -> str:
 
 def identifier(name: str, words: Iterable[str], place: str) -> str:
     """Return a name if another language can have it.
-
-    Parameters
-    ----------
-    name : str
-        A name of ours.
-    words : iterable of str
-        Words of the other language.
-    place : str
-        For the message.
-
-    Returns
-    -------
-    str
-        The same.
-
-    Raises
-    ------
-    ParameterError
-        If it is no identifier there, or a word of the language.
 
     Examples
     --------

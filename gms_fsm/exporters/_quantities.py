@@ -63,22 +63,7 @@ class Quantity:
 
 
 def outputs_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
-    """Return what an export shows: states, forces and what else is observed.
-
-    Parameters
-    ----------
-    start : Problem
-        What is exported.
-    alone : bool
-        Whether it is one friction, whose name is then left out.
-    words : iterable of str
-        Names that it must not have.
-
-    Returns
-    -------
-    tuple of Quantity
-        The state vector, then what is observed, then the states of the elements.
-    """
+    """Return what an export shows: states, forces and what else is observed."""
     layout = start.program.layout
     found: list[Quantity] = []
     for place, places in (("y", layout.y), ("seen", layout.observed)):
@@ -106,18 +91,7 @@ def outputs_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Quant
 
 
 def parameters_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
-    """Return the numbers of an export.
-
-    Parameters
-    ----------
-    start, alone, words
-        As in `outputs_of`.
-
-    Returns
-    -------
-    tuple of Quantity
-        In the order of the arrays; without those that are computed from others.
-    """
+    """Return the numbers of an export."""
     shared, own = numbers_of(start.system)
     found = [
         _parameter(start.system, label, "shared", k, None, (value,), alone)

@@ -11,16 +11,6 @@ __all__ = ["about_friction"]
 def about_friction(element: NamedFriction) -> str:
     """Return the model, its inputs, its numbers and its states, as Markdown.
 
-    Parameters
-    ----------
-    element : NamedFriction
-        The friction.
-
-    Returns
-    -------
-    str
-        Lines, with a line break at the end.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters

@@ -26,20 +26,6 @@ AGREEMENT = 0.01
 def check_moved_from_outside(chart: Chart, known: Iterable[str], title: str) -> None:
     """Refuse a chart that needs more than a velocity that somebody else computes.
 
-    Parameters
-    ----------
-    chart : Chart
-        What is exported.
-    known : iterable of str
-        Forces and accelerations that its guards can read in this format.
-    title : str
-        Of the format, for messages.
-
-    Raises
-    ------
-    ParameterError
-        Naming the state, the edge or the text.
-
     Examples
     --------
     >>> from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
@@ -104,17 +90,6 @@ def element_numbers(contact: Contact) -> list[dict[str, float]]:
 
 def slow_velocity(contact: Contact) -> str:
     """Return a velocity with which Euler's method in steps of 1 ms shows what a contact does.
-
-    Parameters
-    ----------
-    contact : Contact
-        One friction whose velocity is an input.
-
-    Returns
-    -------
-    str
-        A sine of 25 s. Its amplitude is the largest of a few with which half the step gives the
-        same force to a hundredth: the rate of a stiff model grows with the velocity.
 
     Examples
     --------

@@ -16,27 +16,6 @@ __all__ = ["checked_integer", "checked_kind", "checked_path", "listed"]
 def checked_kind(name: str, value: Any, kind: type | tuple[type, ...], wanted: str) -> Any:
     """Return a value if it has the required type.
 
-    Parameters
-    ----------
-    name : str
-        The argument's name.
-    value : object
-        The value to check.
-    kind : type or tuple of type
-        The required type.
-    wanted : str
-        The same in words, for the message.
-
-    Returns
-    -------
-    object
-        The value.
-
-    Raises
-    ------
-    ParameterError
-        If it has another type.
-
     Examples
     --------
     >>> checked_kind("title", 5, str, "a text")
@@ -50,18 +29,6 @@ def checked_kind(name: str, value: Any, kind: type | tuple[type, ...], wanted: s
 
 def checked_path(name: str, value: Any) -> Path:
     """Return a path; raise a `ParameterError` for anything else, and for what names no file.
-
-    Parameters
-    ----------
-    name : str
-        The argument's name.
-    value : str or Path
-        The value to check.
-
-    Returns
-    -------
-    Path
-        The path.
 
     Examples
     --------
@@ -83,27 +50,6 @@ def checked_integer(
 ) -> int:
     """Return an integer.
 
-    Parameters
-    ----------
-    name : str
-        The argument's name.
-    value : int
-        The value to check; True and False are not accepted.
-    least : int, optional
-        The smallest allowed value.
-    kind : type of GMSError
-        The class of error to raise.
-
-    Returns
-    -------
-    int
-        The number.
-
-    Raises
-    ------
-    GMSError
-        If it is not an integer, or too small.
-
     Examples
     --------
     >>> checked_integer("points", 0, 1)
@@ -121,20 +67,5 @@ def checked_integer(
 
 
 def listed(name: str, value: Any, wanted: str) -> list[Any]:
-    """Return an iterable as a list; raise a `ParameterError` for anything else.
-
-    Parameters
-    ----------
-    name : str
-        The argument's name.
-    value : iterable
-        The value to convert.
-    wanted : str
-        The requirement in words, for the message.
-
-    Returns
-    -------
-    list
-        Its items.
-    """
+    """Return an iterable as a list; raise a `ParameterError` for anything else."""
     return list(checked_kind(name, value, Iterable, wanted))

@@ -32,17 +32,6 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 def displayed(*forms: Form) -> Callable[[Shown], Shown]:
     """Return a class decorator: notebooks show the objects of the class.
 
-    Parameters
-    ----------
-    *forms : {"html", "png", "svg"}
-        What the entry point ``notebook`` makes of them.
-
-    Returns
-    -------
-    callable
-        It adds a method ``_repr_html_``, ``_repr_png_`` or ``_repr_svg_`` for each form. The
-        methods return None where there is nothing to show, for example without Graphviz.
-
     Examples
     --------
     >>> @displayed("html")
@@ -93,18 +82,6 @@ def _shown(name: str, *given: object) -> Any:
 def asked(name: str) -> Callable[..., Any] | None:
     """Return what is declared in the entry point group under a name.
 
-    Parameters
-    ----------
-    name : {"notebook", "figure", "formats", "report"}
-        ``notebook(thing, form)`` returns a form of an object, ``figure(figure)`` a matplotlib
-        figure as PNG, ``formats(*subjects)`` the formats of the one table, those of pictures
-        included; ``report(fit, folder)`` writes a report.
-
-    Returns
-    -------
-    callable or None
-        Loaded; None if neither a checkout nor an installed package declares it.
-
     Examples
     --------
     >>> show = asked("notebook")
@@ -133,16 +110,6 @@ def short_repr(kind: Shown) -> Shown:
 
     Long values are cut, arrays are described by their shape, and functions by their name: nothing
     prints a memory address.
-
-    Parameters
-    ----------
-    kind : type
-        A dataclass.
-
-    Returns
-    -------
-    type
-        The same class.
 
     Examples
     --------
@@ -178,16 +145,6 @@ def full_text(value: Any) -> str:
     """Return all fields of a dataclass as one text, in order and uncut.
 
     Values with equal texts are the same, also in the order of their mappings.
-
-    Parameters
-    ----------
-    value : dataclass
-        Its fields must be dataclasses, numbers, texts, tuples or mappings with full reprs.
-
-    Returns
-    -------
-    str
-        The text; an identity, not for display.
 
     Examples
     --------

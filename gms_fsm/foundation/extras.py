@@ -38,23 +38,6 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
 def require(module: str, extra: str) -> Any:
     """Import an optional module, or say how to install it.
 
-    Parameters
-    ----------
-    module : str
-        The module's name, for example ``"pandas"``.
-    extra : str
-        The extra of gms-fsm that provides it, a key of `EXTRAS`.
-
-    Returns
-    -------
-    module
-        The module.
-
-    Raises
-    ------
-    MissingExtraError
-        If it is not installed, or cannot be imported.
-
     Examples
     --------
     >>> require("math", "plots").tau > 6
@@ -72,22 +55,7 @@ def require(module: str, extra: str) -> Any:
 
 
 def missing(name: str, extra: str, state: str = "is not installed") -> MissingExtraError:
-    """Return an error that says what is missing, which extra provides it, and the alternative.
-
-    Parameters
-    ----------
-    name : str
-        A module or a program.
-    extra : str
-        A key of `EXTRAS`.
-    state : str, optional
-        What is wrong with it.
-
-    Returns
-    -------
-    MissingExtraError
-        The error to raise.
-    """
+    """Return an error that says what is missing, which extra provides it, and the alternative."""
     needed, without = EXTRAS[extra]
     return MissingExtraError(
         f'{needed} {name}, which {state}: pip install "gms-fsm[{extra}]" installs it '

@@ -49,24 +49,6 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
     Leftovers of killed processes are removed. Files written into the folder from now on are
     recorded in a list there.
 
-    Parameters
-    ----------
-    path : str or Path
-        The folder; it and its parents are created if missing.
-    names : iterable of str
-        Files that will be written there.
-
-    Returns
-    -------
-    Path
-        The folder.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be created or written, or if one of the files exists and is not as gms-fsm
-        wrote it.
-
     Examples
     --------
     >>> import tempfile
@@ -113,18 +95,6 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
 def refuse_input(path: str | Path, *inputs: Path) -> None:
     """Refuse to overwrite an input file.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file to be written.
-    *inputs : Path
-        The files that are read.
-
-    Raises
-    ------
-    OutputError
-        If it is one of them, under whatever name.
-
     Examples
     --------
     >>> refuse_input("run.html", Path("run.npz"))
@@ -145,23 +115,6 @@ def refuse_input(path: str | Path, *inputs: Path) -> None:
 def inside(folder: Path, name: str) -> Path | None:
     """Return the path of a file named in another file, if it is inside a folder.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    name : str
-        A relative path.
-
-    Returns
-    -------
-    Path or None
-        None if it leads outside.
-
-    Raises
-    ------
-    OSError, ValueError
-        If it is not a file name: too long, or with a null byte.
-
     Examples
     --------
     >>> inside(Path("runs"), "../secret.toml") is None
@@ -176,25 +129,7 @@ def inside(folder: Path, name: str) -> Path | None:
 
 # --------------------------------------------------------------------------- files
 def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
-    """Write a file atomically through a temporary one: the result is the old file or the new one.
-
-    Parameters
-    ----------
-    path : Path
-        The destination.
-    write : callable
-        ``write(file)`` fills the open binary file.
-
-    Returns
-    -------
-    Path
-        The same path.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written, or the path is a device, a pipe or a folder.
-    """
+    """Write a file atomically through a temporary one: it is the old file or the new one."""
     write_together({path: write})
     return path
 
@@ -203,17 +138,6 @@ def write_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
     """Write several files of one folder that belong together.
 
     All are complete before the first is renamed, and no other writer can interleave.
-
-    Parameters
-    ----------
-    files : mapping of Path to callable
-        ``write(file)`` fills the open binary file; the files are renamed in this order. A process
-        killed in between leaves the complete ones behind as `leftovers`.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written, or a path is a device, a pipe or a folder.
     """
     for path in files:
         _check_place(path)
@@ -222,18 +146,7 @@ def write_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
 
 
 def leftovers(path: Path) -> list[Path]:
-    """Return files that a killed process may have completed but not renamed.
-
-    Parameters
-    ----------
-    path : Path
-        The file, one of several that belong together.
-
-    Returns
-    -------
-    list of Path
-        ``.<name>.<random>.gms-fsm-rest``; the next writer of the file removes them.
-    """
+    """Return files that a killed process may have completed but not renamed."""
     pattern = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{16}}\.gms-fsm-rest")
     return sorted(other for other in path.parent.iterdir() if pattern.fullmatch(other.name))
 
@@ -242,13 +155,6 @@ def remove_leftovers(folder: Path, name: str = "") -> None:
     """Remove what processes killed while writing have left in a folder.
 
     Files of a running process, and files that `leftovers` returns, are kept.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to look.
-    name : str
-        Only temporary files of the file with this name.
     """
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
@@ -258,15 +164,7 @@ def remove_leftovers(folder: Path, name: str = "") -> None:
 
 @contextlib.contextmanager
 def folder_lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Wait until no other process renames files in a folder, and keep others out meanwhile.
-
-    Parameters
-    ----------
-    folder : Path
-        An existing folder.
-    shared : bool
-        Whether other readers may enter at the same time.
-    """
+    """Wait until no other process renames files in a folder, and keep others out meanwhile."""
     with ExitStack() as stack:
         with contextlib.suppress(OSError):  # a file system without locks: continue without one
             place = os.open(folder, os.O_RDONLY)

@@ -11,16 +11,6 @@ __all__ = ["plain", "table_lines"]
 def plain(text: str) -> str:
     r"""Return Markdown that displays a text literally.
 
-    Parameters
-    ----------
-    text : str
-        One line or several; the lines are kept.
-
-    Returns
-    -------
-    str
-        Text without HTML, links, images or other active Markdown.
-
     Examples
     --------
     >>> print(plain("F_c < 2 N, *new* ![x](y)"))
@@ -40,18 +30,6 @@ def plain(text: str) -> str:
 
 def table_lines(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     """Return the lines of a table.
-
-    Parameters
-    ----------
-    head : sequence of str
-        Column heads.
-    rows : iterable of sequence of str
-        Cells, Markdown; give texts of the user's through `plain`.
-
-    Returns
-    -------
-    list of str
-        Lines of Markdown.
 
     Examples
     --------

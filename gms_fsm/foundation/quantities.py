@@ -17,20 +17,6 @@ BLOCKS = "▁▂▃▄▅▆▇█"
 def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     """Return a value with its unit, and a prefix instead of an exponent.
 
-    Parameters
-    ----------
-    value : float
-        In SI units.
-    unit : str
-        SI unit; empty for a number without one.
-    digits : int
-        Significant digits.
-
-    Returns
-    -------
-    str
-        The text. A unit that takes no prefix, such as ``m^2``, follows a power of ten.
-
     Examples
     --------
     >>> quantity(-0.77618, "m"), quantity(1.5, "N"), quantity(0, "m/s"), quantity(2.5e4, "N/m")
@@ -52,16 +38,6 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
 
 def sparkline(values: Sequence[float | None]) -> str:
     """Return values as a line of blocks, the lowest and the highest at its edges.
-
-    Parameters
-    ----------
-    values : sequence of float or None
-        One per character; blank where there is none.
-
-    Returns
-    -------
-    str
-        As many characters.
 
     Examples
     --------

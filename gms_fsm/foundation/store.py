@@ -43,18 +43,7 @@ class CodeFolder:
 
     @classmethod
     def at(cls, folder: Path) -> CodeFolder | None:
-        """Return the store in a folder, or None if the folder cannot be written.
-
-        Parameters
-        ----------
-        folder : Path
-            Created if missing. Leftovers of killed processes are removed.
-
-        Returns
-        -------
-        CodeFolder or None
-            Ready for use.
-        """
+        """Return the store in a folder, or None if the folder cannot be written."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
@@ -65,18 +54,7 @@ class CodeFolder:
         return cls(folder)
 
     def get(self, name: str) -> bytes | None:
-        """Return the content stored under a name.
-
-        Parameters
-        ----------
-        name : str
-            A file's name.
-
-        Returns
-        -------
-        bytes or None
-            The stored content; None if there is none, or if it is damaged.
-        """
+        """Return the content stored under a name."""
         path = self.folder / name
         try:
             found = path.read_bytes()
@@ -92,15 +70,7 @@ class CodeFolder:
         return None
 
     def put(self, name: str, content: bytes) -> None:
-        """Store content under a name; on a full disk nothing is stored.
-
-        Parameters
-        ----------
-        name : str
-            A file's name.
-        content : bytes
-            Replaces an existing content atomically.
-        """
+        """Store content under a name; on a full disk nothing is stored."""
         with contextlib.suppress(OutputError):
             write_whole(
                 self.folder / name, lambda file: file.write(_checksum(name, content) + content)

@@ -68,31 +68,7 @@ def read_file(
     build: Callable[[Kind], Made],
     overrides: Sequence[str] = (),
 ) -> Made:
-    """Read what a TOML file describes.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    kind : type of Table
-        What it must contain.
-    error : type of GMSError
-        The class of error to raise for a file that is not such a table.
-    build : callable
-        ``build(table)`` returns the object; the part at fault is the `GMSError.key` of its errors.
-    overrides : sequence of str
-        Keys to change, as in `gms_fsm.foundation.toml.override`.
-
-    Returns
-    -------
-    object
-        From `build`.
-
-    Raises
-    ------
-    GMSError
-        Naming file, line, key, and what is wrong.
-    """
+    """Read what a TOML file describes."""
     text = text_of(path, error)
     data = data_of(text, path, error)
     replaced = [override(data, each) for each in overrides]
@@ -119,25 +95,7 @@ def read_file(
 
 
 def write_file(path: Path, table: Table) -> Path:
-    """Write a table to a TOML file, whole.
-
-    Parameters
-    ----------
-    path : Path
-        File name ending in ``.toml``.
-    table : Table
-        Keys with their default values are left out.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written, has another ending, or exists and is not as gms-fsm wrote it.
-    """
+    """Write a table to a TOML file, whole."""
     if path.suffix != ".toml":
         raise OutputError(f"its name must end in .toml, not {path.suffix!r}", place=str(path))
     text = written(table.model_dump(by_alias=True, exclude_defaults=True))
@@ -159,27 +117,7 @@ def write_file(path: Path, table: Table) -> Path:
 
 
 def built(make: Callable[..., Made], *key: str | int, **given: Any) -> Made:
-    """Return what a function makes; its errors name a part of something larger.
-
-    Parameters
-    ----------
-    make : callable
-        Such as a class.
-    *key : str or int
-        The part: ``"states", 2``.
-    **given : object
-        Arguments of `make`.
-
-    Returns
-    -------
-    object
-        From `make`.
-
-    Raises
-    ------
-    GMSError
-        As `make` does, with `key` before its own key.
-    """
+    """Return what a function makes; its errors name a part of something larger."""
     try:
         return make(**given)
     except GMSError as error:
@@ -210,22 +148,7 @@ def _key_in_file(key: Key, given: Any, root: type[BaseModel]) -> Key:
 def explained(
     error: ValidationError, data: dict[str, Any], root: type[BaseModel]
 ) -> tuple[Key, str]:
-    """Describe the first validation error in one sentence, and count the others.
-
-    Parameters
-    ----------
-    error : ValidationError
-        The errors found by pydantic.
-    data : dict
-        Contents of the file.
-    root : type of Table
-        What the file was checked against.
-
-    Returns
-    -------
-    tuple, str
-        The key; and the sentence: key, value, rule, and the nearest valid key for a mistyped one.
-    """
+    """Describe the first validation error in one sentence, and count the others."""
     findings = error.errors(include_url=False)
     # An unknown key is often the cause of a missing one, so report it first.
     first = min(findings, key=lambda f: f["type"] != "extra_forbidden")

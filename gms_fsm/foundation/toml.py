@@ -29,46 +29,12 @@ _HALF_A_NUMBER = re.compile(  # a digit on only one side of the point
 
 
 def parsed(path: Path) -> dict[str, Any]:
-    """Return the contents of a scenario file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    dict
-        Tables and values as written.
-
-    Raises
-    ------
-    ScenarioError
-        If the file cannot be read, is too large, or is not TOML.
-    """
+    """Return the contents of a scenario file."""
     return data_of(text_of(path), path)
 
 
 def text_of(path: Path, kind: type[GMSError] = ScenarioError) -> str:
-    """Return the text of a file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    kind : type of GMSError
-        The class of error to raise.
-
-    Returns
-    -------
-    str
-        Its text.
-
-    Raises
-    ------
-    GMSError
-        If the file cannot be read, is too large, or is not text.
-    """
+    """Return the text of a file."""
     try:
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
@@ -94,27 +60,7 @@ def text_of(path: Path, kind: type[GMSError] = ScenarioError) -> str:
 
 
 def data_of(text: str, path: Path, kind: type[GMSError] = ScenarioError) -> dict[str, Any]:
-    """Return the contents of a TOML text.
-
-    Parameters
-    ----------
-    text : str
-        From `text_of`.
-    path : Path
-        Its file, for messages.
-    kind : type of GMSError
-        The class of error to raise.
-
-    Returns
-    -------
-    dict
-        Tables and values as written.
-
-    Raises
-    ------
-    GMSError
-        If the text is not TOML.
-    """
+    """Return the contents of a TOML text."""
     if endless := _ENDLESS_KEY.search(text):
         line = text.count("\n", 0, endless.start()) + 1
         raise kind(
@@ -141,27 +87,7 @@ def _with_digits(text: str) -> str:
 
 
 def override(data: dict[str, Any], setting: str) -> Key:
-    """Change one key.
-
-    Parameters
-    ----------
-    data : dict
-        Contents of a file; modified in place.
-    setting : str
-        ``"model.law=published"``: a key path and a TOML value; a bare word is a string. In an
-        array of tables, the next part of the path is the name of one, or its index from 0:
-        ``"body.load.inertia=2"``.
-
-    Returns
-    -------
-    tuple of str or int
-        The key.
-
-    Raises
-    ------
-    ScenarioError
-        If the text does not have this form.
-    """
+    """Change one key."""
     key, equals, text = setting.partition("=")
     parts = [part.strip() for part in key.split(".")]
     if not equals or not all(parts):
@@ -221,19 +147,6 @@ def line_of(text: str, key: Key) -> int:
 
     The line is found by reading prefixes of the text: the first one that has the key ends there.
 
-    Parameters
-    ----------
-    text : str
-        Valid TOML.
-    key : tuple of str or int
-        Such as ``("edge", 2, "guard")``.
-
-    Returns
-    -------
-    int
-        Counted from 1; if the key is not written, the line of the innermost table around it that
-        is; 0 if the line cannot be found at reasonable cost.
-
     Examples
     --------
     >>> line_of('[[edge]]\nname = "b"\n[[edge]]\nguard = "z > s"', ("edge", 1, "guard"))
@@ -283,16 +196,6 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 def written(data: Mapping[str, Any]) -> str:
     """Return tables as TOML text that reads back equal.
-
-    Parameters
-    ----------
-    data : mapping
-        Texts, numbers, truth values, lists of these, tables, and lists of tables.
-
-    Returns
-    -------
-    str
-        Small tables inside others are written as dotted keys.
 
     Examples
     --------

@@ -40,23 +40,6 @@ def save(fit: Fit, path: Path) -> Path:
     """Write the fitted model, driven by the first record, with its run-in if it has one.
 
     A long motion is written to a table beside it, with the same name and the ending ``.csv``.
-
-    Parameters
-    ----------
-    fit : Fit
-        The fit.
-    path : Path
-        Ending in ``.toml``.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
     """
     course = fit.task.course(fit.records[0], None)
     start = fit.task.fine.driver.start(fit.task.subject, course)

@@ -47,13 +47,7 @@ _lock = threading.RLock()  # a sweep may compile from several threads
 
 
 def check_llvmlite() -> None:
-    """Raise an error unless llvmlite is installed.
-
-    Raises
-    ------
-    MissingExtraError
-        With advice on how to install it.
-    """
+    """Raise an error unless llvmlite is installed."""
     for module in ("llvmlite", "platformdirs"):
         if importlib.util.find_spec(module) is None:
             raise missing(module, "fast")
@@ -61,18 +55,6 @@ def check_llvmlite() -> None:
 
 def packed(p: Arguments) -> Packed:
     """Return a program's arguments as arrays.
-
-    Parameters
-    ----------
-    p : tuple of lists
-        ``Program.p``.
-
-    Returns
-    -------
-    tuple of ndarray
-        Shared numbers (m,), own parameters (rows, n), corner tables (2 tables, corners). Shorter
-        rows are padded by repeating their last entry: elements that no contact has, corners that
-        change no value.
 
     Examples
     --------
@@ -90,25 +72,7 @@ def _table(rows: list[list[float]]) -> FloatArray:
 
 
 def engine(program: Program, run: RecordArguments) -> CompiledFunction:
-    """Return the loop of a program as machine code.
-
-    Parameters
-    ----------
-    program : Program
-        From `gms_fsm.lowering.program.lower`.
-    run : RecordArguments
-        From `integrators.runners.compiled.example`, with the functions from `functions`.
-
-    Returns
-    -------
-    CompiledFunction
-        To be called with a block.
-
-    Raises
-    ------
-    MissingExtraError
-        If llvmlite is not installed.
-    """
+    """Return the loop of a program as machine code."""
     from integrators.runners import compiled
 
     check_llvmlite()
@@ -117,18 +81,7 @@ def engine(program: Program, run: RecordArguments) -> CompiledFunction:
 
 
 def text_of(program: Program) -> str:
-    """Return what the machine code of a program depends on: its text, and what the text calls.
-
-    Parameters
-    ----------
-    program : Program
-        From `gms_fsm.lowering.program.lower`.
-
-    Returns
-    -------
-    str
-        Of fixed length.
-    """
+    """Return what the machine code of a program depends on: its text, and what the text calls."""
     from integrators.runners.compiled import digest
 
     return digest(sgn, piecewise_linear, piecewise_slope, text=program.source)
@@ -140,18 +93,7 @@ def _calls(program: Program) -> list[Callable[[float], float]]:
 
 
 def functions(program: Program) -> Mapping[str, Any]:
-    """Return a program's functions in the form that is translated to machine code.
-
-    Parameters
-    ----------
-    program : Program
-        From `gms_fsm.lowering.program.lower`.
-
-    Returns
-    -------
-    mapping of str to callable
-        By name. Signals that are Python functions have been replaced by their numbers.
-    """
+    """Return a program's functions in the form that is translated to machine code."""
     return _loaded(program.source, tuple(program.callables))
 
 
@@ -169,11 +111,6 @@ def store() -> CodeFolder | None:
     """Return the cache for machine code, or None if no cache can be used.
 
     It is in the platform's folder for caches, or in GMS_FSM_CACHE.
-
-    Returns
-    -------
-    CodeFolder or None
-        Ready for use.
     """
     from platformdirs import user_cache_path
 
@@ -182,13 +119,7 @@ def store() -> CodeFolder | None:
 
 
 def notify(text: str) -> None:
-    """Print a message about a slow step to stderr, if somebody waits there.
-
-    Parameters
-    ----------
-    text : str
-        What is being compiled, or how long that took.
-    """
+    """Print a message about a slow step to stderr, if somebody waits there."""
     if sys.stderr.isatty():
         print(f"gms-fsm: {text}", file=sys.stderr)
 
@@ -196,22 +127,7 @@ def notify(text: str) -> None:
 def observe_rows(
     program: Program, t: FloatArray, y: FloatArray, mode: NDArray[np.int64], kept: range
 ) -> FloatArray:
-    """Return some results of `observe` for many rows, with all signs evaluated live.
-
-    Parameters
-    ----------
-    program : Program
-        The program.
-    t, y, mode : ndarray, shapes (rows,), (rows, m), (rows, n)
-        The rows.
-    kept : range
-        Places in ``program.layout.observed``, one after the other.
-
-    Returns
-    -------
-    ndarray, shape (rows, kept)
-        Bit for bit the same as the readable engine.
-    """
+    """Return some results of `observe` for many rows, with all signs evaluated live."""
     made = _observer(program)
     block = made.block()
     functions = block.contents.functions

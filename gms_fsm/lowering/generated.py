@@ -49,20 +49,6 @@ SIGNALS: Mapping[str, Any] = {
 def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
     r"""Run generated text and return the names it defines.
 
-    Parameters
-    ----------
-    title : str
-        Shown in place of a file name.
-    source : str
-        Python text.
-    names : mapping, optional
-        Objects it may use in addition to the functions of the expression language.
-
-    Returns
-    -------
-    dict
-        Its namespace.
-
     Examples
     --------
     >>> load("example", "def twice(v):\n    return 2.0 * v\n")["twice"](3.0)
@@ -74,18 +60,7 @@ def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dic
 
 
 def quickened(namespace: dict[str, Any]) -> dict[str, Any]:
-    """Let a namespace replace its elementary functions by machine code when they are called often.
-
-    Parameters
-    ----------
-    namespace : dict
-        From `load`; changed in place.
-
-    Returns
-    -------
-    dict
-        The same.
-    """
+    """Let a namespace replace elementary functions by machine code when they are called often."""
 
     def counted(name: str, function: Callable[..., float], count: int) -> Callable[..., float]:
         left = quick.FREE
@@ -105,18 +80,7 @@ def quickened(namespace: dict[str, Any]) -> dict[str, Any]:
 
 
 def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Run generated text with functions and numbers that never raise, for use by `ieee`.
-
-    Parameters
-    ----------
-    title, source, names
-        As in `load`.
-
-    Returns
-    -------
-    dict
-        Its namespace.
-    """
+    """Run generated text with functions and numbers that never raise, for use by `ieee`."""
     namespace: dict[str, Any] = {**NAMESPACE, **(names or {}), **_IEEE, "_wide": _wide}
     exec(_compiled(title, source, careful=True), namespace)
     return namespace
@@ -124,21 +88,6 @@ def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None
 
 def standalone(source: str) -> str:
     r"""Return generated text as a standalone program, with the imports and functions that it uses.
-
-    Parameters
-    ----------
-    source : str
-        From `gms_fsm.lowering.program.lower`.
-
-    Returns
-    -------
-    str
-        Python text that depends only on the standard library.
-
-    Raises
-    ------
-    ParameterError
-        If one of its signals is a user's Python function, which cannot be written as text.
 
     Examples
     --------
@@ -178,16 +127,6 @@ def standalone(source: str) -> str:
 
 def elementary_text(names: Iterable[str]) -> str:
     """Return the text of elementary functions of the language, and of all that they use.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Such as ``exp``; ``pow`` is one, too.
-
-    Returns
-    -------
-    str
-        Python text that depends only on the standard library.
 
     Examples
     --------
@@ -277,18 +216,6 @@ class _WideNumbers(ast.NodeTransformer):
 # fast, and if it raises, again with numbers that do not: the same bits as the compiled text.
 def ieee(fast: Callable[..., Any], careful: Callable[..., Any]) -> Callable[..., Any]:
     r"""Return a generated function that yields inf and NaN where Python would raise.
-
-    Parameters
-    ----------
-    fast : callable
-        The function, operating on Python floats.
-    careful : callable
-        The same function from `load_careful`.
-
-    Returns
-    -------
-    callable
-        Takes the same arguments as both.
 
     Examples
     --------

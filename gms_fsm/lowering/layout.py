@@ -124,20 +124,7 @@ class SystemLayout:
 
     @classmethod
     def of(cls, read: Assembly, surfaces: int) -> SystemLayout:
-        """Return the layout of a system.
-
-        Parameters
-        ----------
-        read : Assembly
-            The system, read.
-        surfaces : int
-            Number of surfaces on which the motion can slide.
-
-        Returns
-        -------
-        SystemLayout
-            For its runs.
-        """
+        """Return the layout of a system."""
         system, banks, first, edges = read.system, [], 0, 0
         for bank in read.banks:
             variables = bank.chart.variables
@@ -228,23 +215,7 @@ class SystemLayout:
         return next(bank for bank in self.banks if machine < bank.first + bank.n)
 
     def contact(self, name: str = "") -> BankPlaces:
-        """Return a contact by name; without a name the only one.
-
-        Parameters
-        ----------
-        name : str
-            The contact's.
-
-        Returns
-        -------
-        BankPlaces
-            Its places.
-
-        Raises
-        ------
-        ParameterError
-            If there is no such contact, or several and no name.
-        """
+        """Return a contact by name; without a name the only one."""
         if not name and len(self.banks) == 1:
             return self.banks[0]
         for bank in self.banks:
@@ -292,18 +263,7 @@ class SystemLayout:
         return slice(self.n, None)
 
     def not_sliding(self, states: Sequence[int]) -> tuple[int, ...]:
-        """Return the modes of elements in these states, sliding on no surface.
-
-        Parameters
-        ----------
-        states : sequence of int, shape (n,)
-            Active state of each element.
-
-        Returns
-        -------
-        tuple of int, shape (modes,)
-            The modes of a row.
-        """
+        """Return the modes of elements in these states, sliding on no surface."""
         return (*states, *[0] * self.surfaces)
 
 

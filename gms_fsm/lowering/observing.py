@@ -21,24 +21,7 @@ __all__ = ["armed", "observe", "on_surfaces", "rate", "sigmas"]
 
 
 def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-    """Return the observed quantities of a state, by place (`gms_fsm.lowering.layout`).
-
-    Parameters
-    ----------
-    program : Program
-        The program of the run.
-    t : float
-        s.
-    y : list of float, shape (m,)
-        State.
-    mode : sequence of int, shape (n,) or (n + surfaces,)
-        The modes of a row.
-
-    Returns
-    -------
-    list of float
-        In the layout of ``program.layout.observed``.
-    """
+    """Return the observed quantities of a state, by place (`gms_fsm.lowering.layout`)."""
     out = [0.0] * program.layout.observed.size
     if not any(mode[program.layout.slides]):
         program.ieee["observe"](t, y, mode, program.live, program.p, out)
@@ -48,18 +31,7 @@ def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> 
 
 
 def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-    """Return for each surface the sigma that replaces its sign.
-
-    Parameters
-    ----------
-    program, t, y, mode
-        As in `observe`.
-
-    Returns
-    -------
-    list of float
-        From -1 to 1; NaN for a surface on which the motion does not slide.
-    """
+    """Return for each surface the sigma that replaces its sign."""
     found = [math.nan] * program.layout.surfaces
     if any(mode[program.layout.slides]):
         on = _on(program, mode)._replace(held=armed(program, t, y, mode))
@@ -70,18 +42,7 @@ def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> l
 
 
 def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-    """Return the signs that an arc starting from a state would freeze.
-
-    Parameters
-    ----------
-    program, t, y, mode
-        As in `observe`.
-
-    Returns
-    -------
-    list of float
-        -1, 0 or 1; for sliding surfaces this is not yet their sigma.
-    """
+    """Return the signs that an arc starting from a state would freeze."""
     on = _on(program, mode)
     arm_on(on, t, y, list(mode), on.sliding.watch)
     return on.held
@@ -90,20 +51,7 @@ def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> li
 def rate(
     program: Program, t: float, y: list[float], mode: Sequence[int], held: list[float]
 ) -> FloatArray:
-    """Return dy/dt with frozen signs.
-
-    Parameters
-    ----------
-    program, t, y, mode
-        As in `observe`.
-    held : list of float
-        The frozen signs; those of sliding surfaces are computed here.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        The derivative.
-    """
+    """Return dy/dt with frozen signs."""
     dy = [0.0] * program.layout.y.size
     if not any(mode[program.layout.slides]):
         program.ieee["flow"](t, y, mode, held, program.p, dy)
@@ -115,24 +63,7 @@ def rate(
 def on_surfaces(
     program: Program, made: Mapping[str, Any], p: Any, flags: Sequence[int] = ()
 ) -> Held:
-    """Return the functions of a program, and what it slides on, with scratch space of their own.
-
-    Parameters
-    ----------
-    program : Program
-        The program.
-    made : mapping of str to callable
-        Its functions, by name.
-    p : tuple
-        Their parameters.
-    flags : sequence of int, optional
-        Whether the motion slides on each surface.
-
-    Returns
-    -------
-    Held
-        For `integrators.sliding`.
-    """
+    """Return the functions of a program, and what it slides on, with scratch space of their own."""
     functions = Functions(
         made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p
     )

@@ -75,20 +75,7 @@ class Places(Generic[Name]):
             yield from ((name, i) for name in block.names for i in range(block.n))
 
     def index(self, name: Name, element: int = 0) -> int:
-        """Return the place of a shared name, or of an own name of one element.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-        element : int
-            Counted from 0; ignored for a shared name.
-
-        Returns
-        -------
-        int
-            The place.
-        """
+        """Return the place of a shared name, or of an own name of one element."""
         start, _ = self._spans[name]
         return start if start < len(self.shared) else start + element
 
@@ -104,34 +91,12 @@ class Places(Generic[Name]):
         return spans
 
     def block(self, name: Name) -> slice:
-        """Return the places of an own name, one per element.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `own`.
-
-        Returns
-        -------
-        slice
-            One place per element.
-        """
+        """Return the places of an own name, one per element."""
         start, count = self._spans[name]
         return slice(start, start + count)
 
     def where(self, name: Name) -> int | slice:
-        """Return the subscript for an array that selects everything under a name.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-
-        Returns
-        -------
-        int or slice
-            As `index` for a shared name, as `block` for an own one.
-        """
+        """Return the subscript for an array that selects everything under a name."""
         return self._all[name]
 
     @cached_property
@@ -141,84 +106,27 @@ class Places(Generic[Name]):
         return shared | {name: self.block(name) for name in self.own}
 
     def all_of(self, name: Name) -> range:
-        """Return the places of a name: one if it is shared, else one per element.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-
-        Returns
-        -------
-        range
-            In order.
-        """
+        """Return the places of a name: one if it is shared, else one per element."""
         start, count = self._spans[name]
         return range(start, start + count)
 
     def named(self, values: Any) -> dict[Name, Any]:
-        """Return the values by name.
-
-        Parameters
-        ----------
-        values : sequence, or ndarray with the places as its first axis
-            One entry per place.
-
-        Returns
-        -------
-        dict
-            For a shared name its entry, for an own name its part of `values`, one per element.
-        """
+        """Return the values by name."""
         return {name: values[where] for name, where in self._all.items()}
 
     def joined(self, values: Mapping[Name, Any]) -> list[Any]:
-        """Return entries in the order of the places; the inverse of `named`.
-
-        Parameters
-        ----------
-        values : mapping
-            For a shared name its entry, for an own name a sequence with one entry per element.
-
-        Returns
-        -------
-        list
-            One entry per place.
-        """
+        """Return entries in the order of the places; the inverse of `named`."""
         return [values[name] if i is None else values[name][i] for name, i in self]
 
     # ------------------------------------------------------------------ as text
     def text(self, name: Name) -> str:
-        """Return a place as Python text over ``i`` and the sizes.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-
-        Returns
-        -------
-        str
-            Such as ``"1"`` or ``"2 + n + i"``.
-        """
+        """Return a place as Python text over ``i`` and the sizes."""
         if name in self.shared:
             return str(self.shared.index(name))
         return total([self.start_text(name), "i"])
 
     def start_text(self, name: Name, after: int = 0) -> str:
-        """Return the first place of a name as Python text over the sizes.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-        after : int
-            Of the names after it in its block instead, this many on.
-
-        Returns
-        -------
-        str
-            Such as ``"2 + n"``.
-        """
+        """Return the first place of a name as Python text over the sizes."""
         if name in self.shared:
             return str(self.shared.index(name) + after)
         terms = [str(len(self.shared))]
@@ -231,18 +139,7 @@ class Places(Generic[Name]):
         return total(terms)
 
     def sizes(self, name: Name) -> frozenset[str]:
-        """Return which sizes the text of a place reads.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-
-        Returns
-        -------
-        frozenset of str
-            Empty for a shared name.
-        """
+        """Return which sizes the text of a place reads."""
         found = set[str]()
         if name in self.shared:
             return frozenset()
@@ -262,16 +159,6 @@ class Places(Generic[Name]):
 
 def total(terms: Iterable[str]) -> str:
     """Return a sum as Python text, with its numerals added up.
-
-    Parameters
-    ----------
-    terms : iterable of str
-        Numerals and names.
-
-    Returns
-    -------
-    str
-        The numeral comes first.
 
     Examples
     --------

@@ -281,18 +281,7 @@ def _jolts(plan: ProgramPlan) -> dict[str, Any]:
 
 
 def arguments(system: System) -> Arguments:
-    """Return the numbers of a system in the form that its program's functions take.
-
-    Parameters
-    ----------
-    system : System
-        What runs.
-
-    Returns
-    -------
-    tuple of lists
-        See `Program`.
-    """
+    """Return the numbers of a system in the form that its program's functions take."""
     shared, own = numbers_of(system)
     tables = [
         as_floats(column)
@@ -304,18 +293,7 @@ def arguments(system: System) -> Arguments:
 
 
 def equations(program: Program) -> integrators.Equations:
-    """Return a program in the form that the integrators take.
-
-    Parameters
-    ----------
-    program : Program
-        From `lower`.
-
-    Returns
-    -------
-    integrators.Equations
-        Its functions and numbers.
-    """
+    """Return a program in the form that the integrators take."""
     functions = program.ieee
     return integrators.Equations(
         flow=functions["flow"],
@@ -342,18 +320,6 @@ def equations(program: Program) -> integrators.Equations:
 
 def guarded(name: str, call: Callable[[float], float]) -> Callable[[float], float]:
     """Return a signal's function with errors that name the signal.
-
-    Parameters
-    ----------
-    name : str
-        Of the signal.
-    call : callable
-        The user's function of time.
-
-    Returns
-    -------
-    callable
-        Raises `SignalError` where the function raises an exception or returns no number.
 
     Examples
     --------

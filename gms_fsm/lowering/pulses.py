@@ -28,18 +28,6 @@ INSIDE = 8  # parts into which a change is divided
 def waking_times(tree: Value, t_start: float, t_end: float) -> tuple[float, ...]:
     """Return the times that steps may not jump over.
 
-    Parameters
-    ----------
-    tree : Value
-        A formula in t.
-    t_start, t_end : float
-        s.
-
-    Returns
-    -------
-    tuple of float
-        s, increasing; empty if the formula never rests, never changes, or cannot be computed.
-
     Examples
     --------
     >>> from gms_fsm.language import parse_value

@@ -157,13 +157,7 @@ class BenchMotion:
 
 
 def fastest_engine() -> str:
-    """Return the fastest engine that is installed.
-
-    Returns
-    -------
-    str
-        ``"compiled"``, or ``"ifelse"`` without the extra ``fast``. The results are the same.
-    """
+    """Return the fastest engine that is installed."""
     return "compiled" if importlib.util.find_spec("llvmlite") else "ifelse"
 
 
@@ -174,26 +168,7 @@ def run(
     t_end: float,
     t_eval: FloatArray | None = None,
 ) -> Trace:
-    """Run a contact on the bench, from rest.
-
-    Parameters
-    ----------
-    contact : Contact
-        Called ``friction``, on the velocity ``v``.
-    bench : Bench
-        Mass and tolerance.
-    motion : BenchMotion
-        What moves the slider.
-    t_end : float
-        s.
-    t_eval : ndarray, optional
-        Times of the rows, s.
-
-    Returns
-    -------
-    Trace
-        Its x and v are those of the slider.
-    """
+    """Run a contact on the bench, from rest."""
     numbers = {
         "m": bench.mass,
         "A": motion.vibration,
@@ -263,25 +238,7 @@ class ForcePath:
 
 
 def path(rate: float, stops: Sequence[float], hold: float, *, smooth: bool = False) -> ForcePath:
-    """Return a force that goes through some values.
-
-    Parameters
-    ----------
-    rate : float
-        Mean slope of the ramps, N/s.
-    stops : sequence of float
-        The values, N.
-    hold : float
-        Time at each, s.
-    smooth : bool
-        Whether the ramps begin and end slowly, like half a cosine, so that the mass does not
-        overshoot. They then have 64 pieces.
-
-    Returns
-    -------
-    ForcePath
-        With 200 times on each branch.
-    """
+    """Return a force that goes through some values."""
     t = last = 0.0
     corners, ends, branches = [(0.0, 0.0)], [], []
     share = np.linspace(0.0, 1.0, 65 if smooth else 2)

@@ -45,25 +45,7 @@ class Pulled:
 
 
 def pulled(specimen: Specimen, rate: float) -> Pulled:
-    """Pull a slider through the soft spring until it has broken away.
-
-    Parameters
-    ----------
-    specimen : Specimen
-        The model.
-    rate : float
-        Force rate, N/s: stiffness of the spring times the speed of its far end.
-
-    Returns
-    -------
-    Pulled
-        The run until the slider has moved by `TRAVEL`.
-
-    Raises
-    ------
-    ParameterError
-        If it has not moved so far at `LONGEST` times F_s.
-    """
+    """Pull a slider through the soft spring until it has broken away."""
     bench = specimen.bench
     speed = rate / bench.stiffness
     motion = BenchMotion(spring=bench.stiffness, velocity=((0.0, speed), (1.0, speed)))

@@ -70,21 +70,7 @@ class Specimen:
 
 
 def bench_bank(bench: Bench, n: int) -> GMSParameters:
-    """Return GMS elements with the numbers of the bench.
-
-    Parameters
-    ----------
-    bench : Bench
-        Sum of the stiffness, damping and Stribeck curve.
-    n : int
-        Number of elements: equal shares of the friction; each has half the stiffness of the one
-        before, so that they break away one after another.
-
-    Returns
-    -------
-    GMSParameters
-        The numbers.
-    """
+    """Return GMS elements with the numbers of the bench."""
     share = 0.5 ** np.arange(n)
     share /= share.sum()
     return GMSParameters.from_shares(
@@ -132,26 +118,7 @@ RENUMBERED: Mapping[str, Callable[[Entry, str, Bench], ChartModel]] = {
 def specimens_of(
     models: Iterable[str] | Mapping[str, str | Model | Contact] | None, bench: Bench
 ) -> tuple[Specimen, ...]:
-    """Return the models to be compared.
-
-    Parameters
-    ----------
-    models : iterable of str, mapping, or None
-        Names of included charts; or by any name such a name, a model or a contact; None for all
-        included charts.
-    bench : Bench
-        Numbers of the signals.
-
-    Returns
-    -------
-    tuple of Specimen
-        In this order.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such chart, or a model of the user's own cannot be put on the bench.
-    """
+    """Return the models to be compared."""
     known = {
         "-".join(filter(None, (each.name, law))): (each, law)
         for each in registered().values()
@@ -195,18 +162,7 @@ def _included(name: str, entry: Entry, law: str, bench: Bench) -> Specimen:
 
 
 def unfit(chart: Chart) -> str:
-    """Return why a chart cannot be put on the bench.
-
-    Parameters
-    ----------
-    chart : Chart
-        Any chart.
-
-    Returns
-    -------
-    str
-        Empty if it can.
-    """
+    """Return why a chart cannot be put on the bench."""
     if len(chart.velocities) > 1:
         along = " and ".join(chart.velocities)
         return f"it moves along {along}, and the bench has one direction"

@@ -64,24 +64,6 @@ ColumnLike: TypeAlias = str | tuple[str, str] | tuple[str, str, int] | Column
 def columns_of(given: dict[str, Any]) -> dict[str, Column]:
     """Return the column of each quantity that has one.
 
-    Parameters
-    ----------
-    given : dict
-        By quantity: a name (the unit is that of SI), (name, unit), (name, unit, sign), a `Column`,
-        or None.
-
-    Returns
-    -------
-    dict of str to Column
-        Without those that are None.
-
-    Raises
-    ------
-    ParameterError
-        If one of them is something else.
-    UnitError
-        If a unit is unknown or belongs to another quantity.
-
     Examples
     --------
     >>> columns_of({"position": ("x", "mm"), "force": "F", "normal": None})["force"]

@@ -110,31 +110,7 @@ def selected(
     where: Any = "",
     missing: Any = "error",
 ) -> RecordRows:
-    """Select rows, treat gaps as asked, and check the result.
-
-    Parameters
-    ----------
-    origin : Origin
-        For messages.
-    values : dict of str to ndarray, shape (rows,)
-        In SI units; NaN where there is no number.
-    rows : ndarray of int, shape (rows,)
-        Their numbers.
-    words : dict
-        Cells that are not numbers, by row and quantity.
-    where, missing
-        As in `gms_fsm.Record.from_csv`.
-
-    Returns
-    -------
-    Part
-        From the first to the last selected row; read-only arrays.
-
-    Raises
-    ------
-    RecordError
-        If no row is selected, a needed cell is not a finite number, or time does not increase.
-    """
+    """Select rows, treat gaps as asked, and check the result."""
     if not isinstance(where, str):
         raise ParameterError("it must be a condition, as a text", place="where", value=where)
     if missing not in MISSING:
@@ -331,22 +307,7 @@ def _check_size(origin: Origin, part: RecordRows) -> None:
 
 
 def gaps_in(origin: Origin, time: FloatArray, numbers: Rows) -> list[str]:
-    """Return a note on gaps in time, if there are any.
-
-    Parameters
-    ----------
-    origin : Origin
-        For the words.
-    time : ndarray, shape (rows,)
-        Increasing, s.
-    numbers : ndarray of int, shape (rows,)
-        The numbers of the rows.
-
-    Returns
-    -------
-    list of str
-        One note, or none.
-    """
+    """Return a note on gaps in time, if there are any."""
     steps = np.diff(time)
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP * usual)

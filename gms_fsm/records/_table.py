@@ -64,23 +64,7 @@ class TextFormat:
     def of(
         cls, delimiter: Any, decimal: Any, comment: Any, header: Any, encoding: Any
     ) -> TextFormat:
-        """Return the format with these options, checked.
-
-        Parameters
-        ----------
-        delimiter, decimal, comment, header, encoding
-            As in the class; `comment` may be one text.
-
-        Returns
-        -------
-        TextFormat
-            Checked.
-
-        Raises
-        ------
-        ParameterError
-            Naming the option, its value and what it must be.
-        """
+        """Return the format with these options, checked."""
         marks = (comment,) if isinstance(comment, str) else comment
         try:
             marks = tuple(marks)
@@ -174,27 +158,7 @@ class _Head:
 
 
 def read_cells(path: Path, columns: Mapping[str, Column], form: TextFormat) -> Cells:
-    """Read the named columns of a text table.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    columns : mapping of str to Column
-        The columns, by quantity.
-    form : TextFormat
-        How the table is written.
-
-    Returns
-    -------
-    Cells
-        In the units of the table.
-
-    Raises
-    ------
-    RecordError
-        If the file cannot be read or has no such columns; the message names file and row.
-    """
+    """Read the named columns of a text table."""
     lines = _lines(path, form.encoding)
     head = _head(path, lines, columns, form)
     places = _places(path, head, columns)

@@ -27,25 +27,7 @@ HEADINGS = {
 
 
 def write_csv(columns: Mapping[str, FloatArray], path: str | os.PathLike[str]) -> Path:
-    """Write columns of a record to a CSV file, whole.
-
-    Parameters
-    ----------
-    columns : mapping of str to ndarray, shape (rows,)
-        As in `Record.columns`; NaN is written as an empty cell.
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written, or exists and is not as gms-fsm wrote it.
-    """
+    """Write columns of a record to a CSV file, whole."""
     place = checked_path("path", path)
     names = [name for name in HEADINGS if name in columns]
     text = io.StringIO()

@@ -15,20 +15,7 @@ __all__ = ["only", "some_rows", "thinned"]
 
 
 def some_rows(record: Record, rows: NDArray[np.bool_] | slice) -> Record:
-    """Return a record with some of its rows.
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-    rows : ndarray of bool, shape (rows,), or slice
-        Which of its rows.
-
-    Returns
-    -------
-    Record
-        With read-only columns, and the same name and notes.
-    """
+    """Return a record with some of its rows."""
     columns = {name: values[rows] for name, values in record.columns.items()}
     found = replace(record, columns=columns, chosen=record.chosen[rows], rows=record.rows[rows])
     for array in (*columns.values(), found.chosen, found.rows):
@@ -37,36 +24,10 @@ def some_rows(record: Record, rows: NDArray[np.bool_] | slice) -> Record:
 
 
 def thinned(record: Record, rows: int) -> Record:
-    """Return every n-th row of a record, so that about as many are left as asked for.
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-    rows : int
-        At least as many, and less than twice as many, if it has them.
-
-    Returns
-    -------
-    Record
-        From the first row on.
-    """
+    """Return every n-th row of a record, so that about as many are left as asked for."""
     return some_rows(record, slice(None, None, max(1, len(record) // rows)))
 
 
 def only(record: Record, rows: NDArray[np.bool_]) -> Record:
-    """Return a record of which no other rows are selected; its motion is that of all of them.
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-    rows : ndarray of bool, shape (rows,)
-        Which may stay selected.
-
-    Returns
-    -------
-    Record
-        With the same rows.
-    """
+    """Return a record of which no other rows are selected; its motion is that of all of them."""
     return replace(record, chosen=record.chosen & rows)

@@ -47,23 +47,6 @@ _CODE = (
 def identity(call: Any) -> str:
     """Return a hash of what a function computes.
 
-    Parameters
-    ----------
-    call : callable
-        A Python function, a `functools.partial` of one, or one wrapped by a compiler that
-        keeps it as ``py_func``.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits; the same in every process of one Python.
-
-    Raises
-    ------
-    SignalError
-        If its behaviour cannot be determined: for a builtin, a method, an object with a
-        ``__call__``, or a function that uses an object of unknown contents.
-
     Examples
     --------
     >>> identity(lambda t: 0.1 * t) == identity(lambda t: 0.1 * t)

@@ -310,13 +310,7 @@ class MachineEngine:
         self.program.ieee["act"](edge, machine, t, y, mode, p)
 
     def trigger(self, edge: int, machine: int, t: float) -> None:
-        """Fire the machine's edge with the values for which its guard was evaluated.
-
-        Raises
-        ------
-        Interference
-            If a callback changed these values, or a state.
-        """
+        """Fire the machine's edge with the values for which its guard was evaluated."""
         bank = self.program.layout.bank(machine)
         row = self.parts[machine].model.chart.transitions[edge - bank.first_edge]
         place = f"{self.called(machine)}, edge {row.name!r}"

@@ -36,22 +36,7 @@ Bounds = tuple[Any, Any]  # the least and the largest value, numbers or arrays
 
 
 def bounds_of(start: Problem, b: hybrid.Buffers, t_end: float = np.inf) -> dict[str, Bounds]:
-    """Return between which values the state of a run is.
-
-    Parameters
-    ----------
-    start : Problem
-        The run.
-    b : Buffers
-        Its buffers.
-    t_end : float
-        s: the end of the run.
-
-    Returns
-    -------
-    dict
-        By name, as `integrators.runners.states.state_of`; without what may have any value.
-    """
+    """Return between which values the state of a run is."""
     _, last_edge = last_edges(start)
     n, relations = len(b.now.mode), len(b.relations.watch)
     slid = len(b.sliding.sigma)
@@ -90,20 +75,7 @@ def _bounds(names: Sequence[str], **bounds: Bounds) -> Bounds:
 
 
 def check_state(start: Problem, b: hybrid.Buffers, state: Mapping[str, Any], t_end: float) -> None:
-    """Raise a ValueError unless a run like this one can have reached such a state.
-
-    Parameters
-    ----------
-    start, b, t_end
-        As for `bounds_of`.
-    state : mapping of str to ndarray
-        As `integrators.runners.states.state_of`.
-
-    Raises
-    ------
-    ValueError
-        Naming what is not plausible.
-    """
+    """Raise a ValueError unless a run like this one can have reached such a state."""
     check_ranges({name: (state[name], *u) for name, u in bounds_of(start, b, t_end).items()})
     first_edge, last_edge = last_edges(start)
     counts = dict(zip(states.COUNTS, state["counts"], strict=True))
@@ -119,18 +91,7 @@ def check_state(start: Problem, b: hybrid.Buffers, state: Mapping[str, Any], t_e
 
 
 def check_ranges(ranges: Mapping[str, tuple[Any, Any, Any]]) -> None:
-    """Raise a ValueError unless all numbers are within their ranges.
-
-    Parameters
-    ----------
-    ranges : mapping of str to (found, least, most)
-        Numbers or arrays.
-
-    Raises
-    ------
-    ValueError
-        Naming the first one that is not.
-    """
+    """Raise a ValueError unless all numbers are within their ranges."""
     for name, (found, least, most) in ranges.items():
         if not np.all((np.asarray(found) >= least) & (np.asarray(found) <= most)):
             raise ValueError(f"{name}: not within {least} to {most}")

@@ -17,21 +17,6 @@ FIRST, MOST = 1000, 128_000  # steps of a demonstration
 def printed(start: Problem) -> str:
     """Return a program that takes a run's steps and prints its switches.
 
-    Parameters
-    ----------
-    start : Problem
-        What runs, from when to when.
-
-    Returns
-    -------
-    str
-        Python text that depends only on the standard library.
-
-    Raises
-    ------
-    ParameterError
-        If a signal is a Python function, which cannot be written as text.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed

@@ -111,20 +111,7 @@ class Problem:
         return _tolerances(layout, self.chosen.atol, none)[0]
 
     def trace(self, rows: Rows, stops: Rows, firings: Firings) -> Trace:
-        """Return the trace of a run.
-
-        Parameters
-        ----------
-        rows, stops : Rows
-            What was kept.
-        firings : Firings
-            The log.
-
-        Returns
-        -------
-        Trace
-            With what it was made from.
-        """
+        """Return the trace of a run."""
         trace = Trace(rows, stops, firings, self.what, self.settings)
         vars(trace)["program"] = self.program  # it need not be generated again
         return trace
@@ -176,32 +163,7 @@ class Problem:
         rows_at_once: int = integrators.ROWS_AT_ONCE,
         ticks_from: float | None = None,
     ) -> Problem:
-        """Check the arguments of `gms_fsm.simulate`.
-
-        Parameters
-        ----------
-        what : Mounted
-            What runs.
-        t_end, t_start, initial
-            See `gms_fsm.simulate`.
-        settings : Settings
-            Method, tolerances and output.
-        rows_at_once : int
-            Maximum number of steps in an arc.
-        ticks_from : float, optional
-            s: start of the run that this one continues, from which its ticks are counted. Samplers
-            that tick exactly at t_start have then done so; contacts with a period tick again.
-
-        Returns
-        -------
-        Start
-            Complete.
-
-        Raises
-        ------
-        ParameterError, SignalError
-            If an argument breaks its rule.
-        """
+        """Check the arguments of `gms_fsm.simulate`."""
         chosen, system = settings, what.system
         t_start, t_end = _times(t_start, t_end)
         _check_resolution(chosen, t_start, t_end)
@@ -256,18 +218,7 @@ class Problem:
         )
 
     def with_numbers(self, what: Mounted) -> Problem:
-        """Return the same start with different numbers; signals and initial values stay.
-
-        Parameters
-        ----------
-        what : Mounted
-            With the `same_text`.
-
-        Returns
-        -------
-        Start
-            With the tolerances of its numbers, and the entries of its default states.
-        """
+        """Return the same start with different numbers; signals and initial values stay."""
         program = replace(self.program, p=arguments(what.system))
         scales = scales_of_system(program)
         default = scales.tolerances(self.options.rtol)

@@ -80,22 +80,7 @@ def new_breakpoint(
 
 
 def hits(point: Breakpoint, branch: Branch, row: int) -> bool:
-    """Return whether a breakpoint hits at a row.
-
-    Parameters
-    ----------
-    point : Breakpoint
-        The breakpoint.
-    branch : Branch
-        The current branch.
-    row : int
-        Row number, at least 1.
-
-    Returns
-    -------
-    bool
-        Whether the event happens and the condition holds.
-    """
+    """Return whether a breakpoint hits at a row."""
     start = branch.start
     if not any(_happens(point, branch, row, machine) for machine in _machines(point, start)):
         return False

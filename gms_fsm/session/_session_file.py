@@ -99,20 +99,7 @@ def _written(fork: Fork, branch: Branch, parent: int | None) -> dict[str, Any]:
 
 
 def read(path: Path, made: Callable[..., Session]) -> Session:
-    """Read a session and make its branches again; a faulty file raises any kind of error.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    made : callable
-        The class.
-
-    Returns
-    -------
-    Session
-        With its cursors where they were.
-    """
+    """Read a session and make its branches again; a faulty file raises any kind of error."""
     data = json.loads(path.read_text(encoding="utf-8"))
     if data["format"] != FORMAT:
         raise ValueError(f"format is {data['format']!r}")

@@ -19,26 +19,7 @@ __all__ = ["chart_of", "contact_named", "element_name", "machine_of", "source_of
 
 
 def machine_of(element: int | str, start: Problem) -> int:
-    """Return the machine that an argument means.
-
-    Parameters
-    ----------
-    element : int or str
-        Index of the element, from 0, if there is one contact; or its text, such as ``"gear 1"``,
-        in which the number may be left out if the contact has one element.
-    start : Problem
-        The run.
-
-    Returns
-    -------
-    int
-        Counted over all contacts, from 0.
-
-    Raises
-    ------
-    SessionError
-        If there is no such element, or the contact must be named.
-    """
+    """Return the machine that an argument means."""
     banks = start.program.layout.banks
     if isinstance(element, str):
         return _of_text(element, start)

@@ -49,27 +49,7 @@ def _contact(scope: Scope) -> ContactHere:
 
 
 def why_at(branch: Branch, machine: int, edge: str) -> Why:
-    """Explain the edges of an element at the cursor, or one of them.
-
-    Parameters
-    ----------
-    branch : Branch
-        The current branch.
-    machine : int
-        The element, counted over all contacts from 0.
-    edge : str
-        Name of the edge; empty for all.
-
-    Returns
-    -------
-    Why
-        On a row where the element fired, edges of the state it left, with the values before.
-
-    Raises
-    ------
-    SessionError
-        If there is no such edge, or it leaves a different state.
-    """
+    """Explain the edges of an element at the cursor, or one of them."""
     start, row, place = branch.start, branch.cursor, branch.here
     bank = start.program.layout.bank(machine)
     chart, i = chart_of(start, bank), machine - bank.first

@@ -272,20 +272,7 @@ def _amount(name: str, value: float) -> str:
 
 
 def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> BranchComparison:
-    """Compare two branches that have been computed to their ends.
-
-    Parameters
-    ----------
-    numbers : tuple of int
-        Numbers of the branches.
-    first, second : Trace
-        Traces of the same model or system.
-
-    Returns
-    -------
-    BranchComparison
-        Transitions, and largest differences.
-    """
+    """Compare two branches that have been computed to their ends."""
     t = min(float(first.t[-1]), float(second.t[-1]))
     logs = [trace.transitions[trace.transitions.t <= t] for trace in (first, second)]
     differs = None

@@ -29,20 +29,7 @@ Text: TypeAlias = str | float  # an expression, or just a number
 
 
 def check_text(text: object, place: str) -> None:
-    """Refuse what is neither an expression nor a number.
-
-    Parameters
-    ----------
-    text : str or float
-        What was given.
-    place : str
-        For the message.
-
-    Raises
-    ------
-    ParameterError
-        If it is something else.
-    """
+    """Refuse what is neither an expression nor a number."""
     if not isinstance(text, str | int | float) or isinstance(text, bool):
         raise ParameterError(
             "it must be an expression or a number", place=place, value=text, advice="such as '2*t'"
@@ -50,25 +37,7 @@ def check_text(text: object, place: str) -> None:
 
 
 def mapping_of(given: object, place: str) -> dict[str, Any]:
-    """Return a copy of a mapping with texts as keys.
-
-    Parameters
-    ----------
-    given : mapping
-        What was given.
-    place : str
-        For the message.
-
-    Returns
-    -------
-    dict
-        A copy.
-
-    Raises
-    ------
-    ParameterError
-        If it is no mapping.
-    """
+    """Return a copy of a mapping with texts as keys."""
     if not isinstance(given, Mapping):
         raise ParameterError(
             "it must be a mapping, such as {'name': ...}", place=place, value=given
@@ -77,25 +46,7 @@ def mapping_of(given: object, place: str) -> dict[str, Any]:
 
 
 def texts_of(given: object, place: str) -> dict[str, str]:
-    """Return a copy of a mapping of names to texts, with numbers as texts.
-
-    Parameters
-    ----------
-    given : mapping of str to str or float
-        What was given.
-    place : str
-        For the message.
-
-    Returns
-    -------
-    dict of str to str
-        A copy.
-
-    Raises
-    ------
-    ParameterError
-        If it is no mapping, or has something else for a name.
-    """
+    """Return a copy of a mapping of names to texts, with numbers as texts."""
     texts = mapping_of(given, place)
     for name, text in texts.items():
         check_text(text, f"{place}[{name!r}]")
@@ -105,27 +56,7 @@ def texts_of(given: object, place: str) -> dict[str, str]:
 
 
 def several(given: object, kind: type, place: str) -> tuple[Any, ...]:
-    """Return parts of a kind as a tuple; a single one may stand alone.
-
-    Parameters
-    ----------
-    given : part or sequence of parts
-        What was given.
-    kind : type
-        Their class.
-    place : str
-        For the message.
-
-    Returns
-    -------
-    tuple
-        The parts.
-
-    Raises
-    ------
-    ParameterError
-        If there is something else.
-    """
+    """Return parts of a kind as a tuple; a single one may stand alone."""
     if isinstance(given, kind):
         return (given,)
     if not isinstance(given, Iterable) or isinstance(given, str):
@@ -138,22 +69,7 @@ def several(given: object, kind: type, place: str) -> tuple[Any, ...]:
 
 
 def check_name(name: object, place: str, key: tuple[str | int, ...] = ()) -> None:
-    """Refuse what cannot be the name of a part or a quantity of a system.
-
-    Parameters
-    ----------
-    name : str
-        The name.
-    place : str
-        For the message.
-    key : tuple of str or int
-        The part of the system, as in `GMSError`.
-
-    Raises
-    ------
-    ParameterError
-        If it is not an identifier, or a word of the language.
-    """
+    """Refuse what cannot be the name of a part or a quantity of a system."""
     if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ParameterError(
             f"{shown(name)} is not a name",
@@ -168,29 +84,7 @@ def check_name(name: object, place: str, key: tuple[str | int, ...] = ()) -> Non
 def checked_numbers(
     chart: Chart, values: Mapping[str, Any], n: int, here: str
 ) -> Mapping[str, float | FloatArray]:
-    """Return the numbers of a chart, checked against its parameters.
-
-    Parameters
-    ----------
-    chart : Chart
-        Whose parameters.
-    values : mapping
-        A number, or one per element, for each.
-    n : int
-        Number of elements.
-    here : str
-        For messages.
-
-    Returns
-    -------
-    mapping
-        Complete.
-
-    Raises
-    ------
-    ParameterError
-        If one is missing, unknown, or breaks its rule.
-    """
+    """Return the numbers of a chart, checked against its parameters."""
     if isinstance(n, bool) or not isinstance(n, int) or n < 1:
         raise ParameterError(
             "a bank has an integer number of elements, at least one", place=f"{here}: n", value=n
@@ -213,20 +107,7 @@ def checked_numbers(
 
 
 def is_positive(tree: Value, numbers: Mapping[str, float]) -> bool:
-    """Tell whether a value is positive and finite, as far as numbers alone decide.
-
-    Parameters
-    ----------
-    tree : Value
-        Over the names of a system.
-    numbers : mapping of str to float
-        The system's numbers.
-
-    Returns
-    -------
-    bool
-        True if it depends on the state.
-    """
+    """Tell whether a value is positive and finite, as far as numbers alone decide."""
     return bool(names_in(tree) - {*numbers}) or 0.0 < constant(tree, numbers) < math.inf
 
 
@@ -239,18 +120,7 @@ def constant(tree: Value, numbers: Mapping[str, float]) -> float:
 
 
 def derivative_free(rest: Value) -> bool:
-    """Tell whether a linear form without its velocities is zero.
-
-    Parameters
-    ----------
-    rest : Value
-        The form, with 0 for each velocity.
-
-    Returns
-    -------
-    bool
-        False also if that cannot be seen.
-    """
+    """Tell whether a linear form without its velocities is zero."""
     match rest:
         case Number(value):
             return value == 0.0

@@ -81,18 +81,7 @@ class Model(Protocol):
 
 
 def is_model(given: object) -> bool:
-    """Tell whether an object has what marks a `Model`.
-
-    Parameters
-    ----------
-    given : object
-        Anything.
-
-    Returns
-    -------
-    bool
-        True for those of a user's own class, too.
-    """
+    """Tell whether an object has what marks a `Model`."""
     return hasattr(given, "chart") and hasattr(given, "weights")
 
 
@@ -344,22 +333,7 @@ class ChartModel:
 
 
 def check_bank(chart: Chart, n: int, here: str) -> None:
-    """Refuse banks whose elements would lock the same motion.
-
-    Parameters
-    ----------
-    chart : Chart
-        The element's chart.
-    n : int
-        Number of elements.
-    here : str
-        The place, for the message.
-
-    Raises
-    ------
-    ParameterError
-        If there are several elements and a locked state.
-    """
+    """Refuse banks whose elements would lock the same motion."""
     if chart.locks and n != 1:
         raise ParameterError(
             f"n is {n}, and the chart has a locked state",

@@ -167,25 +167,6 @@ class Mounted:
 def mounted(model: Model | System, rig: Rig | None = None, period: float | None = None) -> Mounted:
     """Return what runs.
 
-    Parameters
-    ----------
-    model : Model or System
-        A model needs a rig, a system has none.
-    rig : Rig, optional
-        The rig.
-    period : float, optional
-        s: of a model on a rig whose outputs are held.
-
-    Returns
-    -------
-    Mounted
-        With its system.
-
-    Raises
-    ------
-    ParameterError
-        If it is no model, or no rig, or the two do not fit together.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, PulledSlider
@@ -210,25 +191,7 @@ def mounted(model: Model | System, rig: Rig | None = None, period: float | None 
 
 
 def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
-    """Return a system, or a model whose velocity is still to be given, as the signal v.
-
-    Parameters
-    ----------
-    model : Model or System
-        What a fit is for.
-    place : str
-        For the message.
-
-    Returns
-    -------
-    Mounted
-        With its system.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither a model nor a system.
-    """
+    """Return a system, or a model whose velocity is still to be given, as the signal v."""
     if isinstance(model, System):
         return mounted(model)
     if not is_model(model):
@@ -241,25 +204,7 @@ def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
 
 
 def shifted(call: str, model: Model | System, rig: Any, *rest: Any) -> tuple[Any, ...]:
-    """Return the rig and the arguments behind it; a system has no rig, and they begin one earlier.
-
-    Parameters
-    ----------
-    call : str
-        How a system is given, for the message: ``simulate(system, t_end)``.
-    model, rig, *rest
-        As given.
-
-    Returns
-    -------
-    tuple
-        The rig, None for a system, and as many arguments as before.
-
-    Raises
-    ------
-    ParameterError
-        If a system was given a rig.
-    """
+    """Return the rig and the arguments behind it; of a system they begin one earlier."""
     if not isinstance(model, System):
         return rig, *rest
     if rest[-1] is not None:
@@ -270,25 +215,7 @@ def shifted(call: str, model: Model | System, rig: Any, *rest: Any) -> tuple[Any
 def arguments_of(
     caller: str, model: Model | System, rig: Rig | float, t_end: float | None
 ) -> tuple[Rig | None, float]:
-    """Return the rig, if there is one, and the end of the run.
-
-    Parameters
-    ----------
-    caller : str
-        For messages: the function that was called.
-    model, rig, t_end
-        Its arguments: ``(model, rig, t_end)``, or ``(system, t_end)``.
-
-    Returns
-    -------
-    Rig or None, float
-        The rig is None for a system.
-
-    Raises
-    ------
-    ParameterError
-        If a system is given a rig, or a model has no end.
-    """
+    """Return the rig, if there is one, and the end of the run."""
     on, end = shifted(f"{caller}(system, t_end)", model, rig, t_end)
     if end is None:
         raise ParameterError(

@@ -53,36 +53,13 @@ class NamedNumber:
 
 
 def column_name(name: str, i: int) -> str:
-    """Return the name of a quantity of element i: z1, but z1_1 for a variable called z1.
-
-    Parameters
-    ----------
-    name : str
-        A quantity of the elements.
-    i : int
-        Element index, from 0.
-
-    Returns
-    -------
-    str
-        The name, in which elements are numbered from 1.
-    """
+    """Return the name of a quantity of element i: z1, but z1_1 for a variable called z1."""
     return f"{name}{'_' if name[-1].isdigit() or name[-1] == '_' else ''}{i + 1}"
 
 
 # --------------------------------------------------------------------------- whole parameters
 def known_in(what: Mounted) -> dict[str, tuple[Parameter, int]]:
     """Return all numbers by name.
-
-    Parameters
-    ----------
-    what : Mounted
-        Whose numbers.
-
-    Returns
-    -------
-    dict
-        The parameter, and for how many elements it can differ (0: one number).
 
     Examples
     --------

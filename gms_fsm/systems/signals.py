@@ -234,18 +234,6 @@ def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) 
     One clock tick before a corner the value is that of the corner: what a jump there comes from.
     Written as plain loops because the compiled engine runs this same function.
 
-    Parameters
-    ----------
-    t : float
-        s.
-    times, values : sequence of float, shape (m,)
-        The corners, in order of time.
-
-    Returns
-    -------
-    float
-        The value.
-
     Examples
     --------
     >>> piecewise_linear(0.5, [0.0, 1.0, 1.0], [0.0, 2.0, 5.0])

@@ -358,18 +358,6 @@ def with_model(system: System, model: Model, rig: Rig) -> System:
     """Return a model on a rig as a system, given that of others of the same shape.
 
     No text is read again.
-
-    Parameters
-    ----------
-    system : System
-        From `system_of`.
-    model, rig
-        With other numbers.
-
-    Returns
-    -------
-    System
-        With these.
     """
     given, new = rig.numbers, object.__new__(System)
     numbers = {name: float(given[name]) for name in system.numbers}
@@ -389,23 +377,6 @@ def with_model(system: System, model: Model, rig: Rig) -> System:
 # --------------------------------------------------------------------------- from a model on a rig
 def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
     """Return a model on a rig as a system: one body, called body, and one contact, called friction.
-
-    Parameters
-    ----------
-    model, rig
-        What runs.
-    period : float, optional
-        s: of a discrete contact.
-
-    Returns
-    -------
-    System
-        With the rig's signals and numbers.
-
-    Raises
-    ------
-    ParameterError
-        If the rig's acceleration is not linear in F.
 
     Examples
     --------

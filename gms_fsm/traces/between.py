@@ -19,18 +19,6 @@ HALVINGS = 60  # bisections between two rows
 def first_true(low: float, high: float, holds: Callable[[float], bool]) -> float:
     """Return the point at which a condition becomes true, found by bisection.
 
-    Parameters
-    ----------
-    low, high : float
-        The condition is false at low and true at high; neither is evaluated again.
-    holds : callable
-        The condition.
-
-    Returns
-    -------
-    float
-        The right end of the bracket, where the condition is true.
-
     Examples
     --------
     >>> first_true(0.0, 1.0, lambda t: t >= 0.3)
@@ -56,24 +44,6 @@ def interpolated(
     """Return the state at t between two rows of one arc, by cubic Hermite interpolation.
 
     The slopes come from the flow.
-
-    Parameters
-    ----------
-    program : Program
-        Program of the run.
-    mode : list of int
-        Active states between the rows.
-    t0, t1 : float
-        Times of the rows, s.
-    y0, y1 : ndarray, shape (m,)
-        Their states.
-    t : float
-        s, from t0 to t1.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        The state.
     """
     with np.errstate(all="ignore"):  # as in a run, overflow gives inf
         at_start, at_end = slopes(program, mode, t0, y0, t1, y1)
@@ -89,18 +59,7 @@ def interpolated(
 def slopes(
     program: Program, mode: list[int], t0: float, y0: FloatArray, t1: float, y1: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the one-sided dy/dt at two adjacent rows of one arc, seen from between them.
-
-    Parameters
-    ----------
-    program, mode, t0, y0, t1, y1
-        As in `interpolated`.
-
-    Returns
-    -------
-    tuple of ndarray, shape (m,)
-        Slopes at the first and at the second row.
-    """
+    """Return the one-sided dy/dt at two adjacent rows of one arc, seen from between them."""
     # The signs inside the interval; at its ends they may be about to change.
     held = armed(program, 0.5 * (t0 + t1), (0.5 * (y0 + y1)).tolist(), mode)
     at_start, at_end = (rate(program, t, y.tolist(), mode, held) for t, y in ((t0, y0), (t1, y1)))
@@ -108,24 +67,7 @@ def slopes(
 
 
 def between(program: Program, table: Rows, i: int, t: float) -> FloatArray:
-    """Return the state at a time in a run.
-
-    Parameters
-    ----------
-    program : Program
-        Of the run.
-    table : Rows
-        Its rows, with both sides of every stop.
-    i : int
-        The last row not after t.
-    t : float
-        s.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        The row itself at its time.
-    """
+    """Return the state at a time in a run."""
     t0 = table.t[i]
     if t == t0 or i + 1 == len(table):
         return np.asarray(table.y[i])

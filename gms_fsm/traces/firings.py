@@ -61,17 +61,7 @@ class Firings:
     def copied(
         cls, columns: Mapping[str, NDArray[Any]], layout: SystemLayout, *, of_system: bool
     ) -> Firings:
-        """Return firings with their own copy of the four columns.
-
-        Parameters
-        ----------
-        columns : mapping of str to ndarray
-            ``t, machine, edge`` and ``numbers``.
-        layout : SystemLayout
-            Of the run.
-        of_system : bool
-            Whether a system ran, and not a model on a rig.
-        """
+        """Return firings with their own copy of the four columns."""
         return cls(
             columns["t"].copy(),
             columns["machine"].astype(np.int32),
@@ -93,22 +83,7 @@ class Firings:
 
     @classmethod
     def coded(cls, columns: Mapping[str, Any], layout: SystemLayout, *, of_system: bool) -> Firings:
-        """Return the firings that columns with names describe.
-
-        Parameters
-        ----------
-        columns : mapping of str to sequence
-            The columns of the log; of a system, if it is not empty, also the contact.
-        layout : SystemLayout
-            Of the run.
-        of_system : bool
-            Whether a system ran, and not a model on a rig.
-
-        Raises
-        ------
-        TraceFileError
-            If the run cannot have written them.
-        """
+        """Return the firings that columns with names describe."""
         count = len(columns["t"])
         if (CONTACT in columns) != (of_system and count > 0):
             raise TraceFileError("the transition log does not have the columns of a trace")

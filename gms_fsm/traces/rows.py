@@ -37,19 +37,7 @@ class Rows:
 
 
 def merged(rows: Rows, stops: Rows) -> Rows:
-    """Merge two tables in time order; rows present in both are kept once.
-
-    Parameters
-    ----------
-    rows, stops : Rows
-        Rows at requested times, and both sides of every stop.
-
-    Returns
-    -------
-    Rows
-        The merged table. A requested row at an event has the values after the event and follows
-        its micro-steps.
-    """
+    """Merge two tables in time order; rows present in both are kept once."""
     if rows is stops or not len(stops):
         return rows
     rows = rows.at(~_found_in(rows, stops))

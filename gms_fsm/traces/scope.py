@@ -43,16 +43,6 @@ FORCE = "F_elements"  # the observed quantity that F1, F2 ... refer to
 def watch_names(model: Model) -> list[str]:
     """Return the names allowed in conditions and watches over a run.
 
-    Parameters
-    ----------
-    model : Model
-        The simulated model.
-
-    Returns
-    -------
-    list of str
-        Without ``state(1)``, which is built into the expression language.
-
     Examples
     --------
     >>> from gms_fsm import LuGre, Stribeck
@@ -64,38 +54,14 @@ def watch_names(model: Model) -> list[str]:
 
 
 def invariant_names(model: Model) -> list[str]:
-    """Return the names allowed in an invariant.
-
-    Parameters
-    ----------
-    model : Model
-        The simulated model.
-
-    Returns
-    -------
-    list of str
-        Without ``state`` and ``state(1)``.
-    """
+    """Return the names allowed in an invariant."""
     chart = model.chart
     own = (*_curve(model), *chart.variables, *chart.parameter_names)
     return ["t", "x", "v", "F", *own, *_numbered(model)]
 
 
 def parameter_values(model: Model, element: int) -> dict[str, float]:
-    """Return the parameter values of an element.
-
-    Parameters
-    ----------
-    model : Model
-        The simulated model.
-    element : int
-        Index, from 0.
-
-    Returns
-    -------
-    dict of str to float
-        Values by parameter name.
-    """
+    """Return the parameter values of an element."""
     return {
         name: float(value if isinstance(value, float | int) else value[element])
         for name, value in model.values.items()
@@ -174,30 +140,7 @@ class Scope:
         contact: str = "",
         observed: Mapping[str, Any] | None = None,
     ) -> Scope:
-        """Return the scope of the present state of a run.
-
-        Parameters
-        ----------
-        model : Model
-            The simulated model.
-        program : Program
-            Its generated program.
-        t : float
-            Time, s.
-        y : list of float, shape (m,)
-            State.
-        mode : sequence of int, shape (modes,)
-            Modes of the elements and the surfaces.
-        contact : str
-            The contact, of a system with several.
-        observed : mapping of str to float or list of float, optional
-            What is observed of this state, by name, if it has been computed.
-
-        Returns
-        -------
-        Scope
-            With numbers as values.
-        """
+        """Return the scope of the present state of a run."""
         layout = program.layout
         places = layout.contact(contact)
         if observed is None:
@@ -207,20 +150,7 @@ class Scope:
 
     @classmethod
     def at(cls, trace: Trace, row: int) -> Scope:
-        """Return the scope of one row of a finished run.
-
-        Parameters
-        ----------
-        trace : Trace
-            The run.
-        row : int
-            Row index; negative counts from the end.
-
-        Returns
-        -------
-        Scope
-            With numbers as values, identical to those seen by the run.
-        """
+        """Return the scope of one row of a finished run."""
         seen = {
             trace.places.velocity: float(trace.v[row]),
             "F": float(trace.F[row]),
@@ -235,18 +165,7 @@ class Scope:
 
     @classmethod
     def over(cls, trace: Trace) -> Scope:
-        """Return the scope of all rows of a finished run.
-
-        Parameters
-        ----------
-        trace : Trace
-            The run.
-
-        Returns
-        -------
-        Scope
-            With arrays as values, whose last axis is the row.
-        """
+        """Return the scope of all rows of a finished run."""
         seen = {"F": trace.F, "x": trace.x, "s": trace.s.T, FORCE: trace.F_elements.T}
         for name in (*trace.model.chart.velocities, *trace.model.chart.force_names):
             seen[name] = trace.seen[trace.places.of(name)]
@@ -298,18 +217,7 @@ class Scope:
         return [names[mode] for mode in active]
 
     def each(self, name: str) -> Any:
-        """Return a quantity of all elements.
-
-        Parameters
-        ----------
-        name : str
-            A variable of the chart, or one of `seen`.
-
-        Returns
-        -------
-        sequence of float, or ndarray, shape (n, rows)
-            One per element.
-        """
+        """Return a quantity of all elements."""
         bank = self.places
         if name in bank.variables:
             return self.y[self.layout.y.block(bank.of(name))]
@@ -317,18 +225,7 @@ class Scope:
 
     # ------------------------------------------------------------------ by name
     def guards(self, element: int) -> dict[str, Any]:
-        """Return the values of the names allowed in guards of an element.
-
-        Parameters
-        ----------
-        element : int
-            Index, from 0.
-
-        Returns
-        -------
-        dict of str to float, or to ndarray, shape (rows,)
-            Values by name.
-        """
+        """Return the values of the names allowed in guards of an element."""
         values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
         for name, value in self.read.items():
             values[name] = value[element] if isinstance(value, list) else value
@@ -337,14 +234,7 @@ class Scope:
         return values | parameter_values(self.model, element)
 
     def watches(self) -> dict[str, Any]:
-        """Return the values of the names allowed in watches, and the states.
-
-        Returns
-        -------
-        dict of str to float, or to ndarray, shape (rows,)
-            Values by name. State names are under ``state(1)``, for a single element also under
-            ``state(0)``.
-        """
+        """Return the values of the names allowed in watches, and the states."""
         values = self._shared() | self._single() | self._numbered_states()
         if self.model.stribeck is not None:
             values["s"] = self.curve
@@ -354,19 +244,7 @@ class Scope:
         return values
 
     def invariants(self, *, states: bool = False) -> dict[str, Any]:
-        """Return the values of the names allowed in invariants; only for scopes over arrays.
-
-        Parameters
-        ----------
-        states : bool
-            Whether to add the states.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (n, rows), (n, 1), (rows,) or ()
-            Values by name. State names are under ``state(1)``, those of each element under
-            ``state(0)``.
-        """
+        """Return the values of the names allowed in invariants; only for scopes over arrays."""
         own = {name: self.each(name) for name in (*self.places.variables, *_curve(self.model))}
         for name, value in self.model.values.items():
             own[name] = value if np.ndim(value) == 0 else np.asarray(value)[:, np.newaxis]
@@ -405,20 +283,7 @@ def _read(
 
 
 def guard_columns(trace: Trace, names: Iterable[str]) -> dict[str, Any]:
-    """Return the values of names in guards at all rows.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run of one contact.
-    names : iterable of str
-        Of its guards: also inputs, named expressions, forces and accelerations.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n, rows), (n, 1), (rows,) or ()
-        Values by name; NaN at a row where they cannot be computed.
-    """
+    """Return the values of names in guards at all rows."""
     wanted, columns = set(names), Scope.over(trace).invariants()
     found = {name: columns[name] for name in wanted & columns.keys()}
     program, rows, places = trace.program, trace.rows, trace.places
@@ -465,17 +330,7 @@ class GuardValues:
     def put(
         self, t: float, y: Sequence[float], shown: Sequence[float], into: Sequence[dict[str, Any]]
     ) -> None:
-        """Store the current values in one mapping per element.
-
-        Parameters
-        ----------
-        t : float
-            Time, s.
-        y, shown : sequence of float
-            State vector, and what is shown of it, by place.
-        into : sequence of dict, length n
-            Modified in place.
-        """
+        """Store the current values in one mapping per element."""
         rows = zip(into, self._places, self._variables, strict=True)
         for values, places, variables in rows:
             values["t"] = t

@@ -31,16 +31,6 @@ __all__ = ["SystemScope", "given_values", "owners_of", "system_names"]
 def system_names(system: System) -> list[str]:
     """Return the names allowed in conditions and watches over the run of a system.
 
-    Parameters
-    ----------
-    system : System
-        What runs.
-
-    Returns
-    -------
-    list of str
-        Without ``gear.state(1)``, which is built into the expression language.
-
     Examples
     --------
     >>> from gms_fsm import Body, Contact, System
@@ -65,18 +55,7 @@ def _names_of(contact: Contact) -> list[str]:
 
 
 def owners_of(system: System) -> dict[str, Owner]:
-    """Return whose states conditions may name: those of each contact's elements.
-
-    Parameters
-    ----------
-    system : System
-        What runs.
-
-    Returns
-    -------
-    dict of str to Owner
-        By contact; elements are counted over all contacts, like machines.
-    """
+    """Return whose states conditions may name: those of each contact's elements."""
     found, first = {}, 0
     for contact in system.contacts:
         states = tuple(state.name for state in contact.chart.states)
@@ -86,20 +65,7 @@ def owners_of(system: System) -> dict[str, Owner]:
 
 
 def given_values(system: System, t: float) -> dict[str, float]:
-    """Return the values at a time of what is given: signals, and velocities of driven bodies.
-
-    Parameters
-    ----------
-    system : System
-        What runs.
-    t : float
-        s.
-
-    Returns
-    -------
-    dict of str to float
-        By name; NaN where one cannot be computed.
-    """
+    """Return the values at a time of what is given: signals, and velocities of driven bodies."""
     wanted = {*system.signals, *(body.v for body in system.bodies if body.driven)}
     values: dict[str, float] = {"t": t, **system.numbers}
     found: dict[str, float] = {}
@@ -161,26 +127,7 @@ class SystemScope:
     def of(
         cls, system: System, program: Program, t: float, y: list[float], mode: Sequence[int]
     ) -> SystemScope:
-        """Return the scope of the present state of a run.
-
-        Parameters
-        ----------
-        system : System
-            What runs.
-        program : Program
-            Its generated program.
-        t : float
-            Time, s.
-        y : list of float, shape (m,)
-            State.
-        mode : sequence of int, shape (modes,)
-            Modes of the elements and the surfaces.
-
-        Returns
-        -------
-        SystemScope
-            With numbers as values.
-        """
+        """Return the scope of the present state of a run."""
         observed = program.layout.observed.named(observe(program, t, y, mode))
         contacts = {
             each.name: Scope.of(each, program, t, y, mode, each.name, observed)
@@ -190,18 +137,7 @@ class SystemScope:
 
     @classmethod
     def over(cls, trace: Trace) -> SystemScope:
-        """Return the scope of all rows of a finished run.
-
-        Parameters
-        ----------
-        trace : Trace
-            The run of a system.
-
-        Returns
-        -------
-        SystemScope
-            With arrays as values, whose last axis is the row.
-        """
+        """Return the scope of all rows of a finished run."""
         system, rows = trace.what.system, trace.rows
         at_rows = [given_values(system, t) for t in rows.t.tolist()]
         given = {name: np.array([at[name] for at in at_rows]) for name in (at_rows or [{}])[0]}
@@ -209,18 +145,7 @@ class SystemScope:
         return cls(system, trace.program.layout, rows.t, rows.y.T, given, contacts)
 
     def value(self, name: str) -> Any:
-        """Return the value of a name of the system, such as the position of a body.
-
-        Parameters
-        ----------
-        name : str
-            Of ``system.names``.
-
-        Returns
-        -------
-        float or ndarray, shape (rows,)
-            Its value.
-        """
+        """Return the value of a name of the system, such as the position of a body."""
         if name == "t":
             return self.t
         if name in self.system.numbers:
@@ -230,13 +155,7 @@ class SystemScope:
         return self.y[self.layout.y.index(name)]
 
     def watches(self) -> dict[str, Any]:
-        """Return the values of all names allowed in conditions, and the states.
-
-        Returns
-        -------
-        dict of str to float, or to ndarray, shape (rows,)
-            Values by name. Names of states are under ``state(1)``, counted over all contacts.
-        """
+        """Return the values of all names allowed in conditions, and the states."""
         values: dict[str, Any] = {}
         for bank in self.layout.banks:
             own = self._of_contact(bank)

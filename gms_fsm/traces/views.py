@@ -64,38 +64,14 @@ def driven_velocity(trace: Trace, body: Body) -> FloatArray:
 
 
 def steps_of(trace: Trace) -> NDArray[np.int64]:
-    """Return the micro-step of the row that each entry of the log made.
-
-    Parameters
-    ----------
-    trace : Trace
-        A run, or the run of one contact.
-
-    Returns
-    -------
-    ndarray of int, shape (transitions,)
-        Micro-steps count the firings of all contacts at one time.
-    """
+    """Return the micro-step of the row that each entry of the log made."""
     log = trace.firings if trace.every is None else trace.every
     counted: NDArray[np.int64] = np.arange(len(log)) - np.searchsorted(log.t, log.t) + 1
     return counted if trace.every is None else counted[log.within(trace.places.name)]
 
 
 def picked(trace: Trace, keep: NDArray[Any] | slice) -> Trace:
-    """Return some of the rows, with what was observed there, and the whole log.
-
-    Parameters
-    ----------
-    trace : Trace
-        A run.
-    keep : ndarray of int or bool, or slice
-        Which rows.
-
-    Returns
-    -------
-    Trace
-        Nothing is computed again.
-    """
+    """Return some of the rows, with what was observed there, and the whole log."""
     rows = trace.rows.at(keep)
     stored = {name: column[keep] for name, column in trace.stored.items()}
     part = replace(trace, rows=rows, stops=rows, stored=stored)

@@ -91,16 +91,6 @@ class ChartSubject:
 def subject_of(chart: Chart) -> ChartSubject:
     """Return a chart as the checks read it.
 
-    Parameters
-    ----------
-    chart : Chart
-        The chart.
-
-    Returns
-    -------
-    Subject
-        Over its own names, H and W.
-
     Examples
     --------
     >>> from gms_fsm.charts import CHARTS

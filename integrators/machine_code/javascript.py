@@ -68,18 +68,7 @@ _UNARY, _WHOLE = 10, 11
 
 
 def tables_of(module: Module) -> tuple[Mapping[str, int], list[float]]:
-    """Return the words at which tables begin, and all words up to the end of the last one.
-
-    Parameters
-    ----------
-    module : Module
-        From `integrators.machine_code.front_end.translate.Translator`.
-
-    Returns
-    -------
-    (mapping, list of float)
-        By name; and what must stand in the memory before the block.
-    """
+    """Return the words at which tables begin, and all words up to the end of the last one."""
     places, words = dict[str, int](), [0.0] * FIRST
     for table in module.tables:
         places[table.name] = len(words)
@@ -89,22 +78,6 @@ def tables_of(module: Module) -> tuple[Mapping[str, int], list[float]]:
 
 def javascript_text(module: Module) -> str:
     """Return a module as JavaScript: functions of words in ``F`` and bytes in ``B``.
-
-    Parameters
-    ----------
-    module : Module
-        From `integrators.machine_code.front_end.translate.Translator`. Functions of the host
-        program cannot be called.
-
-    Returns
-    -------
-    str
-        The text, to stand where ``F`` and ``B`` are defined. It defines the entries by name.
-
-    Raises
-    ------
-    ValueError
-        If the module calls a function of the host program.
 
     Examples
     --------
@@ -283,16 +256,6 @@ class _Script(CWriter):
 
 def library_text(functions: Mapping[str, Callable[..., float]]) -> str:
     r"""Return functions of floats as one JavaScript expression: an object with them by name.
-
-    Parameters
-    ----------
-    functions : mapping of str to callable
-        Of the subset, such as those of `integrators.elementary`.
-
-    Returns
-    -------
-    str
-        It needs nothing around it.
 
     Examples
     --------

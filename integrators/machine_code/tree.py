@@ -179,16 +179,6 @@ Expr = Const | Local | Global | Op | Logic | Choose | Load | AddressOf | Invoke 
 def may_write(expr: Expr) -> bool:
     """Return whether an expression calls a function of the module that is given memory.
 
-    Parameters
-    ----------
-    expr : Expr
-        Any expression.
-
-    Returns
-    -------
-    bool
-        If False, no part of it changes what others read.
-
     Examples
     --------
     >>> may_write(Invoke("f", "sin", (Local("f", "x"),)))
@@ -200,16 +190,6 @@ def may_write(expr: Expr) -> bool:
 
 def parts_of(expr: Expr) -> Iterator[Expr]:
     """Yield an expression and all its parts, from left to right.
-
-    Parameters
-    ----------
-    expr : Expr
-        Any expression.
-
-    Yields
-    ------
-    Expr
-        The expression itself first.
 
     Examples
     --------
@@ -236,16 +216,6 @@ def parts_of(expr: Expr) -> Iterator[Expr]:
 
 def locals_in(expr: Expr) -> Iterator[Local]:
     """Yield the locals that an expression reads.
-
-    Parameters
-    ----------
-    expr : Expr
-        Any expression.
-
-    Yields
-    ------
-    Local
-        From left to right.
 
     Examples
     --------

@@ -63,29 +63,7 @@ def record(
     most_steps: int,
     pause: bool,
 ) -> int:
-    """Run and write all events into columns, until they are full or the run has ended.
-
-    Parameters
-    ----------
-    functions, machines
-        The system. ``observe(t, y, mode, signs, p, seen)`` fills the observed values of a state.
-    b : Buffers
-        The state of the run, changed in place.
-    log : LogColumns
-        Filled; if it has room in ``stops_t``, stops are stored too.
-    recorded : Recorded
-        Where the numbers are that the log stores.
-    most_steps : int
-        Return after about this many steps or events.
-    pause : bool
-        Return before each firing as well.
-
-    Returns
-    -------
-    int
-        ROWS if a column is full or the steps are used up, FIRING, DONE or an error as in
-        `run_to_event`.
-    """
+    """Run and write all events into columns, until they are full or the run has ended."""
     observe, now = machines.observe, b.now
     memory, out = b.memory, b.out
     seen_at = float("nan")  # the time at which log.seen was computed

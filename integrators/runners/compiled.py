@@ -265,25 +265,7 @@ class CompiledFunction:
         return value
 
     def __call__(self, block: MemoryBlock, *integers: int) -> int:
-        """Call the machine code; this releases the GIL.
-
-        Parameters
-        ----------
-        block : MemoryBlock
-            Up to date.
-        *integers : int
-            Further arguments.
-
-        Returns
-        -------
-        int
-            Its result.
-
-        Raises
-        ------
-        Exception
-            What a function of the host program raised; the block is as it was then.
-        """
+        """Call the machine code; this releases the GIL."""
         now = self._now
         outer, now.call = getattr(now, "call", None), _Call(block)
         try:

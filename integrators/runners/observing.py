@@ -27,34 +27,7 @@ def observe_rows(
     start: int,
     count: int,
 ) -> int:
-    """Observe many rows.
-
-    Parameters
-    ----------
-    functions : Functions
-        The system.
-    observe : callable
-        ``observe(t, y, mode, signs, p, out)``.
-    held : list of float
-        Scratch space: held signs.
-    sliding : Sliding
-        With scratch space of its own.
-    t, y, mode : list of float, of list of float and of list of int
-        The rows.
-    seen : list of float
-        Scratch space: the observed values.
-    table : list of list of float
-        Filled with the observed values of each row, from one on.
-    start : int
-        The place of the first observed value that is kept.
-    count : int
-        Number of rows.
-
-    Returns
-    -------
-    int
-        Their number.
-    """
+    """Observe many rows."""
     on = Held(functions, held, sliding)
     for row in range(count):
         observe_row(observe, on, t[row], y[row], mode[row], seen)
@@ -72,17 +45,7 @@ def observe_rows(
 def observe_row(
     observe: Callable[..., Any], on: Held, t: float, y: Vector, mode: list[int], out: Vector
 ) -> None:
-    """Observe one row: with live signs, but with sigmas on the surfaces that it slides on.
-
-    Parameters
-    ----------
-    observe, out
-        As in `integrators.sliding.look`.
-    on : Held
-        The system; what it slides on is set by the row.
-    t, y, mode : float, list of float and list of int
-        The row.
-    """
+    """Observe one row: with live signs, but with sigmas on the surfaces that it slides on."""
     sliding = on.sliding
     if len(sliding.sigma) > 0:
         n, slid = len(mode) - len(sliding.flags), 0
@@ -97,22 +60,7 @@ def observe_row(
 
 
 def is_turn(sliding: Sliding, t: Vector, mode: list[list[int]], row: int) -> bool:
-    """Return whether a slide begins or ends between a row and the next one, at the same time.
-
-    Parameters
-    ----------
-    sliding : Sliding
-        Of the system.
-    t, mode : list of float, and of list of int
-        The rows.
-    row : int
-        Not the last one.
-
-    Returns
-    -------
-    bool
-        True if so.
-    """
+    """Return whether a slide begins or ends between a row and the next one, at the same time."""
     if t[row + 1] != t[row]:
         return False
     n, turns = len(mode[row]) - len(sliding.flags), False
@@ -140,15 +88,6 @@ def observe_beside(
     is not the held one: before a slide it is that of the preceding arc, after it that of the
     following arc. Where an edge fires at the same time, the row belongs to no arc, and is what the
     log has for that edge.
-
-    Parameters
-    ----------
-    observe, on, t, y, mode, count, seen, table, start
-        As in `observe_rows`.
-    row : int
-        The row.
-    side : int
-        1 if the slide begins after it, -1 if one has ended before it.
     """
     sliding, other = on.sliding, row - side
     if other < 0 or other >= count or t[other] == t[row]:

@@ -22,18 +22,6 @@ FREE = 100_000  # calls of about a microsecond before a function is compiled
 def scalar(function: Callable[..., float], count: int) -> Callable[..., float]:
     """Return a function as machine code; the same function if llvmlite is not installed.
 
-    Parameters
-    ----------
-    function : callable
-        Of `integrators.elementary`.
-    count : int
-        Number of its arguments.
-
-    Returns
-    -------
-    callable
-        Takes floats.
-
     Examples
     --------
     >>> from integrators.elementary import exp
@@ -52,18 +40,6 @@ def scalar(function: Callable[..., float], count: int) -> Callable[..., float]:
 
 def each(function: Callable[..., float], *arguments: Any) -> Any:
     """Return a function of each entry of some arrays.
-
-    Parameters
-    ----------
-    function : callable
-        Of `integrators.elementary`.
-    *arguments : array_like
-        Floats; they are broadcast.
-
-    Returns
-    -------
-    ndarray or float
-        Of their common shape.
 
     Examples
     --------

@@ -18,18 +18,7 @@ CURSOR = ("row", "next_time", "next_knot", "steps")
 
 
 def state_of(b: Buffers) -> dict[str, Any]:
-    """Return what makes up a run's state: numbers, and the lists (or arrays) themselves.
-
-    Parameters
-    ----------
-    b : Buffers
-        The buffers of a run between two events.
-
-    Returns
-    -------
-    dict
-        By name; to resume bit for bit, give copies to `put_state`.
-    """
+    """Return what makes up a run's state: numbers, and the lists (or arrays) themselves."""
     now, memory, w, s = b.now, b.memory, b.relations, b.sliding
     return {
         "clock": numbers_in(now, CLOCK),
@@ -48,15 +37,7 @@ def state_of(b: Buffers) -> dict[str, Any]:
 
 
 def put_state(b: Buffers, state: Mapping[str, Sequence[Any]]) -> None:
-    """Return to a state, or to parts of it.
-
-    Parameters
-    ----------
-    b : Buffers
-        Created in the same way as those of the state.
-    state : mapping of str to sequence
-        Python numbers, by name as in `state_of`; other names are left out.
-    """
+    """Return to a state, or to parts of it."""
     for name, place in state_of(b).items():
         if name in state:
             match name:

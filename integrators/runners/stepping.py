@@ -83,22 +83,7 @@ class Sample:
 
 
 def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample) -> int:
-    """Advance to the end of a sample.
-
-    Parameters
-    ----------
-    functions, machines
-        The system; its inputs are the corner tables among its parameters.
-    b : Buffers
-        The state, changed in place. The plan has one knot and no end.
-    sample : Sample
-        What is given and found. A sample that has no length shows the force at its end.
-
-    Returns
-    -------
-    int
-        0 at its end, FULL_LOG, or an error as in `run_to_event`.
-    """
+    """Advance to the end of a sample."""
     now, memory, observe, end = b.now, b.memory, machines.observe, sample.end
     on = Held(functions, now.held, b.sliding)
     motion = ArcMotion(flow_on, margins_on, on, follow_on)
@@ -134,15 +119,7 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
 
 
 def next_tick(plan: RunPlan, clocks: Clocks) -> None:
-    """Put a further tick into the plan, which has two: the last one, and the next one.
-
-    Parameters
-    ----------
-    plan : RunPlan
-        Its jumps are these ticks.
-    clocks : Clocks
-        What ticks, at least one.
-    """
+    """Put a further tick into the plan, which has two: the last one, and the next one."""
     plan.jumps[0] = plan.jumps[1]
     plan.ticks[0] = plan.ticks[1]
     t = INFINITY
@@ -167,15 +144,7 @@ def _due(clocks: Clocks, i: int) -> float:
 
 
 def restart(b: Buffers, clocks: Clocks) -> None:
-    """Let all clocks begin at the time in the buffers, and put the first two ticks into the plan.
-
-    Parameters
-    ----------
-    b : Buffers
-        Their plan has room for two ticks, or for none if nothing ticks.
-    clocks : Clocks
-        What ticks.
-    """
+    """Let all clocks begin at the time in the buffers; put the first two ticks into the plan."""
     t, plan = b.now.t, b.plan
     clocks.begin, clocks.units = t, 0.0
     units = t * clocks.per_second

@@ -64,15 +64,6 @@ def release(on: Held, now: Now, w: Watched, k: int, side: float) -> None:
     """Leave a machine's surface to one side: y moves there by as little as is needed to tell.
 
     The edge to the mode of that side is then enabled, and the one back is not.
-
-    Parameters
-    ----------
-    on, now, w
-        As in `seize`.
-    k : int
-        The surface.
-    side : float
-        Positive or negative.
     """
     t, y, mode = time_of(now), now.y, now.mode
     g, p = on.sliding.upper, on.functions.p
@@ -99,18 +90,7 @@ def release(on: Held, now: Now, w: Watched, k: int, side: float) -> None:
 
 
 def entangled(on: Held, t: float, y: Vector, mode: list[int]) -> bool:
-    """Return whether machines slide on surfaces that bear on each other, or on that of a sign.
-
-    Parameters
-    ----------
-    on, t, y, mode
-        As for a slope.
-
-    Returns
-    -------
-    bool
-        Then the motion is not unique.
-    """
+    """Return whether machines slide on surfaces that bear on each other, or on that of a sign."""
     which, machine = on.sliding.which, on.sliding.surfaces.machine
     found = False
     for r in range(on.sliding.count):
@@ -176,20 +156,6 @@ def seize(on: Held, now: Now, w: Watched) -> bool:
     They are candidates that were slid on, have just been reached, or are met exactly. One that does
     not attract, or whose sigma lies beyond 1, is released again: its sign is that of the side to
     which the flow leads.
-
-    Parameters
-    ----------
-    on : Held
-        The system, and what it slides on; the held signs of candidates are set.
-    now : Now
-        The state of the run; y is moved onto the surfaces, which it left only by rounding.
-    w : Watched
-        Armed, with ``w.start`` filled with margins.
-
-    Returns
-    -------
-    bool
-        Whether the set of sliding surfaces has changed.
     """
     t, y, mode = time_of(now), now.y, now.mode
     held, sliding, surfaces = on.held, on.sliding, on.sliding.surfaces

@@ -40,21 +40,7 @@ def arrange(
     *,
     bare: bool,
 ) -> None:
-    """Draw elements into a graph.
-
-    Parameters
-    ----------
-    graph : graphviz.Digraph
-        Empty.
-    sheet : ChartSheet
-        A fitted sheet.
-    numbers : sequence of int
-        The elements, from 0.
-    values, below : sequence of Row
-        Written below the title of each region, and below the picture.
-    bare : bool
-        Draw the only element without its region.
-    """
+    """Draw elements into a graph."""
     alike = sheet.tally is None and not sheet.live
     shared = alike and len(numbers) > (1 if sheet.form == "matrix" else MOST_ALIKE)
     shown = [numbers[0]] if shared else list(numbers)

@@ -70,38 +70,14 @@ class CellWriter:
     scale: float = 1.0
 
     def text(self, rows: Sequence[Row]) -> Label:
-        """Set lines of text below one another.
-
-        Parameters
-        ----------
-        rows : sequence of Row
-            The lines.
-
-        Returns
-        -------
-        Label
-            A table without border.
-        """
+        """Set lines of text below one another."""
         heights = [self._height(row) for row in rows]
         wide = max(self._width(row) for row in rows) + 2
         body = "".join(map(self._row, rows, heights, [wide] * len(rows)))
         return Label(f"<{_table('', wide, sum(heights), body)}>", wide, sum(heights))
 
     def guard(self, rows: Sequence[Row], marked: bool = False) -> Label:
-        """Set the label of an edge: the priority in a column of its own, then the lines.
-
-        Parameters
-        ----------
-        rows : sequence of Row
-            The first piece of each is the priority, or a blank.
-        marked : bool
-            Draw a frame.
-
-        Returns
-        -------
-        Label
-            A table on the colour of the paper.
-        """
+        """Set the label of an edge: the priority in a column of its own, then the lines."""
         first = max(self._width(row[:1]) for row in rows) + 2
         heights = [self._height(row) for row in rows]
         wide = first + max(self._width(row[1:]) for row in rows) + (6 if marked else 2)
@@ -118,22 +94,7 @@ class CellWriter:
     def state(
         self, rows: Sequence[Row], marked: bool = False, least: tuple[float, float] = (0, 0)
     ) -> Label:
-        """Set the box of a state: its title, a rule, the other rows.
-
-        Parameters
-        ----------
-        rows : sequence of Row
-            The title first.
-        marked : bool
-            Draw the box thick.
-        least : (float, float)
-            Least width and height.
-
-        Returns
-        -------
-        Label
-            A table with round corners.
-        """
+        """Set the box of a state: its title, a rule, the other rows."""
         heights = [self._height(row) for row in rows]
         wide = max(*map(self._width, rows), 36) + 2 * SIDE + 2
         ink, border = self.colours.ink, 3 if marked else 1

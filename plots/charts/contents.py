@@ -21,18 +21,6 @@ def state_texts(write: ChartWriter, state: State) -> Texts:
     Not shown are a variable that flows in no state and the timer behind ``after(T)``; nor, where
     there are three states or more, a force that is the same in all of them: `chart_texts` has it.
 
-    Parameters
-    ----------
-    write : ChartWriter
-        Its chart and notation.
-    state : State
-        A state of the chart.
-
-    Returns
-    -------
-    list of (str, list of str)
-        ``entry``, ``during``, ``force``, ``locked`` and ``exit``, each with its texts.
-
     Examples
     --------
     >>> from gms_fsm.charts import GMS_ELEMENT
@@ -59,19 +47,7 @@ def state_texts(write: ChartWriter, state: State) -> Texts:
 
 
 def chart_texts(write: ChartWriter) -> Texts:
-    """Return what a picture shows of the whole chart.
-
-    Parameters
-    ----------
-    write : ChartWriter
-        Its chart and notation.
-
-    Returns
-    -------
-    list of (str, list of str)
-        Named expressions; the force of an element, if it is the same in three states or more; the
-        force of the contact, if it is not the sum over the elements.
-    """
+    """Return what a picture shows of the whole chart."""
     chart = write.chart
     shared = _forces(chart, chart.default_state) if _force_below(chart) else {}
     return [
@@ -102,16 +78,6 @@ def _forces(chart: Chart, state: State) -> dict[str, Value]:
 
 def chart_in_words(chart: Chart) -> str:
     """Return a chart as text for people: shown where no picture can be drawn.
-
-    Parameters
-    ----------
-    chart : Chart
-        The chart.
-
-    Returns
-    -------
-    str
-        Name, states with their contents, and the edges that leave them, by priority.
 
     Examples
     --------

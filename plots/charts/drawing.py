@@ -87,20 +87,7 @@ class Drawing:
 
 
 def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
-    """Return an element as states and arrows.
-
-    Parameters
-    ----------
-    sheet : ChartSheet
-        The chart and its options.
-    number : int
-        The element, from 0.
-
-    Returns
-    -------
-    Drawing
-        The drawing.
-    """
+    """Return an element as states and arrows."""
     chart, element, cells = sheet.chart, element_id(number), sheet.cells
     edges = [
         (edge, priority)
@@ -167,16 +154,6 @@ def _default_line(
 
 def thirds(a: Point, b: Point) -> tuple[Point, ...]:
     """Return the points that continue a Bezier curve straight from one point to another.
-
-    Parameters
-    ----------
-    a, b : (float, float)
-        The points.
-
-    Returns
-    -------
-    tuple of (float, float)
-        Two points between them, and the second one.
 
     Examples
     --------

@@ -101,16 +101,6 @@ _INDEX = re.compile(r"(?<!\w)([^\W_]+)_(\w*?[^\W_⁰¹²³⁴⁵⁶⁷⁸⁹])(?
 def with_indices(row: Row) -> Row:
     """Return a row in which the indices of names, such as the c of v_c, are pieces of their own.
 
-    Parameters
-    ----------
-    row : Row
-        Pieces of a formula.
-
-    Returns
-    -------
-    Row
-        The same text without the underscores of names.
-
     Examples
     --------
     >>> [(piece.text, piece.lowered) for piece in with_indices([Piece("v > v_c")])]
@@ -133,18 +123,6 @@ def wrapped(text: str, limit: int = LONGEST_LINE) -> list[str]:
 
     A line ends after ``&&``, ``||`` or a comma, or before a comparison or another operator; outside
     of brackets if possible, and never inside a name or a number. Further lines are indented.
-
-    Parameters
-    ----------
-    text : str
-        The text; its operators stand between spaces.
-    limit : int
-        Most characters of a line; only a longer name or number is on a longer one.
-
-    Returns
-    -------
-    list of str
-        The lines; none for an empty text.
 
     Examples
     --------
@@ -200,15 +178,7 @@ def printable(text: str) -> str:
 
 
 def warn_of_missing_glyphs(write: ChartWriter, note: str = "") -> None:
-    """Warn of characters that the font of charts cannot show, and say where they stand.
-
-    Parameters
-    ----------
-    write : ChartWriter
-        The chart and its notation.
-    note : str
-        Text below the picture.
-    """
+    """Warn of characters that the font of charts cannot show, and say where they stand."""
     chart = write.chart
     places = {"the note": note}
     for state in chart.states:
@@ -256,24 +226,7 @@ def part_id(element: str, kind: str, name: str) -> str:
 
 
 def edge_id(chart: Chart, element: str, kind: str, edge: Transition) -> str:
-    """Return the id of an edge or its guard; one that leaves several states has one per source.
-
-    Parameters
-    ----------
-    chart : Chart
-        The edge's chart.
-    element : str
-        Id of the element.
-    kind : {"edge", "guard"}
-        Which part.
-    edge : Transition
-        The edge, from one source.
-
-    Returns
-    -------
-    str
-        Such as ``element1-edge-arrest``, or ``element1-edge-arrest-from-slip``.
-    """
+    """Return the id of an edge or its guard; one that leaves several states has one per source."""
     alone = sum(each.name == edge.name for each in chart.transitions) == 1
     name = part_id(element, kind, edge.name)
     return name if alone else part_id(name, "from", edge.source)

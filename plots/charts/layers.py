@@ -83,20 +83,6 @@ class Laid:
 def layered(sizes: Sequence[Size], links: Sequence[LayerEdge], direction: str = "TB") -> Laid:
     """Lay out a chart.
 
-    Parameters
-    ----------
-    sizes : sequence of (float, float)
-        Width and height of each state; the first one is the default state.
-    links : sequence of LayerEdge
-        The edges; those of one state by priority.
-    direction : {"TB", "LR"}
-        Rows of states from top to bottom, or from left to right.
-
-    Returns
-    -------
-    Laid
-        The layout.
-
     Examples
     --------
     >>> laid = layered([(80, 40), (80, 40)], [LayerEdge(0, 1, (60, 20)), LayerEdge(1, 0, (60, 20))])

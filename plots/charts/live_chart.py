@@ -453,19 +453,7 @@ class ElementParts:
     def paint_edge(
         self, key: tuple[str, str], leaving: bool, marks: Marks | None, fired: str = ""
     ) -> None:
-        """Paint an edge, given its name and source.
-
-        Parameters
-        ----------
-        key : (str, str)
-            The edge, and the state that it leaves.
-        leaving : bool
-            Whether that state is active.
-        marks : tuple of bool or None
-            Truth values of the clauses; None for no marks.
-        fired : str
-            The colour of an edge just taken; empty for another edge.
-        """
+        """Paint an edge, given its name and source."""
         guard, texts, halves = self.edges[key]
         colour = fired or (self.colours.ink if leaving else self.colours.pale)
         classes = ["leaving" if leaving else "pale"] + ["fired"] * bool(fired)

@@ -23,20 +23,7 @@ HEAD = 8  # characters of a name above a column
 
 
 def matrix_drawing(sheet: ChartSheet, number: int) -> Drawing:
-    """Return an element as a matrix.
-
-    Parameters
-    ----------
-    sheet : ChartSheet
-        The chart and its options, with numbers for all guards.
-    number : int
-        The element, from 0.
-
-    Returns
-    -------
-    Drawing
-        The drawing.
-    """
+    """Return an element as a matrix."""
     chart, element, cells = sheet.chart, element_id(number), sheet.cells
     boxes, entries = _boxes(sheet, number), _entries(sheet, number)
     heads, wide = _heads(sheet, boxes, entries)

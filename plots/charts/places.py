@@ -23,28 +23,7 @@ def places(
     sides: Sequence[tuple[int, Sequence[int]]],
     states: int,
 ) -> list[float]:
-    """Return the place of each item, from a linear programme.
-
-    Parameters
-    ----------
-    wide : sequence of (float, float)
-        How far each item reaches to the left and right of its place.
-    apart : sequence of (int, int, float)
-        Two items and the least distance from the first to the second.
-    segments : sequence of (int, int)
-        Items joined by a line, which should be straight.
-    offset : mapping of (int, int) to float
-        For a segment that ends at a state, how far from its place.
-    sides : sequence of (int, sequence of int)
-        A state and the items that it should be in the middle of.
-    states : int
-        The first so many items are states.
-
-    Returns
-    -------
-    list of float
-        The places.
-    """
+    """Return the place of each item, from a linear programme."""
     from scipy.optimize import linprog
     from scipy.sparse import csr_array
 

@@ -166,23 +166,6 @@ def statechart(
 def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ...]:
     """Return the elements to draw, counted from 0.
 
-    Parameters
-    ----------
-    elements : int or sequence of int
-        How many, or which.
-    n : int, optional
-        How many exist.
-
-    Returns
-    -------
-    tuple of int
-        Their numbers, without repetition.
-
-    Raises
-    ------
-    ParameterError
-        If there are no such elements.
-
     Examples
     --------
     >>> chosen(3), chosen([2, 0])
@@ -221,27 +204,7 @@ def _whole(number: object, name: str) -> int:
 
 
 def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
-    """Return a value if it is allowed.
-
-    Parameters
-    ----------
-    name : str
-        Name of the option.
-    value : str
-        The given value.
-    allowed : iterable of str
-        The allowed values.
-
-    Returns
-    -------
-    str
-        The value.
-
-    Raises
-    ------
-    ParameterError
-        If it is not allowed.
-    """
+    """Return a value if it is allowed."""
     words = tuple(allowed)
     if value not in words:
         listed = " or ".join(repr(word) for word in words)
@@ -310,15 +273,7 @@ class ChartSheet:
         return CellWriter(self.colours, self.scale)
 
     def fitted(self) -> ChartSheet:
-        """Return the sheet as it is drawn: a graph or a matrix, with or without numbers for guards.
-
-        Returns
-        -------
-        Sheet
-            The first of these whose picture of an element is at most `WIDEST` wide: guards on the
-            edges; guards of more than `MOST_LINES` lines as numbers; all guards as numbers; these
-            with the smallest texts; a matrix.
-        """
+        """Return the sheet as it is drawn: a graph or a matrix, with guards or their numbers."""
         if self.scale < 1 or self.numbered:
             return self
         long, every = (self._numbers(all_of_them=flag) for flag in (False, True))
@@ -353,24 +308,7 @@ class ChartSheet:
     def graph(
         self, numbers: Sequence[int], *, bare: bool, values: Sequence[Row] = (), foot: str = ""
     ) -> DrawnGraph:
-        """Draw elements.
-
-        Parameters
-        ----------
-        numbers : sequence of int
-            Numbers of the elements, from 0.
-        bare : bool
-            Draw the only element without its region.
-        values : sequence of Row
-            Written below the title of each element.
-        foot : str
-            Written below the picture, line by line.
-
-        Returns
-        -------
-        graphviz.Digraph
-            The picture.
-        """
+        """Draw elements."""
         sheet = self.fitted()
         graph = ChartGraph(
             name=graphviz.escape(printable(self.chart.name)),
@@ -414,31 +352,11 @@ class ChartSheet:
 
     # ----------------------------------------------------------------- labels
     def definitions(self) -> list[Row]:
-        """Return what is written below the picture: what all states share.
-
-        Returns
-        -------
-        list of Row
-            Named expressions and the force of the contact (see
-            `plots.charts.contents.chart_texts`).
-        """
+        """Return what is written below the picture: what all states share."""
         return [self._indexed(row) for row in _rows(chart_texts(self.write))]
 
     def state_rows(self, state: State, number: int) -> list[Row]:
-        """Return the text in a state's box.
-
-        Parameters
-        ----------
-        state : State
-            The state.
-        number : int
-            The element, from 0.
-
-        Returns
-        -------
-        list of Row
-            The title first.
-        """
+        """Return the text in a state's box."""
         title = [Piece(state.name, "title")]
         if self.live:
             title.append(Piece(f" {DOT}", "dot"))
@@ -453,22 +371,7 @@ class ChartSheet:
         return rows
 
     def guard_rows(self, edge: Transition, priority: int, number: int) -> list[Row]:
-        """Return the text on an edge, clause by clause.
-
-        Parameters
-        ----------
-        edge : Transition
-            The edge.
-        priority : int
-            1 is checked first.
-        number : int
-            The element, from 0.
-
-        Returns
-        -------
-        list of Row
-            The first piece of each is the priority, or a blank.
-        """
+        """Return the text on an edge, clause by clause."""
         rows: list[Row] = [[Piece(edge.name, "word")]] if self.names else []
         rows += self._number_row(edge) if edge.name in self.numbered else self._guard_lines(edge)
         if self.tally is not None:

@@ -44,22 +44,7 @@ def low() -> bool:
 def sheet(
     wide: float, tall: float, *, layout: str | None = "constrained", grows: bool = False
 ) -> Figure:
-    """Return an empty figure.
-
-    Parameters
-    ----------
-    wide, tall : float
-        Inches on the screen. The preset decides the width, and may decide the height.
-    layout : str, optional
-        Layout engine of matplotlib.
-    grows : bool
-        Whether the figure may be higher than the preset, because it shows a list.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Return an empty figure."""
     used = current()
     high = inches(tall)
     if used.height is not None:
@@ -69,18 +54,7 @@ def sheet(
 
 
 def fitted(figure: Figure) -> Figure:
-    """Fold titles that are too wide, and thin out the numbers of axes, until nothing overlaps.
-
-    Parameters
-    ----------
-    figure : Figure
-        Complete; on the screen only titles beside a legend of several rows are moved.
-
-    Returns
-    -------
-    Figure
-        The same one.
-    """
+    """Fold titles that are too wide, and thin out the numbers of axes, until nothing overlaps."""
     with rc_context(settings()):
         if current() is not SCREEN:
             _fit(figure)
@@ -240,24 +214,7 @@ def _above_legend(ax: Axes, renderer: RendererBase) -> bool:
 def legend_below(
     figure: Figure, handles: Sequence[Artist], labels: Sequence[str], *, most: int = 10
 ) -> Legend:
-    """Add a legend below the panels, with as many columns as there is room for.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    handles : sequence of Artist
-        What.
-    labels : sequence of str
-        Their names.
-    most : int
-        Most columns.
-
-    Returns
-    -------
-    Legend
-        The legend.
-    """
+    """Add a legend below the panels, with as many columns as there is room for."""
     wide = figure.bbox.width - inches(0.1) * figure.dpi
 
     def legend(columns: int) -> Legend:

@@ -13,22 +13,7 @@ __all__ = ["picture"]
 
 
 def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
-    """Return a figure as bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-        What.
-    form : str
-        A format of matplotlib, for example ``"png"``.
-    metadata : mapping of str to None
-        Metadata that matplotlib omits, such as the date.
-
-    Returns
-    -------
-    bytes
-        Identical for identical traces.
-    """
+    """Return a figure as bytes."""
     buffer = BytesIO()
     # A journal's PDF has fonts that can be selected and edited: TrueType, Type 42.
     with rc_context(RC | {"pdf.fonttype": 42}):

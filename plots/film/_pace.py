@@ -79,24 +79,7 @@ class Pace:
 
 
 def paced(trace: Trace, window: Window, frames: int, fps: float) -> Pace:
-    """Choose what each frame shows.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-    window : (float, float)
-        s, the part that is shown.
-    frames : int
-        Their number, at least 2.
-    fps : float
-        Frames per second.
-
-    Returns
-    -------
-    Pace
-        With exactly so many frames.
-    """
+    """Choose what each frame shows."""
     begin, end = window
     log, steps = trace.transitions, steps_of(trace)
     entries = np.flatnonzero((log.t >= begin) & (log.t <= end))

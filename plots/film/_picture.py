@@ -177,18 +177,7 @@ class FilmPicture:
 
     # ------------------------------------------------------------------ the frame
     def picture(self, number: int) -> Image.Image:
-        """Return a frame.
-
-        Parameters
-        ----------
-        number : int
-            Counted from 0.
-
-        Returns
-        -------
-        Image
-            RGB.
-        """
+        """Return a frame."""
         frame = self.pace.frames[number]
         look = self.chart.look(frame)
         if look != self.look:

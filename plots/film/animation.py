@@ -55,46 +55,6 @@ def animate(
     bristles are contacts on the ground, with a spring each to the slider. Where the chart has no
     deflection, they are rods.
 
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-    path : str or Path
-        Its ending must be that of an animation format in `plots.output.formats.FORMATS`, such as
-        ``.gif``. Videos need the extra ``film``. The folder must exist; an existing file is
-        replaced atomically.
-    elements : int or sequence of int, optional
-        How many elements the chart shows, or which ones, counted from 0; by default all.
-    frames : int, optional
-        Number of frames, at least 2; by default 200. In a GIF, consecutive frames without a visible
-        difference become one frame that is shown longer.
-    seconds : float, optional
-        s, length of the film, instead of the number of frames.
-    t_start, t_end : float, optional
-        s, the part of the run that is shown; by default the whole run.
-    fps : float
-        Frames per second, at most 50.
-    notation : {"stateflow", "math"}
-        See `plots.charts.statechart.statechart`.
-    theme : {"light", "dark"}
-        Colours.
-    progress : callable, optional
-        Called as ``progress(done, frames)``.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    ParameterError
-        If an option is not allowed.
-    OutputError
-        If the folder cannot be written.
-    MissingExtraError
-        If there is no Graphviz, neither program nor package, or no PyAV for a video.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate

@@ -37,16 +37,6 @@ def gif(movie: Movie) -> bytes:
 
     All frames share one palette. Each stores only the pixels that differ from those before; a
     frame that does not differ makes the one before it last longer.
-
-    Parameters
-    ----------
-    movie : Movie
-        What.
-
-    Returns
-    -------
-    bytes
-        The file.
     """
     palette = _palette(movie)
     table = palette.tobytes().ljust(3 * 256, b"\0")
@@ -140,27 +130,7 @@ class _Nearest:
 
 # --------------------------------------------------------------------------- video
 def video(movie: Movie, form: str, codec: str) -> bytes:
-    """Return a film as a video that browsers play.
-
-    Parameters
-    ----------
-    movie : Movie
-        What; its size is even.
-    form : str
-        Container, by ffmpeg's name. The index of an MP4 is at its beginning.
-    codec : {"libx264", "libvpx-vp9"}
-        What compresses the frames, with 4:2:0 colours.
-
-    Returns
-    -------
-    bytes
-        The file.
-
-    Raises
-    ------
-    MissingExtraError
-        If PyAV is not installed.
-    """
+    """Return a film as a video that browsers play."""
     av = require("av", "film")
     with TemporaryDirectory() as folder:
         path = Path(folder, f"film.{form}")  # its index is moved to the front, which needs a file

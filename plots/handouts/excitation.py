@@ -41,27 +41,7 @@ class Excited:
 
 
 def excited(model: Model, velocity: str | None, t_end: float | None) -> Excited:
-    """Return a run for the hysteresis loop of a model.
-
-    Parameters
-    ----------
-    model : Model
-        The model.
-    velocity : str, optional
-        v(t), m/s; by default that of a sine of suitable amplitude.
-    t_end : float, optional
-        End of that motion, s.
-
-    Returns
-    -------
-    Excited
-        A model that locks, or sets the velocity, is pulled through a spring.
-
-    Raises
-    ------
-    ParameterError
-        If no amplitude was found.
-    """
+    """Return a run for the hysteresis loop of a model."""
     if velocity is not None and t_end is not None:
         return Excited(simulate(model, Prescribed(velocity), t_end), f"v(t) = {velocity} m/s")
     pulled = model.chart.locks or model.chart.sets_velocity

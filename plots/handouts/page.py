@@ -55,33 +55,6 @@ def handout(
 ) -> Path:
     """Write a model on one A4 page: chart, equations, parameters, and a hysteresis loop.
 
-    Parameters
-    ----------
-    model : Model
-        For example `GMS`, or a `ChartModel` of a chart of the zoo.
-    path : str or Path
-        Its ending selects the format, for example ``.pdf``.
-    velocity : str, optional
-        v(t) of the loop, m/s, an expression in t. By default x(t) is a sine, with an amplitude at
-        which the model slips. A model that locks is pulled through a spring instead.
-    t_end : float, optional
-        End of that motion, s; needed with `velocity`.
-
-    Returns
-    -------
-    Path
-        The file, written atomically.
-
-    Raises
-    ------
-    ParameterError
-        If the chart and the rest do not fit on one page, no suitable amplitude is found, or only
-        one of `velocity` and `t_end` is given.
-    OutputError
-        If the folder cannot be written.
-    MissingExtraError
-        If matplotlib or Graphviz is not installed.
-
     Examples
     --------
     >>> import tempfile

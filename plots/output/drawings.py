@@ -18,18 +18,6 @@ def image(picture: str | bytes, words: str) -> str:
 
     JupyterLab cuts off the right side of a wide SVG document that is not in HTML.
 
-    Parameters
-    ----------
-    picture : str or bytes
-        An SVG document, or PNG.
-    words : str
-        What it shows, for readers who do not see it.
-
-    Returns
-    -------
-    str
-        An ``img`` element.
-
     Examples
     --------
     >>> image("<svg></svg>", "nothing")

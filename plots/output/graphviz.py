@@ -22,27 +22,7 @@ PNG_DPI = "144"  # twice a screen point: crisp on dense displays
 
 
 def picture(graph: graphviz.Digraph, form: str) -> bytes:
-    """Return a picture as bytes.
-
-    Parameters
-    ----------
-    graph : graphviz.Digraph
-        What to draw.
-    form : str
-        See `drawn`.
-
-    Returns
-    -------
-    bytes
-        The picture.
-
-    Raises
-    ------
-    MissingExtraError
-        If there is no Graphviz, neither program nor package.
-    OutputError
-        If Graphviz cannot draw the graph.
-    """
+    """Return a picture as bytes."""
     found = drawn(graph, form)
     if found is None:
         raise missing("Graphviz", "render")
@@ -50,25 +30,7 @@ def picture(graph: graphviz.Digraph, form: str) -> bytes:
 
 
 def drawn(graph: graphviz.Digraph, form: str) -> bytes | None:
-    """Return a picture as bytes, or None if there is no Graphviz.
-
-    Parameters
-    ----------
-    graph : graphviz.Digraph
-        What to draw.
-    form : str
-        ``"svg"``, ``"png"``, ``"pdf"`` or another output format of Graphviz.
-
-    Returns
-    -------
-    bytes or None
-        The picture.
-
-    Raises
-    ------
-    OutputError
-        If Graphviz cannot draw the graph.
-    """
+    """Return a picture as bytes, or None if there is no Graphviz."""
     picture = _by_program(graph, form)
     if picture is None:
         picture = _by_package(graph, form)

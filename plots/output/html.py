@@ -17,22 +17,6 @@ def table(
 ) -> str:
     """Return a table; every text is escaped and cut.
 
-    Parameters
-    ----------
-    heads : sequence of str
-        Column heads.
-    rows : iterable of sequence
-        Cells: texts, integers and floats.
-    more : str, optional
-        A line below the table.
-    caption : str, optional
-        A line above it.
-
-    Returns
-    -------
-    str
-        HTML.
-
     Examples
     --------
     >>> table(["t [s]"], [[0.1]], more="and 2 more")

@@ -52,20 +52,7 @@ DPI = 200  # of a figure: two pixels per point of a screen, crisp on dense displ
 
 
 def shown(thing: object, form: Form) -> Any:
-    """Return an object in one of the forms that notebooks show.
-
-    Parameters
-    ----------
-    thing : object
-        The object.
-    form : {"html", "png", "svg"}
-        The form.
-
-    Returns
-    -------
-    str, bytes or None
-        None if the object has no such form, or what is needed for it is not installed.
-    """
+    """Return an object in one of the forms that notebooks show."""
     for kind in type(thing).__mro__:
         for key in (kind, f"{kind.__module__}.{kind.__qualname__}"):
             if (key, form) in FORMS:
@@ -74,18 +61,7 @@ def shown(thing: object, form: Form) -> Any:
 
 
 def figure_png(figure: Any) -> tuple[bytes, dict[str, int]]:
-    """Return a matplotlib figure for IPython.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-
-    Returns
-    -------
-    bytes, dict
-        PNG; its width and height on the page, in pixels.
-    """
+    """Return a matplotlib figure for IPython."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, bbox_inches="tight")
     png = buffer.getvalue()

@@ -23,16 +23,6 @@ PLAIN = " .,=+()"  # allowed besides letters and digits of any script
 def plantuml(chart: Chart) -> str:
     """Write a chart as a PlantUML state diagram.
 
-    Parameters
-    ----------
-    chart : Chart
-        The chart.
-
-    Returns
-    -------
-    str
-        The text, from ``@startuml`` to ``@enduml``.
-
     Examples
     --------
     >>> from gms_fsm.charts import LUGRE

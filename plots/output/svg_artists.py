@@ -64,24 +64,7 @@ class SvgPart:
 def drawn(
     ax: Axes, root: ElementTree.Element, *, scale: float = 1.0, animated: bool = False
 ) -> Iterator[SvgPart]:
-    """Make an artist for each part of the SVG, in its order.
-
-    Parameters
-    ----------
-    ax : Axes
-        Axes to draw on, in the coordinates of the SVG.
-    root : Element
-        The SVG.
-    scale : float
-        Size of the drawing, relative to that of the SVG; for texts and widths of lines.
-    animated : bool
-        Whether the artists are drawn one by one, and not with the figure.
-
-    Yields
-    ------
-    Part
-        As the tree is now.
-    """
+    """Make an artist for each part of the SVG, in its order."""
     (graph,) = root.findall("g")
     moved = re.search(r"translate\((\S+) (\S+)\)", graph.get("transform", ""))
     dx, dy = (float(n) for n in moved.groups()) if moved else (0.0, 0.0)

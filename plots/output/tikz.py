@@ -51,16 +51,6 @@ CODES: Mapping[str, str] = {
 def tikz(chart: Chart) -> str:
     r"""Write a chart as a TikZ picture.
 
-    Parameters
-    ----------
-    chart : Chart
-        The chart.
-
-    Returns
-    -------
-    str
-        From ``\begin{tikzpicture}`` to ``\end{tikzpicture}``, after a comment.
-
     Examples
     --------
     >>> from gms_fsm.charts import GMS_ELEMENT

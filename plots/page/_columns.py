@@ -23,16 +23,6 @@ def packed(values: ArrayLike) -> list[str]:
 
     Increasing numbers are stored as their differences; the type is then ``+u1`` and so on.
 
-    Parameters
-    ----------
-    values : array_like of int, shape (m,)
-        The numbers.
-
-    Returns
-    -------
-    list of str
-        Type and data.
-
     Examples
     --------
     >>> packed([0, 1, 300]), packed([3, 1])
@@ -67,20 +57,7 @@ class ColumnStore:
         self._known: dict[tuple[str, bytes], int] = {}
 
     def add(self, values: ArrayLike, *, exact: bool = True) -> int:
-        """Store a column and return its number.
-
-        Parameters
-        ----------
-        values : array_like, shape (rows,) or ()
-            The numbers.
-        exact : bool
-            Store all bits, not just seven digits.
-
-        Returns
-        -------
-        int
-            Its index in `columns`.
-        """
+        """Store a column and return its number."""
         kind = "f8" if exact else "f4"
         with np.errstate(over="ignore", under="ignore"):
             column = np.broadcast_to(np.asarray(values, dtype=f"<{kind}"), self._instants.shape)

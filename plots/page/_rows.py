@@ -59,25 +59,7 @@ class PageRows:
 
 
 def page_rows(trace: Trace, window: tuple[float, float] | None = None) -> PageRows:
-    """Return the rows that a page shows.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-    window : (float, float), optional
-        Time interval, s; by default the whole run.
-
-    Returns
-    -------
-    PageRows
-        The rows, with their numbers in the trace.
-
-    Raises
-    ------
-    ParameterError
-        If there are more transitions than a page can hold.
-    """
+    """Return the rows that a page shows."""
     found = _with_microsteps(trace)
     if window is not None:
         t = found.trace.t

@@ -37,22 +37,7 @@ FORCE = "F"  # names of forces begin like this; they are shown, not read by guar
 
 
 def stored_run(page: PageRows, charts: Sequence[int], reports: Sequence[Report]) -> dict[str, Any]:
-    """Return the data of a run.
-
-    Parameters
-    ----------
-    page : PageRows
-        The rows to show.
-    charts : sequence of int
-        Number of the picture of each contact's chart.
-    reports : sequence of Report
-        Their counterexamples are pinned in the planes of their charts.
-
-    Returns
-    -------
-    dict
-        Data for JSON.
-    """
+    """Return the data of a run."""
     trace = page.trace
     instants = np.cumsum(np.diff(trace.t, prepend=trace.t[0]) > 0, dtype=np.int64)
     pool = ColumnStore(instants)

@@ -34,18 +34,6 @@ Stored = dict[str, Value]  # by name, such as "#0"
 def tree_of(tree: Node, stored: Stored | None = None) -> Any:
     """Return a tree as data for the page.
 
-    Parameters
-    ----------
-    tree : Value or Condition
-        The tree.
-    stored : dict of str to Value, optional
-        Gets what is to be stored in columns, by name; by default nothing is.
-
-    Returns
-    -------
-    float, str or list
-        Data for JSON.
-
     Examples
     --------
     >>> from gms_fsm.language import parse_condition

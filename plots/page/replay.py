@@ -120,26 +120,7 @@ class Replay:
         )
 
     def save(self, path: str | Path) -> Path:
-        """Write the page to a file.
-
-        Parameters
-        ----------
-        path : str or Path
-            Its ending must be that of a page format in `plots.output.formats.FORMATS`, such as
-            ``.html``.
-
-        Returns
-        -------
-        Path
-            The file, written atomically.
-
-        Raises
-        ------
-        ParameterError
-            If the file ending is not supported.
-        OutputError
-            If the folder cannot be written.
-        """
+        """Write the page to a file."""
         return formats.save(self, path, "page")
 
 
@@ -242,25 +223,7 @@ def replay_html(
     window: tuple[float, float] | None = None,
     checks: Report | Sequence[Report] = (),
 ) -> str:
-    """Return a replay page as text.
-
-    Parameters
-    ----------
-    trace, other, title, names, window, checks
-        See `replay`.
-
-    Returns
-    -------
-    str
-        HTML.
-
-    Raises
-    ------
-    ParameterError
-        See `replay`.
-    MissingExtraError
-        If uPlot is not installed.
-    """
+    """Return a replay page as text."""
     traces = [trace] if other is None else [trace, other]
     stored = page_data(traces, title=title, names=names, window=window, checks=checks)
     return page_html(*stored)
@@ -275,27 +238,7 @@ def page_data(
     checks: Report | Sequence[Report] = (),
     draw: Callable[[Chart, int], str] = chart_svg,
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return what a page shows: the data of one or two runs, and pictures of their charts.
-
-    Parameters
-    ----------
-    traces : sequence of Trace
-        One run, or two.
-    title, names, window, checks
-        See `replay`.
-    draw : callable, optional
-        Draws the chart of a number of elements, as `plots.page.chart.chart_svg` does.
-
-    Returns
-    -------
-    (dict, list of str)
-        Data for JSON, and SVG texts, to which the data refer by number.
-
-    Raises
-    ------
-    ParameterError
-        See `replay`.
-    """
+    """Return what a page shows: the data of one or two runs, and pictures of their charts."""
     for each in traces:
         checked_kind("trace", each, Trace, "a Trace, from simulate(...) or Trace.load(path)")
         window_of(each, window)
@@ -333,25 +276,7 @@ def page_data(
 
 
 def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
-    """Return a page that shows data from `page_data`.
-
-    Parameters
-    ----------
-    data : mapping
-        The runs.
-    charts : sequence of str
-        The pictures of their charts.
-
-    Returns
-    -------
-    str
-        HTML.
-
-    Raises
-    ------
-    MissingExtraError
-        If uPlot is not installed.
-    """
+    """Return a page that shows data from `page_data`."""
     plot_script, plot_style = _uplot()
     script = "".join([_elementary(), *map(_part, SCRIPTS)])
     style = _theme() + plot_style + _part("page.css")

@@ -107,13 +107,7 @@ def stribeck(
 
 
 def checked_points(measured: tuple[ArrayLike, ArrayLike]) -> tuple[Any, Any]:
-    """Return the magnitudes of measured velocities and forces.
-
-    Raises
-    ------
-    ParameterError
-        If they are not two one-dimensional lists of finite numbers of equal length.
-    """
+    """Return the magnitudes of measured velocities and forces."""
     try:
         v, F = (np.abs(np.asarray(values, dtype=np.float64)) for values in measured)
         good = v.ndim == 1 and v.size > 0 and v.shape == F.shape

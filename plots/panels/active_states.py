@@ -64,22 +64,7 @@ class _SpanName(Text):
 
 
 def spans(trace: Trace, i: int, window: Window) -> Iterator[tuple[str, float, float]]:
-    """Yield the states of element i as (name, begin, end) [s], read from the transition log.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-    i : int
-        Element, from 0.
-    window : (float, float)
-        s; spans are cut at its ends.
-
-    Yields
-    ------
-    (str, float, float)
-        States of zero duration are omitted.
-    """
+    """Yield the states of element i as (name, begin, end) [s], read from the transition log."""
     log = trace.transitions[trace.transitions.element == i]
     first = log.source[0] if log.size else trace.model.chart.states[trace.modes[0, i]].name
     ends = np.clip(np.concatenate([[window[0]], log.t, [window[1]]]), *window)

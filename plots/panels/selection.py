@@ -118,25 +118,13 @@ def _telling_rows(trace: Trace) -> NDArray[np.intp]:
 
 
 def checked_window(trace: Trace, window: Window | None) -> Window:
-    """Return the window, or the whole run for None.
-
-    Raises
-    ------
-    ParameterError
-        If it is not two increasing times that overlap the run, or if there is no run.
-    """
+    """Return the window, or the whole run for None."""
     check_trace(trace)
     return window_of(trace, window)
 
 
 def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
-    """Return the chosen elements, or all for None.
-
-    Raises
-    ------
-    ParameterError
-        If one does not exist or is listed twice, or the list is empty.
-    """
+    """Return the chosen elements, or all for None."""
     if elements is None:
         return list(range(trace.n))
     try:
@@ -171,13 +159,7 @@ def one_element(trace: Trace, element: Any) -> int:
 
 
 def checked_row(trace: Trace, row: Any, t: Any = None) -> int:
-    """Return the number of a row, from 0; with a time, that of the last row at or before it.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such row.
-    """
+    """Return the number of a row, from 0; with a time, that of the last row at or before it."""
     if t is not None:
         first, last = float(trace.t[0]), float(trace.t[-1])
         if not is_number(t) or not first <= t <= last:
@@ -202,18 +184,6 @@ def is_number(value: object) -> bool:
 
 def scaled(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
     """Return the factor and the prefixed unit that suit the values.
-
-    Parameters
-    ----------
-    values : ndarray
-        Values in this unit.
-    unit : str
-        For example ``"m/s"``.
-
-    Returns
-    -------
-    (float, str)
-        Factor and prefixed unit.
 
     Examples
     --------

@@ -12,13 +12,7 @@ Window = tuple[float, float]
 
 
 def window_of(trace: Trace, window: Window | None) -> Window:
-    """Return the window, or the whole run for None.
-
-    Raises
-    ------
-    ParameterError
-        If it is not two increasing times inside the run.
-    """
+    """Return the window, or the whole run for None."""
     first, last = float(trace.t[0]), float(trace.t[-1])
     if window is None:
         return first, last

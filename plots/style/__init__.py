@@ -146,18 +146,6 @@ ROLES: Mapping[str, Role] = MappingProxyType({role.name: role for role in _ROLES
 def colour(name: str, theme: Theme = "light") -> str:
     """Return the colour of a role.
 
-    Parameters
-    ----------
-    name : str
-        Of a role in `ROLES`.
-    theme : "light" or "dark"
-        The ground.
-
-    Returns
-    -------
-    str
-        The first one, if the role has steps.
-
     Examples
     --------
     >>> colour("now"), colour("now", "dark")
@@ -168,20 +156,6 @@ def colour(name: str, theme: Theme = "light") -> str:
 
 def ramp(name: str, count: int, theme: Theme = "light") -> tuple[str, ...]:
     """Return evenly spaced steps between the colours of a role.
-
-    Parameters
-    ----------
-    name : str
-        Of a role in `ROLES`.
-    count : int
-        How many steps.
-    theme : "light" or "dark"
-        The ground.
-
-    Returns
-    -------
-    tuple of str
-        The first and the last one are those of the role.
 
     Examples
     --------

@@ -65,20 +65,6 @@ _RANGES = _ranges()
 def width(text: str, size: float, *, mono: bool = True) -> float:
     """Return the width of a text.
 
-    Parameters
-    ----------
-    text : str
-        The text, on one line.
-    size : float
-        Size of the font, points.
-    mono : bool
-        In the font of formulas, or in that of titles.
-
-    Returns
-    -------
-    float
-        Points.
-
     Examples
     --------
     >>> width("v > v_c", 10)
@@ -100,16 +86,6 @@ def _em(character: str, mono: bool) -> float:
 
 def missing_glyphs(text: str) -> list[str]:
     """Return the characters of a text that the font of formulas does not have, each once.
-
-    Parameters
-    ----------
-    text : str
-        The text.
-
-    Returns
-    -------
-    list of str
-        In the order of the text.
 
     Examples
     --------

@@ -13,18 +13,6 @@ __all__ = ["Formulas", "formula"]
 def formula(tree: Value, names: Mapping[str, str] | None = None) -> str:
     r"""Return a value as a formula, without dollar signs.
 
-    Parameters
-    ----------
-    tree : Value
-        A checked tree.
-    names : mapping of str to str, optional
-        Formulas for names, instead of `latex_name`.
-
-    Returns
-    -------
-    str
-        In the language of TeX, as far as matplotlib knows it.
-
     Examples
     --------
     >>> from gms_fsm.language import parse_value
@@ -71,13 +59,7 @@ class Formulas:
         return [f"{self.left(name)} = {self(tree)}" for name, tree in self.chart.lets.items()]
 
     def of_states(self) -> list[tuple[tuple[str, ...], str]]:
-        """Return flows and forces as equations, each with the states in which it holds.
-
-        Returns
-        -------
-        list of (tuple of str, str)
-            No states if it holds in all of them.
-        """
+        """Return flows and forces as equations, each with the states in which it holds."""
         chart, found = self.chart, dict[str, list[str]]()
         names = [state.name for state in chart.states]
         for variable in chart.variables:

@@ -158,16 +158,6 @@ def _scale() -> float:
 def font(size: float) -> float:
     """Return the size of a text, points.
 
-    Parameters
-    ----------
-    size : float
-        On the screen, points.
-
-    Returns
-    -------
-    float
-        At least the smallest of the preset.
-
     Examples
     --------
     >>> from plots.style.presets import font, preset
@@ -203,16 +193,6 @@ def inches(size: float) -> float:
 
 def room(usual: float) -> float:
     """Return the width of a figure, in inches of the screen.
-
-    Parameters
-    ----------
-    usual : float
-        Width if the preset has none.
-
-    Returns
-    -------
-    float
-        Texts take as much of it as on the screen.
 
     Examples
     --------

@@ -50,29 +50,6 @@ def elements_at(
 
     A contact in the default state (stick) is plain pale blue and held by a peg; in another state
     (slip) it is hatched, with an arrow in the direction in which the slider moves.
-
-    Parameters
-    ----------
-    ax : Axes
-        Axes to draw on; its axis lines are hidden.
-    trace : Trace, optional
-        The run. By default the elements are drawn at rest, with symbols only.
-    row : int
-        Row of the run; negative rows count from the end.
-    elements : int
-        Number of elements drawn without a run.
-
-    Returns
-    -------
-    list of Artist
-        Everything drawn. Contacts have the group id ``contact i`` (i from 1), springs ``spring i``,
-        dampers ``damper i``.
-
-    Raises
-    ------
-    ParameterError
-        If the row does not exist, there are too many elements to draw, or the chart has no
-        variables.
     """
     if trace is not None:
         check_trace(trace)

@@ -43,18 +43,7 @@ FOOT = 90  # characters of a line below the drawing
 
 
 def mechanical_figure(system: System) -> Figure:
-    """Draw a system as a mechanism; see `plots.systems.mechanism.schematic`.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-
-    Returns
-    -------
-    Figure
-        One panel without axes.
-    """
+    """Draw a system as a mechanism; see `plots.systems.mechanism.schematic`."""
     layout = arranged(system)
     with rc_context(RC):
         figure = Figure()

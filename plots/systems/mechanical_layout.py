@@ -254,18 +254,7 @@ def arranged(system: System) -> MechanismLayout:
 
 
 def label_of(touch: Touch) -> list[str]:
-    """Return the lines under the symbol of a contact.
-
-    Parameters
-    ----------
-    touch : Touch
-        The contact.
-
-    Returns
-    -------
-    list of str
-        Its chart with the number of elements, and numbers that belong into the picture.
-    """
+    """Return the lines under the symbol of a contact."""
     contact = touch.contact
     count = f" × {contact.n}" if contact.n > 1 else ""
     lines = _wrapped(f"{printable(contact.chart.name)}{count}")

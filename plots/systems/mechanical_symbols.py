@@ -48,16 +48,6 @@ _GREEK = frozenset(
 def formula(text: str) -> str:
     r"""Return the text of an expression as a formula for matplotlib.
 
-    Parameters
-    ----------
-    text : str
-        As `gms_fsm.language.spell` writes it.
-
-    Returns
-    -------
-    str
-        Between dollar signs.
-
     Examples
     --------
     >>> formula("k_c * (x_2 - x_1)")

@@ -70,30 +70,6 @@ def schematic_figure(
 
     A contact in the default state (stick) is plain pale blue and held by a peg; in another state
     (slip) it is hatched, with an arrow in the direction in which the slider moves.
-
-    Parameters
-    ----------
-    trace : Trace, optional
-        The run; by default the elements are drawn at rest, with symbols only.
-    row : int
-        Row of the run; negative rows count from the end.
-    elements : int
-        Number of elements drawn without a run.
-    title : str
-        Of the figure; with a run, the model, its law and the time are added.
-
-    Returns
-    -------
-    Figure
-        One panel, no taller than a page of A4.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    ParameterError
-        If the row does not exist, there are too many elements to draw, or the chart has no
-        variables.
     """
     from plots.systems.elements import elements_figure
 

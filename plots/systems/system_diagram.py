@@ -103,18 +103,7 @@ class DiagramBlock:
 
 
 def system_diagram(system: System) -> DrawnGraph:
-    """Draw a system.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-
-    Returns
-    -------
-    graphviz.Digraph
-        The picture as a Graphviz graph.
-    """
+    """Draw a system."""
     blocks = list(_blocks(system))
     graph = DrawnGraph(
         name=graphviz.escape(printable(system.name)),

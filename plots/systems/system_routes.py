@@ -117,18 +117,6 @@ class _Wire:
 def routed(boxes: Sequence[Box], joins: Sequence[Join]) -> DiagramSheet:
     """Return places for blocks and wires.
 
-    Parameters
-    ----------
-    boxes : sequence of Box
-        With their columns; x and y are set.
-    joins : sequence of Join
-        Wires between them.
-
-    Returns
-    -------
-    Sheet
-        With y pointing up.
-
     Examples
     --------
     >>> sheet = routed([Box("a", 50, 30, 0), Box("b", 50, 30, 1)], [Join("w", "a", "b", "u")])

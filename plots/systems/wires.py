@@ -66,25 +66,7 @@ def draw_wire(
     kind: str = "wire",
     style: str = "solid",
 ) -> None:
-    """Draw a line from node to node with corners between them.
-
-    Parameters
-    ----------
-    graph : graphviz.Digraph
-        Where.
-    name : str
-        What ids of its parts begin with.
-    start, end : str
-        Nodes.
-    corners : sequence of (float, float)
-        Between them.
-    colour, style, kind : str
-        Of the line: colour, ``"solid"`` or ``"dashed"``, class in the SVG.
-    arrow : {"forward", "both", "none"}
-        Which ends have arrowheads.
-    width, tip : float
-        Of the line, and of its last piece.
-    """
+    """Draw a line from node to node with corners between them."""
     stops = [start, *(f"{name}-corner{k}" for k in range(1, len(corners) + 1)), end]
     for stop, corner in zip(stops[1:], corners, strict=False):  # the last stop is not a corner
         joint(graph, stop, corner, colour, width)

@@ -1,4 +1,4 @@
-"""`integrators.runners.columns.record`, run by Python over the compiled engine's arrays: the same rows.
+"""`record`, run by Python over the compiled engine's arrays, gives the same rows.
 
 So the loop that fills the columns is correct as source, whatever a compiler makes of it; that the
 compiled code does the same is the claim of test_compiled_is_bit_identical.py.

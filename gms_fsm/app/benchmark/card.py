@@ -103,31 +103,7 @@ def make(
     methods: Sequence[Method] = METHODS,
     told: Told | None = None,
 ) -> Card:
-    """Train and score the methods; Ctrl-C ends it with what is complete.
-
-    Parameters
-    ----------
-    folder : Path
-        With the data.
-    only : sequence of str
-        Names of data sets; all by default.
-    data : sequence of DataSet
-        The data sets.
-    methods : sequence of Method
-        The models.
-    told : callable, optional
-        Called with what is being done and the share that is done.
-
-    Returns
-    -------
-    Card
-        A row for each method.
-
-    Raises
-    ------
-    RecordError
-        If the data are not there.
-    """
+    """Train and score the methods; Ctrl-C ends it with what is complete."""
     chosen = [each for each in data if not only or each.name in only]
     read = [(each, each.splits(folder)) for each in chosen]  # so that missing data are said first
     sections, complete = [], True

@@ -104,21 +104,6 @@ DATA_SETS = (
 def data_set(name: object) -> DataSet:
     """Return a data set by name.
 
-    Parameters
-    ----------
-    name : str
-        ``"tribometer"`` or ``"damper"``.
-
-    Returns
-    -------
-    DataSet
-        That one.
-
-    Raises
-    ------
-    ParameterError
-        If there is none of this name.
-
     Examples
     --------
     >>> data_set("damper").held_out
@@ -134,41 +119,12 @@ def data_set(name: object) -> DataSet:
 
 
 def held_rows(splits: tuple[Split, ...]) -> dict[str, Record]:
-    """Return the records with held-out rows, by name.
-
-    Parameters
-    ----------
-    splits : tuple of Split
-        Of one data set.
-
-    Returns
-    -------
-    dict of str to Record
-        With the held-out rows selected.
-    """
+    """Return the records with held-out rows, by name."""
     return {record.name: record for split in splits for record in split.held}
 
 
 def score(held: Mapping[str, Record], forces: Mapping[str, FloatArray]) -> dict[str, object]:
-    """Return how well forces reproduce what was held out.
-
-    Parameters
-    ----------
-    held : mapping of str to Record
-        From `held_rows`.
-    forces : mapping of str to ndarray
-        By record, one force for each held-out row, N.
-
-    Returns
-    -------
-    dict
-        ``rmse`` and ``r2`` over all rows, ``rows``, and ``by_record``: the RMSE of each record.
-
-    Raises
-    ------
-    RecordError
-        If a record without forces, or with another number of them, is scored.
-    """
+    """Return how well forces reproduce what was held out."""
     modelled, measured, by_record = [], [], {}
     for name, force in forces.items():
         target = held[name].columns["force"][held[name].chosen]

@@ -40,18 +40,7 @@ listed here, open an issue with the file and a sentence on how the model was tra
 
 
 def page(card: Card) -> str:
-    """Return a card as a Markdown page.
-
-    Parameters
-    ----------
-    card : Card
-        The results.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
+    """Return a card as a Markdown page."""
     lines = [
         "# Report card",
         "",
@@ -79,16 +68,6 @@ def _section(section: Section) -> list[str]:
 
 def table(rows: Sequence[Row]) -> str:
     """Return rows as a Markdown table.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-        The models.
-
-    Returns
-    -------
-    str
-        Markdown.
 
     Examples
     --------
@@ -129,25 +108,7 @@ def _number(value: float | None, form: str) -> str:
 
 
 def write(card: Card, folder: Path) -> list[Path]:
-    """Write a card.
-
-    Parameters
-    ----------
-    card : Card
-        The results.
-    folder : Path
-        Where; created if it does not exist.
-
-    Returns
-    -------
-    list of Path
-        The page, then the JSON file.
-
-    Raises
-    ------
-    OutputError
-        If the folder is not writable.
-    """
+    """Write a card."""
     target = output_folder(folder, FILES)
     texts = (page(card), json.dumps(card.as_data(), indent=1, ensure_ascii=False) + "\n")
     return [

@@ -16,27 +16,7 @@ OWN = "give a chart file, such as own.toml"
 
 
 def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
-    """Return the chart named on the command line.
-
-    Parameters
-    ----------
-    verb : str
-        Verb, for the message.
-    name : str
-        Name of an included chart.
-    law : str
-        Value of ``--law``; empty if it is not given.
-
-    Returns
-    -------
-    (Entry, Chart)
-        The entry of this name, and its chart for the law.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such chart, or the law is missing, unknown or not applicable.
-    """
+    """Return the chart named on the command line."""
     try:
         found = entry(name)
     except ParameterError as error:
@@ -58,11 +38,6 @@ def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
 def catalogue() -> str:
     """Return a list of the included charts, with their parameters.
 
-    Returns
-    -------
-    str
-        Text, at most 78 columns wide where possible.
-
     Examples
     --------
     >>> "  v_c      arrest velocity, m/s, > 0" in catalogue().splitlines()
@@ -73,13 +48,7 @@ def catalogue() -> str:
 
 
 def checkable() -> str:
-    """Return a list of the charts that can be checked, with the faults of the faulty ones.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return a list of the charts that can be checked, with the faults of the faulty ones."""
     sound = [_name(each) for each in registered().values() if not each.wrong]
     return f"{', '.join(sound)}, and as demonstrations:\n{_faulty()}"
 

@@ -179,20 +179,7 @@ def check_command(
 
 
 def no_contact(contact: str, own: object) -> None:
-    """Refuse a contact of an included chart.
-
-    Parameters
-    ----------
-    contact : str
-        Value of ``--contact``.
-    own : OwnFile or None
-        None for an included chart.
-
-    Raises
-    ------
-    ParameterError
-        If both are given.
-    """
+    """Refuse a contact of an included chart."""
     if contact and own is None:
         raise ParameterError(
             "an included chart has no contacts",

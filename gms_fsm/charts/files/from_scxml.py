@@ -43,27 +43,7 @@ class ScxmlTransition:
 
 
 def load(kind: type[Chart], path: Path, texts: Mapping[str, Any]) -> Chart:
-    """Return the chart of a document.
-
-    Parameters
-    ----------
-    kind : type of Chart
-        The class, which imports this module.
-    path : Path
-        The document.
-    texts : mapping
-        Fields of `Texts`, which replace what the document says.
-
-    Returns
-    -------
-    Chart
-        Checked.
-
-    Raises
-    ------
-    ChartError, ExpressionError
-        See `Chart.from_scxml`.
-    """
+    """Return the chart of a document."""
     here = str(path)
     given = Texts.of(texts, here)  # unknown names first
     root = _root(path, here)

@@ -26,23 +26,7 @@ MACHINE_CALLBACKS = (
 
 
 def read(machine: object) -> tuple[list[str], list[ImportedEdge]]:
-    """Return the states, the default state first, and the edges in the order of their priority.
-
-    Parameters
-    ----------
-    machine : transitions.Machine
-        Any.
-
-    Returns
-    -------
-    (list of str, list of ImportedEdge)
-        One edge for each trigger.
-
-    Raises
-    ------
-    ChartError
-        Naming what has no counterpart in a chart.
-    """
+    """Return the states, the default state first, and the edges in the order of their priority."""
     if not isinstance(machine, Machine):
         raise ChartError("it must be a transitions.Machine", place="machine", value=machine)
     _check_machine(machine)

@@ -99,31 +99,7 @@ class GivenTexts(TypedDict, total=False):
 def built(
     kind: type[Chart], states: list[str], edges: list[ImportedEdge], given: Texts, here: str
 ) -> Chart:
-    """Return the chart.
-
-    Parameters
-    ----------
-    kind : type of Chart
-        The class, which imports this module.
-    states : list of str
-        The first one is the default state.
-    edges : list of ImportedEdge
-        In the order of their priority.
-    given : Texts
-        The texts.
-    here : str
-        What is imported, for messages.
-
-    Returns
-    -------
-    Chart
-        Checked.
-
-    Raises
-    ------
-    ChartError, ExpressionError
-        If a text belongs to no state or edge, an edge has no guard, or the chart is inconsistent.
-    """
+    """Return the chart."""
     by_state = {
         name: _known(getattr(given, name), states, "state", f"{here}: {name}")
         for name in ("flows", "entry", "exit", "state_outputs")

@@ -25,16 +25,6 @@ STEP = "step"  # the event at which one transition is taken, the first whose con
 def written_out(lets: Mapping[str, Value]) -> dict[str, Value]:
     """Return named expressions without names of other ones, which SCXML does not have.
 
-    Parameters
-    ----------
-    lets : mapping of str to Value
-        `Chart.lets`.
-
-    Returns
-    -------
-    dict of str to Value
-        By name.
-
     Examples
     --------
     >>> from gms_fsm.language import parse_value, spell
@@ -59,21 +49,6 @@ def conditions(chart: Chart) -> dict[str, str]:
 
 
 def assignments(chart: Chart, kind: str, owner: str) -> dict[str, str]:
-    """Return what a state or an edge assigns, as expressions in ECMAScript, by name.
-
-    Parameters
-    ----------
-    chart : Chart
-        The chart.
-    kind : {"entry", "exit", "action"}
-        When.
-    owner : str
-        Name of the state or the edge.
-
-    Returns
-    -------
-    dict of str to str
-        In order.
-    """
+    """Return what a state or an edge assigns, as expressions in ECMAScript, by name."""
     lets, trees = written_out(chart.lets), chart.assignments[kind, owner]
     return {name: spell(renamed(tree, lets), ECMASCRIPT) for name, tree in trees.items()}

@@ -109,18 +109,7 @@ class ChartTable(Table):
 
     @classmethod
     def of(cls, chart: Chart) -> ChartTable:
-        """Describe a chart.
-
-        Parameters
-        ----------
-        chart : Chart
-            Any chart.
-
-        Returns
-        -------
-        ChartTable
-            With the edges as they were given, and plain names of parameters without unit and rule.
-        """
+        """Describe a chart."""
         edges: dict[str, dict[str, Any]] = {}
         for edge in chart.transitions:
             one = {name: getattr(edge, name) for name in EdgeTable.model_fields}
@@ -150,23 +139,7 @@ class ChartTable(Table):
         )
 
     def build(self, kind: type[Chart]) -> Chart:
-        """Return the chart.
-
-        Parameters
-        ----------
-        kind : type of Chart
-            The class, which imports this module.
-
-        Returns
-        -------
-        Chart
-            Equal to the one described.
-
-        Raises
-        ------
-        ChartError, ExpressionError
-            With the part at fault as their key.
-        """
+        """Return the chart."""
         parameters = [
             each if isinstance(each, str) else built(Parameter, "parameters", i, **vars(each))
             for i, each in enumerate(self.parameters)

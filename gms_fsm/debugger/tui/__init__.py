@@ -17,29 +17,7 @@ __all__ = ["run_tui"]
 
 
 def run_tui(session: Session, title: str = "", *, light: bool = False) -> int:
-    """Show a session on the whole terminal until the user quits.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-    title : str, optional
-        What it is, shown at the top.
-    light : bool
-        Whether to begin with dark text on a light ground; a key changes it.
-
-    Returns
-    -------
-    int
-        The exit code, 0.
-
-    Raises
-    ------
-    MissingExtraError
-        If Textual is not installed.
-    SessionError
-        If there is no terminal, or one that cannot place text.
-    """
+    """Show a session on the whole terminal until the user quits."""
     require("textual", "tui")
     terminal = all(file is not None and file.isatty() for file in (sys.stdin, sys.stdout))
     if not terminal or os.environ.get("TERM") == "dumb":

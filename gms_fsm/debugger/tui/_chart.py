@@ -84,22 +84,7 @@ def _drawn(arms: Sequence[int]) -> str:
 
 
 def chart_art(states: Sequence[StateView], width: int, *, names: bool = True) -> list[Line]:
-    """Draw a chart.
-
-    Parameters
-    ----------
-    states : sequence of StateView
-        The states, as `gms_fsm.debugger._view.chart_states` gives them.
-    width : int
-        Columns; guards are wrapped to fit.
-    names : bool
-        Whether edges have their names in front of the guards.
-
-    Returns
-    -------
-    list of Line
-        The rows.
-    """
+    """Draw a chart."""
     targets = [s.name for s in states if any(e.target == s.name for t in states for e in t.edges)]
     room = max(NARROWEST, width - LABEL - LANE * len(targets) - 1)
     texts = {state.name: [_texts(edge, room, names) for edge in state.edges] for state in states}

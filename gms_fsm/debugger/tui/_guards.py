@@ -24,18 +24,6 @@ VALUES = VALUE + 4  # columns around text and bar
 def margin_bar(relative: float, half: int) -> str:
     """Return a margin on a logarithmic scale: to the right if true, to the left if false.
 
-    Parameters
-    ----------
-    relative : float
-        The margin over the larger side. Each of six decades below 1 has the same width.
-    half : int
-        Characters on each side.
-
-    Returns
-    -------
-    str
-        ``2 * half + 1`` characters.
-
     Examples
     --------
     >>> margin_bar(1.0, 6), margin_bar(-1e-3, 6), margin_bar(0.0, 6)
@@ -51,24 +39,7 @@ def margin_bar(relative: float, half: int) -> str:
 
 
 def why_rows(why: Why, address: str, points: Sequence[Breakpoint], width: int) -> list[PanelLine]:
-    """Return the edges of an element clause by clause; a click sets a breakpoint at a guard.
-
-    Parameters
-    ----------
-    why : Why
-        From the session.
-    address : str
-        How a command names the element.
-    points : sequence of Breakpoint
-        The breakpoints, which are marked.
-    width : int
-        Columns.
-
-    Returns
-    -------
-    list of PanelLine
-        Heading, edges with their clauses, and one sentence per edge.
-    """
+    """Return the edges of an element clause by clause; a click sets a breakpoint at a guard."""
     rows = [
         PanelLine(line((part, "head"))) for text in why.heading for part in wrapped(text, width)
     ]

@@ -70,18 +70,7 @@ def with_number(number: str) -> list[tuple[str, str, str]]:
 
 
 def help_rows(overview: str) -> list[PanelLine]:
-    """Return the page of the help: the keys, then the commands of the prompt.
-
-    Parameters
-    ----------
-    overview : str
-        The first page of the prompt's help.
-
-    Returns
-    -------
-    list of PanelLine
-        The rows.
-    """
+    """Return the page of the help: the keys, then the commands of the prompt."""
     rows = [PanelLine(line(("Keys. A number before a key is its argument.", "head")))]
     rows += [PanelLine(line((f"  {each.shown:<4}", "command"), each.says)) for each in KEYS]
     rows += [

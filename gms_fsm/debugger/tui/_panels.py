@@ -32,26 +32,7 @@ TIME = " " * 16  # columns of the time of a transition
 def status_lines(
     view: Screen, title: str, width: int, *, several: bool = False, busy: bool = False
 ) -> list[Line]:
-    """Return time, place and the main values: what is shown above everything.
-
-    Parameters
-    ----------
-    view : Screen
-        The screen.
-    title : str
-        What runs.
-    width : int
-        Columns.
-    several : bool
-        Whether there are several branches; else the branch is not shown.
-    busy : bool
-        Whether a command is being executed.
-
-    Returns
-    -------
-    list of Line
-        As many as are needed.
-    """
+    """Return time, place and the main values: what is shown above everything."""
     step = f" micro-step {view.microstep}" if view.microstep else ""
     place = f"between rows {view.row} and {view.row + 1}" if view.located else f"row {view.row}"
     parts = [
@@ -95,22 +76,7 @@ def fitted(parts: Sequence[Span], width: int, gap: str = "  ") -> list[Line]:
 
 
 def element_rows(view: Screen, chosen: int, width: int) -> list[PanelLine]:
-    """Return a table of the elements; a click chooses one.
-
-    Parameters
-    ----------
-    view : Screen
-        The screen.
-    chosen : int
-        The marked element, counted over all contacts from 0.
-    width : int
-        Columns.
-
-    Returns
-    -------
-    list of PanelLine
-        A heading per contact and a row per element; then bodies and further values of a system.
-    """
+    """Return a table of the elements; a click chooses one."""
     rows: list[PanelLine] = []
     for contact in view.contacts:
         if contact.name:
@@ -201,22 +167,7 @@ def _ratio_bar(ratio: float | None) -> str:
 
 
 def event_rows(events: Sequence[EventView], cursor: int, width: int) -> list[PanelLine]:
-    """Return the firings computed so far; a click goes there.
-
-    Parameters
-    ----------
-    events : sequence of EventView
-        All firings of the branch.
-    cursor : int
-        Row at the cursor.
-    width : int
-        Columns.
-
-    Returns
-    -------
-    list of PanelLine
-        One per firing; the last at or before the cursor is marked.
-    """
+    """Return the firings computed so far; a click goes there."""
     if not events:
         return [PanelLine(line(("no transition so far", "dim")))]
     here = max((i for i, each in enumerate(events) if each.row <= cursor), default=-1)
@@ -252,24 +203,7 @@ def session_rows(
     watches: Sequence[str],
     width: int,
 ) -> list[PanelLine]:
-    """Return branches as a tree, breakpoints and watches; a click switches to a branch.
-
-    Parameters
-    ----------
-    branches : sequence of BranchView
-        All branches.
-    points : sequence of Breakpoint
-        All breakpoints.
-    watches : sequence of str
-        The lines of the watches.
-    width : int
-        Columns.
-
-    Returns
-    -------
-    list of PanelLine
-        The rows.
-    """
+    """Return branches as a tree, breakpoints and watches; a click switches to a branch."""
     rows, numbered = list[PanelLine](), {each.number: each for each in branches}
     for each in branches:
         mark, indent = ("▶" if each.current else " "), "  " * _depth(each, numbered)
@@ -291,20 +225,7 @@ def _depth(each: BranchView, branches: Mapping[int, BranchView]) -> int:
 
 
 def answer_rows(lines: Sequence[str], width: int) -> list[PanelLine]:
-    """Return lines of a transcript, wrapped; commands and errors stand out.
-
-    Parameters
-    ----------
-    lines : sequence of str
-        Commands begin with their prompt, errors with ``error:``.
-    width : int
-        Columns.
-
-    Returns
-    -------
-    list of PanelLine
-        The rows.
-    """
+    """Return lines of a transcript, wrapped; commands and errors stand out."""
     rows = []
     for each in lines:
         role = "command" if each.startswith("(t=") else "error" if each.startswith("error:") else ""

@@ -48,26 +48,7 @@ def axis(start: float, end: float, width: int) -> str:
 def ribbon_rows(
     ribbons: Ribbons, parent: Ribbons | None, view: Screen, chosen: int, lead: int
 ) -> list[PanelLine]:
-    """Return the states of all elements over time; the cursor is a column.
-
-    Parameters
-    ----------
-    ribbons : Ribbons
-        Of the current branch.
-    parent : Ribbons or None
-        Of the branch to compare with, over the same time.
-    view : Screen
-        The screen.
-    chosen : int
-        The marked element.
-    lead : int
-        Columns of the labels.
-
-    Returns
-    -------
-    list of PanelLine
-        One per element; with a parent, a last one that marks where any state differs.
-    """
+    """Return the states of all elements over time; the cursor is a column."""
     rows = []
     states = [each.state for each in view.elements]
     roles = [
@@ -125,22 +106,7 @@ def ranges(values: Mapping[str, Sequence[float | None]]) -> str:
 def curve_rows(
     values: Mapping[str, Sequence[float | None]], lead: int, now: int
 ) -> list[PanelLine]:
-    """Return velocity and force over time as sparklines; `ranges` says what they span.
-
-    Parameters
-    ----------
-    values : dict
-        From `gms_fsm.debugger._view.curves`.
-    lead : int
-        Columns of the label.
-    now : int
-        The part that contains the cursor.
-
-    Returns
-    -------
-    list of PanelLine
-        One per name.
-    """
+    """Return velocity and force over time as sparklines; `ranges` says what they span."""
     rows = []
     for name, each in values.items():
         text = sparkline(each)

@@ -137,28 +137,7 @@ class Described:
 def fmu(
     subject: Subject, version: int, describe: Callable[[Described, int], Mapping[str, str]]
 ) -> dict[str, str | bytes]:
-    """Return an FMU and its README.
-
-    Parameters
-    ----------
-    subject : Subject
-        A friction or a system.
-    version : {2, 3}
-        Of FMI.
-    describe : callable
-        Takes what is described and the version; returns the XML files that the standard wants, by
-        their paths in the archive.
-
-    Returns
-    -------
-    dict of str to (str or bytes)
-        Contents by file name.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be stepped, or a name cannot be one in C.
-    """
+    """Return an FMU and its README."""
     start = subject.start
     check_first_call(subject, WORDS)
     exchange = "piecewise_slope(" not in start.program.source
@@ -251,20 +230,6 @@ def _platform(version: int) -> tuple[str, str]:
 def tag(name: str, /, *inside: str, **attributes: object) -> str:
     """Return an XML element.
 
-    Parameters
-    ----------
-    name : str
-        Of the element.
-    *inside : str
-        Elements.
-    **attributes : object
-        Those that are None or empty are left out; truth values and numbers are written as XML does.
-
-    Returns
-    -------
-    str
-        Text, indented.
-
     Examples
     --------
     >>> print(tag("a", tag("b", x=1.5), y=True))
@@ -285,18 +250,7 @@ def tag(name: str, /, *inside: str, **attributes: object) -> str:
 
 
 def units_of(variables: Iterable[FmuVariable]) -> dict[str, dict[str, int]]:
-    """Return the units that can be read, with their exponents.
-
-    Parameters
-    ----------
-    variables : iterable of FmuVariable
-        Of an FMU.
-
-    Returns
-    -------
-    dict of str to dict of str to int
-        In alphabetical order.
-    """
+    """Return the units that can be read, with their exponents."""
     found = {each.unit: base_units(each.unit) for each in variables if each.unit}
     return {text: found[text] or {} for text in sorted(found) if found[text] is not None}
 

@@ -81,20 +81,7 @@ class FmuModel:
         }
 
     def sources(self, version: int, token: str) -> dict[str, str]:
-        """Return the contents of the folder ``sources``.
-
-        Parameters
-        ----------
-        version : {2, 3}
-            Of FMI.
-        token : str
-            GUID or instantiation token.
-
-        Returns
-        -------
-        dict of str to str
-            By file name; those to be compiled end in ``.c``.
-        """
+        """Return the contents of the folder ``sources``."""
         return {
             f"fmi{version}.c": (TEMPLATES / "fmi.c").read_text(encoding="utf-8"),
             f"{self.subject.name}_engine.c": self.engine(),
@@ -179,18 +166,7 @@ class FmuModel:
 
 
 def both_of(subject: Subject) -> FmuArguments:
-    """Return the arguments of all entries, made of lists.
-
-    Parameters
-    ----------
-    subject : Subject
-        A friction or a system.
-
-    Returns
-    -------
-    FmuArguments
-        At the start, for Co-Simulation.
-    """
+    """Return the arguments of all entries, made of lists."""
     start, alone = subject.start, subject.alone
     functions, machines, buffers, sample = arguments_of(start)
     size, relations = len(buffers.now.y), len(buffers.relations.watch)

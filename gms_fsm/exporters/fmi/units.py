@@ -30,17 +30,6 @@ _TOKEN = re.compile(
 def base_units(text: str) -> dict[str, int] | None:
     """Return the exponents of the SI base units in a unit.
 
-    Parameters
-    ----------
-    text : str
-        Symbols, possibly with exponents, one after the other or joined by ``*``, a space or ``/``.
-        All that stands between two ``/`` is divided by.
-
-    Returns
-    -------
-    dict of str to int or None
-        Without zeros; None if it cannot be read.
-
     Examples
     --------
     >>> base_units("Ns/m")

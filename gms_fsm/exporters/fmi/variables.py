@@ -95,20 +95,7 @@ class Indicator:
 
 
 def variables_of(subject: Subject, *, exchange: bool) -> tuple[FmuVariable, ...]:
-    """Return the variables of what is exported.
-
-    Parameters
-    ----------
-    subject : Subject
-        A friction or a system.
-    exchange : bool
-        Whether there are event indicators.
-
-    Returns
-    -------
-    tuple of FmuVariable
-        With names that are all different.
-    """
+    """Return the variables of what is exported."""
     start, alone = subject.start, subject.alone
     found = [FmuVariable("time", "TIME", causality="independent", initial="", unit="s")]
     found += _inputs(subject)
@@ -233,20 +220,7 @@ def _different(found: list[FmuVariable]) -> Iterator[FmuVariable]:
 
 # --------------------------------------------------------------------------- event indicators
 def indicators_of(start: Problem, alone: bool) -> tuple[Indicator, ...]:
-    """Return the event indicators: one for each comparison that may be watched.
-
-    Parameters
-    ----------
-    start : Problem
-        What is exported.
-    alone : bool
-        Whether it is one friction, whose name is then left out.
-
-    Returns
-    -------
-    tuple of Indicator
-        In the order of the margins; those that end a slide come last.
-    """
+    """Return the event indicators: one for each comparison that may be watched."""
     plan, program = plan_of(start.system.assembly), start.program
     sizes = _sizes(start)
     edges: dict[object, list[tuple[str, str]]] = {}

@@ -64,21 +64,6 @@ FORMS = Forms(
 def plain_c(subject: Subject) -> dict[str, str]:
     """Return the plain form of a friction: ``<name>_plain.h`` and ``<name>_plain.c``.
 
-    Parameters
-    ----------
-    subject : Subject
-        One friction, whose velocity is an input.
-
-    Returns
-    -------
-    dict of str to str
-        Contents by file name.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be expressed; what is in the way is named.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters
@@ -92,18 +77,7 @@ def plain_c(subject: Subject) -> dict[str, str]:
 
 
 def plain_c_notes(subject: Subject) -> str:
-    """Return what a README says about the files of `plain_c`.
-
-    Parameters
-    ----------
-    subject : Subject
-        As for `plain_c`.
-
-    Returns
-    -------
-    str
-        PlainForm text.
-    """
+    """Return what a README says about the files of `plain_c`."""
     name = subject.name
     return f"""\
 {name}_plain.h, {name}_plain.c: the plain form, for a microcontroller.

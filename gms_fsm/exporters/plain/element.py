@@ -113,27 +113,6 @@ class NamedFriction:
     ) -> NamedFriction:
         """Describe a friction.
 
-        Parameters
-        ----------
-        subject : Subject
-            What is exported: one friction whose velocity is an input.
-        words : iterable of str
-            Words of the format's language.
-        time : bool
-            Whether the time is an input where it is read; else the format has a clock.
-        cases : bool
-            Whether the language tells k from K.
-
-        Returns
-        -------
-        NamedFriction
-            Complete.
-
-        Raises
-        ------
-        ParameterError
-            If it cannot be a text of its own; what is in the way is named.
-
         Examples
         --------
         >>> from gms_fsm import GMS, GMSParameters
@@ -153,20 +132,7 @@ class NamedFriction:
 
     # ------------------------------------------------------------------ what is read
     def needed(self, names: Iterable[str], *, per_element: bool) -> tuple[Let, ...]:
-        """Return the quantities that names are computed from, shared or per element, in order.
-
-        Parameters
-        ----------
-        names : iterable of str
-            What is read.
-        per_element : bool
-            Which of the two.
-
-        Returns
-        -------
-        tuple of Let
-            In the order of computation.
-        """
+        """Return the quantities that names are computed from, shared or per element, in order."""
         return tuple(each for each in _needed(self.lets, names) if each.per_element == per_element)
 
     def placed(
@@ -175,18 +141,6 @@ class NamedFriction:
         """Return which quantities of an element are computed before a choice, and in its branches.
 
         What only one branch reads is computed there.
-
-        Parameters
-        ----------
-        reads : sequence of frozenset of str
-            What each branch reads.
-        moves : bool
-            Only those that are computed from variables.
-
-        Returns
-        -------
-        (list of Let, list of list of Let)
-            Before the choice; and for each branch.
         """
         wanted = [
             [e for e in self.needed(names, per_element=True) if e.moves or not moves]
@@ -218,20 +172,7 @@ class NamedFriction:
                 yield from (tree for _, tree in edge.steps)
 
     def check_name(self, name: str, *, cases: bool = True) -> None:
-        """Refuse a name of what is defined, if the friction has a quantity of that name.
-
-        Parameters
-        ----------
-        name : str
-            Of the files.
-        cases : bool
-            Whether the language tells k from K.
-
-        Raises
-        ------
-        ParameterError
-            Naming it.
-        """
+        """Refuse a name of what is defined, if the friction has a quantity of that name."""
         found = [each for each, _ in self.inputs] + [self.position, *self.names]
         if name in found or (not cases and name.lower() in [each.lower() for each in found]):
             raise ParameterError(
@@ -241,33 +182,11 @@ class NamedFriction:
             )
 
     def free(self, name: str) -> str:
-        """Return a name for what a format needs besides; it gives way to those in use.
-
-        Parameters
-        ----------
-        name : str
-            The name wanted.
-
-        Returns
-        -------
-        str
-            With a number after it if there is such a name already.
-        """
+        """Return a name for what a format needs besides; it gives way to those in use."""
         return next(each for each in _numbered(name) if each.lower() not in self.taken)
 
     def reserved(self, *names: str) -> NamedFriction:
-        """Return the same friction with further names in use, to which those of `free` give way.
-
-        Parameters
-        ----------
-        *names : str
-            What a format has defined.
-
-        Returns
-        -------
-        NamedFriction
-            A copy.
-        """
+        """Return the same friction with further names in use, to which those of `free` give way."""
         return replace(self, taken=self.taken | {name.lower() for name in names})
 
 

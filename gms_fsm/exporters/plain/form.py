@@ -137,18 +137,6 @@ class PlainForm:
 def plain_form(element: NamedFriction, dt: str = "dt") -> PlainForm:
     """Return the plain form of a friction.
 
-    Parameters
-    ----------
-    element : NamedFriction
-        The friction.
-    dt : str
-        What the step is called, unless the friction uses that name.
-
-    Returns
-    -------
-    PlainForm
-        For a printer.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters

@@ -25,18 +25,7 @@ SHOWN = 1000  # rows of 1 ms, of a system without records
 
 
 def c99(subject: Subject) -> dict[str, str]:
-    """Return header, source, a program that runs it on a record, that record, and a README.
-
-    Parameters
-    ----------
-    subject : Subject
-        A friction or a system.
-
-    Returns
-    -------
-    dict of str to str
-        Contents by file name.
-    """
+    """Return header, source, a program that runs it on a record, that record, and a README."""
     made = engine_of(subject)
     name = made.name
     plain, notes = _plain(subject)

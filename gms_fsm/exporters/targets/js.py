@@ -78,18 +78,7 @@ class Whole(NamedTuple):
 
 
 def js(subject: Subject) -> dict[str, str]:
-    """Return a module, its types and a README.
-
-    Parameters
-    ----------
-    subject : Subject
-        A friction or a system.
-
-    Returns
-    -------
-    dict of str to str
-        Contents by file name.
-    """
+    """Return a module, its types and a README."""
     name = subject.name
     made = _Friction(subject) if subject.alone else _Run(subject)
     return {

@@ -66,21 +66,6 @@ FORMS = Forms(
 def matlab(subject: Subject) -> dict[str, str]:
     """Return a friction as a function file.
 
-    Parameters
-    ----------
-    subject : Subject
-        One friction, whose velocity is an input.
-
-    Returns
-    -------
-    dict of str to str
-        ``<name>.m`` and ``README-<name>-matlab.md``.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be expressed; what is in the way is named.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters

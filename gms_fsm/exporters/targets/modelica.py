@@ -53,21 +53,6 @@ WORDS = frozenset(
 def modelica(subject: Subject) -> dict[str, str]:
     """Return a friction as a Modelica model.
 
-    Parameters
-    ----------
-    subject : Subject
-        One friction, whose velocity is an input.
-
-    Returns
-    -------
-    dict of str to str
-        ``<name>.mo`` and ``README-<name>-modelica.md``.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be expressed; what is in the way is named.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters

@@ -87,21 +87,6 @@ class _Keywords(frozenset[str]):
 def structured_text(subject: Subject) -> dict[str, str]:
     """Return the plain form of a friction as a function block.
 
-    Parameters
-    ----------
-    subject : Subject
-        One friction, whose velocity is an input.
-
-    Returns
-    -------
-    dict of str to str
-        ``<name>.st`` and ``README-<name>-st.md``.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be expressed; what is in the way is named.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters

@@ -159,22 +159,7 @@ class _Entry:
 
 
 def assessed(task: Task, point: Point, pool: ThreadPool) -> Assessed:
-    """Return the table of a fit.
-
-    Parameters
-    ----------
-    task : Task
-        Whose start values are the fitted ones.
-    point : Point
-        These, evaluated with all rows.
-    pool : ThreadPool
-        To evaluate slopes side by side.
-
-    Returns
-    -------
-    Assessed
-        Table, covariance, and what cannot be told.
-    """
+    """Return the table of a fit."""
     experiment = task.fine
     parts = stretches(task.courses, point.residual)
     basis = _basis(experiment, point)
@@ -216,18 +201,7 @@ def assessed(task: Task, point: Point, pool: ThreadPool) -> Assessed:
 
 
 def unassessed(task: Task, point: Point) -> Assessed:
-    """Return the table of a fit without intervals, for one that was interrupted or needs none.
-
-    Parameters
-    ----------
-    task, point
-        As in `assessed`.
-
-    Returns
-    -------
-    Assessed
-        With the values only.
-    """
+    """Return the table of a fit without intervals, for one that was interrupted or needs none."""
     experiment, count = task.fine, len(task.unknowns) + len(task.options.nuisance)
     nothing = np.zeros((point.residual.size, len(experiment.searched)))
     entries = _entries(experiment, point, nothing, _basis(experiment, point))
@@ -473,21 +447,6 @@ def sorted_elements(
 
     Elements that may change places in a search are named from the first to slip to the last; all
     that belongs to an element moves with it.
-
-    Parameters
-    ----------
-    subject : Mounted
-        Fitted.
-    unknowns : sequence of Unknown
-        What was free.
-    bounded : collection of str
-        The names for which there were bounds.
-
-    Returns
-    -------
-    Mounted
-        The same as given if elements cannot change places: a name stands for one element only, in
-        `free` or in the bounds; or if no parameter is a threshold.
     """
     if subject.named:
         return subject

@@ -115,31 +115,7 @@ def walked(
     pool: ThreadPool,
     seed: int,
 ) -> Region:
-    """Walk through the likelihood region, towards both ends of each parameter.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        With few rows, because many points are evaluated.
-    point : Point
-        The best point.
-    directions : dict of str to ndarray
-        For each parameter the step of the searched coordinates that changes it by one standard
-        deviation, all else following as the linearised model says.
-    shape : ndarray, shape (searched, m)
-        A square root of the covariance of the searched coordinates.
-    effective : float
-        Effective rows of the whole fit.
-    pool : ThreadPool
-        To evaluate points side by side.
-    seed : int
-        Of the random parts.
-
-    Returns
-    -------
-    Region
-        All points met.
-    """
+    """Walk through the likelihood region, towards both ends of each parameter."""
     rows = min(effective, float(experiment.target.size))
     best = values_of(experiment, point)
     low, high = experiment.coordinates.limits

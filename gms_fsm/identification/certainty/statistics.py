@@ -50,16 +50,6 @@ def correlation_time(parts: Sequence[FloatArray]) -> float:
 
     ``tau = 1 + 2 * sum(rho_l)`` over lags up to 5 tau; n rows count for n / tau.
 
-    Parameters
-    ----------
-    parts : sequence of ndarray
-        Residuals, one array per unbroken stretch of rows.
-
-    Returns
-    -------
-    float
-        At least 1.
-
     Examples
     --------
     >>> import numpy as np
@@ -114,24 +104,7 @@ class Certainty:
 def certainty(
     slopes: FloatArray, parts: Sequence[FloatArray], logarithmic: FloatArray, size: float
 ) -> Certainty:
-    """Return what the data say, from the slopes of the force and the residuals.
-
-    Parameters
-    ----------
-    slopes : ndarray, shape (rows, p)
-        d(force)/d(coordinate) at the rows that count.
-    parts : sequence of ndarray
-        The residuals, by unbroken stretches of rows.
-    logarithmic : ndarray of bool, shape (p,)
-        Whether a coordinate is a logarithm; the others are scaled so that 1 is the force's size.
-    size : float
-        Typical size of the force.
-
-    Returns
-    -------
-    Certainty
-        Intervals and directions.
-    """
+    """Return what the data say, from the slopes of the force and the residuals."""
     rows, p = slopes.shape
     residual = np.concatenate(list(parts))
     tau = correlation_time(parts)
@@ -183,20 +156,7 @@ def _block_sums(scores: FloatArray, parts: Sequence[FloatArray], length: int) ->
 
 
 def phase_floor(t: FloatArray, values: FloatArray, period: float) -> float:
-    """Return how far single cycles are from their mean: what no model of the motion can beat.
-
-    Parameters
-    ----------
-    t, values : ndarray, shape (rows,)
-        Times, s, and what repeats.
-    period : float
-        s.
-
-    Returns
-    -------
-    float
-        Root mean square, corrected for the number of cycles; NaN with fewer than two.
-    """
+    """Return how far single cycles are from their mean: what no model of the motion can beat."""
     step = float(np.median(np.diff(t)))
     bins = max(1, round(period / step))
     place = np.rint((t - t[0]) / period * bins).astype(int) % bins

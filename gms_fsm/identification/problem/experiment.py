@@ -243,20 +243,7 @@ class Experiment:
 
 
 def value_of(subject: Mounted, unknown: Unknown) -> float:
-    """Return the present value of an unknown.
-
-    Parameters
-    ----------
-    subject : Mounted
-        Whose.
-    unknown : Unknown
-        Which.
-
-    Returns
-    -------
-    float
-        In its unit.
-    """
+    """Return the present value of an unknown."""
     value = np.asarray(value_in(subject, unknown.key), dtype=float)
     if unknown.element is None or value.ndim == 0:
         return float(value.flat[0])
@@ -266,19 +253,6 @@ def value_of(subject: Mounted, unknown: Unknown) -> float:
 def split_unknowns(
     unknowns: Sequence[Unknown], linear: Sequence[str]
 ) -> tuple[tuple[Unknown, ...], tuple[Unknown, ...]]:
-    """Return what is searched and what is solved for.
-
-    Parameters
-    ----------
-    unknowns : sequence of Unknown
-        All of them.
-    linear : sequence of str
-        Parameters that the force is linear in.
-
-    Returns
-    -------
-    tuple of Unknown, tuple of Unknown
-        A linear parameter with an upper bound is searched: non-negative least squares has none.
-    """
+    """Return what is searched and what is solved for."""
     solved = [each for each in unknowns if each.key in linear and not np.isfinite(each.high)]
     return tuple(each for each in unknowns if each not in solved), tuple(solved)

@@ -21,17 +21,6 @@ __all__ = ["linear_names"]
 def linear_names(subject: Mounted) -> tuple[str, ...]:
     """Return the names of the parameters that the friction force is linear in.
 
-    Parameters
-    ----------
-    subject : Mounted
-        A model driven by a record, or a system; of a system with a free body, a sampled value or a
-        further state there are none, because its motion depends on the force.
-
-    Returns
-    -------
-    tuple of str
-        In the order of `gms_fsm.systems.numbers.known`.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters

@@ -204,30 +204,7 @@ def course_of(
     most_steps: int | None,
     seen: int | None = None,
 ) -> Course:
-    """Return what a record makes a model do.
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-    column : str
-        What is compared; it need not be there if no rows count.
-    rows : ndarray of bool or None
-        The rows that count; None for those the record has selected.
-    smoothing : float or None
-        Of the motion, s.
-    begin : {"relaxed", "run in"}
-        What is before the first row.
-    most_steps : int or None
-        Budget of a run.
-    seen : int or None
-        Number of rows that a run-in is taken from; all of them by default.
-
-    Returns
-    -------
-    Course
-        The course.
-    """
+    """Return what a record makes a model do."""
     motion = record.motion(smoothing)
     nothing = np.empty(0)
     first = slice(seen)
@@ -354,29 +331,7 @@ class Driver:
 
 
 def driver_of(subject: Mounted, drive: str | None, rtol: float, budgets: int) -> Driver:
-    """Return what runs a subject.
-
-    Parameters
-    ----------
-    subject : Mounted
-        A model, or a system.
-    drive : str or None
-        As the user gave it.
-    rtol : float
-        Relative tolerance.
-    budgets : int
-        As in `Driver`.
-
-    Returns
-    -------
-    Driver
-        The driver.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such signal, or it cannot be told which one is meant.
-    """
+    """Return what runs a subject."""
     system = subject.system
     if not subject.named:
         if drive is not None:

@@ -59,29 +59,7 @@ def refine(
     pool: ThreadPool | None = None,
     kept: Best | None = None,
 ) -> Point:
-    """Refine a proposal by Levenberg-Marquardt steps within the bounds.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        What is minimised.
-    u : ndarray
-        Where to start.
-    step : float
-        Of the secants that stand for slopes, in coordinates. It must exceed what the error of the
-        runs makes of the force: near 1e-3 where the loop is closed.
-    most : int
-        Evaluations, without those of the slopes.
-    pool : ThreadPool, optional
-        To evaluate the slopes side by side.
-    kept : Best, optional
-        Takes each point as it is found, for the case of an interrupt.
-
-    Returns
-    -------
-    Point
-        The best point seen.
-    """
+    """Refine a proposal by Levenberg-Marquardt steps within the bounds."""
     if not len(u):
         return experiment.at(u)
     low, high = experiment.coordinates.limits
@@ -142,23 +120,7 @@ def hops(
     many: int = HOPS,
     spread: int = SPREAD,
 ) -> None:
-    """Search from a spread of starts, then by hops from the best.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        What is minimised.
-    seed : int
-        Of the perturbations.
-    best : Best
-        Takes what is found.
-    pool : ThreadPool
-        To refine side by side.
-    many : int
-        Number of hops.
-    spread : int
-        Number of proposals about the start; with none the hops go from the best so far.
-    """
+    """Search from a spread of starts, then by hops from the best."""
     rng = np.random.default_rng(seed)
     low, high = experiment.coordinates.limits
     start = experiment.coordinates.start
@@ -192,13 +154,7 @@ def hops(
 
 
 def de(experiment: Experiment, seed: int, best: Best, pool: ThreadPool) -> None:
-    """Search by differential evolution.
-
-    Parameters
-    ----------
-    experiment, seed, best, pool
-        As in `hops`.
-    """
+    """Search by differential evolution."""
     low, high = experiment.coordinates.limits
     best.take([experiment.start_point()])
     if not len(low):

@@ -221,20 +221,7 @@ def _local(experiment: Experiment, _: int, best: Best, pool: ThreadPool) -> None
 
 @contextlib.contextmanager
 def bar(text: str, progress: bool | None) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar on standard error.
-
-    Parameters
-    ----------
-    text : str
-        What is in progress.
-    progress : bool or None
-        None: if standard error is a terminal.
-
-    Yields
-    ------
-    callable
-        Takes the share that is done.
-    """
+    """Show a progress bar on standard error."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn
 
@@ -249,20 +236,7 @@ def bar(text: str, progress: bool | None) -> Iterator[Callable[[float], None]]:
 
 
 def stretches(courses: Sequence[Course], residual: FloatArray) -> list[FloatArray]:
-    """Return residuals by unbroken stretches of rows.
-
-    Parameters
-    ----------
-    courses : sequence of Course
-        Whose rows the residuals belong to.
-    residual : ndarray, shape (rows,)
-        All of them.
-
-    Returns
-    -------
-    list of ndarray
-        None is empty.
-    """
+    """Return residuals by unbroken stretches of rows."""
     places = [np.flatnonzero(course.rows) for course in courses]
     ends = np.cumsum([where.size for where in places])[:-1]
     found = list[FloatArray]()

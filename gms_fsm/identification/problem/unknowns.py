@@ -83,29 +83,7 @@ def unknowns_of(
     tied: Sequence[str],
     bounds: Mapping[str, tuple[float, float]],
 ) -> tuple[Unknown, ...]:
-    """Return the numbers to be found, from their names.
-
-    Parameters
-    ----------
-    subject : Mounted
-        Whose numbers.
-    free : iterable of str
-        ``k`` for all elements, ``k2`` for one of them.
-    tied : sequence of str
-        Parameters of which all elements get one value.
-    bounds : mapping of str to (float, float)
-        By either name.
-
-    Returns
-    -------
-    tuple of Unknown
-        In the order of `free`.
-
-    Raises
-    ------
-    ParameterError
-        If a name is unknown or given twice, or bounds contradict a rule.
-    """
+    """Return the numbers to be found, from their names."""
     found: dict[str, Unknown] = {}
     for name in free:
         for each in _named(subject, name, tied):
@@ -321,21 +299,6 @@ class Coordinates:
 def values_by_key(
     subject: Mounted, unknowns: Sequence[Unknown], numbers: Iterable[float]
 ) -> dict[str, Any]:
-    """Return values of unknowns by the names of their parameters.
-
-    Parameters
-    ----------
-    subject : Mounted
-        Supplies the elements that are not among the unknowns.
-    unknowns : sequence of Unknown
-        Some unknowns.
-    numbers : iterable of float
-        A value for each.
-
-    Returns
-    -------
-    dict
-        A number, or an array where elements differ.
-    """
+    """Return values of unknowns by the names of their parameters."""
     pairs = zip(unknowns, numbers, strict=True)
     return joined(subject, ((each.key, each.element, number) for each, number in pairs))

@@ -44,19 +44,7 @@ class ForceWriter(ProgramWriter):
     def forces(
         self, signs: Signs, *, wanted: bool, rates: bool = False, observed: bool = False
     ) -> list[CodeLine]:
-        """Write the rates and the forces of all contacts, and the accelerations.
-
-        Parameters
-        ----------
-        signs : {"held", "live", "given"}
-            Where signs come from.
-        wanted : bool
-            Whether forces are wanted at all.
-        rates : bool
-            Store the rates into dy.
-        observed : bool
-            Store what is observed of the elements into out.
-        """
+        """Write the rates and the forces of all contacts, and the accelerations."""
         lines: list[CodeLine] = []
         for bank in self.plan.banks:
             lines += self.bank_forces(bank, signs, wanted, rates=rates, observed=observed)

@@ -423,17 +423,7 @@ class Locks:
         ]
 
     def hit(self, bank: int, targets: Mapping[int, CodeLine], *, impulse: bool) -> list[CodeLine]:
-        """Write that velocities of a contact are set next.
-
-        Parameters
-        ----------
-        bank : int
-            The contact.
-        targets : mapping of int to CodeLine
-            By velocity, its new value.
-        impulse : bool
-            Whether they may be far from it; else they have passed it by rounding only.
-        """
+        """Write that velocities of a contact are set next."""
         lines = [CodeLine(f"hit = {2 if impulse else 1}")]
         for q, goal in targets.items():
             r = self.number(bank, q)

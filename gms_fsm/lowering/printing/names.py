@@ -59,16 +59,6 @@ class QuantityNames:
 def computed_names(node: Node) -> frozenset[str]:
     """Return the names whose values a tree is computed from: ``u**0`` is 1 whatever u is.
 
-    Parameters
-    ----------
-    node : Node
-        A value or a condition.
-
-    Returns
-    -------
-    frozenset of str
-        As `names_in`, except for such powers.
-
     Examples
     --------
     >>> from gms_fsm.language import parse_value
@@ -85,16 +75,6 @@ def computed_names(node: Node) -> frozenset[str]:
 
 def names_of(read: Assembly) -> QuantityNames:
     """Choose the names of a system's program.
-
-    Parameters
-    ----------
-    read : Assembly
-        The system, read.
-
-    Returns
-    -------
-    QuantityNames
-        Without clashes.
 
     Examples
     --------

@@ -235,16 +235,6 @@ class ProgramPlan:
 def plan_of(read: Assembly) -> ProgramPlan:
     """Plan the program of a system.
 
-    Parameters
-    ----------
-    read : Assembly
-        From `assembled`; of its numbers only the shapes matter.
-
-    Returns
-    -------
-    ProgramPlan
-        For a printer.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed

@@ -63,16 +63,6 @@ class Phase:
 def python(plan: ProgramPlan) -> str:
     """Return a program as Python text.
 
-    Parameters
-    ----------
-    plan : ProgramPlan
-        Of the program.
-
-    Returns
-    -------
-    str
-        The constants for states and edges, then the functions named in `FUNCTIONS`.
-
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed

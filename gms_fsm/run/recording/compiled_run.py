@@ -83,29 +83,12 @@ class CompiledRun:
                 self.engine.set_state(memory.machine, edge.target)
 
     def reset(self, what: Mounted) -> None:
-        """Start over with different numbers; signals and initial values stay.
-
-        Parameters
-        ----------
-        what : Mounted
-            With the same text as the previous one.
-        """
+        """Start over with different numbers; signals and initial values stay."""
         self.columns.reset(what)
         self.next_look = PATIENCE
 
     def advance(self) -> bool:
-        """Run until a chunk of steps is complete.
-
-        Returns
-        -------
-        bool
-            False if the run has reached its end.
-
-        Raises
-        ------
-        SimulationError
-            If it cannot continue.
-        """
+        """Run until a chunk of steps is complete."""
         columns = self.columns
         columns.make_room()
         b, start, before = columns.buffers, columns.start, columns.latest
@@ -404,18 +387,7 @@ def _prepared(start: Problem) -> compiled.Prepared:
 
 
 def example_of(start: Problem) -> RecordArguments:
-    """Return the arguments of `integrators.runners.columns.record`, with columns that may grow.
-
-    Parameters
-    ----------
-    start : Problem
-        The run.
-
-    Returns
-    -------
-    integrators.runners.compiled.RecordArguments
-        An example for `integrators.machine_code.layout.BlockLayout`.
-    """
+    """Return the arguments of `integrators.runners.columns.record`, with columns that may grow."""
     from integrators.runners.compiled import example
 
     program, layout = start.program, start.program.layout

@@ -14,25 +14,7 @@ __all__ = ["engine_of", "own_machines"]
 
 
 def own_machines(given: Any, start: Problem) -> dict[str, ElementMachines]:
-    """Return the user's machines by contact.
-
-    Parameters
-    ----------
-    given : ElementMachines or mapping of str to ElementMachines
-        As passed to `simulate`.
-    start : Problem
-        The run.
-
-    Returns
-    -------
-    dict of str to ElementMachines
-        For some or all contacts.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such contact, or machines were made for something else.
-    """
+    """Return the user's machines by contact."""
     contacts, named = start.system.contacts, start.what.named
     if not isinstance(given, Mapping):
         if len(contacts) > 1:

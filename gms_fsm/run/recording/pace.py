@@ -35,20 +35,7 @@ COARSE = 1e-3  # relative tolerance of a look ahead
 
 
 def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
-    """Stop a run for which stability, not accuracy, asks for more steps than are left.
-
-    Parameters
-    ----------
-    recording : Recording
-        The run in progress.
-    buffers : integrators.hybrid.Buffers
-        Its current state.
-
-    Raises
-    ------
-    StepLimitError
-        With the advice to use an implicit method.
-    """
+    """Stop a run for which stability, not accuracy, asks for more steps than are left."""
     start, now, plan = recording.start, buffers.now, buffers.plan
     t = now.t
     place = t, list(now.y), hybrid.modes_of(buffers)

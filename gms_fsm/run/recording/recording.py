@@ -203,20 +203,7 @@ class Recorder:
 
 # --------------------------------------------------------------------------- wording of errors
 def explained(error: HybridError, recorder: Recording) -> SimulationError:
-    """Translate an error of the loop into the terms of the model.
-
-    Parameters
-    ----------
-    error : HybridError
-        From `integrators`.
-    recorder : Recording
-        The recorded data.
-
-    Returns
-    -------
-    SimulationError
-        With the trace.
-    """
+    """Translate an error of the loop into the terms of the model."""
     trace = recorder.trace()
     if isinstance(error, NotFinite):
         values = [float(f"{u:.6g}") for u in error.y]
@@ -411,20 +398,7 @@ def _slow(recorder: Recording) -> tuple[str, str]:
 
 
 def interference_error(error: Interference, recorder: Recording) -> CallbackError:
-    """Return an error with the trace for a callback that changed something.
-
-    Parameters
-    ----------
-    error : Interference
-        From the machines.
-    recorder : Recording
-        The recorded data.
-
-    Returns
-    -------
-    CallbackError
-        With the trace.
-    """
+    """Return an error with the trace for a callback that changed something."""
     return CallbackError(
         error.reason, recorder.trace(), t=error.t, place=error.place, advice=error.advice
     )
@@ -461,18 +435,7 @@ def _not_finite(error: NotFinite, recorder: Recording) -> str:
 
 
 def check_end(recorder: Recording) -> None:
-    """Raise an error if a sampled signal ended before the run was meant to.
-
-    Parameters
-    ----------
-    recorder : Recording
-        A run that has reached its last time.
-
-    Raises
-    ------
-    SignalEndError
-        With the trace.
-    """
+    """Raise an error if a sampled signal ended before the run was meant to."""
     last, t_end = recorder.start.last, recorder.start.t_end
     if last < t_end:
         raise SignalEndError(

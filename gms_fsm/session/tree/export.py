@@ -22,27 +22,7 @@ NAMES = ("step", "rtol", "atol", "max_step", "max_steps")  # any engine gives th
 
 
 def save_scenario(path: str | Path, start: Problem, title: str, notes: str) -> Path:
-    """Write a run as a scenario file of its system.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file; its ending must be ``.toml``.
-    start : Problem
-        The run.
-    title, notes : str
-        For people.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OutputError
-        If a signal is a Python function, or the file cannot be written.
-    """
+    """Write a run as a scenario file of its system."""
     path = checked_path("path", path)
     if path.suffix != ".toml":
         raise OutputError("the ending must be .toml", place=str(path))

@@ -189,22 +189,7 @@ def _by_element(key: object, value: Any, n: int) -> dict[int, float]:
 
 
 def initial_with(edits: Edits, start: Problem, here: BranchRow) -> dict[str, Any]:
-    """Return the ``initial`` of a run that continues from a point with edits.
-
-    Parameters
-    ----------
-    edits : Edits
-        The changes.
-    start : Problem
-        Of the run.
-    here : BranchRow
-        The point.
-
-    Returns
-    -------
-    dict
-        In the form accepted by `gms_fsm.simulate`: the whole state, with the changes.
-    """
+    """Return the ``initial`` of a run that continues from a point with edits."""
     initial = initial_values(start, here)
     layout = start.program.layout
     poked = {machine_of(element, start): name for element, name in edits.state.items()}
@@ -224,20 +209,7 @@ def initial_with(edits: Edits, start: Problem, here: BranchRow) -> dict[str, Any
 
 
 def initial_values(start: Problem, here: BranchRow) -> dict[str, Any]:
-    """Return the whole state at a point of a run as the ``initial`` of another.
-
-    Parameters
-    ----------
-    start : Problem
-        Of the run.
-    here : BranchRow
-        The point.
-
-    Returns
-    -------
-    dict
-        In the form accepted by `gms_fsm.simulate`.
-    """
+    """Return the whole state at a point of a run as the ``initial`` of another."""
     layout = start.program.layout
     initial: dict[str, Any] = layout.y.named(here.y)
     modes = list(here.mode[layout.elements])

@@ -89,20 +89,7 @@ def walk_to(branch: Branch, row: int, t: float | None) -> None:
 
 
 def reaches(branch: Branch, holds: Callable[[BranchRow], bool]) -> bool:
-    """Go forward to the next point where a condition becomes true, located between rows.
-
-    Parameters
-    ----------
-    branch : Branch
-        The current branch.
-    holds : callable
-        The condition. If it is already true, it must first become false.
-
-    Returns
-    -------
-    bool
-        False if the end of the run was reached.
-    """
+    """Go forward to the next point where a condition becomes true, located between rows."""
     truth = holds(branch.here)
     begin = None if branch.between is None else branch.between.t  # a second `until` starts there
     while True:

@@ -86,18 +86,7 @@ SignalField = Annotated[
 
 
 def signal_table(signal: Signal | str) -> SignalField:
-    """Describe a signal.
-
-    Parameters
-    ----------
-    signal : Signal or str
-        As systems and rigs have it.
-
-    Returns
-    -------
-    str, list or Table
-        An expression, ramps, a record, or the mark of a Python function.
-    """
+    """Describe a signal."""
     match signal:
         case str(text) | Formula(text=text):
             return text
@@ -109,20 +98,7 @@ def signal_table(signal: Signal | str) -> SignalField:
 
 
 def signal_of(name: str, table: SignalField) -> Signal | str:
-    """Return the signal that a table describes.
-
-    Parameters
-    ----------
-    name : str
-        The signal's, for messages.
-    table : str, float, list or Table
-        From `signal_table`, or as a file has it.
-
-    Returns
-    -------
-    Signal or str
-        A text as it is; a Python function has become one that raises.
-    """
+    """Return the signal that a table describes."""
     match table:
         case str(text) | FormulaTable(text=text):
             return text
@@ -319,18 +295,7 @@ class SystemTable(Table):
 
     @classmethod
     def of(cls, system: System) -> SystemTable:
-        """Describe a system; a Python function as a signal is named as such.
-
-        Parameters
-        ----------
-        system : System
-            Any system.
-
-        Returns
-        -------
-        SystemTable
-            With every chart written out.
-        """
+        """Describe a system; a Python function as a signal is named as such."""
         return cls(**plain(system), contacts=[ContactTable.of(each) for each in system.contacts])
 
     def build(self, kind: type[System]) -> System:

@@ -152,25 +152,7 @@ class SystemFile(SystemTable):
     contacts: list[ContactInFile] = Field(alias="contact")  # type: ignore[assignment]
 
     def chosen(self, folder: Path, kind: type[System]) -> System:
-        """Return the system; its charts may be files in a folder.
-
-        Parameters
-        ----------
-        folder : Path
-            Where the names of chart files lead.
-        kind : type of System
-            The class, which imports this module.
-
-        Returns
-        -------
-        System
-            Checked.
-
-        Raises
-        ------
-        GMSError
-            With the part at fault as its key.
-        """
+        """Return the system; its charts may be files in a folder."""
         for name, signal in self.signals.items():
             if isinstance(signal, FunctionTable):
                 raise ScenarioError(
@@ -202,27 +184,7 @@ def save(system: System, path: Path) -> Path:
 
 
 def save_as(kind: type[SystemFile], system: System, path: Path, **further: Any) -> Path:
-    """Write a file that holds a system and more.
-
-    Parameters
-    ----------
-    kind : type of SystemFile
-        What the file holds.
-    system, path
-        As in `save`.
-    **further
-        Its further fields, and those that replace fields of the system.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OutputError
-        As in `save`.
-    """
+    """Write a file that holds a system and more."""
     contacts = [ContactInFile(**described(each), **_numbers(each)) for each in system.contacts]
     table = kind(**{**plain(system), "contacts": contacts, **further})
     for name, signal in table.signals.items():

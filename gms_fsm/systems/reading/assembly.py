@@ -250,24 +250,7 @@ class Assembly:
 
 @functools.lru_cache(maxsize=64)
 def assembled(system: System) -> Assembly:
-    """Read all texts of a system; a system is read once, when it is constructed.
-
-    Parameters
-    ----------
-    system : System
-        What runs.
-
-    Returns
-    -------
-    Assembly
-        With every quantity under a name of its own.
-
-    Raises
-    ------
-    ExpressionError, ParameterError
-        If a text cannot be read, a velocity is not linear, an inertia is not positive, or locks
-        that always hold depend on each other.
-    """
+    """Read all texts of a system; a system is read once, when it is constructed."""
     return SystemReader(system).read()
 
 

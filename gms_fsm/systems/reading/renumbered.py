@@ -16,21 +16,7 @@ __all__ = ["check_numbers", "renumbered"]
 
 
 def renumbered(read: Assembly, system: System) -> Assembly:
-    """Return what was read with the numbers of another system of the same texts.
-
-    Parameters
-    ----------
-    read : Assembly
-        Of a system.
-    system : System
-        One that differs from it in numbers only.
-
-    Returns
-    -------
-    Assembly
-        With the same trees. Its `system` stays the first one: a circle would have to wait for the
-        garbage collector.
-    """
+    """Return what was read with the numbers of another system of the same texts."""
     shared, own = numbers_of(system)
     pairs = zip(read.banks, system.contacts, strict=True)
     banks = tuple(replace(bank, contact=contact) for bank, contact in pairs)
@@ -40,21 +26,7 @@ def renumbered(read: Assembly, system: System) -> Assembly:
 
 
 def check_numbers(read: Assembly, system: System) -> None:
-    """Refuse numbers with which a system that was read could not be run.
-
-    Parameters
-    ----------
-    read : Assembly
-        Of a system of the same texts.
-    system : System
-        With other numbers.
-
-    Raises
-    ------
-    ParameterError
-        If an inertia is not positive, a spring pushes away, or locks that always hold depend on
-        each other.
-    """
+    """Refuse numbers with which a system that was read could not be run."""
     reader = SystemReader(system)
     reader.check_inertias(read.inertias)
     check_springs(system)

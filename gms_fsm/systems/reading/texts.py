@@ -19,18 +19,7 @@ T = TypeVar("T")
 
 
 def texts_of_system(system: System) -> tuple[Any, ...]:
-    """Return everything that the trees of a system depend on, in hashable form.
-
-    Parameters
-    ----------
-    system : System
-        Complete, but for its assembly.
-
-    Returns
-    -------
-    tuple
-        Equal for systems that differ in numbers only.
-    """
+    """Return everything that the trees of a system depend on, in hashable form."""
     contacts = [
         (
             contact.name,

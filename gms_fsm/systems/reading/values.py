@@ -18,18 +18,7 @@ def of(contact: str, name: str) -> str:
 
 
 def numbers_of(system: System) -> tuple[dict[str, float], dict[str, tuple[int, np.ndarray]]]:
-    """Return all numbers of a system by name.
-
-    Parameters
-    ----------
-    system : System
-        What runs.
-
-    Returns
-    -------
-    (dict, dict)
-        `Assembly.shared` and `Assembly.own`. Their order does not depend on the numbers.
-    """
+    """Return all numbers of a system by name."""
     shared: dict[str, float] = {}
     own: dict[str, tuple[int, np.ndarray]] = {}
     for contact in system.contacts:  # what a model brings besides its chart's parameters

@@ -25,15 +25,7 @@ SAMPLES, SAMPLE = 16, 4096  # number and bytes of the places that are tried
 
 
 def write_arrays(file: IO[bytes], arrays: Mapping[str, Any]) -> None:
-    """Write arrays as a file that `numpy.load` reads.
-
-    Parameters
-    ----------
-    file : file
-        An open binary file.
-    arrays : mapping of str to array_like
-        The arrays by name.
-    """
+    """Write arrays as a file that `numpy.load` reads."""
     with zipfile.ZipFile(file, "w") as archive:
         for name, value in arrays.items():
             array = np.asarray(value)
@@ -52,30 +44,7 @@ def _shrinks(array: NDArray[Any]) -> bool:
 
 
 def member(file: Any, name: str, most: int | None = None) -> Any:
-    """Read an array from an archive after checking its unpacked size.
-
-    Parameters
-    ----------
-    file : numpy.lib.npyio.NpzFile
-        The open archive.
-    name : str
-        Name of the array.
-    most : int, optional
-        Largest size in bytes, if other arrays determine it. Otherwise the limit follows from the
-        compressed size.
-
-    Returns
-    -------
-    ndarray
-        The array.
-
-    Raises
-    ------
-    TraceFileError
-        If it is too large.
-    KeyError
-        If the archive has no such array.
-    """
+    """Read an array from an archive after checking its unpacked size."""
     members = {info.filename: info for info in file.zip.infolist()}
     found = members.get(name) or members[f"{name}.npy"]
     most = ROOM + (DENSEST * found.compress_size if most is None else most)

@@ -19,39 +19,13 @@ FORCES = "_elements"  # how the names of the elements' forces end in a layout
 
 
 def column_title(layout: SystemLayout, name: str, *, short: bool) -> str:
-    """Return the title of the column of a quantity; without the number of its element.
-
-    Parameters
-    ----------
-    layout : SystemLayout
-        Of the run.
-    name : str
-        The quantity's name there.
-    short : bool
-        Whether to leave out the name of the contact, of which there is one only.
-
-    Returns
-    -------
-    str
-        Such as ``"F"`` or ``"pad.F"``.
-    """
+    """Return the title of the column of a quantity; without the number of its element."""
     title = name.removesuffix(FORCES)
     return title.removeprefix(layout.contact().of("")) if short else title
 
 
 def columns_of(trace: Trace) -> dict[str, NDArray[Any]]:
-    """Return the rows of a trace as flat columns.
-
-    Parameters
-    ----------
-    trace : Trace
-        A run; or what one contact of it sees.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (rows,)
-        See `Trace.columns`.
-    """
+    """Return the rows of a trace as flat columns."""
     layout, system = trace.program.layout, trace.what.system
     table: dict[str, NDArray[Any]] = {"t": trace.t, "microstep": trace.microstep}
     slid = trace.rows.mode[:, layout.slides].T

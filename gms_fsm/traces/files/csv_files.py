@@ -65,24 +65,7 @@ def log_texts(firings: Firings) -> Iterator[str]:
 def write(
     path: Path, header: Header, parts: Iterable[Mapping[str, NDArray[Any]]], firings: Firings
 ) -> Path:
-    """Write a trace and its log, both completely or neither.
-
-    Parameters
-    ----------
-    path : Path
-        Of the rows.
-    header : Header
-        Describes the run.
-    parts : iterable of mapping of str to ndarray
-        The columns, some rows at a time.
-    firings : Firings
-        The log.
-
-    Returns
-    -------
-    Path
-        Of the rows.
-    """
+    """Write a trace and its log, both completely or neither."""
     stamp = _stamp(log_texts(firings))
     head = json.loads(header.model_copy(update={"log": stamp}).model_dump_json())
 

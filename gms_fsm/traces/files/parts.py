@@ -48,20 +48,7 @@ class RunDescription:
 
 
 def stored_names(what: Mounted, layout: SystemLayout) -> dict[str, str]:
-    """Return for each observed quantity in a file its name in the layout.
-
-    Parameters
-    ----------
-    what : Mounted
-        What ran; the files of a model on a rig have short names.
-    layout : SystemLayout
-        Of the run.
-
-    Returns
-    -------
-    dict of str to str
-        With the velocities of driven bodies, which are in no layout, under their own names.
-    """
+    """Return for each observed quantity in a file its name in the layout."""
     if what.named:
         driven = [body.v for body in what.system.bodies if body.driven]
         return {name: name for name in (*layout.observed.shared, *layout.observed.own, *driven)}
@@ -100,24 +87,7 @@ class Parts:
 
 
 def checked(parts: Parts) -> Parts:
-    """Check the parts of a file and return them, completed.
-
-    Parameters
-    ----------
-    parts : Parts
-        The parts as read.
-
-    Returns
-    -------
-    Parts
-        With slide flags for the surfaces, which files of older versions lack, and with integers of
-        the size that a run has.
-
-    Raises
-    ------
-    TraceFileError
-        If they are inconsistent.
-    """
+    """Check the parts of a file and return them, completed."""
     layout, system = parts.ran.layout, parts.ran.what.system
     states = [len(each.chart.states) for each in system.contacts for _ in range(each.n)]
     tables = {"rows": _with_slides(parts.rows, layout)}

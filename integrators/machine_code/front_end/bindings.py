@@ -39,22 +39,7 @@ def bind(work: Work, name: str, value: Value) -> None:
 
 
 def own(work: Work, path: str, value: Value) -> Value:
-    """Return a value whose parts do not change when variables do.
-
-    Parameters
-    ----------
-    work : Work
-        The function.
-    path : str
-        Begins the names of the local variables that keep parts of it.
-    value : Value
-        The value.
-
-    Returns
-    -------
-    Value
-        The same, now and later.
-    """
+    """Return a value whose parts do not change when variables do."""
     match value:
         case RecordValue(fields=fields):
             parts = {name: own(work, f"{path}.{name}", part) for name, part in fields.items()}

@@ -26,20 +26,7 @@ __all__ = ["passed_of", "take"]
 
 
 def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
-    """Return what is passed for some arguments.
-
-    Parameters
-    ----------
-    arguments : sequence of Value
-        In terms of the caller's locals.
-
-    Returns
-    -------
-    list of Expr
-        Numbers and addresses.
-    tuple
-        The types of the arguments; calls with equal types can use the same translation.
-    """
+    """Return what is passed for some arguments."""
     passed: list[Expr] = []
     names: dict[Local, Expr] = {}
 
@@ -75,20 +62,7 @@ def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
 
 
 def take(work: Work, arguments: Sequence[Value]) -> None:
-    """Give a function its parameters, in the order in which `passed_of` passes them.
-
-    Parameters
-    ----------
-    work : Work
-        The function, before its first statement.
-    arguments : sequence of Value
-        In terms of the caller's locals.
-
-    Raises
-    ------
-    TranslationError
-        If it takes another number of arguments.
-    """
+    """Give a function its parameters, in the order in which `passed_of` passes them."""
     names = [each.arg for each in work.source.definition.args.args]
     if len(names) != len(arguments):
         raise work.error(f"it takes {len(names)} arguments, not {len(arguments)}")

@@ -70,21 +70,6 @@ _files: dict[tuple[str, int], _File] = {}
 def source_of(function: Callable[..., Any]) -> Source:
     """Return the text of a function.
 
-    Parameters
-    ----------
-    function : callable
-        A Python function; `linecache` knows its file.
-
-    Returns
-    -------
-    Source
-        Its text, which is compared with the code that is loaded.
-
-    Raises
-    ------
-    TranslationError
-        If the text is not there, or has changed since the function was loaded.
-
     Examples
     --------
     >>> from integrators.step_size import next_factor

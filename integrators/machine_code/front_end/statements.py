@@ -49,18 +49,7 @@ __all__ = ["body"]
 
 
 def body(work: Work) -> tuple[Statement, ...]:
-    """Translate the statements of a function.
-
-    Parameters
-    ----------
-    work : Work
-        The function, with its parameters.
-
-    Returns
-    -------
-    tuple of Statement
-        All of them.
-    """
+    """Translate the statements of a function."""
     made = (*work.out, *_block(work, work.source.definition.body))
     if _comes_to_its_end(made):
         if work.gives:

@@ -149,16 +149,6 @@ def times(a: Expr, b: Expr) -> Expr:
 def leaves(value: Value) -> Iterator[NumberValue | ArrayValue | FixedValue]:
     """Yield the numbers, arrays and objects that a value is made of, in order.
 
-    Parameters
-    ----------
-    value : Value
-        A record is taken apart.
-
-    Yields
-    ------
-    NumberValue, ArrayValue or FixedValue
-        At least one, unless it is an empty record.
-
     Examples
     --------
     >>> one, two = (NumberValue(Const("i", each)) for each in (1, 2))
@@ -174,18 +164,6 @@ def leaves(value: Value) -> Iterator[NumberValue | ArrayValue | FixedValue]:
 
 def substituted(part: Any, given: Mapping[Local, Expr]) -> Any:
     """Return a value, or an expression in one, with locals replaced.
-
-    Parameters
-    ----------
-    part : Value or Expr
-        Expressions that would have been assigned to a local are not expected.
-    given : mapping of Local to Expr
-        What takes their places.
-
-    Returns
-    -------
-    Value or Expr
-        Of the same class.
 
     Examples
     --------

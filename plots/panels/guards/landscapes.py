@@ -411,13 +411,7 @@ def _flow(ax: Axes, trace: Trace, plane: Plane, view: PlaneWindow) -> Artists:
 
 # --------------------------------------------------------------------------- counterexamples
 def pinned(plane: Plane, checks: Report) -> list[Finding]:
-    """Return the findings of a chart's checks that have a point in the plane.
-
-    Raises
-    ------
-    ParameterError
-        If the report is that of another chart.
-    """
+    """Return the findings of a chart's checks that have a point in the plane."""
     if not isinstance(checks, Report):
         raise ParameterError("it must be a Report, from prove(chart)", place="checks", value=checks)
     if checks.chart != plane.chart:

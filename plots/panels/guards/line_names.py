@@ -91,18 +91,7 @@ class LineNames(Artist):
             text.draw(renderer)
 
     def placed(self, renderer: RendererBase) -> list[Text]:
-        """Return the names that have a place, in pixels of a renderer.
-
-        Parameters
-        ----------
-        renderer : RendererBase
-            Of the figure; it knows how large texts are.
-
-        Returns
-        -------
-        list of Text
-            No two of them overlap.
-        """
+        """Return the names that have a place, in pixels of a renderer."""
         ax, unit = self._owner, float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
         taken = _Taken()
         for point in self.avoid:

@@ -53,17 +53,6 @@ SEARCHED = np.geomspace(1e-15, 1e6, 1200)  # distances from 0 at which guards ar
 def plane_axes(chart: Chart) -> tuple[str, str] | None:
     """Return the two names that span the plane of a chart.
 
-    Parameters
-    ----------
-    chart : Chart
-        The chart.
-
-    Returns
-    -------
-    (str, str) or None
-        The first velocity and the first variable. Without variables, the second name is the first
-        other quantity in the texts of the guards; None if they read nothing else.
-
     Examples
     --------
     >>> from gms_fsm.charts import CHARTS
@@ -83,13 +72,7 @@ def plane_axes(chart: Chart) -> tuple[str, str] | None:
 
 
 def checked_axes(chart: Chart) -> tuple[str, str]:
-    """Return the names that span the plane of a chart.
-
-    Raises
-    ------
-    ParameterError
-        If the chart has no such plane.
-    """
+    """Return the names that span the plane of a chart."""
     found = plane_axes(chart)
     if found is None:
         raise ParameterError(
@@ -155,27 +138,7 @@ class Plane:
 
     @classmethod
     def of(cls, trace: Trace, row: int, element: int) -> Plane:
-        """Return the plane of an element at a row.
-
-        Parameters
-        ----------
-        trace : Trace
-            The run.
-        row : int
-            Row index; negative counts from the end.
-        element : int
-            Element index, from 0.
-
-        Returns
-        -------
-        Plane
-            As `gms_fsm.session.explain.explain` sees the row.
-
-        Raises
-        ------
-        ParameterError
-            If the chart has no plane.
-        """
+        """Return the plane of an element at a row."""
         chart = trace.model.chart
         names = checked_axes(chart)
         why = explain(trace, row, element)
@@ -250,38 +213,12 @@ class Plane:
         return renamed(tree, self.inner)
 
     def truths(self, condition: Condition, v: ArrayLike, z: ArrayLike) -> NDArray[np.bool_]:
-        """Return where a guard or clause is true.
-
-        Parameters
-        ----------
-        condition : Condition
-            As in the chart.
-        v, z : array_like
-            The velocity and the second quantity; their shapes are broadcast.
-
-        Returns
-        -------
-        ndarray of bool
-            At the point of the row, the truth that the run saw.
-        """
+        """Return where a guard or clause is true."""
         shape = np.broadcast_shapes(np.shape(v), np.shape(z))
         return truths(self.expanded(condition), self._columns(v, z), shape)
 
     def numbers(self, tree: Value, v: ArrayLike, z: ArrayLike) -> Floats | None:
-        """Return the values of a tree at points; None if it reads what the row does not give.
-
-        Parameters
-        ----------
-        tree : Value
-            A side of a clause or a flow, as in the chart.
-        v, z : array_like
-            The velocity and the second quantity.
-
-        Returns
-        -------
-        ndarray or None
-            NaN or infinity where it cannot be computed.
-        """
+        """Return the values of a tree at points; None if it reads what the row does not give."""
         expanded, columns = self.expanded_value(tree), self._columns(v, z)
         if not names_in(expanded) <= columns.keys():
             return None
@@ -320,25 +257,7 @@ def _threshold(curve: Stribeck, weight: float, velocity: str) -> Value:
 
 # --------------------------------------------------------------------------- its axes
 def turning_points(plane: Plane, edges: Iterable[Transition], axis: int, at: float = 0.0) -> Floats:
-    """Return where comparisons of guards turn along one axis of the plane.
-
-    Parameters
-    ----------
-    plane : Plane
-        The plane.
-    edges : iterable of Transition
-        Whose guards.
-    axis : {0, 1}
-        Along the velocity, or along the second quantity.
-    at : float
-        The value of the other one.
-
-    Returns
-    -------
-    ndarray
-        Both signs, without 0, to two digits. Along the velocity, only comparisons that do not read
-        the second quantity are asked.
-    """
+    """Return where comparisons of guards turn along one axis of the plane."""
     own, other = plane.names[axis], plane.names[1 - axis]
     found: list[float] = []
     for each in plane.atoms(edges):
@@ -355,19 +274,6 @@ def turning_points(plane: Plane, edges: Iterable[Transition], axis: int, at: flo
 
 def linear_threshold(plane: Plane, largest: float) -> float:
     """Return the speed below which the axis of the velocity is linear.
-
-    Parameters
-    ----------
-    plane : Plane
-        The plane.
-    largest : float
-        The largest speed of the run, m/s.
-
-    Returns
-    -------
-    float
-        A power of ten: a decade below the smallest speed at which a guard of any state turns; if
-        there is none, a thousandth of the largest speed.
 
     Examples
     --------

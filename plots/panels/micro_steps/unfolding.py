@@ -353,24 +353,7 @@ def column_width(wide: float, part: Unfolded) -> float:
 
 
 def edge_texts(part: Unfolded, wide: float) -> tuple[dict[str, str], bool, float]:
-    """Return how the edges are written above columns of a width.
-
-    Parameters
-    ----------
-    part : Unfolded
-        From `unfolded`.
-    wide : float
-        Width of a column, inches of the screen.
-
-    Returns
-    -------
-    texts : dict of str to str
-        By edge: whole, or broken at underscores.
-    upright : bool
-        Whether they are rotated, because nothing else is narrow enough.
-    tall : float
-        Height of the highest one, inches.
-    """
+    """Return how the edges are written above columns of a width."""
     edges = {each.edge for each in part.columns if each.edge}
     broken = {edge: edge.replace("_", "_\n").rstrip("\n") for edge in edges}
     if LETTER * max(map(len, edges)) + 0.06 < wide:
@@ -405,24 +388,7 @@ def _edge_names(ax: Axes, part: Unfolded, wide: float) -> Artists:
 
 
 def time_texts(part: Unfolded, wide: float) -> tuple[list[str], bool, float]:
-    """Return how the times between instants are written below columns of a width.
-
-    Parameters
-    ----------
-    part : Unfolded
-        From `unfolded`.
-    wide : float
-        Width of a column, inches of the screen.
-
-    Returns
-    -------
-    texts : list of str
-        One for each gap.
-    upright : bool
-        Whether they are rotated, because they would meet.
-    tall : float
-        Height of the highest one, inches.
-    """
+    """Return how the times between instants are written below columns of a width."""
     texts = []
     for step in np.diff(part.times).tolist():
         factor, unit = scaled(np.array([step]), "s") if step >= 1e-10 else (1.0, "s")

@@ -34,25 +34,6 @@ Cell = tuple[str, str]  # its kind, "markdown" or "code", and its text
 def write_notebook(number: int, folder: str | Path) -> Path:
     """Write a lesson as a notebook.
 
-    Parameters
-    ----------
-    number : int
-        For example 7.
-    folder : str or Path
-        Output folder for ``lesson_N.ipynb``; created if it does not exist.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such lesson.
-    OutputError
-        If the file cannot be written, or exists and has been changed since it was written.
-
     Examples
     --------
     >>> import tempfile
@@ -67,21 +48,6 @@ def write_notebook(number: int, folder: str | Path) -> Path:
 
 def composed(number: int) -> tuple[Cell, ...]:
     """Return the cells of a lesson.
-
-    Parameters
-    ----------
-    number : int
-        For example 7.
-
-    Returns
-    -------
-    tuple of (str, str)
-        ``"markdown"`` or ``"code"``, and the text of each cell.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such lesson.
 
     Examples
     --------
@@ -98,16 +64,6 @@ def composed(number: int) -> tuple[Cell, ...]:
 
 def cells_of(text: str) -> tuple[Cell, ...]:
     r"""Split Markdown into cells: ``python`` blocks are code; their outputs are left out.
-
-    Parameters
-    ----------
-    text : str
-        The Markdown. Comments and pictures are left out.
-
-    Returns
-    -------
-    tuple of (str, str)
-        As from `composed`.
 
     Examples
     --------
@@ -137,16 +93,6 @@ def _parts(text: str) -> Iterator[Cell]:
 
 def notebook(cells: tuple[Cell, ...]) -> str:
     """Return cells as the text of a notebook file, without outputs.
-
-    Parameters
-    ----------
-    cells : tuple of (str, str)
-        From `composed` or `cells_of`.
-
-    Returns
-    -------
-    str
-        JSON; the same cells give the same text.
 
     Examples
     --------

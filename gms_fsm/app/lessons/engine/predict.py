@@ -15,15 +15,6 @@ __all__ = ["reveal", "vary"]
 def reveal(predicted: float | str | None, measured: float | str, unit: str = "") -> None:
     """Print what was predicted next to what was measured.
 
-    Parameters
-    ----------
-    predicted : float, str or None
-        The reader's answer; None if there is none.
-    measured : float or str
-        What the run gave.
-    unit : str, optional
-        Of both.
-
     Examples
     --------
     >>> reveal(5.0, 6.25, "um")
@@ -62,19 +53,7 @@ def vary(
     *,
     log: bool = False,
 ) -> None:
-    """Show what a function draws, with a slider for its argument if ipywidgets is installed.
-
-    Parameters
-    ----------
-    draw : callable
-        ``draw(value)`` returns a figure. Its argument is an integer if the four numbers are.
-    initial, least, most, step : float
-        Of the slider. With `log` the last three are powers of 10.
-    label : str
-        Next to the slider.
-    log : bool
-        Whether the slider is logarithmic.
-    """
+    """Show what a function draws, with a slider for its argument if ipywidgets is installed."""
     display: Any = import_module("IPython.display").display
     if find_spec("ipywidgets") is None:
         display(draw(initial))
