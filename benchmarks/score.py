@@ -1,4 +1,4 @@
-"""Score a JSON file of predictions on the held-out rows of the report card.
+"""Score a JSON file of predictions on the held-out rows of the benchmark.
 
     python benchmarks/score.py mine.json --data FOLDER
 

@@ -472,7 +472,7 @@ rows = {
     "chart without values": ("own.toml", ..., "phenomena own.toml -o o"),
     "system of several contacts": ("pair.toml", ..., "phenomena pair.toml -o o"),
     "model that is no file": ("", ..., "phenomena lugre -o o"),
-    "data set that is missing": ("dataset", "skates", "reportcard --only skates -o out"),
+    "data set that is missing": ("dataset", "skates", "benchmark --only skates -o out"),
 }
 group("command", ParameterError, command, rows)
 rows = {
@@ -493,7 +493,7 @@ rows = {
     "plot of no trace": ("own.toml", ..., "plot own.toml"),
 }
 group("command", TraceFileError, command, rows)
-rows = {"data that are missing": ("nowhere", ..., "reportcard --data nowhere -o out")}
+rows = {"data that are missing": ("nowhere", ..., "benchmark --data nowhere -o out")}
 group("command", RecordError, command, rows)
 
 

@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 import gms_fsm
-from gms_fsm.app.verbs.card import reportcard_command
+from gms_fsm.app.verbs.card import benchmark_command
 from gms_fsm.app.verbs.charts import (
     blocks_command,
     chart_command,
@@ -131,7 +131,7 @@ app.command("debug")(debug_command)
 app.command("lesson")(lesson_command)
 app.command("code")(code_command)
 app.command("export")(export_command)
-app.command("reportcard")(reportcard_command)
+app.command("benchmark")(benchmark_command)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""The frictions of many joints, advanced together by somebody else's loop."""
+"""The frictions of many joints, advanced together by a co-simulation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frictions whose velocities somebody else knows, as one program.
+"""Frictions whose velocities another program knows, as one program.
 
 Each friction acts on a body of its own. The places of these bodies' velocities in the program's
 state vector are filled from outside, so the rates that the program has for them are never used.

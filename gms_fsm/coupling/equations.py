@@ -1,4 +1,4 @@
-"""Friction as equations with events, for a solver of somebody else that locates events.
+"""Friction as equations with events, for another solver that locates events.
 
 Between two events everything is smooth: the states are frozen, and so is every sign. The solver
 integrates `FrictionEquations.derivatives` beside its own equations, stops where

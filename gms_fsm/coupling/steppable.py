@@ -1,4 +1,4 @@
-"""A friction model, or a contact of a system, whose velocity somebody else's loop prescribes."""
+"""A friction model, or a contact of a system, whose velocity a co-simulation prescribes."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def start_of(
 def start_of_system(
     system: System, t: float, initial: Mapping[str, Any] | None, settings: Settings
 ) -> Problem:
-    """Return a system whose records are straight lines, which somebody else's loop gives."""
+    """Return a system whose records are straight lines, which a co-simulation gives."""
     t, end = begin(t)
     signals = dict(system.signals)
     for name, signal in system.signals.items():

@@ -1,4 +1,4 @@
-"""Friction for somebody else's loop: it is given velocities, and returns forces."""
+"""Friction for a co-simulation: it is given velocities, and returns forces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["ElementSwitch", "FrictionState", "Snapshot"]
 
 
 class FrictionState:
-    """The friction of one contact, advanced by somebody else's loop.
+    """The friction of one contact, advanced by a co-simulation.
 
     In each sample the velocity is a straight line, along which every switch is located. The result
     is that of `simulate` with ``Prescribed((t, v))``, to the last bit. One thread at a time may

@@ -24,7 +24,7 @@ AGREEMENT = 0.01
 
 
 def check_moved_from_outside(chart: Chart, known: Iterable[str], title: str) -> None:
-    """Refuse a chart that needs more than a velocity that somebody else computes.
+    """Refuse a chart that needs more than a velocity that another program computes.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A run whose steps somebody else takes, who asks for slopes and margins and goes to the events.
+"""A run whose steps a solver takes that asks for slopes and margins and goes to the events.
 
 The caller sets the time and the state in the buffers. `settle` brings the states of the machines up
 to date and freezes them; until the next call of `settle` everything is smooth. A margin that leads

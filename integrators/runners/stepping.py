@@ -1,4 +1,4 @@
-"""One sample of somebody else's loop: inputs on straight lines from its start to its end.
+"""One sample of a co-simulation: inputs on straight lines from its start to its end.
 
 The end of a sample is a knot, as in a record: steps end there, but nothing is asked, armed or
 restarted. So the results are those of a run over the same samples as a record, to the last bit.

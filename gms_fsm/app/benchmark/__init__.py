@@ -1,4 +1,4 @@
-"""The report card: friction models on public records, scored on rows that were held out."""
+"""The benchmark: friction models on public records, scored on rows that were held out."""
 
 from __future__ import annotations
 

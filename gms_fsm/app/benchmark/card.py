@@ -74,7 +74,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Card:
-    """A report card.
+    """A benchmark.
 
     Parameters
     ----------

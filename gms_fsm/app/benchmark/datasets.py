@@ -1,4 +1,4 @@
-"""The data sets of the report card, and what of each is held out."""
+"""The data sets of the benchmark, and what of each is held out."""
 
 from __future__ import annotations
 

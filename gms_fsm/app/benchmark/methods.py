@@ -1,4 +1,4 @@
-"""The models of the report card, from a static curve to what `choose` finds."""
+"""The models of the benchmark, from a static curve to what `choose` finds."""
 
 from __future__ import annotations
 

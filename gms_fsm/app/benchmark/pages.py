@@ -1,4 +1,4 @@
-"""The report card as a page and as JSON."""
+"""The benchmark as a page and as JSON."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from gms_fsm.foundation.files import output_folder, write_whole
 
 __all__ = ["FILES", "page", "table", "write"]
 
-FILES = ("reportcard.md", "reportcard.json")
-COMMAND = "gms-fsm reportcard --data FOLDER -o FOLDER"
+FILES = ("benchmark.md", "benchmark.json")
+COMMAND = "gms-fsm benchmark --data FOLDER -o FOLDER"
 NOTES = {
     "damper": "Each test is predicted by models trained on the other twelve. The first split is "
     "searched in full; the later ones are refined from it, and keep the kind of model that "
@@ -42,7 +42,7 @@ listed here, open an issue with the file and a sentence on how the model was tra
 def page(card: Card) -> str:
     """Return a card as a Markdown page."""
     lines = [
-        "# Report card",
+        "# Benchmark",
         "",
         f"Friction models on public records, made by `{COMMAND}`. Errors are of rows that were "
         f"held out of the training. Made with {card.machine}.",

@@ -14,10 +14,10 @@ from gms_fsm.app.verbs.options import INTERRUPTED
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-__all__ = ["reportcard_command"]
+__all__ = ["benchmark_command"]
 
 
-def reportcard_command(
+def benchmark_command(
     data: Annotated[
         Path | None,
         typer.Option(
@@ -26,7 +26,7 @@ def reportcard_command(
         ),
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
-        "reportcard"
+        "benchmark"
     ),
     only: Annotated[
         list[str] | None,

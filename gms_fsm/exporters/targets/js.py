@@ -1,6 +1,6 @@
 """JavaScript: the engine itself as a module, for node and for browsers.
 
-A system becomes a function that runs it; one friction a class whose inputs somebody else moves.
+A system becomes a function that runs it; one friction a class whose inputs the caller moves.
 """
 
 from __future__ import annotations
@@ -364,7 +364,7 @@ A run begins at {self.start.t_start!r} s and ends at {self.start.t_end!r} s."""
 
 
 class _Friction(_Module):
-    """One friction, whose inputs somebody else moves."""
+    """One friction, whose inputs the caller moves."""
 
     face = "js_friction"
 

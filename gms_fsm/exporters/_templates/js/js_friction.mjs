@@ -1,7 +1,7 @@
 
 const LATEST = $latest, FULL_LOG = $full_log;
 
-/** Friction that somebody else moves: its inputs run on straight lines during each call. */
+/** Friction that the caller moves: its inputs run on straight lines during each call. */
 export class Friction {
     #memory = new Memory({});
 

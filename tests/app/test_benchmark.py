@@ -1,4 +1,4 @@
-"""The report card trains each method on training rows, scores the held-out ones, and anyone's JSON.
+"""The benchmark trains each method on training rows, scores the held-out ones, and anyone's JSON.
 
 Made small: a data set of one record, and methods that are known exactly.
 """
@@ -169,10 +169,10 @@ def test_a_file_that_cannot_be_scored(submit: Any, given: Any, words: list[str])
 
 
 def test_missing_data_are_said_first(gms_fsm: CommandLine) -> None:
-    done = gms_fsm("reportcard", "--data", "nowhere", "-o", "out")
+    done = gms_fsm("benchmark", "--data", "nowhere", "-o", "out")
     assert done.code == 2
     assert "nowhere: there is no such folder" in done.err
-    assert gms_fsm("reportcard", "--only", "skates", "-o", "out").code == 2
+    assert gms_fsm("benchmark", "--only", "skates", "-o", "out").code == 2
 
 
 @pytest.fixture
