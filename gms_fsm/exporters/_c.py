@@ -122,7 +122,7 @@ class _Text:
         edges = [f"    {name}_edge_{each} = {k}," for k, each in enumerate(made.edges)]
         states = [f"    {name}_state_{each} = {k}," for each, k in made.states.items()]
         return filled(
-            "engine.h",
+            "c/engine.h",
             name=name,
             guard=f"{name.upper()}_H",
             title=safe(self.title),
@@ -161,7 +161,7 @@ class _Text:
             f'    case {name}_edge_{each}: return "{text}";' for each, text in made.edges.items()
         ]
         return filled(
-            "engine.c",
+            "c/engine.c",
             name=name,
             title=safe(self.title),
             version=__version__,

@@ -176,7 +176,7 @@ def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.Monkey
         calls.append(arguments)
         return real(*arguments)
 
-    monkeypatch.setattr(plots.live_chart, "picture", counted)
+    monkeypatch.setattr(plots.charts.live_chart, "picture", counted)
     told: list[tuple[int, int]] = []
     more = {"elements": [1], "frames": 6, "progress": lambda *each: told.append(each)}
     animate(bank(), tmp_path / "run.gif", **more)

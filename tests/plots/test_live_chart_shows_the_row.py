@@ -193,7 +193,7 @@ def test_one_layout_serves_all_frames_and_texts_do_not_move(
         calls.append(arguments)
         return real(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(plots.live_chart, "picture", counted)
+    monkeypatch.setattr(plots.charts.live_chart, "picture", counted)
     chart, trace = LiveChart(run("three states")), run("three states")
     places = {
         tuple((t.get("x"), t.get("y")) for t in groups(chart.frame(row))["graph0"].iter("text"))
@@ -262,7 +262,7 @@ def test_a_graphviz_with_unexpected_output_is_rejected(monkeypatch: pytest.Monke
     def other(graph: object, form: str) -> bytes:
         return real(graph, form).replace(b"<text", b"<tspan", 1).replace(b"</text", b"</tspan", 1)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(plots.live_chart, "picture", other)
+    monkeypatch.setattr(plots.charts.live_chart, "picture", other)
     with pytest.raises(OutputError, match="cannot be used for live charts"):
         LiveChart(run("one"))
 

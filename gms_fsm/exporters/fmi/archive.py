@@ -264,7 +264,7 @@ def _readme(subject: Subject, described: Described, version: int, why: str) -> s
         for causality in ("input", "output")
     )
     return filled(
-        "fmu.md",
+        "fmi/fmu.md",
         title=subject.title,
         version=version,
         writer=__version__,
@@ -276,7 +276,7 @@ def _readme(subject: Subject, described: Described, version: int, why: str) -> s
         binary=f"There is no binary in it: {why}. Compile the sources."
         if why
         else f"The binary is for {folder}; for other machines compile the sources.",
-        exchange=filled("fmu_exchange.md") if described.exchange else NO_EXCHANGE,
+        exchange=filled("fmi/fmu_exchange.md") if described.exchange else NO_EXCHANGE,
         flags=" ".join(FLAGS),
         sources=" ".join(described.sources),
         ending=ending or ".so",
@@ -294,14 +294,14 @@ def _held(subject: Subject, described: Described, version: int) -> str:
         return ""
     file = _file(described.name, version)
     loop = filled(
-        f"fmi{version}_loop.md",
+        f"fmi/fmi{version}_loop.md",
         file=file,
         name=described.name,
         input=inputs[0],
         output=described.variables[described.outputs[0]].name,
         start=repr(subject.t_start),
     )
-    return filled("fmu_inputs.md", held=HELD[version], only_held=ONLY_HELD[version], loop=loop)
+    return filled("fmi/fmu_inputs.md", held=HELD[version], only_held=ONLY_HELD[version], loop=loop)
 
 
 def _line(each: FmuVariable) -> str:

@@ -83,9 +83,9 @@ class FmuModel:
     def sources(self, version: int, token: str) -> dict[str, str]:
         """Return the contents of the folder ``sources``."""
         return {
-            f"fmi{version}.c": (TEMPLATES / "fmi.c").read_text(encoding="utf-8"),
+            f"fmi{version}.c": (TEMPLATES / "fmi/fmi.c").read_text(encoding="utf-8"),
             f"{self.subject.name}_engine.c": self.engine(),
-            "fmu_core.h": (TEMPLATES / "fmu_core.h").read_text(encoding="utf-8"),
+            "fmu_core.h": (TEMPLATES / "fmi/fmu_core.h").read_text(encoding="utf-8"),
             "model.h": self.header(version, token),
         }
 
@@ -96,7 +96,7 @@ class FmuModel:
         translate(translator, self.layout, ENTRIES, "fmu_")
         taken = [f"{name}_{each}" for each in (*ENTRIES, "start", "derive")]
         return filled(
-            "fmu_engine.c",
+            "fmi/fmu_engine.c",
             name=name,
             title=safe(self.subject.title),
             version=__version__,
@@ -123,7 +123,7 @@ class FmuModel:
         reasons = [f'    case {code}: return "{reason}";' for code, (_, reason) in FAILURES.items()]
         places = [each.index + constants["Y"] for each in self.variables if each.continuous_state]
         return filled(
-            "model.h",
+            "c/model.h",
             name=self.subject.name,
             title=safe(self.subject.title),
             token=token,

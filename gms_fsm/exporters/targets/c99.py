@@ -70,7 +70,7 @@ def _main(made: CEngine) -> str:
         for k in names
     )
     return filled(
-        "main.c",
+        "c/main.c",
         name=name,
         columns=",".join(("t", *made.inputs)),
         heads=",".join(heads),
@@ -136,7 +136,7 @@ def _readme(subject: Subject, made: CEngine) -> str:
     numbers = "\n".join(each.shown for each in made.parameters)
     settings = subject.settings
     return filled(
-        "c99.md",
+        "c/c99.md",
         name=name,
         title=subject.title,
         arguments="".join(f"{each}0, {each}1, " for each in made.inputs),

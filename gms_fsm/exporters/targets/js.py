@@ -132,7 +132,7 @@ class _Module(ABC):
         _, tables = tables_of(translator.module)
         image, true = _image(MemoryBlock(self.layout, self.arguments))
         return filled(
-            "js.mjs",
+            "js/js.mjs",
             name=self.subject.name,
             title=" ".join(self.subject.title.split()),
             version=__version__,
@@ -154,7 +154,7 @@ class _Module(ABC):
                 }
             ),
             edges=_rows(self._edges()),
-            face=filled(f"{self.face}.mjs", **self.holes()),
+            face=filled(f"js/{self.face}.mjs", **self.holes()),
         )
 
     def types(self) -> str:
@@ -164,13 +164,13 @@ class _Module(ABC):
             for each in self.numbers
         ]
         return filled(
-            "js.d.mts",
+            "js/js.d.mts",
             name=self.subject.name,
             version=__version__,
             numbers="\n".join(lines),
             error_fields=self.error_fields,
             switch_fields=self.switch_fields,
-            types=filled(f"{self.face}.d.mts", **self._face_types()),
+            types=filled(f"js/{self.face}.d.mts", **self._face_types()),
         )
 
     def readme(self) -> str:
@@ -178,7 +178,7 @@ class _Module(ABC):
         settings = self.subject.settings
         shown = [each.shown for each in self.numbers]
         return filled(
-            "js.md",
+            "js/js.md",
             name=self.subject.name,
             title=" ".join(self.subject.title.split()),
             example=self.example(),
