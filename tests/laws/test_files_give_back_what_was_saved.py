@@ -30,10 +30,7 @@ def test_a_trace_in_npz_is_whole(name: str, tmp_path: Path) -> None:
         same_bits(read.sample(times), one.sample(times))
 
 
-HELD = {"several rates"}  # a CSV file does not have the values that contacts with a period hold
-
-
-@each(name for name in [*FEW, *FAILING] if name not in HELD)
+@each([*FEW, *FAILING])
 def test_a_trace_in_csv_is_whole_but_for_its_stops(name: str, tmp_path: Path) -> None:
     one, _ = outcome(name)
     assert one is not None

@@ -57,7 +57,15 @@ def _of_contact(trace: Trace) -> tuple[dict[str, NDArray[Any]], dict[str, NDArra
         for name in kept
         if name in layout.observed.shared
     }
-    blocks: dict[str, NDArray[Any]] = {name: trace.variable(name) for name in bank.variables}
+    y = trace.rows.y
+    held = [name for name, i in layout.y if i in (None, 0) and name.startswith(start)]
+    shared |= {name.removeprefix(start): y[:, layout.y.index(name)] for name in held
+               if name in layout.y.shared}  # fmt: skip
+    blocks: dict[str, NDArray[Any]] = {
+        column_title(layout, name, short=False).removeprefix(start): y[:, layout.y.all_of(name)]
+        for name in held
+        if name not in layout.y.shared
+    }
     blocks["state"] = trace.states
     blocks |= {
         column_title(layout, name, short=False).removeprefix(start): trace.seen[name]
