@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import importlib
 import inspect
-import pkgutil
 import re
 import tempfile
 from collections import Counter
@@ -22,12 +21,11 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-import gms_fsm.charts
 import plots
 from gms_fsm import Chart, Trace, prove
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts.parameters import ANY, Parameter, with_shared
-from gms_fsm.charts.registry import Demonstration, Entry
+from gms_fsm.charts.registry import Demonstration, Entry, registered_modules
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.foundation.files import write_whole
 from gms_fsm.traces.failures import StepLimitError
@@ -112,14 +110,15 @@ class Item:
 def items() -> tuple[Item, ...]:
     """Return the charts that are models, in the order of their names."""
     found = []
-    for module in pkgutil.iter_modules(gms_fsm.charts.__path__):
-        page = importlib.import_module(f"gms_fsm.charts.{module.name}")
-        for each in getattr(page, "CHARTS", ()) if not module.name.startswith("_") else ():
+    for module in registered_modules():
+        page = importlib.import_module(module)
+        file = module.removeprefix("gms_fsm.charts.").replace(".", "/") + ".py"
+        for each in getattr(page, "CHARTS", ()):
             if isinstance(each, Entry) and not each.wrong:
                 for law in each.laws or ("",):
                     name = "-".join(filter(None, (each.name, law)))
                     text = inspect.getdoc(page) or ""
-                    found.append(Item(name, law, each, f"{module.name}.py", text))
+                    found.append(Item(name, law, each, file, text))
     return tuple(sorted(found, key=lambda item: item.name))
 
 

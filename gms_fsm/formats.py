@@ -1,7 +1,7 @@
 """The one table of output formats: pictures, texts and programs, each a row `Format`.
 
-A room registers the formats that it writes: `plots.formats` those of pictures and pages, each
-module of `gms_fsm.exporters` those of programs. Command line, help, messages, scenario files,
+A room registers the formats that it writes: `plots.output.formats` those of pictures and pages,
+each module of `gms_fsm.exporters` those of programs. Command line, help, messages, scenario files,
 `plots.render`, `plots.figures.save`, `plots.animate` and `gms_fsm.export` read the table.
 """
 

@@ -2,7 +2,7 @@
 
 Importing this package needs neither a Graphviz program nor matplotlib; drawing does. Figures are in
 `plots.figures`, single panels in `plots.panels` (extra ``plots``). What notebooks show of charts,
-models, systems and runs is made by `plots.notebook`; they need no import of this package.
+models, systems and runs is made by `plots.output.notebook`; they need no import of this package.
 """
 
 from __future__ import annotations

@@ -223,7 +223,7 @@ def registered() -> Mapping[str, Entry]:
     'Generalized Maxwell Slip element'
     """
     found: dict[str, tuple[Entry, str]] = {}
-    for module in _pages():
+    for module in registered_modules():
         place = f"{module.replace('.', '/')}.py"
         for each in _entries(module, place):
             if each.name in found:
@@ -258,7 +258,7 @@ def charts() -> Mapping[str, Chart]:
     }
 
 
-def _pages() -> list[str]:
+def registered_modules() -> list[str]:
     """Return the modules of this folder and of those in it, by the last part of their names."""
     found = pkgutil.walk_packages(sys.modules["gms_fsm.charts"].__path__, "gms_fsm.charts.")
     return sorted((each.name for each in found), key=lambda name: name.rpartition(".")[2])

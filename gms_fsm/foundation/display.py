@@ -85,7 +85,7 @@ def asked(name: str) -> Callable[..., Any] | None:
     Examples
     --------
     >>> show = asked("notebook")
-    >>> show is None or show.__module__ == "plots.notebook"
+    >>> show is None or show.__module__ == "plots.output.notebook"
     True
     """
     for each in _declared():

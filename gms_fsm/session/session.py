@@ -107,6 +107,11 @@ class Session:
         return self.branch.start
 
     @property
+    def t_start(self) -> float:
+        """Start of the run, s."""
+        return self.tree.t_start
+
+    @property
     def t_end(self) -> float:
         """End of the run, s."""
         return self.made_of[-1]

@@ -1,1 +1,1 @@
-"""The parts of a film: its pace, chart, bristles, picture and files (see `plots.animation`)."""
+"""Films, and their parts: pace, chart, bristles, picture and files."""

@@ -29,8 +29,8 @@ def blend(ground: str, colour: str, share: float) -> str:
 class FilmChart:
     """The painted chart of a film.
 
-    A single element has its live chart (`plots.live_chart`). Several have one chart: a state is
-    active if at least one of them is in it, and says how many are.
+    A single element has its live chart (`plots.charts.live_chart`). Several have one chart: a state
+    is active if at least one of them is in it, and says how many are.
 
     Parameters
     ----------

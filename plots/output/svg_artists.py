@@ -1,8 +1,8 @@
 """The SVG of a chart as matplotlib artists.
 
-Graphviz lays out the chart and `plots.live_chart` paints it; the painted SVG contains only paths,
-polygons, circles and texts, which matplotlib draws. A chart therefore looks the same everywhere,
-and no SVG converter is needed.
+Graphviz lays out the chart and `plots.charts.live_chart` paints it; the painted SVG contains only
+paths, polygons, circles and texts, which matplotlib draws. A chart therefore looks the same
+everywhere, and no SVG converter is needed.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def test_the_text_is_in_one_place() -> None:
     homes = {p.relative_to(ROOT).as_posix() for p, text in texts.items() if "gms-fsm[" in text}
     raised = {p.name for p, text in texts.items() if "MissingExtraError(" in text}
     assert homes == {"gms_fsm/foundation/extras.py"}
-    assert raised == {"_extras.py", "errors.py"}
+    assert raised == {"extras.py", "errors.py"}
 
 
 def made() -> Sweep:
@@ -92,12 +92,12 @@ import importlib, sys
 for absent in ("matplotlib", "PIL"):
     sys.modules[absent] = None
     from gms_fsm.errors import MissingExtraError
-    for module in ("figures", "panels", "_elements", "animation"):
+    for module in ("figures", "panels", "systems.elements", "film.animation"):
         try:
             importlib.import_module("plots." + module)
         except MissingExtraError as error:
             print(error)
-    for name in [each for each in sys.modules if each.startswith(("plots", absent))]:
+    for name in [each for each in sys.modules if each.startswith(("plots", "gms_fsm", absent))]:
         del sys.modules[name]
 """
     done = subprocess.run(
