@@ -241,26 +241,21 @@ def some_rows(page: Page, count: int, seed: int = 18) -> list[tuple[int, int]]:
 
 
 def at_rows(page: Page, rows: Sequence[int], function: str) -> list[Any]:
-    """Show rows one after the other, and return what a function returns at each when drawn."""
-    return list(
-        page.evaluate(
-            f"""async (rows) => {{
-                const found = [];
-                for (const row of rows) {{
-                    go(row);
-                    await new Promise((done) => requestAnimationFrame(done));
-                    found.push(({function})());
-                }}
-                return found;
-            }}""",
-            list(rows),
-        )
-    )
+    """Show rows one after the other, and return what a function returns at each."""
+    asked = f"(rows) => rows.map((row) => {{ go(row); return ({function})(); }})"
+    return list(page.evaluate(asked, list(rows)))
 
 
 def faults(page: Page, **options: Any) -> list[Any]:
     """Return what axe finds: the rules that are broken, and where."""
-    found = Axe().run(page, **options).response["violations"]
+    if page.evaluate("!window.axe"):
+        page.evaluate(Axe().axe_script)
+    found = page.evaluate(
+        """async ({ context, options }) => (
+            await axe.run(context ?? document, { resultTypes: ["violations"], ...options })
+        ).violations""",
+        options,
+    )
     return [(each["id"], [node["target"] for node in each["nodes"]][:3]) for each in found]
 
 
