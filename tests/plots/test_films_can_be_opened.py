@@ -30,7 +30,7 @@ from tests.plots.films import count, frames_of, with_movie
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not available(), reason="no Graphviz")]
 VIDEOS = [ending for ending in endings("animation") if ending != ".gif"]
-FRAMES, FPS = 20, 10.0
+FRAMES, FPS = 12, 6.0
 WINDOW = {"t_start": 3.3, "t_end": 5.0, "frames": FRAMES, "fps": FPS}  # four micro-steps at 3.8 s
 
 
@@ -128,17 +128,17 @@ def one() -> Trace:
 
 def test_frames_have_the_theme_the_active_states_and_the_cursor(tmp_path: Path) -> None:
     theme = "dark"
-    path = animate(bank(), tmp_path / "run.gif", frames=6, fps=10, theme=theme, notation="math")
+    path = animate(bank(), tmp_path / "run.gif", frames=3, fps=10, theme=theme, notation="math")
     assert list(tmp_path.iterdir()) == [path]
     with Image.open(path) as film:
         assert film.format == "GIF"
-        assert film.n_frames == 6  # type: ignore[attr-defined]
+        assert film.n_frames == 3  # type: ignore[attr-defined]
         assert film.info["duration"] == 100
         assert film.info["loop"] == 0
     pictures = frames_of(path)
     assert {picture.size for picture in pictures} == {pictures[0].size}
     assert min(pictures[0].size) > 300
-    assert len({picture.tobytes() for picture in pictures}) == 6
+    assert len({picture.tobytes() for picture in pictures}) == 3
     colours = CHART_THEMES[theme]
     assert pictures[0].getpixel((3, 3)) == tuple(round(255 * c) for c in to_rgb(colours.paper))
     for picture in pictures:
