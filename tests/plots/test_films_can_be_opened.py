@@ -30,7 +30,7 @@ from tests.plots.films import count, frames_of, with_movie
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not available(), reason="no Graphviz")]
 VIDEOS = [ending for ending in endings("animation") if ending != ".gif"]
-FRAMES, FPS = 12, 6.0
+FRAMES, FPS = 20, 10.0
 WINDOW = {"t_start": 3.3, "t_end": 5.0, "frames": FRAMES, "fps": FPS}  # four micro-steps at 3.8 s
 
 
@@ -178,10 +178,10 @@ def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(plots.charts.live_chart, "picture", counted)
     told: list[tuple[int, int]] = []
-    more = {"elements": [1], "frames": 6, "progress": lambda *each: told.append(each)}
+    more = {"elements": [1], "frames": 3, "progress": lambda *each: told.append(each)}
     animate(bank(), tmp_path / "run.gif", **more)
     assert len(calls) == 1
-    assert told == [(k, 6) for k in range(1, 7)]
+    assert told == [(k, 3) for k in range(1, 4)]
 
 
 def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
