@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from plots.panels.titles import lettered
+from plots.panels.parts.titles import lettered
 from plots.style.matplotlib import (
     Artist,
     AutoLocator,

@@ -23,7 +23,7 @@ from matplotlib.text import Annotation, Text
 from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, Transition
 from plots import figures, panels
 from plots.panels.micro_steps.cascades import RESOLVED
-from plots.panels.selection import MOST_ROWS
+from plots.panels.parts.selection import MOST_ROWS
 from tests.helpers import (
     FASTEST,
     FIG4_SINE,

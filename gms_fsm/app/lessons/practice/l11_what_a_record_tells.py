@@ -106,7 +106,14 @@ second weight starts at the truth, so that it is not to blame.
 ```python
 from matplotlib.figure import Figure
 
-from gms_fsm.app.lessons.l11_what_a_record_tells import START, TRUTH, bank, fitted, recorded, sine
+from gms_fsm.app.lessons.practice.l11_what_a_record_tells import (
+    START,
+    TRUTH,
+    bank,
+    fitted,
+    recorded,
+    sine,
+)
 
 
 def known(amplitude):

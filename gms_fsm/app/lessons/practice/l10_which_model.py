@@ -58,7 +58,7 @@ For a contact that rests: {chosen[0]}; that also lags: {chosen[1]}; that also re
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.l10_which_model import MODELS
+from gms_fsm.app.lessons.practice.l10_which_model import MODELS
 from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(creeps, max(MODELS, key=lambda model: result.number(model, "drift")))
