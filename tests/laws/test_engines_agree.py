@@ -84,7 +84,7 @@ def test_the_corpus_switches() -> None:
     """The laws would hold for runs in which nothing happens, too."""
     counts = {name: len(trace(name).transitions) for name in CORPUS}
     assert {name for name, count in counts.items() if not count} <= STILL
-    assert sum(counts.values()) > 3000
+    assert sum(counts.values()) > 2000
 
 
 def test_random_systems_are_drawn_again_by_their_numbers() -> None:
