@@ -30,7 +30,9 @@ FORMATTER = string.Formatter()
 Ran = Callable[[int], Result]
 SLOW = sorted({*LESSONS} - {1, 9})
 each_lesson = pytest.mark.parametrize(
-    "number", [1, 9, *(pytest.param(number, marks=pytest.mark.slow) for number in SLOW)]
+    "number",
+    [1, 9, *(pytest.param(number, marks=pytest.mark.slow) for number in SLOW)],
+    scope="module",  # tests of a lesson follow each other, so that one worker runs it
 )
 
 
