@@ -42,7 +42,7 @@ def test_what_relaxes_does_not_wander_across_its_threshold(key: tuple[str, int, 
 
 def test_the_judge_detects_a_coarse_run() -> None:
     """At rtol 1e-2 runs are wrong, so the judge can fail one."""
-    found = [judge(trial("pulled", 14, index), rtol=1e-2, atol=1e-3) for index in range(10)]
+    found = [judge(trial("pulled", 14, index), rtol=1e-2, atol=1e-3) for index in range(COUNT)]
     wrong = [judged for judged in found if judged.verdict == "wrong"]
     assert wrong
     assert all(is_finding(judged) and judged.trial.again in said(judged) for judged in wrong)

@@ -279,7 +279,7 @@ def _one_nursery() -> Iterator[None]:
     end_nursery()
 
 
-@pytest.mark.parametrize(("name", "share"), zip(WRITERS, itertools.cycle(SHARES), strict=False))
+@pytest.mark.parametrize(("name", "share"), [*zip(WRITERS, itertools.cycle(SHARES), strict=False)])
 def test_killed_at_some_moment(name: str, share: float, tmp_path: Path) -> None:
     if name == "run":
         pytest.importorskip("matplotlib", reason="a run draws figures: needs the extra plots")
