@@ -51,8 +51,8 @@ def test_the_fired_edge_is_lit_and_fades(tmp_path: Path) -> None:
     def use(movie: Movie) -> tuple[list[int], tuple[Frame, ...]]:
         return [count(picture, orange) for picture in movie.pictures()], movie.film.pace.frames
 
-    more = {"theme": "dark", "elements": [0, 1, 2]}
-    seen, frames = with_movie(cascade(), tmp_path, use, **WINDOW, **more)
+    more = WINDOW | {"theme": "dark", "elements": [0, 1, 2], "frames": 30}
+    seen, frames = with_movie(cascade(), tmp_path, use, **more)
     plain = [n for n, frame in zip(seen, frames, strict=True) if not frame.fired]
     for n, frame in zip(seen, frames, strict=True):
         if frame.entry >= 0 and cascade().transitions.element[frame.entry] < 3:
