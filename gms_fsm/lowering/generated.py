@@ -135,29 +135,38 @@ def elementary_text(names: Iterable[str]) -> str:
     >>> program["pow"](2.0, 0.5) == 2.0 ** 0.5
     True
     """
-    tree = _tree(inspect.getsource(elementary))
-    parts: dict[str, ast.stmt] = {}
-    for part in tree.body:
-        match part:
-            case ast.FunctionDef(name=name):
-                parts[name] = part
-            case ast.Assign(targets=targets):
-                for each in ast.walk(ast.Tuple(targets)):
-                    if isinstance(each, ast.Name):
-                        parts[each.id] = part
+    parts = _elementary_parts()
+    place = {name: number for number, (given, _, _) in enumerate(parts) for name in given}
     waiting = [NAMESPACE[name].__name__ for name in names]
-    used = set[ast.stmt]()
+    used = set[int]()
     while waiting:
-        found = parts.get(waiting.pop())
+        found = place.get(waiting.pop())
         if found is not None and found not in used:
             used.add(found)
-            waiting += [each.id for each in ast.walk(found) if isinstance(each, ast.Name)]
-    lines = ["import math\n"]
-    for part in tree.body:
-        if part in used:
-            lines.append(("\n\n" if isinstance(part, ast.FunctionDef) else "") + _unannotated(part))
+            waiting += parts[found][1]
+    lines = ["import math\n", *(parts[number][2] for number in sorted(used))]
     renamed = {NAMESPACE[name].__name__: name for name in names}
     return "\n".join([*lines, *(f"\n{b} = {a}" for a, b in renamed.items() if a != b), ""])
+
+
+@functools.cache
+def _elementary_parts() -> list[tuple[list[str], list[str], str]]:
+    """Return the names that each part of the module defines, those that it uses, and its text."""
+    parts = []
+    for part in _tree(inspect.getsource(elementary)).body:
+        match part:
+            case ast.FunctionDef(name=name):
+                given, space = [name], "\n\n"
+            case ast.Assign(targets=targets):
+                given, space = _names(ast.Tuple(targets)), ""
+            case _:
+                continue
+        parts.append((given, _names(part), space + _unannotated(part)))
+    return parts
+
+
+def _names(tree: ast.AST) -> list[str]:
+    return [each.id for each in ast.walk(tree) if isinstance(each, ast.Name)]
 
 
 def _tree(source: str) -> ast.Module:

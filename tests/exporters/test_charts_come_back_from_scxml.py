@@ -39,7 +39,7 @@ def test_the_documents_of_a_models_elements(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @given(chart=charts(locks=False, forces=(), plain=True))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_any_chart(chart: Chart, tmp_path_factory: pytest.TempPathFactory) -> None:
     path, *_ = export(chart, "scxml", tmp_path_factory.mktemp("chart"), name="file")
     assert Chart.from_scxml(path) == chart

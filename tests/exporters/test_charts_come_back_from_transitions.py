@@ -34,7 +34,7 @@ def test_every_included_chart(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @given(chart=charts(locks=False))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_any_chart(chart: Chart, tmp_path_factory: pytest.TempPathFactory) -> None:
     path, *_ = export(chart, "transitions", tmp_path_factory.mktemp("chart"), name="file")
     file = imported(path)
@@ -76,7 +76,7 @@ def test_machines_built_by_hand_also_with_locks(name: str) -> None:
 
 @pytest.mark.slow
 @given(chart=charts())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_any_machine_also_with_locks(chart: Chart) -> None:
     assert Chart.from_transitions(machine_like(chart), **texts_of(chart)) == chart
 

@@ -12,7 +12,6 @@ from gms_fsm import ChartModel, Prescribed, simulate
 from gms_fsm.identification.candidates import BEHIND_BACKLASH, STIFFER_ONE_WAY
 from gms_fsm.identification.problem.linear import linear_names
 from gms_fsm.systems.mounted import mounted_alone
-from tests.helpers import FASTEST
 
 TURNS = np.array([0.0, 1.0, -1.0, 0.4, -0.3, 0.8, -1.2, 1.2, -1.2])
 
@@ -37,7 +36,7 @@ def play(x: np.ndarray, forward: float, backward: float) -> np.ndarray:
 
 def forces(model: ChartModel, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     t, x, corners = motion(turns)
-    run = simulate(model, Prescribed(corners), float(t[-1]), t_eval=t, engine=FASTEST, rtol=1e-10)
+    run = simulate(model, Prescribed(corners), float(t[-1]), t_eval=t, engine="ifelse", rtol=1e-10)
     return x, run.F
 
 
@@ -64,7 +63,7 @@ def test_thresholds_rise_at_rest_by_rho(sign: float) -> None:
     for speed in (0.1, 1.0, 5.0):
         model = backlash(rho=0.4)
         t_end = 2.0 / speed
-        run = simulate(model, Prescribed(str(sign * speed)), t_end, engine=FASTEST)
+        run = simulate(model, Prescribed(str(sign * speed)), t_end, engine="ifelse")
         threshold = 0.3 * (1.0 if sign > 0 else 1.5) * (1.0 + 0.4 * np.exp(-(speed**2)))
         assert run.F[-1] == pytest.approx(sign * (3.0 + sign) * threshold, rel=1e-12)
 

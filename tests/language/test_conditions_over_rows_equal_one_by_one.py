@@ -49,7 +49,7 @@ CONDITIONS = st.recursive(
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(text=CONDITIONS, rows=st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=1, max_size=6))
 def test_place_by_place(text: str, rows: list[tuple[float, float, float]]) -> None:
     tree = parse_condition(text, NAMES)

@@ -117,7 +117,7 @@ def _outcome_of_text(text: str, point: Mapping[str, float]) -> str:
 
 # --------------------------------------------------------------------------- evaluate
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(any_values, points)
 def test_a_value_equals_what_python_computes_from_its_text(
     tree: Value, point: dict[str, float]
@@ -126,7 +126,7 @@ def test_a_value_equals_what_python_computes_from_its_text(
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(conditions, points)
 def test_a_condition_equals_what_python_decides_from_its_text(
     tree: Condition, point: dict[str, float]
@@ -134,7 +134,7 @@ def test_a_condition_equals_what_python_decides_from_its_text(
     assert _outcome_of_tree(tree, point) == _outcome_of_text(spell(tree, PYTHON), point)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(st.sampled_from(["a", "(a + b)", "(a / b)", "(a * b)", "-a", "(1 / a)"]), st.data())
 def test_small_integer_powers_are_products(base: str, data: st.DataObject) -> None:
     whole = data.draw(st.integers(-8, 8))
@@ -181,7 +181,7 @@ def test_a_product_stays_short() -> None:
 
 # --------------------------------------------------------------------------- spell, read, spell
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(any_values, points)
 @example(parse_value("(-((a**8)**3))**3", NAMES), {"a": 1.1, "b": 0.0, "c": 0.0})
 @example(parse_value(f"(({'+'.join('a' * 30)})**0)**3", NAMES), {"a": 1.1, "b": 0.0, "c": 0.0})
@@ -199,7 +199,7 @@ def test_printing_and_parsing_preserve_values(tree: Value, point: dict[str, floa
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(conditions, points)
 def test_printing_and_parsing_preserve_conditions(tree: Condition, point: dict[str, float]) -> None:
     text = spell(tree)
@@ -271,7 +271,7 @@ def _requirements(part: Split) -> list[Requirement]:
 
 
 @pytest.mark.slow
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(tame_conditions, near, st.booleans())
 def test_split_agrees_with_the_condition(
     condition: Condition, point: dict[str, float], holds: bool
@@ -327,7 +327,7 @@ def test_a_chain_reads_as_its_links() -> None:
     assert [spell(part) for part in clauses(chain)] == ["a < b", "b <= c", "c > 0.0"]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(near)
 def test_splitting_two_absolute_values_terminates(point: dict[str, float]) -> None:
     condition = parse_condition("abs(a) <= abs(b)", NAMES)

@@ -312,7 +312,7 @@ TEXTS = st.one_of(
 
 
 @pytest.mark.slow
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(TEXTS)
 @example("(" * 199 + "v" + ")" * 199)
 @example("'" * 3)

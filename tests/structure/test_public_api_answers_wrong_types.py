@@ -66,6 +66,11 @@ EDGE = Transition("go", "on", "on", guard="z > 1", actions={"z": "0"})
 CHART = Chart("one", ("v",), ("z",), ("k",), (STATE,), (EDGE,), {"F": "k * z"})
 BODY, CONTACT = Body("mass", inertia=1.0), Contact("pad", CHART, {"k": 1.0})
 SYSTEM = System("one mass", bodies=(BODY,), contacts=(CONTACT,))
+FEWER = {
+    "progress": WRONG[:-1],  # any function is accepted there
+    "frames": WRONG[1:],  # None: the whole film
+    "title": WRONG[:2],  # anything becomes text
+}
 # Classes that only the package creates, for users to read.
 RECORDS = {
     "Finding",
@@ -105,8 +110,8 @@ def _switching() -> Trace:
     return simulate(model, Prescribed("0.2"), 3.0)
 
 
-def _entries(tmp: Path) -> Iterator[Entry]:
-    """Yield every public entry with known valid arguments."""
+def _entries() -> Iterator[Entry]:
+    """Yield every public entry with known valid arguments; files are in the current folder."""
     run = {"model": MODEL, "rig": RIG, "t_end": 1.0, "t_start": 0.0, "initial": None}
     run |= {"settings": None}
     options = {each.name: each.default for each in fields(Settings)}
@@ -164,7 +169,7 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         | {"seed": 0, "most_steps": None, "progress": False},
         "initial_bank": {"records": _rubbed(), "n": 2, "law": "signed", "train": None}
         | {"smoothing": None, "v_c": None},
-        "export": {"system": MODEL, "format": "c99", "folder": tmp / "c99", "name": "friction"}
+        "export": {"system": MODEL, "format": "c99", "folder": Path("c99"), "name": "friction"}
         | {"initial": None, "t_start": 0.0, "settings": None},
         "measure_phenomena": {"models": ["stiction"], "phenomena": ["stick-slip"]}
         | {"bench": None, "progress": None},
@@ -177,10 +182,10 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         | options
         | {"parameters": {"v_c": [1.0]}, "executor": None, "progress": False},
         "LiveChart": {"trace": _trace()} | view,
-        "animate": {"trace": _trace(), "path": tmp / "a.gif", "frames": 2},
+        "animate": {"trace": _trace(), "path": Path("a.gif"), "frames": 2},
         "block_diagram": {"elements": 1},
         "explore": run | options | {"sliders": {"v_c": (1e-9, 2.0)}, "height": 500},
-        "handout": {"model": MODEL, "path": tmp / "a.pdf", "velocity": "0.1", "t_end": 1.0},
+        "handout": {"model": MODEL, "path": Path("a.pdf"), "velocity": "0.1", "t_end": 1.0},
         "live_statechart": {"trace": _trace(), "row": 0} | view,
         "landscape": {"trace": _trace(), "element": 0, "row": -1, "t": None, "window": None}
         | {"checks": None, "title": ""},
@@ -188,13 +193,13 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "overview": {"trace": _trace(), "title": ""},
         "phase": {"trace": _trace(), "row": None, "window": None, "elements": None, "title": ""},
         "preset": {"chosen": "ieee1"},
-        "render": {"graph": plots.block_diagram(1), "path": tmp / "a.dot"},
+        "render": {"graph": plots.block_diagram(1), "path": Path("a.dot")},
         "replay": {"trace": _trace(), "other": None, "title": "", "names": ()},
         "schematic": {"system": SYSTEM},
         "statechart": {"chart": CHART, "elements": 1, "notation": "stateflow", "direction": "TB"}
         | {"theme": "light", "counts": None, "marked": (), "names": False, "note": ""},
         "unfold": {"trace": _switching(), "t0": 1.0, "t1": 3.0, "elements": None, "title": ""},
-        "write_replay": {"path": tmp / "a.html", "trace": _trace(), "other": None, "title": ""}
+        "write_replay": {"path": Path("a.html"), "trace": _trace(), "other": None, "title": ""}
         | {"names": ()},
     }
     for home in (gms_fsm, plots):
@@ -204,7 +209,7 @@ def _entries(tmp: Path) -> Iterator[Entry]:
                 continue
             assert name in right, f"{name} is public; say here what its right arguments are"
             yield Entry(name, functools.partial(getattr, home, name), right[name])
-    yield from _methods(tmp)
+    yield from _methods()
 
 
 def _session() -> Session:
@@ -216,7 +221,7 @@ def _swept() -> Sweep:
     return sweep(MODEL, RIG, 1.0, {"v_c": [1.0, 2.0]}, progress=False)
 
 
-def _methods(tmp: Path) -> Iterator[Entry]:
+def _methods() -> Iterator[Entry]:
     """Yield every public method, by its signature; valid arguments are known by name."""
     objects: dict[str, Callable[[], Any]] = {
         "Trace": _trace,
@@ -243,7 +248,7 @@ def _methods(tmp: Path) -> Iterator[Entry]:
         "Report": lambda: prove(CHART),
         "LiveChart": lambda: plots.LiveChart(_trace()),
     }
-    right = RIGHT | {"path": tmp / "file.npz"}
+    right = RIGHT | {"path": Path("file.npz")}
     right |= {f"FrictionState.{each}.v{k}": 0.1 for each in SAMPLES for k in (0, 1)}
     right |= {f"FrictionBank.{each}.v{k}": [0.1] for each in SAMPLES for k in (0, 1)}
     for kind, make in objects.items():
@@ -347,7 +352,7 @@ def _defaults_to_none(call: Callable[..., Any], name: str) -> bool:
 
 def _faults(entry: Entry) -> Iterator[str]:
     for name in entry.right:
-        for wrong in WRONG[:-1] if name == "progress" else WRONG:  # any function is accepted there
+        for wrong in FEWER.get(name, WRONG):
             call = entry.make()
             if wrong is None and _defaults_to_none(call, name):
                 continue
@@ -360,23 +365,23 @@ def _faults(entry: Entry) -> Iterator[str]:
                 yield f"{entry.name}({name}={wrong!r}): {type(error).__name__}: {str(error)[:150]}"
 
 
-NAMES = [entry.name for entry in _entries(Path())]
+ENTRIES = {entry.name: entry for entry in _entries()}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.filterwarnings("ignore")
-def test_wrong_types_raise_our_errors(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    entry = next(each for each in _entries(tmp_path) if each.name == name)
-    assert list(_faults(entry)) == []
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in NAMES if "." not in name])
-def test_valid_arguments_are_accepted(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ENTRIES)
+@pytest.mark.filterwarnings("ignore")
+def test_wrong_types_raise_our_errors(name: str) -> None:
+    assert list(_faults(ENTRIES[name])) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in ENTRIES if "." not in name])
+def test_valid_arguments_are_accepted(name: str) -> None:
     """Otherwise the wrong ones above would be rejected for another reason."""
-    entry = next(each for each in _entries(tmp_path) if each.name == name)
-    entry.make()(**entry.right)
+    ENTRIES[name].make()(**ENTRIES[name].right)
