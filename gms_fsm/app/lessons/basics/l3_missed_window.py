@@ -43,8 +43,8 @@ nearly does). Locate the switches, or test with a step that does not divide the 
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
 from gms_fsm.app.lessons.basics.l3_missed_window import STEP, STEPS, window_width
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(window, 1e6 * window_width(), "us")
 reveal(found, result.counts[STEPS.index(STEP)])

@@ -41,8 +41,8 @@ threshold: put it well below the smallest motion of interest.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
 from gms_fsm.app.lessons.basics.l5_how_many import COUNTS
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(error_of_four, 100 * result.errors[COUNTS.index(4)], "%")
 reveal(loss_of_two, 100 * result.losses[COUNTS.index(2)] / result.losses[-1], "% of that of 12")

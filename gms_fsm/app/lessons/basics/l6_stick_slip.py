@@ -47,8 +47,8 @@ motion it keeps sliding.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
 from gms_fsm.app.lessons.basics.l6_stick_slip import SPEED, SPEEDS
+from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 here, slow = result.cycles[SPEEDS.index(SPEED)], result.cycles[0]
 reveal(pull_at_slip, here.pull_at_slip, "N")
