@@ -10,6 +10,7 @@ from tests.helpers import FASTEST
 from tests.run.stepping_cases import friction
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["ifelse"] if FASTEST == "ifelse" else ["compiled", "ifelse"])
 def test_joints_of_many_kinds(engine: str) -> None:
     rng = np.random.default_rng(5)

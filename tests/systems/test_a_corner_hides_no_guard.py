@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import pytest
+
 from gms_fsm import Body, Chart, Contact, State, System, Trace, Transition, simulate
 
 FALLING = Chart(
@@ -38,6 +40,7 @@ def _pulled(share: float) -> Trace:
     return simulate(system, 60.0, engine="ifelse")
 
 
+@pytest.mark.slow
 def test_the_velocity_has_the_sign_of_its_state() -> None:
     """Over 30 runs, in some of which a step meets v = 0 exactly."""
     count = 0

@@ -152,6 +152,7 @@ def test_a_belt_that_jumps_lets_its_load_slide() -> None:
         assert trace.body("a").v[-1] == pytest.approx(0.5 - 0.5 * 1.9, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pads", [False, True])
 def test_newtons_cradle_passes_the_impact_on(pads: bool) -> None:
     """With restitution e nearly 1, the last ball leaves with ((1 + e) / 2)**3 of the velocity."""
@@ -163,6 +164,7 @@ def test_newtons_cradle_passes_the_impact_on(pads: bool) -> None:
     assert sum(trace.body(name).v[at] for name in "abcd") == pytest.approx(v, rel=1e-12)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     m=st.lists(st.floats(0.1, 10.0), min_size=3, max_size=3),
