@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
 
-RUNS = 192
+RUNS = 128
 
 
 def sets(runs: int = RUNS) -> dict[str, Any]:
@@ -72,13 +72,13 @@ def test_a_killed_worker_costs_no_result(cluster: Any, monkeypatch: pytest.Monke
         workers = set(client.run(os.getpid).values())
         assert len(workers) == 2
         assert os.getpid() not in workers
-        far = sweep(model, rig, 8.0, sets(), executor=client.get_executor(), engine="ifelse")
+        far = sweep(model, rig, 6.0, sets(), executor=client.get_executor(), engine="ifelse")
         assert killed[0] in workers
         assert killed[0] not in client.run(os.getpid).values()
     assert len(arrived) < 2 * RUNS
     assert sorted(arrived) == list(range(RUNS))  # every result, exactly once
     monkeypatch.undo()
-    here = sweep(model, rig, 8.0, sets(), engine="ifelse")
+    here = sweep(model, rig, 6.0, sets(), engine="ifelse")
     assert set(far.outcome) == {"ok"}
     for name in ("t", "x", "v", "F", "z", "states"):
         np.testing.assert_array_equal(getattr(far, name), getattr(here, name))
@@ -103,7 +103,7 @@ def test_a_run_that_kills_every_worker_is_a_row_that_says_so() -> None:
     dask = pytest.importorskip("dask", reason="needs the extra cluster")
     pytest.importorskip("llvmlite", reason="needs the extra fast")
     model, rig = pulled_mass()
-    here = sweep(model, rig, 8.0, sets(8), engine="ifelse")
+    here = sweep(model, rig, 6.0, sets(8), engine="ifelse")
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
         distributed.LocalCluster(
@@ -116,8 +116,8 @@ def test_a_run_that_kills_every_worker_is_a_row_that_says_so() -> None:
         distributed.Client(made) as client,
     ):
         executor = client.get_executor()
-        far = sweep(model, rig, 8.0, sets(8), executor=Deadly(executor))
-        again = sweep(model, rig, 8.0, sets(8), executor=executor)
+        far = sweep(model, rig, 6.0, sets(8), executor=Deadly(executor))
+        again = sweep(model, rig, 6.0, sets(8), executor=executor)
     lost = far.outcome != "ok"
     assert lost[2]
     assert lost.sum() < 4, "pending runs next to it may be lost with it, but no more"
