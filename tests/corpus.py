@@ -489,6 +489,9 @@ def _scenario(name: str) -> Maker:
             read = load_scenario(ROOT / "scenarios" / f"{name}.toml")
         how = {key: u for key, u in read.arguments.items() if key not in ("engine", "t_end")}
         *subject, t_end = read.subject
+        if name == "tribometer":  # its record has thousands of rows
+            t_end *= 0.1
+            how["t_eval"] = [t for t in how["t_eval"] if t <= t_end]
         return Run(tuple(subject), t_end, how)
 
     return made

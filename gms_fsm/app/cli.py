@@ -1,8 +1,7 @@
 """The command line. A user's mistake is answered by one message and exit code 2.
 
-The verbs are in ``_run_verbs``, ``_fit_verb``, ``_chart_verbs``, ``_export_verb``, ``_trace_verbs``
-and ``_card_verb``. Each imports what it needs when it runs, so that help, completion and error
-messages appear at once.
+Each verb of `gms_fsm.app.verbs` imports what it needs when it runs, so that help, completion and
+error messages appear at once.
 """
 
 from __future__ import annotations

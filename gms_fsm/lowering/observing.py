@@ -43,6 +43,10 @@ def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> l
 
 def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
     """Return the signs that an arc starting from a state would freeze."""
+    if not any(mode[program.layout.slides]):
+        held = [0.0] * program.held
+        program.ieee["arm"](t, y, mode, program.p, held, [0] * len(program.strict))
+        return held
     on = _on(program, mode)
     arm_on(on, t, y, list(mode), on.sliding.watch)
     return on.held

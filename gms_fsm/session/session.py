@@ -60,11 +60,8 @@ class Session:
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
     >>> session = Session(GMS(GMSParameters.paper("stick-slip"), law="published"),
     ...                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
-    >>> session
-    <Session: GMS, 4 elements, published law; prescribed velocity, to t = 100 s; at t = 0 s>
 
-    A move returns the row at which it stopped, which prints as readable text. Elements are
-    numbered from 0 in Python, and from 1 in printed text and in conditions.
+    A move returns the row at which it stopped. Elements count from 0 in Python, from 1 in texts.
 
     >>> here = session.next_transition()
     >>> round(here.t, 3), here.fired.element, here.fired.edge, here.states[0]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.observing import armed, rate
@@ -46,13 +48,18 @@ def interpolated(
     The slopes come from the flow.
     """
     with np.errstate(all="ignore"):  # as in a run, overflow gives inf
-        at_start, at_end = slopes(program, mode, t0, y0, t1, y1)
-        h = t1 - t0
-        theta = (t - t0) / h
-        rise = y1 - y0
-        bend = h * at_start - rise
-        twist = rise - h * at_end - bend
-        value: FloatArray = y0 + theta * (rise + (1 - theta) * (bend + theta * twist))
+        return _hermite(t0, y0, t1, y1, *slopes(program, mode, t0, y0, t1, y1), t)
+
+
+def _hermite(
+    t0: Any, y0: FloatArray, t1: Any, y1: FloatArray, first: FloatArray, last: FloatArray, t: Any
+) -> FloatArray:
+    h = t1 - t0
+    theta = (t - t0) / h
+    rise = y1 - y0
+    bend = h * first - rise
+    twist = rise - h * last - bend
+    value: FloatArray = y0 + theta * (rise + (1 - theta) * (bend + theta * twist))
     return value
 
 
@@ -66,10 +73,22 @@ def slopes(
     return at_start, at_end
 
 
-def between(program: Program, table: Rows, i: int, t: float) -> FloatArray:
-    """Return the state at a time in a run."""
-    t0 = table.t[i]
-    if t == t0 or i + 1 == len(table):
-        return np.asarray(table.y[i])
-    mode, ends = table.mode[i].tolist(), (float(t0), table.y[i], float(table.t[i + 1]))
-    return interpolated(program, mode, *ends, table.y[i + 1], t)
+def between(program: Program, table: Rows, left: NDArray[np.intp], times: FloatArray) -> FloatArray:
+    """Return the states at times in a run, each at or after the row of an index in `left`."""
+    y = np.array(table.y[left])
+    inside = (times != table.t[left]) & (left + 1 < len(table))
+    if not inside.any():
+        return y
+    rows, which = np.unique(left[inside], return_inverse=True)
+    t, states, modes = table.t.tolist(), table.y, table.mode
+    with np.errstate(all="ignore"):
+        ends = np.array(
+            [
+                slopes(program, modes[i].tolist(), t[i], states[i], t[i + 1], states[i + 1])
+                for i in rows.tolist()
+            ]
+        )[which]
+        i = left[inside]
+        t0, t1, at = (each[:, None] for each in (table.t[i], table.t[i + 1], times[inside]))
+        y[inside] = _hermite(t0, states[i], t1, states[i + 1], ends[:, 0], ends[:, 1], at)
+    return y

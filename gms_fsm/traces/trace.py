@@ -441,9 +441,7 @@ class Trace:
                 f"{shown(table.t[-1])} s"
             )
         left = np.searchsorted(table.t, wanted, side="right") - 1
-        y = np.array(
-            [between(self.program, table, int(i), t) for i, t in zip(left, wanted, strict=True)]
-        )
+        y = between(self.program, table, left, wanted)
         rows = Rows(wanted, np.zeros(wanted.size, dtype=np.int64), y, table.mode[left])
         return replace(self, rows=rows, stops=merged(table, rows), stored={})
 

@@ -23,7 +23,7 @@ from plots.figures._profiles import profiles_figure
 from plots.figures._runs import Measured, cascade_figure, overview, ribbons_figure
 from plots.figures._unfold import unfold
 from plots.output import formats
-from plots.panels.selection import SMOOTH
+from plots.panels.parts.selection import SMOOTH
 from plots.style.matplotlib import Figure
 
 __all__ = [

@@ -14,8 +14,8 @@ from plots.figures._parts import head
 from plots.panels.guards.landscapes import DASHED, acceleration, pinned, quantity
 from plots.panels.guards.plane import Plane
 from plots.panels.guards.racing import rows_of
-from plots.panels.selection import checked_row, one_element
-from plots.panels.window import Window
+from plots.panels.parts.selection import checked_row, one_element
+from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY
 from plots.style.matplotlib import Axes, Figure, Line2D, rc_context
 from plots.style.presets import current, font, inches, pt, room, settings

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
 
-from plots.panels.titles import lettered
+from plots.panels.parts.titles import lettered
 from plots.style.matplotlib import (
     Artist,
     AutoLocator,
@@ -107,7 +108,7 @@ def _head_folded(figure: Figure, renderer: RendererBase) -> bool:
 def _titles_folded(figure: Figure, renderer: RendererBase) -> bool:
     """Fold the titles of panels that would reach into the next panel, or out of the figure."""
     changed = False
-    boxes = {ax: ax.get_tightbbox(renderer) for ax in figure.axes}
+    box = cache(lambda ax: ax.get_tightbbox(renderer))  # takes long, and few are needed
     for ax in figure.axes:
         title = ax._left_title  # type: ignore[attr-defined]
         title = title if title.get_text() else ax.title
@@ -118,7 +119,7 @@ def _titles_folded(figure: Figure, renderer: RendererBase) -> bool:
         for other in figure.axes:
             theirs = other.get_window_extent(renderer)
             if theirs.x0 >= mine.x1 and theirs.y0 < mine.y1 + 1 and mine.y0 < theirs.y1 + 1:
-                whole = boxes[other]
+                whole = box(other)
                 rights.append(theirs.x0 if whole is None else min(theirs.x0, whole.x0))
         begin, space = title.get_window_extent(renderer).x0, inches(0.05) * figure.dpi
         wide = max(min(rights) - begin - space, 0.6 * mine.width)

@@ -13,10 +13,10 @@ from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import fitted, legend_below, low, narrow, sheet
 from plots.figures._parts import element_legend, lanes_height, letter_panels
-from plots.panels.axes import MANY, first_variable
 from plots.panels.held_outputs import HeldLag
-from plots.panels.selection import checked_elements, checked_window, scaled, shown
-from plots.panels.window import Window
+from plots.panels.parts.axes import MANY, first_variable
+from plots.panels.parts.selection import checked_elements, checked_window, scaled, shown
+from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 from plots.style.matplotlib import Axes, Figure, rc_context
 from plots.style.presets import font, pt, settings, to_scale

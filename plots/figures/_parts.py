@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import legend_below
-from plots.panels.axes import MANY
-from plots.panels.selection import checked_elements
-from plots.panels.window import Window
+from plots.panels.parts.axes import MANY
+from plots.panels.parts.selection import checked_elements
+from plots.panels.parts.window import Window
 from plots.style.matplotlib import Annotation, Axes, Figure
 from plots.style.presets import pt
 

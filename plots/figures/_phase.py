@@ -13,9 +13,15 @@ from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
 from plots.figures._layout import fitted, narrow, sheet
 from plots.figures._parts import head, letter_panels
-from plots.panels.axes import Artists
-from plots.panels.selection import checked_elements, checked_row, checked_window, scaled, shown
-from plots.panels.window import Window
+from plots.panels.parts.axes import Artists
+from plots.panels.parts.selection import (
+    checked_elements,
+    checked_row,
+    checked_window,
+    scaled,
+    shown,
+)
+from plots.panels.parts.window import Window
 from plots.style import PAPER, VERMILION
 from plots.style.matplotlib import Axes, Figure, LineCollection, rc_context
 from plots.style.presets import pt, settings

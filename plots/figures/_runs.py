@@ -21,10 +21,10 @@ from plots.figures._parts import (
     one_time_axis,
     over_threshold,
 )
-from plots.panels.axes import MANY, VECTOR_ROWS
 from plots.panels.micro_steps.cascades import CASCADE
-from plots.panels.selection import checked_elements, checked_window, scaled, shown
-from plots.panels.window import Window
+from plots.panels.parts.axes import MANY, VECTOR_ROWS
+from plots.panels.parts.selection import checked_elements, checked_window, scaled, shown
+from plots.panels.parts.window import Window
 from plots.style import LINE_GREY, PALE_GREY
 from plots.style.matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
 from plots.style.presets import pt, settings

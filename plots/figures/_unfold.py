@@ -18,7 +18,7 @@ from plots.panels.micro_steps.unfolding import (
     edge_texts,
     time_texts,
 )
-from plots.panels.selection import scaled
+from plots.panels.parts.selection import scaled
 from plots.style import state_look
 from plots.style.matplotlib import Figure, Rectangle, rc_context
 from plots.style.presets import inches, room, settings, to_scale

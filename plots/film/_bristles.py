@@ -15,7 +15,7 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.traces.trace import Trace
 from plots.film._pace import Frame
-from plots.panels.selection import has_threshold, scaled
+from plots.panels.parts.selection import has_threshold, scaled
 from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme, ramp
 from plots.style.matplotlib import Artist, Axes, Line2D, LineCollection, Rectangle, patches
 

@@ -19,7 +19,7 @@ from plots.film._pace import paced
 from plots.film._picture import FilmPicture
 from plots.output import formats
 from plots.output.svg_artists import EXACT
-from plots.panels.selection import shown as shown_rows
+from plots.panels.parts.selection import shown as shown_rows
 from plots.style import RC, Theme
 from plots.style.matplotlib import rc_context
 

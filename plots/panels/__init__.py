@@ -21,8 +21,6 @@ from plots.panels import (
     _stribeck,
     active_states,
     held_outputs,
-    selection,
-    titles,
 )
 from plots.panels._differences import *  # noqa: F403
 from plots.panels._many import *  # noqa: F403
@@ -37,8 +35,9 @@ from plots.panels.held_outputs import *  # noqa: F403
 from plots.panels.micro_steps import cascades, unfolding
 from plots.panels.micro_steps.cascades import *  # noqa: F403
 from plots.panels.micro_steps.unfolding import *  # noqa: F403
-from plots.panels.selection import *  # noqa: F403
-from plots.panels.titles import *  # noqa: F403
+from plots.panels.parts import selection, titles
+from plots.panels.parts.selection import *  # noqa: F403
+from plots.panels.parts.titles import *  # noqa: F403
 
 __all__: list[str] = []
 __all__ += cascades.__all__

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gms_fsm.traces.trace import Trace
-from plots.panels.axes import (
+from plots.panels.parts.axes import (
     Artists,
     draw_curve,
     element_look,
@@ -16,14 +16,14 @@ from plots.panels.axes import (
     note,
     time_axis,
 )
-from plots.panels.selection import (
+from plots.panels.parts.selection import (
     checked_elements,
     checked_window,
     has_threshold,
     scaled,
     shown,
 )
-from plots.panels.window import Window
+from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY
 from plots.style.matplotlib import Axes
 from plots.style.presets import pt

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
 from plots.panels._many import counted_away, place_of
-from plots.panels.axes import VECTOR_ROWS, Artists, draw_curve, log_axis
-from plots.panels.selection import checked_elements, scaled, shown
-from plots.panels.window import Window
+from plots.panels.parts.axes import VECTOR_ROWS, Artists, draw_curve, log_axis
+from plots.panels.parts.selection import checked_elements, scaled, shown
+from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
 from plots.style.matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots.style.presets import pt, to_scale

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from plots.panels.axes import Artists, draw_curve, time_axis
+from plots.panels.parts.axes import Artists, draw_curve, time_axis
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY, compared_look
 from plots.style.matplotlib import Axes, LogLocator
 from plots.style.presets import pt, to_scale

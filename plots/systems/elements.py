@@ -14,7 +14,7 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace, check_trace
-from plots.panels.selection import checked_row, scaled
+from plots.panels.parts.selection import checked_row, scaled
 from plots.style import (
     INK,
     LINE_GREY,

@@ -11,7 +11,7 @@ from gms_fsm import Trace
 from gms_fsm.app.report import compare, measured_force, plain, run_scenario
 from gms_fsm.app.scenario import Loaded, load_scenario
 from gms_fsm.foundation.files import LIST
-from tests.helpers import ROOT, same_bits
+from tests.helpers import FASTEST, ROOT, same_bits
 from tests.scenario_files import data_folder
 
 pytestmark = pytest.mark.slow
@@ -80,7 +80,7 @@ def test_there_are_thirteen() -> None:
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_a_shipped_system_runs(name: str, tmp_path: Path) -> None:
     loaded = load_scenario(
-        ROOT / "scenarios" / f"{name}.toml", ["run.engine='ifelse'", *undrawn(name)]
+        ROOT / "scenarios" / f"{name}.toml", [f"run.engine={FASTEST!r}", *undrawn(name)]
     )
     trace, files = run_scenario(loaded, tmp_path / "out")
     contacts = trace.system.contacts
@@ -147,7 +147,7 @@ def tribometer(tmp_path_factory: pytest.TempPathFactory) -> tuple[Loaded, Trace,
     pytest.importorskip("matplotlib", reason="the figures need the extra 'plots'")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("GMS_FSM_DATA", str(data_folder()))
-        loaded = load_scenario(ROOT / "scenarios" / "tribometer.toml")
+        loaded = load_scenario(ROOT / "scenarios" / "tribometer.toml", [f"run.engine={FASTEST!r}"])
     trace, files = run_scenario(loaded, tmp_path_factory.mktemp("tribometer") / "out")
     return loaded, trace, files
 

@@ -14,7 +14,6 @@ pytest.importorskip("llvmlite", reason="needs the extra fast")
 
 STRICT = ("-Wall", "-Wno-unused", "-Werror")
 TRANSLATED = (
-    "open loop",
     "pulled mass, rk4",
     "a function",
     "sliding",

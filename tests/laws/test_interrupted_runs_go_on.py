@@ -12,8 +12,7 @@ from gms_fsm import Trace, simulate
 from tests.corpus import CORPUS, ENGINES, each, rates, run, trace
 from tests.helpers import FASTEST, other_parts
 
-# A Python function may be another one; the record of the tribometer takes half a minute to write.
-LEFT_OUT = {"a function", "scenario tribometer"}
+LEFT_OUT = {"a function"}  # it may be another one
 
 
 class Interrupted(Exception):

@@ -18,11 +18,16 @@ def last_row(one: Trace) -> dict[str, object]:
     return {**shown, "microstep": ""}
 
 
+def whole_of(name: str) -> Trace:
+    """Return all rows of a run in its engine."""
+    if "t_eval" in run(name).how:
+        return run(name)(engine=in_turn(name), t_eval=None)
+    return trace(name, in_turn(name))
+
+
 @each(CORPUS)
 def test_the_end_is_the_last_of_all_rows(name: str) -> None:
-    engine = in_turn(name)
-    whole = run(name)(engine=engine, t_eval=None, output="all")
-    end = run(name)(engine=engine, t_eval=None, output="end")
+    whole, end = whole_of(name), run(name)(engine=in_turn(name), t_eval=None, output="end")
     assert len(end) == len(end.stops) == 1
     assert end.t.tolist() == [run(name).t_end]
     assert end.microstep.tolist() == [0]
@@ -34,13 +39,12 @@ def test_the_end_is_the_last_of_all_rows(name: str) -> None:
 @each(CORPUS)
 def test_requested_rows_are_those_of_the_run(name: str) -> None:
     """A row on a switch is the one after it; both sides of every stop are kept beside them."""
-    engine, t_end = in_turn(name), run(name).t_end
-    whole = run(name)(engine=engine, t_eval=None)
+    whole, t_end = whole_of(name), run(name).t_end
     start = whole.t[0]
     located = run(name).how.get("events") != "step"  # the others take an edge after the step's end
     events = np.unique(whole.transitions.t[:4]) if located else []
     times = np.unique([start, 0.9 * start + 0.1 * t_end, *events, 0.2 * start + 0.8 * t_end, t_end])
-    some = run(name)(engine=engine, t_eval=times)
+    some = run(name)(engine=in_turn(name), t_eval=times)
     assert some.t.tolist() == times.tolist()
     assert not some.microstep.any()
     same_logs(some, whole)

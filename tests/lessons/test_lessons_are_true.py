@@ -14,16 +14,16 @@ from scipy.integrate import quad, solve_ivp
 
 from gms_fsm import GMS, Trace, measure_phenomena, simulate
 from gms_fsm.app.lessons import Result
-from gms_fsm.app.lessons import l1_hysteresis as l1
-from gms_fsm.app.lessons import l3_missed_window as l3
-from gms_fsm.app.lessons import l4_sign_of_s as l4
-from gms_fsm.app.lessons import l5_how_many as l5
-from gms_fsm.app.lessons import l6_stick_slip as l6
-from gms_fsm.app.lessons import l7_frictional_lag as l7
-from gms_fsm.app.lessons import l8_chart_or_ifelse as l8
-from gms_fsm.app.lessons import l9_contacts as l9
-from gms_fsm.app.lessons import l10_which_model as l10
-from gms_fsm.app.lessons import l11_what_a_record_tells as l11
+from gms_fsm.app.lessons.basics import l1_hysteresis as l1
+from gms_fsm.app.lessons.basics import l3_missed_window as l3
+from gms_fsm.app.lessons.basics import l4_sign_of_s as l4
+from gms_fsm.app.lessons.basics import l5_how_many as l5
+from gms_fsm.app.lessons.basics import l6_stick_slip as l6
+from gms_fsm.app.lessons.practice import l7_frictional_lag as l7
+from gms_fsm.app.lessons.practice import l8_chart_or_ifelse as l8
+from gms_fsm.app.lessons.practice import l9_contacts as l9
+from gms_fsm.app.lessons.practice import l10_which_model as l10
+from gms_fsm.app.lessons.practice import l11_what_a_record_tells as l11
 from gms_fsm.phenomena.specimens import bench_bank
 from tests.helpers import same_bits
 

@@ -59,7 +59,7 @@ ROWS = """
     sys.stderr.isatty = lambda: True
     import numpy as np
     from gms_fsm import GMS, GMSParameters, Prescribed
-    from gms_fsm.lowering import _compiled as compiled
+    from gms_fsm.lowering import compiling as compiled
     from gms_fsm.lowering.program import lower
     model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     t = np.linspace(0.0, 3.0, 50)

@@ -126,7 +126,7 @@ def cases(draw):
 
 # No shrinking: the oracle is slow, and the example as drawn is just as informative.
 @settings(
-    max_examples=50,
+    max_examples=30,
     deadline=None,
     derandomize=True,
     phases=[Phase.generate],

@@ -139,14 +139,14 @@ def fired(trace: Trace) -> None:
     event(f"transitions: {count if count < 3 else '3 or more' if count < 10 else '10 or more'}")
 
 
-@hard(60)
+@hard(40)
 @given(chart_models(), rigs(), options(), rounded(1, 5))
 def test_random_charts(model: ChartModel, rig: Any, given: dict[str, Any], t_end: float) -> None:
     trace, end = attempt(model, rig, t_end, **given)
     lawful(trace, end, t_end, given.get("events") != "step")
 
 
-@hard(50)
+@hard(40)
 @given(banks(), rigs(), options(), rounded(2, 8))
 def test_random_banks(model: GMS, rig: Any, given: dict[str, Any], t_end: float) -> None:
     trace, end = attempt(model, rig, t_end, **given)
@@ -169,7 +169,7 @@ def test_engines_agree_on_random_charts(model: ChartModel, rig: Any, given: dict
     engines_agree(model, rig, given, ("ifelse",))
 
 
-@hard(8)
+@hard(5)
 @given(banks(), ramps(jumps=True), options(), st.booleans())
 def test_engines_agree_on_random_banks(
     model: GMS, corners: Any, given: dict[str, Any], pushed: bool
@@ -195,7 +195,7 @@ MIRRORED = {
 }
 
 
-@hard(60)
+@hard(40)
 @given(banks("signed"), ramps(jumps=True), options(), st.integers(0, 2))
 def test_the_mirrored_signal_gives_the_mirrored_run(
     model: GMS, corners: Any, given: dict[str, Any], kind: int

@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -138,7 +138,7 @@ RUNS: dict[str, Callable[[], Trace]] = {
     "no numbers": without_numbers,
 }
 # Pages that compare two runs; every other page has the run of its name.
-PAIRS = {"two": ("published", "signed"), "ended": ("signed", "short"), "same": ("signed",) * 2}
+PAIRS = {"two": ("published", "signed"), "ended": ("signed", "short"), "same": ("short",) * 2}
 TITLES = {"evil": EVIL}
 _PAGES: dict[str, Path] = {}
 
@@ -159,28 +159,57 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def open_page(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Open]:
-    """Open a page; at the end there must be no requests and no console messages."""
-    contexts, wrong = [], []
+    """Open a page; at the end there must be no requests and no console messages.
 
-    def opened(page: str | Path, size: str = "desk", tab: str = "", **options: Any) -> Page:
+    All are opened in one tab of the module, one after the other, but for a page with options of
+    its own: a new tab takes three times as long.
+    """
+    asked, wrong, tabs, contexts = set(), [], list[Page](), []
+    hear: dict[Any, Any] = {
+        "console": lambda message: wrong.append(message.text),
+        "pageerror": lambda error: wrong.append(str(error)),
+        "request": lambda r: r.url in asked or wrong.append(f"asked for {r.url}"),
+    }
+
+    def tab_of(options: dict[str, Any]) -> Page:
+        if options:
+            contexts.append(browser.new_context(**options))
+            return contexts[-1].new_page()
+        context = browser.contexts[0] if browser.contexts else browser.new_context()
+        return context.pages[0] if context.pages else context.new_page()
+
+    def opened(
+        page: str | Path,
+        size: str = "desk",
+        tab: str = "",
+        color_scheme: Any = "light",
+        reduced_motion: Any = "no-preference",
+        **options: Any,
+    ) -> Page:
         if isinstance(page, str) and page not in _PAGES:  # each is written once
             runs = [run(name) for name in PAIRS.get(page, (page,))]
             folder = tmp_path_factory.mktemp("replay")
             _PAGES[page] = write_replay(folder / "page.html", *runs, title=TITLES.get(page, page))
         path = _PAGES[page] if isinstance(page, str) else page
+        shown = tab_of(options)
         width, height = SIZES[size]
-        context = browser.new_context(viewport={"width": width, "height": height}, **options)
-        contexts.append(context)
-        shown = context.new_page()
-        shown.on("console", lambda message: wrong.append(message.text))
-        shown.on("pageerror", lambda error: wrong.append(str(error)))
-        shown.on("request", lambda r: r.url == path.as_uri() or wrong.append(f"asked for {r.url}"))
+        shown.set_viewport_size({"width": width, "height": height})
+        shown.emulate_media(color_scheme=color_scheme, reduced_motion=reduced_motion)
+        shown.mouse.move(0, 0)
+        if shown not in tabs:
+            tabs.append(shown)
+            for event, call in hear.items():
+                shown.on(event, call)
+        asked.add(path.as_uri())
         shown.goto(path.as_uri())
         if tab:
             open_tab(shown, tab)
         return shown
 
     yield opened
+    for shown in tabs:
+        for event, call in hear.items():
+            shown.remove_listener(event, call)
     for context in contexts:
         context.close()
     assert wrong == []
@@ -211,9 +240,22 @@ def some_rows(page: Page, count: int, seed: int = 18) -> list[tuple[int, int]]:
     return [own[k] for k in chosen]
 
 
+def at_rows(page: Page, rows: Sequence[int], function: str) -> list[Any]:
+    """Show rows one after the other, and return what a function returns at each."""
+    asked = f"(rows) => rows.map((row) => {{ go(row); return ({function})(); }})"
+    return list(page.evaluate(asked, list(rows)))
+
+
 def faults(page: Page, **options: Any) -> list[Any]:
     """Return what axe finds: the rules that are broken, and where."""
-    found = Axe().run(page, **options).response["violations"]
+    if page.evaluate("!window.axe"):
+        page.evaluate(Axe().axe_script)
+    found = page.evaluate(
+        """async ({ context, options }) => (
+            await axe.run(context ?? document, { resultTypes: ["violations"], ...options })
+        ).violations""",
+        options,
+    )
     return [(each["id"], [node["target"] for node in each["nodes"]][:3]) for each in found]
 
 

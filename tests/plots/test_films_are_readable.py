@@ -11,6 +11,7 @@ import re
 from functools import cache
 from itertools import combinations, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,13 +20,14 @@ pytest.importorskip("matplotlib", reason="films need the extra 'plots'")
 
 from matplotlib.transforms import Bbox
 
-from gms_fsm import LivelockError, PulledSlider, Trace, simulate
-from gms_fsm.charts.registry import entry
+from gms_fsm import Body, Contact, LivelockError, Prescribed, PulledSlider, System, Trace, simulate
+from gms_fsm.charts.registry import Entry, entry
+from gms_fsm.systems.models import demonstration
 from plots.film._movie import Movie
 from plots.film._pace import FADE, SLOW, Frame, Pace, paced
 from plots.output.graphviz import available
 from plots.style import CHART_THEMES
-from tests.charts.test_registry_finds_what_is_there import every, mounted
+from tests.charts.test_registry_finds_what_is_there import every
 from tests.helpers import bank, matrix, one_element, open_loop, pulled_mass, stick_slip
 from tests.plots.films import count, with_movie
 from tests.plots.printed import drawn_texts
@@ -49,8 +51,8 @@ def test_the_fired_edge_is_lit_and_fades(tmp_path: Path) -> None:
     def use(movie: Movie) -> tuple[list[int], tuple[Frame, ...]]:
         return [count(picture, orange) for picture in movie.pictures()], movie.film.pace.frames
 
-    more = {"theme": "dark", "elements": [0, 1, 2]}
-    seen, frames = with_movie(cascade(), tmp_path, use, **WINDOW, **more)
+    more = WINDOW | {"theme": "dark", "elements": [0, 1, 2], "frames": 30}
+    seen, frames = with_movie(cascade(), tmp_path, use, **more)
     plain = [n for n, frame in zip(seen, frames, strict=True) if not frame.fired]
     for n, frame in zip(seen, frames, strict=True):
         if frame.entry >= 0 and cascade().transitions.element[frame.entry] < 3:
@@ -117,7 +119,7 @@ def boxes(movie: Movie) -> list[tuple[str, float, Bbox]]:
     return [*found, ("the chart", 10.0, Bbox.union(inside))]
 
 
-@pytest.mark.parametrize("n", [1, 4, 24])
+@pytest.mark.parametrize("n", matrix([1, 4, 24], [1, 24]))
 def test_texts_have_room(n: int, tmp_path: Path) -> None:
     def use(movie: Movie) -> None:
         held = movie.held()
@@ -137,7 +139,27 @@ def test_texts_have_room(n: int, tmp_path: Path) -> None:
     with_movie(pulled(n), tmp_path, use, frames=120)
 
 
-@pytest.mark.parametrize(("name", "law"), matrix(every(), every()[::4]))
+def mounted(found: Entry, law: str) -> tuple[Any, ...]:
+    """Return a chart on a rig, or in a system if it has several velocities."""
+    chart = found.chart(law)
+    if len(chart.velocities) > 1:
+        names = [f"v{i}" for i, _ in enumerate(chart.velocities)]
+        bodies = [
+            Body(f"b{v}", inertia=1.0, force=f"2 * sin(t + {i})", x=f"x{v}", v=v)
+            for i, v in enumerate(names)
+        ]
+        contact = Contact("pad", chart, dict(found.demonstration.values), v=names)
+        return (System("plane", bodies=bodies, contacts=[contact]),)
+    held = chart.locks or chart.sets_velocity  # needs a free body
+    rig = PulledSlider(1.0, 2.0, 0.1) if held else Prescribed("0.2*sin(t)")
+    return demonstration(found, law), rig
+
+
+# Every sixth, the chart with two velocities among them.
+SIXTH = {*every()[::6], ("planar-coulomb", "")}
+
+
+@pytest.mark.parametrize(("name", "law"), matrix(every(), SIXTH))
 def test_every_chart_has_a_film(name: str, law: str, tmp_path: Path) -> None:
     try:
         run = simulate(*mounted(entry(name), law), 2.0)
@@ -152,7 +174,7 @@ def test_every_chart_has_a_film(name: str, law: str, tmp_path: Path) -> None:
         assert all(size >= 7 for _, size, _ in found)
         return len(pictures)
 
-    assert with_movie(trace, tmp_path, use, frames=6) == 6
+    assert with_movie(trace, tmp_path, use, frames=2) == 2
 
 
 # --------------------------------------------------------------------------- pace

@@ -128,17 +128,17 @@ def one() -> Trace:
 
 def test_frames_have_the_theme_the_active_states_and_the_cursor(tmp_path: Path) -> None:
     theme = "dark"
-    path = animate(bank(), tmp_path / "run.gif", frames=6, fps=10, theme=theme, notation="math")
+    path = animate(bank(), tmp_path / "run.gif", frames=3, fps=10, theme=theme, notation="math")
     assert list(tmp_path.iterdir()) == [path]
     with Image.open(path) as film:
         assert film.format == "GIF"
-        assert film.n_frames == 6  # type: ignore[attr-defined]
+        assert film.n_frames == 3  # type: ignore[attr-defined]
         assert film.info["duration"] == 100
         assert film.info["loop"] == 0
     pictures = frames_of(path)
     assert {picture.size for picture in pictures} == {pictures[0].size}
     assert min(pictures[0].size) > 300
-    assert len({picture.tobytes() for picture in pictures}) == 6
+    assert len({picture.tobytes() for picture in pictures}) == 3
     colours = CHART_THEMES[theme]
     assert pictures[0].getpixel((3, 3)) == tuple(round(255 * c) for c in to_rgb(colours.paper))
     for picture in pictures:
@@ -178,10 +178,10 @@ def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(plots.charts.live_chart, "picture", counted)
     told: list[tuple[int, int]] = []
-    more = {"elements": [1], "frames": 6, "progress": lambda *each: told.append(each)}
+    more = {"elements": [1], "frames": 3, "progress": lambda *each: told.append(each)}
     animate(bank(), tmp_path / "run.gif", **more)
     assert len(calls) == 1
-    assert told == [(k, 6) for k in range(1, 7)]
+    assert told == [(k, 3) for k in range(1, 4)]
 
 
 def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:

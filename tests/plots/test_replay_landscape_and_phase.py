@@ -12,8 +12,10 @@ import pytest
 from gms_fsm import Trace
 from gms_fsm.language import evaluate
 from gms_fsm.session.explain import explain, values_at
+from tests.helpers import matrix
 from tests.plots.browser import (
     Open,
+    at_rows,
     box_of,
     browser,
     frame,
@@ -52,10 +54,10 @@ SHOWN = """([asked, far]) => asked.map(([row, element]) => {
 })"""
 
 
-@pytest.mark.parametrize(
-    ("name", "size"),
-    [*((name, "laptop") for name in NAMES), ("signed", "phone")],
-)
+LAPTOP = [(name, "laptop") for name in NAMES]
+
+
+@pytest.mark.parametrize(("name", "size"), matrix([*LAPTOP, ("signed", "phone")], LAPTOP))
 def test_regions_and_the_race_have_the_truths_of_the_run(
     open_page: Open, name: str, size: str
 ) -> None:
@@ -65,7 +67,7 @@ def test_regions_and_the_race_have_the_truths_of_the_run(
     open_tab(page, "Landscape")
     numbers, own = dict(own_rows(page)), [row for row, _ in own_rows(page)]
     rng = np.random.default_rng(18)
-    asked = [(int(rng.choice(own)), int(rng.integers(trace.n))) for _ in range(100)]
+    asked = [(int(rng.choice(own)), int(rng.integers(trace.n))) for _ in range(40)]
     seen = set()
     for (row, element), lanes in zip(asked, page.evaluate(SHOWN, [asked, 0.6]), strict=True):
         why = explain(trace, numbers[row], element)
@@ -114,12 +116,13 @@ def test_dragging_to_random_points_says_what_would_fire(open_page: Open, name: s
     press(page, "f")
     open_tab(page, "Landscape")
     numbers = dict(own_rows(page))
-    dot, answer = page.locator(".probe"), page.locator(".answer").first
+    answer = page.locator(".answer").first
     box = box_of(page, ".plane .ground")
     rng, fired = np.random.default_rng(18), []
-    for _ in range(40):
+    for _ in range(20):
         page.evaluate("(row) => show(row)", int(rng.choice([*numbers])))
-        dot.hover(force=True)
+        here = box_of(page, ".probe .here")
+        page.mouse.move(here["x"] + here["width"] / 2, here["y"] + here["height"] / 2)
         page.mouse.down()
         x, y = rng.uniform(size=2)
         page.mouse.move(box["x"] + x * box["width"], box["y"] + y * box["height"], steps=2)
@@ -137,7 +140,7 @@ def test_dragging_to_random_points_says_what_would_fire(open_page: Open, name: s
         else:
             assert text.startswith(("nothing would fire: ", "no edge leaves "))
         fired.append(edge)
-    assert 5 < sum(map(bool, fired)) < len(fired) - 5
+    assert 2 < sum(map(bool, fired)) < len(fired) - 2
 
 
 WORST = """() => {
@@ -154,19 +157,18 @@ def test_the_clause_that_holds_an_edge_back_is_that_of_the_printed_race(
     from plots.panels.guards.racing import held_back_by  # needs matplotlib
 
     page, trace = open_page(name), run(name)
-    checked = 0
-    for row, number in own_rows(page)[::3]:
-        why = explain(trace.contact(trace.contacts[0]), number, 0)
+    checked, contact, rows = 0, trace.contact(trace.contacts[0]), own_rows(page)[::3]
+    for (_, number), shown in zip(rows, at_rows(page, [k for k, _ in rows], WORST), strict=True):
+        why = explain(contact, number, 0)
         if why.left:
             continue
-        page.evaluate("(row) => show(row)", row)
         wanted = [held_back_by(each) for each in why]
-        assert page.evaluate(WORST) == [each.text if each else "" for each in wanted]
+        assert shown == [each.text if each else "" for each in wanted]
         checked += sum(each is not None for each in wanted)
     assert checked > 15
 
 
-@pytest.mark.parametrize("size", ["laptop", "phone"])
+@pytest.mark.parametrize("size", matrix(["laptop", "phone"], ["phone"]))
 def test_keys_move_the_dot_and_escape_or_another_row_puts_it_back(
     open_page: Open, size: str
 ) -> None:

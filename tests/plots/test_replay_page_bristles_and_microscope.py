@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
+from tests.helpers import matrix
 from tests.plots.browser import (
     Open,
+    at_rows,
     box_of,
     browser,
     events,
@@ -55,22 +57,28 @@ GROUND = """(() => {
 
 
 # --------------------------------------------------------------------------- bristles
-@pytest.mark.parametrize("size", ["laptop", "phone"])
+# At a row: the elements, the texts of the motion, and where the ground is.
+DRAWN = f"""() => [
+    ({ELEMENTS})(), {GROUND},
+    [...document.querySelectorAll(".bristles .motion text")].map((node) => node.textContent),
+]"""
+
+
+@pytest.mark.parametrize("size", matrix(["laptop", "phone"], ["laptop"]))
 def test_contacts_pegs_and_values_are_those_of_the_run(open_page: Open, size: str) -> None:
     page, trace = open_page("mass", size, "Bristles"), run("mass")
-    places, z, ends, counts = [], [], set(), {True: 0, False: 0}
-    for row, number in some_rows(page, 40):
-        page.evaluate(f"go({row})")
-        elements = page.evaluate(ELEMENTS)
+    places, z, said, ends, counts = [], [], [], set(), {True: 0, False: 0}
+    rows = some_rows(page, 40)
+    drawn = at_rows(page, [row for row, _ in rows], DRAWN)
+    wanted: list[str] = []
+    for (_, number), (elements, _, motion) in zip(rows, drawn, strict=True):
         places.append([element["x"] for element in elements])
         ends |= {round(element["end"]) for element in elements}
         z.append(trace.z[number])
         v, F = float(trace.v[number]), float(np.float32(trace.F[number]))
-        motion = page.locator(".bristles .motion text").all_text_contents()
-        said = [f"'v = ' + eng({v!r}, 'm/s', 4)", f"'F = ' + eng({F!r}, 'N', 4)"]
-        said += [f"'z ' + eng({float(each)!r}, 'm', 4)" for each in trace.z[number]]
-        wanted = page.evaluate(f"[{', '.join(said)}]")
-        assert [*motion, *(element["texts"][1] for element in elements)] == wanted
+        said += [*motion, *(element["texts"][1] for element in elements)]
+        wanted += [f"'v = ' + eng({v!r}, 'm/s', 4)", f"'F = ' + eng({F!r}, 'N', 4)"]
+        wanted += [f"'z ' + eng({float(each)!r}, 'm', 4)" for each in trace.z[number]]
         for element, state in zip(elements, trace.states[number], strict=True):
             held = bool(state == "stick")
             counts[held] += 1
@@ -78,6 +86,7 @@ def test_contacts_pegs_and_values_are_those_of_the_run(open_page: Open, size: st
             assert element["arrow"] == (not held and v != 0)
             assert element["texts"][0].split()[1] == state
             assert not element["arrow"] or element["way"] == np.sign(v)
+    assert said == page.evaluate(f"[{', '.join(wanted)}]")
     slope, rest = np.polyfit(np.ravel(z), np.ravel(places), 1)
     np.testing.assert_allclose(np.ravel(places), rest + slope * np.ravel(z), atol=0.05)
     assert slope < 0  # the slider moves to the right, away from its contacts
@@ -100,9 +109,10 @@ def test_a_peg_is_a_default_state_or_without_bristles_a_locked_one(
     if name == "wear":
         held = {chart.default_state.name}
     seen = set()
-    for row, number in some_rows(page, 40):
-        page.evaluate(f"go({row})")
-        for element, state in zip(page.evaluate(ELEMENTS), trace.states[number], strict=True):
+    rows = some_rows(page, 40)
+    drawn = at_rows(page, [row for row, _ in rows], ELEMENTS)
+    for (_, number), elements in zip(rows, drawn, strict=True):
+        for element, state in zip(elements, trace.states[number], strict=True):
             assert element["peg"] == (state in held)
             seen.add(str(state))
     assert len(seen) > 1 or name == "ball"  # a ball that bounces is free
@@ -113,9 +123,7 @@ def test_a_contact_that_sticks_moves_with_the_ground(open_page: Open) -> None:
     checked = slid = 0
     first = events(page)[0]
     before = None
-    for row in range(first + 1, first + 120):
-        page.evaluate(f"go({row})")
-        elements, ground = page.evaluate(ELEMENTS), page.evaluate(GROUND)
+    for elements, ground, _ in at_rows(page, range(first + 1, first + 120), DRAWN):
         if before is not None:
             for now, then in zip(elements, before[0], strict=True):
                 way = (now["x"] - then["x"] - (ground - before[1])) / 60  # a period of the ground
@@ -137,22 +145,24 @@ def test_the_element_that_fires_is_in_view_in_both(open_page: Open, size: str) -
     assert page.locator(".bristles .element").count() == 20
     both = page.locator(".bristles").is_visible()
     seen = set()
-    for k in events(page)[:60]:
-        go(page, k)
-        element, height, fired, named = page.evaluate(
-            """() => {
-                const of = (q) => document.querySelector(q).getBoundingClientRect();
-                const back = of(".bristles .element.fired .back"), box = of("#run1-bristles");
-                const name = of(".micro .names .chosen");
-                return [views[0].element, views[0].open.left.height,
-                    back.top >= of(".bristles .motion").bottom - 1 && back.bottom <= box.bottom + 1,
-                    name.top >= of(".micro .top").bottom - 1
-                        && name.bottom <= of(".micro .foot").top + 1];
-            }"""
-        )
+    drawn = at_rows(
+        page,
+        events(page)[:60],
+        """() => {
+            const of = (q) => document.querySelector(q).getBoundingClientRect();
+            const back = of(".bristles .element.fired .back"), box = of("#run1-bristles");
+            const name = of(".micro .names .chosen");
+            return [views[0].element, views[0].open.left.height,
+                back.top >= of(".bristles .motion").bottom - 1 && back.bottom <= box.bottom + 1,
+                name.top >= of(".micro .top").bottom - 1
+                    && name.bottom <= of(".micro .foot").top + 1,
+                document.querySelector(".micro .names .chosen").innerText];
+        }""",
+    )
+    for element, height, fired, named, name in drawn:
         seen.add(element)
         assert named, element
-        assert page.locator(".micro .names .chosen").inner_text() == f"E{element + 1}"
+        assert name == f"E{element + 1}"
         assert fired, element
         assert height >= 26
     assert len(seen) == 20
@@ -163,13 +173,10 @@ def test_the_element_that_fires_is_in_view_in_both(open_page: Open, size: str) -
 @pytest.mark.parametrize("name", ["backlash", "dahl", "puck", "blocks", "rate-state-ageing"])
 def test_charts_of_every_kind_are_drawn(open_page: Open, name: str) -> None:
     page = open_page(name, "laptop", "Bristles")
-    for row, _ in some_rows(page, 5):
-        page.evaluate(f"go({row})")
-        elements = page.evaluate(ELEMENTS)
+    for elements, _, motion in at_rows(page, [row for row, _ in some_rows(page, 5)], DRAWN):
         assert [element["springs"] for element in elements] == [3 if name == "dahl" else 1]
         assert len(elements[0]["texts"]) == (2 if name == "dahl" else 1)
-        force = page.locator(".bristles .motion text").nth(1).text_content() or ""
-        assert force.startswith("F = ")
+        assert motion[1].startswith("F = ")
     notes = page.locator(".bristles .motion p").all_inner_texts()
     said = "v is the first of the velocities v, w; the others are not drawn."
     assert notes == [said] * (name == "puck")
@@ -184,18 +191,15 @@ def test_charts_of_every_kind_are_drawn(open_page: Open, name: str) -> None:
     open_tab(page, "Microscope")
     names = page.locator(".micro .names b").all_inner_texts()
     assert {each.split()[0] for each in names} == set(run("blocks").contacts)
-    for k in events(page)[:10]:
-        go(page, k)
-        chosen, contact = page.evaluate(
-            "[document.querySelector('.micro .names .chosen').textContent, views[0].contact.name]"
-        )
+    shown = "[document.querySelector('.micro .names .chosen').textContent, views[0].contact.name]"
+    for chosen, contact in at_rows(page, events(page)[:10], f"() => {shown}"):
         assert chosen.startswith(contact)
 
 
 # --------------------------------------------------------------------------- microscope
 def go(page: Any, k: int) -> None:
-    """Show a row after a transition, and wait for the picture."""
-    page.evaluate(f"new Promise((done) => {{ go({k}); requestAnimationFrame(() => done()); }})")
+    """Show a row."""
+    page.evaluate(f"go({k})")
 
 
 # Columns in view in their order: element, edge, row and micro-step, left edge.
@@ -246,8 +250,7 @@ TEXTS = """() => {
 }"""
 
 
-def overlapping(page: Any) -> list[tuple[str, str]]:
-    texts = page.evaluate(TEXTS)
+def overlapping(texts: list[Any]) -> list[tuple[str, str]]:
     assert len(texts) > 20
     return [
         (a[0], b[0])
@@ -272,12 +275,10 @@ def close(text: str, expected: float) -> bool:
 def four(page: Any, trace: Trace, first: int) -> list[Any]:
     """Show the second of four firings; return their columns, checked against the log."""
     log = trace.transitions[first : first + 4]
-    row = page.evaluate(f"runs[0].log[{first + 1}].row")
-    go(page, row)
-    columns = page.evaluate(COLUMNS)
-    numbers = [
-        int(page.evaluate(f"runs[0].number[runs[0].log[{first + k}].row]")) for k in range(4)
-    ]
+    (columns,) = at_rows(page, [page.evaluate(f"runs[0].log[{first + 1}].row")], COLUMNS)
+    numbers = page.evaluate(
+        f"runs[0].log.slice({first}, {first + 4}).map(({{ row }}) => runs[0].number[row])"
+    )
     at = [int(column[2].split("\n")[0]) for column in columns]
     columns = columns[at.index(numbers[0]) :][:4]
     assert [int(column[2].split("\n")[0]) for column in columns] == numbers
@@ -299,6 +300,7 @@ def test_every_firing_is_a_column_in_the_order_of_the_log(open_page: Open, name:
         if name == "mass":
             continue
         texts = page.evaluate(TEXTS)
+        assert overlapping(texts) == []
         times = [text[0] for text in texts if text[1] == "time"]
         gaps = np.diff(log.t[first : first + 4])
         if name == "cascade" and first == np.flatnonzero(log.t > 15.0)[0]:
@@ -321,13 +323,15 @@ def test_every_firing_is_a_column_in_the_order_of_the_log(open_page: Open, name:
     assert name == "mass"
 
 
-@pytest.mark.parametrize("name", ["mass", "ramp", "cascade", "many"])
+RUNS = ["mass", "ramp", "cascade", "many"]
+
+
+@pytest.mark.parametrize("name", matrix(RUNS, ["mass", "many"]))
 def test_no_text_covers_another_or_is_cut_off(open_page: Open, name: str) -> None:
     page = open_page(name, "laptop", "Microscope")
-    for k in events(page)[:: 1 if name == "ramp" else 7]:
-        for row in (k - 1, k, k + 1):
-            go(page, row)
-            assert overlapping(page) == []
+    for k in events(page)[:: 1 if name == "ramp" else 12]:
+        for texts in at_rows(page, (k - 1, k, k + 1), TEXTS):
+            assert overlapping(texts) == []
         box, labels = box_of(page, ".micro .strip"), box_of(page, ".micro .names")["width"]
         widths = page.evaluate(
             """() => views[0].open.right.texts.filter((node) => node.textContent)
@@ -344,32 +348,39 @@ def test_columns_show_the_states_stay_in_the_middle_and_lead_to_their_rows(
 ) -> None:
     page, trace = open_page("mass", "laptop", "Microscope"), run("mass")
     middles = []
-    for k in events(page)[10:40]:
-        go(page, k)
-        row = page.evaluate("runs[0].number[views[0].row]")
-        classes = page.evaluate(
-            """() => {
-                const at = views[0].open.right, k = at.strip.at(at.strip.place(views[0].row));
-                return [...at.nodes.get(k).column.children]
-                    .map((cell) => (cell.matches(".fires") ? cell.children[1] : cell).className);
-            }"""
-        )
+    drawn = at_rows(
+        page,
+        events(page)[10:40],
+        """() => {
+            const at = views[0].open.right, k = at.strip.at(at.strip.place(views[0].row));
+            const classes = [...at.nodes.get(k).column.children]
+                .map((cell) => (cell.matches(".fires") ? cell.children[1] : cell).className);
+            const now = [...document.querySelectorAll(".micro .foot .now")]
+                .map((node) => node.getBoundingClientRect()).map((box) => box.x + box.width / 2);
+            return [runs[0].number[views[0].row], classes, now];
+        }""",
+    )
+    for row, classes, now in drawn:
         assert classes == [f"state{int(state == 'slip')}" for state in trace.states[row]]
-        assert page.locator(".micro .foot .now").count() == 1
-        box = box_of(page, ".micro .foot .now")
-        middles.append(box["x"] + box["width"] / 2)
+        assert len(now) == 1
+        middles += now
     middles = middles[2:]
     assert np.ptp(middles) <= 1.0
     strip, labels = box_of(page, ".micro .strip"), box_of(page, ".micro .names")["width"]
     middle = strip["x"] + (labels + strip["width"]) / 2
     assert middles[0] == pytest.approx(middle, abs=8)  # a bar to scroll
     a, b = events(page)[7:9]  # rows between firings are in the gap
-    places = []
-    for row in range(a + 1, b):
-        go(page, row)
-        assert page.locator(".micro .foot .now").count() == 0
-        assert page.locator(".micro .line").is_visible()
-        places.append(page.evaluate(f"views[0].open.right.strip.place({row})"))
+    drawn = at_rows(
+        page,
+        range(a + 1, b),
+        """() => [
+            document.querySelectorAll(".micro .foot .now").length,
+            document.querySelector(".micro .line").checkVisibility(),
+            views[0].open.right.strip.place(views[0].row),
+        ]""",
+    )
+    assert all(now == 0 and line for now, line, _ in drawn)
+    places = [place for *_, place in drawn]
     assert (np.diff(places) >= 0).all()
     assert places[-1] > places[0]
     go(page, events(page)[8])  # the button below a column, the column, and a gap

@@ -47,9 +47,10 @@ EXPLAINED = """([place, rows]) => rows.map((row) => {
 })"""
 
 
-@pytest.mark.parametrize(
-    "name", ["published", "signed", "pulled", "ball", "blocks", "servo", "timed", "shared"]
-)
+EXPLAINING = ["published", "signed", "pulled", "ball", "blocks", "servo", "timed", "shared"]
+
+
+@pytest.mark.parametrize("name", matrix(EXPLAINING, {*EXPLAINING} - {"pulled"}))
 def test_every_row_has_the_truths_and_margins_of_the_run_bit_for_bit(
     open_page: Open, name: str
 ) -> None:
@@ -57,8 +58,9 @@ def test_every_row_has_the_truths_and_margins_of_the_run_bit_for_bit(
     page, whole = open_page(name), run(name)
     own = own_rows(page)
     assert {number for _, number in own} >= set(np.flatnonzero(whole.microstep).tolist())
-    if len(own) > 1000:  # with the ticks of a sampled controller: some, and all micro-steps
-        own = [each for k, each in enumerate(own) if k % 7 == 0 or whole.microstep[each[1]]]
+    # About 150 rows, and all micro-steps.
+    some = range(0, len(own), max(1, len(own) // 150))
+    own = [each for k, each in enumerate(own) if k in some or whole.microstep[each[1]]]
     held = 0
     for place, each in enumerate(whole.contacts):
         trace = whole.contact(each)
@@ -114,12 +116,18 @@ def test_the_chart_shows_every_firing_and_the_table_explains_the_chosen_element(
     for record in trace.transitions:
         press(page, "Shift+ArrowRight")
         element = f"element{record.element + 1}"
-        assert page.locator(f"#{element}-state-{record.target}.active").count() == 1
-        assert page.locator(f"#{element}-state-{record.source}.active").count() == 0
-        assert page.locator(".guard.fired").count() == 1
-        assert page.locator(f"#{element}-guard-{record.edge}.fired").count() == 1
-        assert page.locator(f"#{element}-edge-{record.edge}-2.fired").count() == 1
-        marks = page.locator(f"#{element}-guard-{record.edge} .mark").all_text_contents()
+        counted = {
+            f"#{element}-state-{record.target}.active": 1,
+            f"#{element}-state-{record.source}.active": 0,
+            ".guard.fired": 1,
+            f"#{element}-guard-{record.edge}.fired": 1,
+            f"#{element}-edge-{record.edge}-2.fired": 1,
+        }
+        texts = "(each) => [...document.querySelectorAll(each)].map((node) => node.textContent)"
+        *found, marks = page.evaluate(
+            f"(asked) => asked.map({texts})", [*counted, f"#{element}-guard-{record.edge} .mark"]
+        )
+        assert [len(each) for each in found] == [*counted.values()]
         assert marks == ["✓", "✓"]
 
 
@@ -133,7 +141,7 @@ def test_what_fired_its_guard_and_the_cursor_are_in_view(
     open_page: Open, size: str, scheme: str
 ) -> None:
     page, trace = open_page("mass", size, color_scheme=scheme), run("mass")
-    for record in trace.transitions[:12]:
+    for record in trace.transitions[:6]:
         press(page, "Shift+ArrowRight")
         element = f"element{record.element + 1}"
         assert page.evaluate("views[0].element") == record.element
@@ -182,7 +190,7 @@ def test_many_elements_are_one_chart_and_a_token_each(open_page: Open) -> None:
     page, trace, n = open_page("many", "laptop"), run("many"), 20
     assert page.locator("svg .state").count() == 2
     assert page.locator(".token").count() == n
-    for record in trace.transitions[: 2 * n]:
+    for record in trace.transitions[:n]:
         press(page, "Shift+ArrowRight")
         while page.evaluate("runs[0].fired.get(views[0].row)?.element") != record.element:
             press(page, "ArrowRight")
@@ -193,7 +201,7 @@ def test_many_elements_are_one_chart_and_a_token_each(open_page: Open) -> None:
         assert page.locator(f"#element1-guard-{record.edge}.fired").count() == 1
     press(page, "f")
     who = page.locator(".who")
-    for i in range(n):
+    for i in (0, 1, 11, n - 1):
         page.locator(".token").nth(i).click()
         assert who.inner_text() == f"Guards of element {i + 1}"
     press(page, "]")

@@ -129,7 +129,7 @@ def test_rows_and_elements_are_those_of_the_trace(open_page: Open) -> None:
 
 def test_time_is_zoomed_by_buttons_keys_and_dragging(open_page: Open) -> None:
     page = open_page("published")
-    press(page, *["Shift+ArrowRight"] * 20)
+    page.evaluate("go(events[19])")
     page.click("#zoom-in")
     press(page, "+")
     low, high = window(page)
@@ -168,7 +168,9 @@ def test_time_is_zoomed_by_buttons_keys_and_dragging(open_page: Open) -> None:
     area.dblclick(position={"x": box["width"] / 2, "y": 30})
     assert window(page) == (0.0, 100.0)
     assert page.locator(".ribbon").first.locator("i").count() > pieces
-    press(page, "Home", "Shift+ArrowRight", *["+"] * 60, *["ArrowRight"] * 6)  # into micro-steps
+    press(page, "Home", "Shift+ArrowRight")  # into micro-steps
+    page.evaluate("for (let k = 0; k < 28; k++) document.querySelector('#zoom-in').click()")
+    press(page, *["ArrowRight"] * 6)
     low, high = window(page)
     assert 0.0 < high - low < 1e-6
 
@@ -228,9 +230,10 @@ def test_playing_moves_silently_and_stops_on_demand_at_breakpoints_and_at_the_en
 def test_playing_stays_at_every_micro_step_and_is_uniform_between(open_page: Open) -> None:
     page = open_page("mass")
     assert page.locator("#speed").input_value() == "20"
+    page.evaluate("show(frames.t.findIndex((t) => t > 40))")
+    times, transitions, start = page.evaluate("[[...frames.t], [...eventFrames], frame]")
+    transitions = [k for k in transitions if k > start]
     shown = page.evaluate(PLAYED, "20")
-    times = page.evaluate("[...frames.t]")
-    transitions = page.evaluate("[...eventFrames]")
     first = {}
     for now, k in shown:
         first.setdefault(k, now)
@@ -239,14 +242,15 @@ def test_playing_stays_at_every_micro_step_and_is_uniform_between(open_page: Ope
     stays = {k: sum(each == k for _, each in shown) * 1000 / 60 for k in transitions}
     assert min(stays.values()) >= hold - 1000 / 30
     # Away from transitions the clock takes 20 s for the whole run.
+    end = last(page)
     moving = [
         (now, times[k], times[after])
         for (now, k), (_, after) in zip(shown, shown[60:], strict=False)
-        if not any(k <= event <= after for event in transitions) and after < page.evaluate("last")
+        if not any(k <= event <= after for event in transitions) and after < end
     ]
-    assert len(moving) > 100
-    for _, begin, end in moving[:: len(moving) // 40]:
-        assert end - begin == pytest.approx(3.0, abs=0.4)  # 60 s / 20 s times one second
+    assert len(moving) > 20
+    for _, begin, finish in moving[::3]:
+        assert finish - begin == pytest.approx(3.0, abs=0.4)  # 60 s / 20 s times one second
     page = open_page("mass", reduced_motion="reduce")
     assert page.locator("#speed").input_value() == "rows"
 

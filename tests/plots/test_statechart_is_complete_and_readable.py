@@ -63,8 +63,8 @@ ZOO: dict[str, tuple[Chart, int, dict[str, Any]]] = {
 }
 CASES = OWN | HARD | ZOO
 BOTH = [(name, direction) for name in CASES for direction in ("TB", "LR")]
-KEPT = [each for each in BOTH if each[0] not in ZOO]  # and charts of the zoo alternately
-KEPT += [(name, ("TB", "LR")[k % 2]) for k, name in enumerate(ZOO)]
+KEPT = [each for each in BOTH if each[0] in OWN]  # and the others alternately
+KEPT += [(name, ("TB", "LR")[k % 2]) for k, name in enumerate(HARD | ZOO)]
 
 
 @cache

@@ -160,7 +160,8 @@ def test_the_page_listens_to_its_host_only_and_pictures_cannot_act(host: Host) -
 def test_controls_are_for_everybody(browser: Browser) -> None:
     widget = plots.explore(*pulled_mass(), 20.0, sliders={"F_s": (1.1, 3.0)})
     widget.poke({"z": {0: 0.0}}, t=9.0)
+    host = Host(browser, widget)
     for scheme in ("light", "dark"):
-        host = Host(browser, widget, color_scheme=scheme)
+        host.page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
         assert faults(host.page, context=".gms-explore", options={"iframes": False}) == []
-        host.close()
+    host.close()

@@ -20,7 +20,7 @@ ZOO = ("backlash", "bouc-wen", "dahl", "elasto-plastic", "lugre", "lugre-sigma1"
 
 def bank(rng: np.random.Generator) -> tuple[GMS, float]:
     """Return a random GMS model, and a speed at which it switches, at any scale."""
-    n = int(rng.choice([1, 4, 7]))  # each one is another program
+    n = int(rng.choice([1, 5]))  # each one is another program
     shares = rng.dirichlet(np.ones(n)) + 0.02
     force, v_s = 10.0 ** rng.uniform(-3, 3), 10.0 ** rng.uniform(-6, 0)
     stiffness = force / v_s * 10.0 ** rng.uniform(0, 2, n)

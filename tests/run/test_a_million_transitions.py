@@ -62,7 +62,7 @@ def peak(engine: str, transitions: int, **options: float) -> tuple[int, Trace]:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 400), ("machines", 200)])
+@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 200), ("machines", 100)])
 def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
     load_once(engine)
     few, first = peak(engine, transitions // 4)
@@ -77,12 +77,12 @@ def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
 def test_ten_times_the_steps_take_no_more_memory(engine: str) -> None:
     load_once(engine)
     few, first = peak(engine, 64)
-    many, second = peak(engine, 64, max_step=0.02)  # tens of thousands of steps, a few times more
+    many, second = peak(engine, 64, max_step=0.05)  # thousands of steps, a few times more
     assert len(first.transitions) == len(second.transitions)
     assert many < few + 100_000
 
 
-@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 2000)])
+@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 1000)])
 def test_every_period_equals_the_last(engine: str, transitions: int) -> None:
     """Late transitions are as accurate as early ones: same order, same phase, same values."""
     log = run(engine, transitions).transitions
@@ -128,7 +128,7 @@ def measured(engine: str, transitions: int) -> None:
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
 def test_the_operating_system_reports_the_same() -> None:
-    few, many = in_a_child("ifelse", 64), in_a_child("ifelse", 1600)
-    assert many.transitions >= 1600
+    few, many = in_a_child("ifelse", 64), in_a_child("ifelse", 800)
+    assert many.transitions >= 800
     # Memory comes in pages and heaps in larger blocks: a megabyte is within the noise.
     assert many.peak - few.peak < BYTES_A_FIRING * many.transitions + 2**21

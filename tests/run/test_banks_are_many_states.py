@@ -10,10 +10,11 @@ from tests.helpers import FASTEST
 from tests.run.stepping_cases import friction
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["ifelse"] if FASTEST == "ifelse" else ["compiled", "ifelse"])
 def test_joints_of_many_kinds(engine: str) -> None:
     rng = np.random.default_rng(5)
-    made = [friction(rng) for _ in range(12)]
+    made = [friction(rng) for _ in range(8)]
     made = [(model, u) for model, u in made if "slip law" not in model.title]
     models, speed = [model for model, _ in made], np.array([u for _, u in made])
     models += models[:3]  # the same ones again share their machine code

@@ -45,12 +45,12 @@ pytest.importorskip("llvmlite", reason="needs the extra fast")
 Call = tuple[Any, ...]
 
 CASES: dict[str, tuple[Model, Rig, float]] = {
-    "open loop": (stick_slip("signed"), open_loop(), 61.0),
-    "published": (stick_slip("published"), Prescribed("0.15*sin(2*pi*t/25)"), 60.0),
-    "pulled mass": (*pulled_mass(), 30.0),
+    "open loop": (stick_slip("signed"), open_loop(), 21.0),
+    "published": (stick_slip("published"), Prescribed("0.15*sin(2*pi*t/25)"), 30.0),
+    "pulled mass": (*pulled_mass(), 12.0),
     "fig. 3, slipping": (*non_drifting("signed", slipping=True), 20.0),
-    "resets, open loop": (wear(), Prescribed("0.3*sin(2*pi*t/17)"), 40.0),
-    "resets, closed loop": (wear(), PulledSlider(1, 2, 0.1), 40.0),
+    "resets, open loop": (wear(), Prescribed("0.3*sin(2*pi*t/17)"), 20.0),
+    "resets, closed loop": (wear(), PulledSlider(1, 2, 0.1), 20.0),
 }
 OPTIONS: dict[str, dict[str, Any]] = {
     "all rows": {},

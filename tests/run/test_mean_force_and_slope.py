@@ -87,6 +87,7 @@ def test_before_the_first_sample() -> None:
     assert friction.mean_force == friction.peek(0.1, 0.1, 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_first_sample_of_a_chart_with_an_entry(engine: str) -> None:
     """The entry sees the first velocity, also when the sample is repeated for its mean."""

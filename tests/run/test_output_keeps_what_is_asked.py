@@ -40,7 +40,7 @@ def test_the_default_output_depends_on_t_eval() -> None:
 def test_both_sides_of_every_stop_are_recorded_with_requested_rows() -> None:
     """So that samples between distant rows do not cross a switch or a jump."""
     model, rig, t_end = CASES["jumps"]
-    trace = simulate(model, rig, t_end, t_eval=[0.0, t_end], engine=FASTEST)
+    trace = simulate(model, rig, t_end, t_eval=[0.0, t_end], engine="ifelse")
     stops = trace.stops
     assert stops.t[0] == 0.0
     assert (np.diff(stops.t) >= 0).all()
@@ -48,7 +48,7 @@ def test_both_sides_of_every_stop_are_recorded_with_requested_rows() -> None:
         assert (stops.t == t).sum() >= 2, "before and after"
     for jump in (1.0, 6.0):
         assert {np.nextafter(jump, 0.0), jump} <= set(stops.t.tolist())
-    whole = simulate(model, rig, t_end, engine=FASTEST)
+    whole = simulate(model, rig, t_end, engine="ifelse")
     times = np.linspace(0.0, t_end, 101)
     between, sampled = trace.sample(times), whole.sample(times)
     np.testing.assert_array_equal(between.states, sampled.states)

@@ -145,6 +145,7 @@ def test_going_back_forgets_the_last_sample(make: Any, engine: str) -> None:
             _ = friction.mean_force
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_banks_that_share_a_snapshot_keep_their_own_switches(engine: str) -> None:
     n = 100  # more elements than the log of a sample has places

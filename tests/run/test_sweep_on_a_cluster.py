@@ -72,13 +72,13 @@ def test_a_killed_worker_costs_no_result(cluster: Any, monkeypatch: pytest.Monke
         workers = set(client.run(os.getpid).values())
         assert len(workers) == 2
         assert os.getpid() not in workers
-        far = sweep(model, rig, 12.0, sets(), executor=client.get_executor(), engine="machines")
+        far = sweep(model, rig, 8.0, sets(), executor=client.get_executor(), engine="ifelse")
         assert killed[0] in workers
         assert killed[0] not in client.run(os.getpid).values()
     assert len(arrived) < 2 * RUNS
     assert sorted(arrived) == list(range(RUNS))  # every result, exactly once
     monkeypatch.undo()
-    here = sweep(model, rig, 12.0, sets(), engine="machines")
+    here = sweep(model, rig, 8.0, sets(), engine="ifelse")
     assert set(far.outcome) == {"ok"}
     for name in ("t", "x", "v", "F", "z", "states"):
         np.testing.assert_array_equal(getattr(far, name), getattr(here, name))
@@ -103,7 +103,7 @@ def test_a_run_that_kills_every_worker_is_a_row_that_says_so() -> None:
     dask = pytest.importorskip("dask", reason="needs the extra cluster")
     pytest.importorskip("llvmlite", reason="needs the extra fast")
     model, rig = pulled_mass()
-    here = sweep(model, rig, 12.0, sets(8), engine="machines")
+    here = sweep(model, rig, 8.0, sets(8), engine="ifelse")
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
         distributed.LocalCluster(
@@ -116,8 +116,8 @@ def test_a_run_that_kills_every_worker_is_a_row_that_says_so() -> None:
         distributed.Client(made) as client,
     ):
         executor = client.get_executor()
-        far = sweep(model, rig, 12.0, sets(8), executor=Deadly(executor))
-        again = sweep(model, rig, 12.0, sets(8), executor=executor)
+        far = sweep(model, rig, 8.0, sets(8), executor=Deadly(executor))
+        again = sweep(model, rig, 8.0, sets(8), executor=executor)
     lost = far.outcome != "ok"
     assert lost[2]
     assert lost.sum() < 4, "pending runs next to it may be lost with it, but no more"
@@ -126,7 +126,7 @@ def test_a_run_that_kills_every_worker_is_a_row_that_says_so() -> None:
     assert np.isnan(far.F[lost]).all()
     np.testing.assert_array_equal(far.F[~lost], here.F[~lost])
     assert set(again.outcome) == {"ok"}
-    np.testing.assert_array_equal(again.F, here.F)  # compiled over there, by machines here
+    np.testing.assert_array_equal(again.F, here.F)  # compiled over there, not here
     assert again.transitions.tolist() == here.transitions.tolist()
 
 
@@ -141,8 +141,8 @@ def test_a_signal_that_cannot_be_sent_is_a_row_that_says_so(cluster: Any) -> Non
     model, values = stick_slip("signed"), {"F_s": np.linspace(1.5, 1.9, 130)}
     with distributed.Client(cluster) as client:
         executor = client.get_executor()
-        lost = sweep(model, Prescribed(velocity), 3.0, values, executor=executor, engine="machines")
-        found = sweep(model, Prescribed("0.1*t"), 3.0, values, executor=executor, engine="machines")
+        lost = sweep(model, Prescribed(velocity), 3.0, values, executor=executor, engine="ifelse")
+        found = sweep(model, Prescribed("0.1*t"), 3.0, values, executor=executor, engine="ifelse")
     assert set(lost.outcome) == {"NotSent"}
     assert len(lost) == 130
     assert np.isnan(lost.F).all()

@@ -5,6 +5,7 @@ Checked on the source (by tokens, not by substrings) and in fresh interpreters.
 
 from __future__ import annotations
 
+import functools
 import io
 import itertools
 import json
@@ -27,6 +28,7 @@ def _sources(*packages: str) -> list[Path]:
     return [path for package in packages for path in sorted((ROOT / package).rglob("*.py"))]
 
 
+@functools.cache
 def _tokens(path: Path) -> list[tokenize.TokenInfo]:
     return list(tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline))
 
@@ -116,6 +118,7 @@ def test_the_search_by_tokens_finds_calls(tmp_path: Path) -> None:
     path.write_text("# eval(1)\ntext = 'eval(1)'\nevaluate(1)\nmodel.eval\neval (1)\nexec(text)\n")
     assert _calls(path, "eval") == [5]
     assert _calls(path, "exec") == [6]
+    path = tmp_path / "other.py"
     path.write_text("re.compile('a')\ndef compile(a): ...\ncompile('a')\n")
     assert _bare(path, "compile") == [3]
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 
+import pytest
+
 from gms_fsm import Body, Chart, Contact, State, System, Trace, Transition, simulate
-from tests.helpers import FASTEST
 
 FALLING = Chart(
     "stiction with friction that falls with the speed",
@@ -36,9 +37,10 @@ def _pulled(share: float) -> Trace:
         contacts=(Contact("pad", FALLING, {"F_c": 1.0, "F_s": 1.5, "v_s": 0.1}),),
         numbers={"A": 3.0 + 0.1 * share},
     )
-    return simulate(system, 60.0, engine=FASTEST)
+    return simulate(system, 60.0, engine="ifelse")
 
 
+@pytest.mark.slow
 def test_the_velocity_has_the_sign_of_its_state() -> None:
     """Over 30 runs, in some of which a step meets v = 0 exactly."""
     count = 0

@@ -48,8 +48,9 @@ def test_a_constant_load_is_a_factor_of_both_strengths(name: str) -> None:
     v = f"{speed} * (sin(t) + 0.7 * sin(3 * t))"
     t = np.linspace(0.0, 6.0, 31)
     strong = run(moved(with_values(model, {"F_c": F_c, "F_s": F_s}), v), 6.0, rtol=1e-9, t_eval=t,
-                 engine=FASTEST)  # fmt: skip
-    found = [run(moved(model, v, "5"), 6.0, rtol=1e-9, t_eval=t, engine=e) for e in ENGINES]
+                 engine="ifelse")  # fmt: skip
+    engines = ENGINES if name in {"signed", "lugre"} else ENGINES[:2]
+    found = [run(moved(model, v, "5"), 6.0, rtol=1e-9, t_eval=t, engine=e) for e in engines]
     pad, other = found[0].contact("pad"), strong.contact("pad")
     for each, its in zip(*(trace.settings["atol"].values() for trace in (found[0], strong)),
                          strict=True):  # fmt: skip
@@ -122,7 +123,7 @@ def test_an_input_x_is_the_position_that_the_contact_reads() -> None:
 def test_a_friction_state_takes_the_load_and_gives_the_bits_of_a_record(engine: str) -> None:
     """Also where velocity and load jump, together and alone."""
     rng = np.random.default_rng(5)
-    for name in ("signed", "lugre"):
+    for name in ("signed", "lugre") if engine == "ifelse" else ("signed",):
         model, speed = MODELS[name]
         t = np.linspace(0.0, 10.0, 41)
         v0, v1 = speed * rng.normal(size=(2, 40))

@@ -16,7 +16,6 @@ from gms_fsm.session.session import Session
 from gms_fsm.systems.models import demonstration
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.numbers import known_in, law_of, value_in, varied, with_law
-from tests.helpers import FASTEST
 
 STICTION = {"F_c": 1.0, "F_s": 1.5, "b": 0.1}
 
@@ -91,7 +90,7 @@ def test_the_load_of_another_contact_in_a_fork_with_another_law() -> None:
             Contact("gms", bank(), v="v_a"),
         ),
     )
-    session = Session(system, 1.0, engine=FASTEST)
+    session = Session(system, 1.0, engine="ifelse")
     session.fork(law="published")
     before, after = (session.tree.trace(k).contact("pad").F[-1] for k in (0, 1))
     assert before == after == 3.0

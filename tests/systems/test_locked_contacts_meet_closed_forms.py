@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from gms_fsm import Body, Chart, Contact, State, System, simulate
-from tests.helpers import FASTEST
 from tests.systems_cases import BALL, DRY, ball, gear_box, impact, pulled_mass
 
 
@@ -23,7 +22,7 @@ def test_a_pulled_mass_sticks_and_slips_at_the_times_of_its_closed_form() -> Non
     wanted = [F_s / (K * V)]
     while wanted[-1] < 60.0:
         wanted.append(wanted[-1] + (slip if len(wanted) % 2 else stick))
-    trace = pulled_mass().run(FASTEST)
+    trace = pulled_mass().run("ifelse")
     assert len(trace.transitions) == len(wanted) - 1
     np.testing.assert_allclose(trace.transitions.t, wanted[:-1], rtol=0, atol=1e-6)
     stuck = trace.states[:, 0] == "stuck"
@@ -33,7 +32,7 @@ def test_a_pulled_mass_sticks_and_slips_at_the_times_of_its_closed_form() -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_tree_of_locked_bodies_moves_as_one_whatever_the_order_of_its_contacts(seed: int) -> None:
     """Each contact pulls all that hangs on it; the velocities are equal to the last bit."""
     n, m = 15, 0.5
@@ -48,7 +47,7 @@ def test_a_tree_of_locked_bodies_moves_as_one_whatever_the_order_of_its_contacts
         ],
         contacts=contacts,
     )
-    trace = simulate(system, 5.0, rtol=1e-10, engine=FASTEST)
+    trace = simulate(system, 5.0, rtol=1e-10, engine="ifelse")
     hanging = [1.0] * n
     for i in reversed(range(1, n)):
         hanging[(i - 1) // 2] += hanging[i]
@@ -61,7 +60,7 @@ def test_a_tree_of_locked_bodies_moves_as_one_whatever_the_order_of_its_contacts
 
 
 def test_a_ball_rests_after_finitely_many_bounces_and_its_weight_is_carried() -> None:
-    trace, g = ball().run(FASTEST), 9.81
+    trace, g = ball().run("ifelse"), 9.81
     wanted, v = [math.sqrt(2 * BALL["x_s"] / g)], math.sqrt(2 * g * BALL["x_s"])
     while v > BALL["v_r"]:
         v *= BALL["e"]
@@ -76,7 +75,7 @@ def test_a_ball_rests_after_finitely_many_bounces_and_its_weight_is_carried() ->
 
 
 def test_an_impact_of_two_bodies_keeps_the_momentum() -> None:
-    trace = impact().run(FASTEST)
+    trace = impact().run("ifelse")
     a, b = trace.body("a").v, trace.body("b").v
     assert trace.transitions.edge.tolist() == ["bounce"]
     np.testing.assert_allclose(1.0 * a + 3.0 * b, 1.0, rtol=0, atol=4e-16)
@@ -84,7 +83,7 @@ def test_an_impact_of_two_bodies_keeps_the_momentum() -> None:
 
 
 def test_a_clutch_with_ratio_3_joins_the_inertias() -> None:
-    trace = gear_box().run(FASTEST)
+    trace = gear_box().run("ifelse")
     J1, J2, N, M = 1.0, 2.0, 3.0, 0.5
     t, w1, w2 = trace.t, trace.body("a").v, trace.body("b").v
     before = 10.0 + M * 0.5 / J1

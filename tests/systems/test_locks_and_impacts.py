@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from gms_fsm import Body, Chart, Contact, LockError, State, System, Trace, Transition, simulate
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ChartError
-from tests.helpers import FASTEST
 from tests.systems_cases import cradle, mass, pad, stop
 
 
@@ -110,7 +109,7 @@ def test_an_arrest_that_would_take_an_impact_is_refused() -> None:
     contacts = [stop("stop", "v_a"), Contact("pad", OLD, {"F_c": 0.1}, v="v_a")]
     system = System("refused", bodies=[mass("a", 1.0)], contacts=contacts)
     with pytest.raises(LockError) as caught:
-        simulate(system, 3.0, initial={"v_a": 1.0}, engine="ifelse")
+        run(system, 3.0, initial={"v_a": 1.0})
     assert caught.value.place == "contact 'pad', edge 'arrest'"
     assert caught.value.t == pytest.approx(0.5132, abs=1e-4)
     assert "impulse=True" in caught.value.advice
@@ -153,6 +152,7 @@ def test_a_belt_that_jumps_lets_its_load_slide() -> None:
         assert trace.body("a").v[-1] == pytest.approx(0.5 - 0.5 * 1.9, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pads", [False, True])
 def test_newtons_cradle_passes_the_impact_on(pads: bool) -> None:
     """With restitution e nearly 1, the last ball leaves with ((1 + e) / 2)**3 of the velocity."""
@@ -164,6 +164,7 @@ def test_newtons_cradle_passes_the_impact_on(pads: bool) -> None:
     assert sum(trace.body(name).v[at] for name in "abcd") == pytest.approx(v, rel=1e-12)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     m=st.lists(st.floats(0.1, 10.0), min_size=3, max_size=3),
@@ -186,7 +187,7 @@ def test_momentum_and_energy_of_every_impulse_are_accounted_for(
     start = dict(zip(("v_a", "v_b", "v_c"), v, strict=True))
     if v[1] != 0.0:
         start["pad.states"] = ["forward" if v[1] > 0.0 else "backward"]
-    trace = simulate(system, 0.4, initial=start, engine=FASTEST)
+    trace = run(system, 0.4, initial=start)
     rows: dict[str, dict[str, float]] = {
         "hit": {"a": 1.0, "b": -1.0}, "pad": {"b": 1.0}, "gear": {"b": 1.0, "c": -ratio},
     }  # fmt: skip
@@ -211,7 +212,7 @@ def test_a_stuck_pad_beside_a_wall_carries_nothing_of_what_the_wall_takes() -> N
         bodies = [mass("a", 1.0), mass("b", 1.0, "0.5")]
         system = System("beside", bodies=bodies, contacts=[stop("hit", "v_a - v_b"), *locked])
         start = {"v_a": 1.0, "wall.states": ["rest"], "pad.states": ["stuck"]}
-        trace = simulate(system, 0.6, initial=start, engine=FASTEST)
+        trace = run(system, 0.6, initial=start)
         found = {str(each.carrier): float(each.P) for each in trace.impulses}
         assert found == {"hit": pytest.approx(1.6), "wall": pytest.approx(1.6)}
 
@@ -300,7 +301,7 @@ def test_geared_locks_log_no_ghosts(ratio: float, rtol: float) -> None:
             pad("s", "0.7 * v_c - v_b", 0.4, 0.5),
         ],
     )  # fmt: skip
-    trace = simulate(system, 2.0, rtol=rtol, initial=_on_the_belt(ratio), engine=FASTEST)
+    trace = run(system, 2.0, rtol=rtol, initial=_on_the_belt(ratio))
     log = edges(trace)
     assert log[0] == ("s", "release_forward")
     assert len(log) == 1

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
-from tests.helpers import FASTEST
 from tests.systems_cases import clutched_bearings, pushed_against_a_stop
 
 
@@ -23,7 +22,7 @@ def states(trace: Trace, contact: str) -> np.ndarray:
 
 @pytest.mark.parametrize("stop_first", [False, True])
 def test_a_mass_with_stiction_comes_to_rest_at_a_stop_and_leaves_again(stop_first: bool) -> None:
-    trace = pushed_against_a_stop(stop_first=stop_first).run(FASTEST)
+    trace = pushed_against_a_stop(stop_first=stop_first).run("ifelse")
     stop, log = trace.contact("stop"), trace.transitions
     rest = states(trace, "stop") == "rest"
     assert rest.any()
@@ -37,7 +36,7 @@ def test_a_mass_with_stiction_comes_to_rest_at_a_stop_and_leaves_again(stop_firs
 
 def test_two_bearings_and_a_clutch_let_go_one_after_the_other() -> None:
     """The first bearing carries all, up to its stiction; then the second carries the rest."""
-    trace = clutched_bearings().run(FASTEST)
+    trace = clutched_bearings().run("ifelse")
     log, R = trace.transitions, 0.5
     assert [(str(row.contact), str(row.edge)) for row in log] == [
         ("dog", "engage"),

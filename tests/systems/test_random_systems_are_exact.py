@@ -9,7 +9,7 @@ import pytest
 from tests import exact_systems
 from tests.exact_systems import trial, verdict
 
-SEED, SHAPES, COUNT = 7, 40, 40
+SEED, SHAPES, COUNT = 7, 40, 28
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gms_fsm.app.scenario import load_scenario
-from tests.helpers import FASTEST, ROOT
+from tests.helpers import ROOT
 from tests.hybrid_reference import Modes, Switch, Way, reference
 
 J_T, J_B, K, C, C_R, C_B, U = 2122.0, 471.9698, 861.5336, 172.3067, 425.0, 50.0, 5800.0
@@ -53,7 +53,7 @@ def on_paper() -> list[Switch]:
 @pytest.mark.slow
 def test_the_bit_sticks_and_slips_as_in_an_independent_loop() -> None:
     loaded = load_scenario(ROOT / "scenarios" / "drill_string.toml", ["run.rtol=1e-10"])
-    wanted, log = on_paper(), loaded.simulate(engine=FASTEST).transitions
+    wanted, log = on_paper(), loaded.simulate(engine="ifelse").transitions
     assert len(wanted) == 25
     assert [(row.source, row.target) for row in log] == [(w.source, w.target) for w in wanted]
     np.testing.assert_allclose(log.t, [each.t for each in wanted], rtol=0, atol=1e-7)

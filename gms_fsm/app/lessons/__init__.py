@@ -2,7 +2,7 @@ r"""Lessons: the behaviour of friction models, and the pitfalls of simulating an
 
 Each lesson answers one question: ``run()`` makes the runs and measures, ``figure(result)`` draws
 what it returns, and ``result.lines()`` summarizes it in five lines, in which every number is
-measured in that run. A module ``lN_name`` in this folder with a `LESSON` is a lesson.
+measured in that run. A module ``lN_name`` in a folder of this one, with a `LESSON`, is a lesson.
 
 >>> print(lesson(7).question)
 Why does friction lag behind the speed?
@@ -29,13 +29,11 @@ __all__ = ["LESSONS", "Lesson", "Result", "Taught", "lesson", "listed", "numbere
 
 
 def _found() -> Mapping[int, Lesson]:
-    """Return the lessons in this folder: a module ``l3_name`` is lesson 3."""
-    names = (re.match(r"l(\d+)_", each.name) for each in pkgutil.iter_modules(__path__))
+    """Return the lessons in these folders: a module ``l3_name`` is lesson 3."""
+    found = pkgutil.walk_packages(__path__, f"{__name__}.")
+    names = (re.search(r"\.l(\d+)_\w+$", each.name) for each in found)
     modules = {int(name[1]): name.string for name in names if name}
-    return {
-        number: importlib.import_module(f"{__name__}.{modules[number]}").LESSON
-        for number in sorted(modules)
-    }
+    return {number: importlib.import_module(modules[number]).LESSON for number in sorted(modules)}
 
 
 LESSONS: Mapping[int, Lesson] = _found()

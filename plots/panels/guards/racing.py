@@ -10,8 +10,8 @@ import numpy as np
 from gms_fsm.session.explain import ROUNDING, Clause, Explanation, Why, explain
 from gms_fsm.traces.trace import Trace
 from plots.charts.labels import FALSE, TRUE
-from plots.panels.axes import Artists, note
-from plots.panels.selection import checked_row, one_element, scaled
+from plots.panels.parts.axes import Artists, note
+from plots.panels.parts.selection import checked_row, one_element, scaled
 from plots.style import EDGE_COLOURS, EDGE_HATCHES, INK, LINE_GREY, PAPER, TEXT_GREY
 from plots.style.matplotlib import Axes, Rectangle
 from plots.style.presets import font, pt

@@ -10,15 +10,15 @@ import numpy as np
 from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace, check_trace
-from plots.panels.axes import Artists, draw_curve, element_look, note, time_axis
-from plots.panels.selection import (
+from plots.panels.parts.axes import Artists, draw_curve, element_look, note, time_axis
+from plots.panels.parts.selection import (
     checked_elements,
     checked_window,
     has_threshold,
     is_number,
     shown,
 )
-from plots.panels.window import Window
+from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY, PAPER
 from plots.style.matplotlib import Axes
 from plots.style.presets import font, pt

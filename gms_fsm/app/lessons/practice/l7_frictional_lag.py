@@ -43,8 +43,8 @@ the frequency of the widest loop reveals C.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.l7_frictional_lag import OMEGAS
 from gms_fsm.app.lessons.engine.predict import reveal, vary
+from gms_fsm.app.lessons.practice.l7_frictional_lag import OMEGAS
 
 reveal(accelerating, "higher" if min(result.widths) > 0 else "lower")
 reveal(widest, OMEGAS[int(result.widths.argmax())], "rad/s")
@@ -66,7 +66,7 @@ The loop opens as the frequency rises to about w = C/s, and closes again beyond 
 ```python
 from matplotlib.figure import Figure
 
-from gms_fsm.app.lessons.l7_frictional_lag import SIGMA_2, STRIBECK, last_period, moved
+from gms_fsm.app.lessons.practice.l7_frictional_lag import SIGMA_2, STRIBECK, last_period, moved
 
 
 def loop(w):

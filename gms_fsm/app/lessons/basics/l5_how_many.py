@@ -41,7 +41,7 @@ threshold: put it well below the smallest motion of interest.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.l5_how_many import COUNTS
+from gms_fsm.app.lessons.basics.l5_how_many import COUNTS
 from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(error_of_four, 100 * result.errors[COUNTS.index(4)], "%")
@@ -65,7 +65,7 @@ A bank of n elements approximates the parabola by n line segments.
 from matplotlib.figure import Figure
 
 from gms_fsm import Prescribed, simulate
-from gms_fsm.app.lessons.l5_how_many import ATOL, RTOL, SPEED, STROKE, bank, parabola
+from gms_fsm.app.lessons.basics.l5_how_many import ATOL, RTOL, SPEED, STROKE, bank, parabola
 
 
 def chain(n):

@@ -99,7 +99,7 @@ The same gear with a different gap. While the motor crosses it, the load stands 
 from matplotlib.figure import Figure
 
 from gms_fsm import simulate
-from gms_fsm.app.lessons.l9_contacts import PERIOD, dead_time, dead_times, gear
+from gms_fsm.app.lessons.practice.l9_contacts import PERIOD, dead_time, dead_times, gear
 
 
 def with_gap(gap):
@@ -139,8 +139,8 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import Body, Contact, Spring, System, Trace, simulate
+from gms_fsm.app.lessons.basics.l6_stick_slip import SIGMA_2, F_c, F_s, bank
 from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
-from gms_fsm.app.lessons.l6_stick_slip import SIGMA_2, F_c, F_s, bank
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import INK, LINE_GREY

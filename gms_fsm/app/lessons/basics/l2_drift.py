@@ -71,7 +71,7 @@ GMS bank that has slipped once only oscillates with a larger stroke.
 from matplotlib.figure import Figure
 
 from gms_fsm import GMS, Slider, simulate
-from gms_fsm.app.lessons.l2_drift import END, TABLE_I, cycle_means
+from gms_fsm.app.lessons.basics.l2_drift import END, TABLE_I, cycle_means
 from gms_fsm.app.paper.experiments import lugre_like
 
 

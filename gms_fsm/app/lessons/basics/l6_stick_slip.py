@@ -47,7 +47,7 @@ motion it keeps sliding.
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.l6_stick_slip import SPEED, SPEEDS
+from gms_fsm.app.lessons.basics.l6_stick_slip import SPEED, SPEEDS
 from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 here, slow = result.cycles[SPEEDS.index(SPEED)], result.cycles[0]
@@ -73,7 +73,7 @@ The same mass on the same spring, pulled from rest at a different speed.
 from matplotlib.figure import Figure
 
 from gms_fsm import PulledSlider, simulate
-from gms_fsm.app.lessons.l6_stick_slip import MASS, STIFFNESS, bank
+from gms_fsm.app.lessons.basics.l6_stick_slip import MASS, STIFFNESS, bank
 
 
 def pulled(V):

@@ -74,7 +74,7 @@ through the point (circle) at which the inner loop began.
 from matplotlib.figure import Figure
 
 from gms_fsm import GMS, Prescribed, simulate
-from gms_fsm.app.lessons.l1_hysteresis import FINE, PARAMETERS, strokes
+from gms_fsm.app.lessons.basics.l1_hysteresis import FINE, PARAMETERS, strokes
 
 
 def inner_loop(b):

@@ -43,7 +43,7 @@ nearly does). Locate the switches, or test with a step that does not divide the 
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.l3_missed_window import STEP, STEPS, window_width
+from gms_fsm.app.lessons.basics.l3_missed_window import STEP, STEPS, window_width
 from gms_fsm.app.lessons.engine.predict import reveal, vary
 
 reveal(window, 1e6 * window_width(), "us")
@@ -67,7 +67,12 @@ step is a matter of luck: a smaller step is not always better.
 ```python
 from matplotlib.figure import Figure
 
-from gms_fsm.app.lessons.l3_missed_window import REVERSALS, ROWS, once_a_step, samples_in_window
+from gms_fsm.app.lessons.basics.l3_missed_window import (
+    REVERSALS,
+    ROWS,
+    once_a_step,
+    samples_in_window,
+)
 
 
 def with_step(ms):

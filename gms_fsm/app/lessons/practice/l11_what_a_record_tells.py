@@ -106,7 +106,14 @@ second weight starts at the truth, so that it is not to blame.
 ```python
 from matplotlib.figure import Figure
 
-from gms_fsm.app.lessons.l11_what_a_record_tells import START, TRUTH, bank, fitted, recorded, sine
+from gms_fsm.app.lessons.practice.l11_what_a_record_tells import (
+    START,
+    TRUTH,
+    bank,
+    fitted,
+    recorded,
+    sine,
+)
 
 
 def known(amplitude):
@@ -164,7 +171,7 @@ from gms_fsm import (
     fit,
     simulate,
 )
-from gms_fsm.app.lessons.engine.lesson import DOTS, GUIDE, Lesson, grid, note, ticks
+from gms_fsm.app.lessons.engine.lesson import DOTS, FASTEST, GUIDE, Lesson, grid, note, ticks
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import INK, LINE_GREY, PALE_GREY, TEXT_GREY
 
@@ -254,7 +261,7 @@ def sine(amplitude: float = AMPLITUDE) -> Record:
 def moved(model: GMS, motion: Record) -> Trace:
     """Return the run of a model, relaxed at the begin, at the times of a motion and at switches."""
     t, v = motion.columns["time"], motion.columns["velocity"]
-    return simulate(model, Prescribed((t, v)), float(t[-1]), t_eval=t)
+    return simulate(model, Prescribed((t, v)), float(t[-1]), t_eval=t, engine=FASTEST)
 
 
 def force(model: GMS, motion: Record) -> FloatArray:

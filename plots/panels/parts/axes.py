@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
-from plots.panels.selection import scaled
+from plots.panels.parts.selection import scaled
 from plots.style import ELEMENT_DASHES, TEXT_GREY, element_colour
 from plots.style.matplotlib import Artist, Axes, MaxNLocator
 from plots.style.presets import font

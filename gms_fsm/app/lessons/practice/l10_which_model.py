@@ -58,8 +58,8 @@ For a contact that rests: {chosen[0]}; that also lags: {chosen[1]}; that also re
 ## Compare
 
 ```python
-from gms_fsm.app.lessons.l10_which_model import MODELS
 from gms_fsm.app.lessons.engine.predict import reveal, vary
+from gms_fsm.app.lessons.practice.l10_which_model import MODELS
 
 reveal(creeps, max(MODELS, key=lambda model: result.number(model, "drift")))
 reveal(makes_energy, max(MODELS, key=lambda model: result.number(model, "passivity")))

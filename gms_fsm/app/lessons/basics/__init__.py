@@ -1,0 +1,1 @@
+"""Lessons about the GMS model: what its elements do, and how runs go wrong."""

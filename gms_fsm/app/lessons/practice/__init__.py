@@ -1,0 +1,1 @@
+"""Lessons about choosing, fitting and combining friction models."""

@@ -1,0 +1,1 @@
+"""The panes of the replay page, one script each."""

@@ -1,0 +1,1 @@
+"""Parts of panels: axes, titles, the window and the rows that are drawn."""
