@@ -27,7 +27,7 @@ from gms_fsm import (
     Transition,
     export,
 )
-from tests.helpers import ROOT, stick_slip
+from tests.helpers import ROOT, matrix, stick_slip
 from tests.platforms import (
     COMPILERS,
     Case,
@@ -56,7 +56,7 @@ def pulled(**numbers: float) -> System:
 
 @needs_node
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ball_screw_table", "servo"])
+@pytest.mark.parametrize("name", matrix(["ball_screw_table", "servo"], ["servo"]))
 def test_a_scenario_has_the_same_bits_in_c_and_in_javascript(name: str) -> None:
     differ = check(scenario(SCENARIOS / f"{name}.toml"), [(each, "-O2") for each in COMPILERS[:1]],
                    ("node",))  # fmt: skip

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, measure_phenomena, simulate
-from tests.helpers import FASTEST
 from tests.phenomena.cases import MAXWELL, known
 
 
@@ -31,7 +30,7 @@ def test_in_prescribed_motion_to_rounding() -> None:
         velocity += [(t, np.sign(after - one) * 1e-5)]
     ends = np.cumsum(np.abs(np.diff(stops)) / 1e-5)
     trace = simulate(
-        MAXWELL, Prescribed(velocity), float(ends[-1]), t_eval=ends, engine=FASTEST, rtol=1e-10
+        MAXWELL, Prescribed(velocity), float(ends[-1]), t_eval=ends, engine="ifelse", rtol=1e-10
     )
     top, bottom, _, bottom_again, top_again = trace.F.tolist()
     assert len(trace.transitions) > 6  # elements do yield, and turn, on the way
