@@ -15,10 +15,10 @@ from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import last_cycles, letter_panels
 from plots.panels.parts.axes import VECTOR_ROWS, draw_curve, time_axis
 from plots.panels.parts.selection import is_number, is_whole, scaled
-from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY, PALE_GREY, REPORTED, TEXT_GREY, colour
 from plots.style.matplotlib import Axes, Figure, rc_context
 from plots.style.presets import font, pt, settings, to_scale
+from plots.views.window import Window
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Estimate, Fit, Residuals

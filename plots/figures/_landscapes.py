@@ -12,13 +12,13 @@ from plots import panels
 from plots.figures._layout import fitted, low, sheet
 from plots.figures._parts import head
 from plots.panels.guards.landscapes import DASHED, acceleration, pinned, quantity
-from plots.panels.guards.plane import Plane
 from plots.panels.guards.racing import rows_of
 from plots.panels.parts.selection import checked_row, one_element
-from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY
 from plots.style.matplotlib import Axes, Figure, Line2D, rc_context
 from plots.style.presets import current, font, inches, pt, room, settings
+from plots.views.plane import Plane
+from plots.views.window import Window
 
 __all__ = ["landscape"]
 

@@ -16,10 +16,10 @@ from plots.figures._parts import element_legend, lanes_height, letter_panels
 from plots.panels.held_outputs import HeldLag
 from plots.panels.parts.axes import MANY, first_variable
 from plots.panels.parts.selection import checked_elements, checked_window, scaled, shown
-from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 from plots.style.matplotlib import Axes, Figure, rc_context
 from plots.style.presets import font, pt, settings, to_scale
+from plots.views.window import Window
 
 __all__ = [
     "FIG3_PHASES",

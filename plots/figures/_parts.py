@@ -14,9 +14,9 @@ from plots import panels
 from plots.figures._layout import legend_below
 from plots.panels.parts.axes import MANY
 from plots.panels.parts.selection import checked_elements
-from plots.panels.parts.window import Window
 from plots.style.matplotlib import Annotation, Axes, Figure
 from plots.style.presets import pt
+from plots.views.window import Window
 
 LANE = 0.15  # inches: a row of one element, with its label
 

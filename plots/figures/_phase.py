@@ -21,10 +21,10 @@ from plots.panels.parts.selection import (
     scaled,
     shown,
 )
-from plots.panels.parts.window import Window
 from plots.style import PAPER, VERMILION
 from plots.style.matplotlib import Axes, Figure, LineCollection, rc_context
 from plots.style.presets import pt, settings
+from plots.views.window import Window
 
 __all__ = ["phase"]
 

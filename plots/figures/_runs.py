@@ -24,10 +24,10 @@ from plots.figures._parts import (
 from plots.panels.micro_steps.cascades import CASCADE
 from plots.panels.parts.axes import MANY, VECTOR_ROWS
 from plots.panels.parts.selection import checked_elements, checked_window, scaled, shown
-from plots.panels.parts.window import Window
 from plots.style import LINE_GREY, PALE_GREY
 from plots.style.matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
 from plots.style.presets import pt, settings
+from plots.views.window import Window
 
 __all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
-from plots.panels.parts.window import Window
+from plots.views.window import Window
 
 __all__ = ["FADE", "Frame", "Pace", "paced"]
 

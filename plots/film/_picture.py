@@ -18,9 +18,9 @@ from plots.film._chart import FilmChart
 from plots.film._pace import Frame, Pace
 from plots.output.svg_artists import drawn
 from plots.panels.active_states import spans
-from plots.panels.parts.window import Window
 from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme
 from plots.style.matplotlib import Artist, Axes, Figure, FigureCanvasAgg, Image
+from plots.views.window import Window
 
 __all__ = ["FilmPicture"]
 

@@ -29,7 +29,7 @@ from gms_fsm.verification.prove import Report
 from plots.page._columns import ColumnStore, packed
 from plots.page._rows import PageRows
 from plots.page._trees import Stored, tree_of
-from plots.panels.guards.plane import Plane, linear_threshold, plane_axes
+from plots.views.plane import Plane, linear_threshold, plane_axes
 
 __all__ = ["stored_run"]
 

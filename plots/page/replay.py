@@ -44,8 +44,8 @@ from plots.output import formats
 from plots.page._rows import page_rows
 from plots.page._run import stored_run, views_of
 from plots.page.chart import chart_svg
-from plots.panels.parts.window import window_of
 from plots.style import CHART_THEMES, ELEMENT_STEPS, PAGE_THEMES
+from plots.views.window import window_of
 
 __all__ = ["Replay", "page_data", "page_html", "replay", "replay_html", "write_replay"]
 

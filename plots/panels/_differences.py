@@ -12,10 +12,10 @@ from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import Artists, draw_curve, time_axis
 from plots.panels.parts.selection import SMOOTH, checked_window, is_number
-from plots.panels.parts.window import Window
 from plots.style import INK, PALE_GREY
 from plots.style.matplotlib import Axes
 from plots.style.presets import pt
+from plots.views.window import Window
 
 __all__ = ["difference", "residual"]
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import Artists, lanes, note, time_axis
 from plots.panels.parts.selection import checked_elements, checked_window, has_threshold, shown
-from plots.panels.parts.window import Window
 from plots.style import INK, PAPER, ramp
 from plots.style.matplotlib import Axes, ListedColormap
 from plots.style.presets import font, pt
+from plots.views.window import Window
 
 __all__ = ["heat", "slipping"]
 

@@ -23,10 +23,10 @@ from plots.panels.parts.selection import (
     scaled,
     shown,
 )
-from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY
 from plots.style.matplotlib import Axes
 from plots.style.presets import pt
+from plots.views.window import Window
 
 NO_VARIABLE = "no deflection:\nthis chart has no variables"
 

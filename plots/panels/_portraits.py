@@ -13,10 +13,10 @@ from gms_fsm.traces.trace import Trace
 from plots.panels._many import counted_away, place_of
 from plots.panels.parts.axes import VECTOR_ROWS, Artists, draw_curve, log_axis
 from plots.panels.parts.selection import checked_elements, scaled, shown
-from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
 from plots.style.matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots.style.presets import pt, to_scale
+from plots.views.window import Window
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
 

@@ -13,10 +13,10 @@ from gms_fsm.systems.system import loaded
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import Artists, draw_curve
 from plots.panels.parts.selection import scaled, shown
-from plots.panels.parts.window import Window
 from plots.style import INK, PALE_GREY, PAPER
 from plots.style.matplotlib import Axes
 from plots.style.presets import pt
+from plots.views.window import Window
 
 __all__ = ["stribeck"]
 

@@ -9,10 +9,10 @@ import numpy as np
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import MANY, VECTOR_ROWS, Artists, lanes, time_axis
 from plots.panels.parts.selection import checked_elements, checked_window
-from plots.panels.parts.window import Window
 from plots.style import INK, PAPER, state_look
 from plots.style.matplotlib import Axes, RendererBase, Text
 from plots.style.presets import font, pt, to_scale
+from plots.views.window import Window
 
 __all__ = ["ribbons"]
 

@@ -29,8 +29,8 @@ from matplotlib.text import Annotation
 
 from plots import figures, panels
 from plots.panels.guards.line_names import LineNames, NamedLine
-from plots.panels.guards.plane import Plane, linear_threshold, plane_axes
 from plots.panels.guards.racing import held_back_by
+from plots.views.plane import Plane, linear_threshold, plane_axes
 from tests.helpers import FASTEST, one_element, pulled_mass, stick_slip, wear
 from tests.helpers import open_loop as sine
 from tests.zoo.zoo_cases import elasto_plastic, karnopp, modelica

@@ -27,10 +27,8 @@ from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.findings import Finding, Report
 from plots.panels.guards.line_names import LineNames, NamedLine
-from plots.panels.guards.plane import Plane, linear_threshold, turning_points
 from plots.panels.parts.axes import Artists
 from plots.panels.parts.selection import checked_row, checked_window, one_element, scaled, shown
-from plots.panels.parts.window import Window
 from plots.style import (
     EDGE_COLOURS,
     EDGE_HATCHES,
@@ -43,6 +41,8 @@ from plots.style import (
 )
 from plots.style.matplotlib import Axes, NullLocator, to_rgb
 from plots.style.presets import font, pt
+from plots.views.plane import Plane, linear_threshold, turning_points
+from plots.views.window import Window
 
 __all__ = ["landscape", "pins"]
 

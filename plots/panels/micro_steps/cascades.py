@@ -18,10 +18,10 @@ from plots.panels.parts.selection import (
     is_number,
     shown,
 )
-from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY, PAPER
 from plots.style.matplotlib import Axes
 from plots.style.presets import font, pt
+from plots.views.window import Window
 
 __all__ = ["cascade", "cascade_window", "margins", "marks"]
 

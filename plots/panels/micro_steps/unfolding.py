@@ -17,10 +17,10 @@ from gms_fsm.traces.trace import Trace, check_trace
 from gms_fsm.traces.views import steps_of
 from plots.panels.parts.axes import Artists
 from plots.panels.parts.selection import checked_elements, checked_window, is_number, scaled
-from plots.panels.parts.window import Window
 from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, state_look
 from plots.style.matplotlib import Axes, Rectangle
 from plots.style.presets import font, inches, pt, to_scale
+from plots.views.window import Window
 
 __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
 

@@ -13,7 +13,7 @@ from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace, check_trace
 from gms_fsm.traces.views import picked
-from plots.panels.parts.window import Window, window_of
+from plots.views.window import Window, window_of
 
 __all__ = ["has_threshold", "shown"]
 
