@@ -278,7 +278,7 @@ class Trace:
         """First variable (the deflection) of every element, shape (rows, n), m."""
         bank = self.places
         if not bank.variables:
-            return np.empty((len(self.rows), bank.n)) * np.nan
+            return np.full((len(self.rows), bank.n), np.nan)
         return self._named(bank.of(bank.variables[0]))
 
     def variable(self, name: str) -> FloatArray:
@@ -355,7 +355,7 @@ class Trace:
     def dz(self) -> FloatArray:
         """Rate of the first variable in the states of the row, shape (rows, n), m/s."""
         if not self.places.variables:
-            return np.empty((len(self.rows), self.places.n)) * np.nan
+            return np.full((len(self.rows), self.places.n), np.nan)
         return self.seen[self.places.of(f"d{self.places.variables[0]}")]
 
     @property
