@@ -91,11 +91,6 @@ class Problem:
         """What moves it."""
         return self.what.rig
 
-    @property
-    def given(self) -> System | None:
-        """The system, if it is the user's and not a model on a rig."""
-        return self.what.given
-
     def before_entry(self) -> tuple[list[float], list[int]]:
         """Return the state vector before any entry, and 1 for what the initial values give."""
         layout = self.program.layout

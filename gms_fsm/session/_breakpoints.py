@@ -64,7 +64,7 @@ def new_breakpoint(
     elif element is not None:
         machine = machine_of(element, start)
         bank = start.program.layout.bank(machine)
-        contact, index = "" if start.given is None else bank.name, machine - bank.first
+        contact, index = start.what.whose(bank.name), machine - bank.first
     charts = [chart_of(start, bank) for bank in banks if contact in ("", bank.name)]
     edges = [edge.name for chart in charts for edge in chart.transitions]
     states = [state.name for chart in charts for state in chart.states]

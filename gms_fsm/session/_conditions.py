@@ -19,7 +19,7 @@ __all__ = ["holds_at", "names_of", "read", "value_of"]
 
 def names_of(start: Problem) -> list[str]:
     """Return the names allowed in conditions and watches."""
-    return watch_names(start.model) if start.given is None else system_names(start.system)
+    return system_names(start.system) if start.what.named else watch_names(start.model)
 
 
 def read(start: Problem, text: str) -> Condition:
@@ -27,7 +27,7 @@ def read(start: Problem, text: str) -> Condition:
     states, n, owners = [], 0, {}
     if len(start.system.contacts) == 1:
         states, n = [state.name for state in start.model.chart.states], start.model.n
-    if start.given is not None:
+    if start.what.named:
         owners = owners_of(start.system)
     with _explained(start):
         return parse_condition(text, names_of(start), states, n, own_state=n == 1, owners=owners)
@@ -65,7 +65,7 @@ def _complete(start: Problem) -> dict[str, str]:
     """Return how to complete names that are incomplete."""
     known, found = names_of(start), dict[str, str]()
     for contact in start.system.contacts:
-        lead = "" if start.given is None else f"{contact.name}."
+        lead = start.what.of(contact.name, "")
         for name in contact.chart.variables:
             for each in (name, f"{lead}{name}"):
                 found.setdefault(each, f"for element 1 write {lead}{name}1")

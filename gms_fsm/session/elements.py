@@ -38,10 +38,10 @@ def _of_text(text: str, start: Problem) -> int:
     banks = start.program.layout.banks
     form = re.fullmatch(r"\s*(\w+?)(?:\s+(\d{1,9}))?\s*", text)
     named = {bank.name: bank for bank in banks}
-    if start.given is None or form is None or form[1] not in named:
+    if not start.what.named or form is None or form[1] not in named:
         edges = [edge.name for bank in banks for edge in chart_of(start, bank).transitions]
         known = shown(text) + (f" (to name an edge, use edge={text!r})" if text in edges else "")
-        if start.given is None:
+        if not start.what.named:
             raise _no_element(known, banks[0])
         raise SessionError(
             f"no element {known}",
@@ -75,7 +75,7 @@ def _known(banks: Sequence[BankPlaces]) -> str:
 def contact_named(name: str, start: Problem) -> BankPlaces:
     """Return the contact with a name; raise `SessionError` if there is none."""
     for bank in start.program.layout.banks:
-        if bank.name == name and start.given is not None:
+        if bank.name == name and start.what.named:
             return bank
     raise SessionError(f"no contact {shown(name)}", advice=_known(start.program.layout.banks))
 
@@ -88,9 +88,9 @@ def element_name(start: Problem, machine: int) -> str:
 
 def title_of(start: Problem) -> str:
     """Return what runs: titles of model and rig, or of a system and its contacts."""
-    if start.given is None:
-        return f"{start.model.title}; {start.rig.title}"
-    return f"{start.system.name}; {'; '.join(each.title for each in start.system.contacts)}"
+    if start.what.named:
+        return f"{start.system.name}; {'; '.join(each.title for each in start.system.contacts)}"
+    return f"{start.model.title}; {start.rig.title}"
 
 
 def chart_of(start: Problem, bank: BankPlaces) -> Chart:

@@ -28,7 +28,7 @@ def here_at(branch: Branch, row: int) -> Here:
         {name: scope.value(name) for name in further},
         located,
         None if located else branch.fired(row),
-        start.given is not None,
+        start.what.named,
     )
 
 
@@ -57,7 +57,7 @@ def why_at(branch: Branch, machine: int, edge: str) -> Why:
     sources = source_of(edge, chart) if edge else ()
     fired = None if branch.between is not None else branch.fired(row)
     before = place
-    contact = "" if start.given is None else bank.name
+    contact = start.what.whose(bank.name)
     mine = fired is not None and (fired.contact, fired.element) == (contact, i)
     if fired and mine and (not edge or fired.source in sources):
         left, taken, before = fired.source, fired.edge, branch.raw(row - 1)

@@ -364,13 +364,13 @@ class Explorer(anywidget.AnyWidget):
             own += [bank.of(name) for name in names]
             contacts.append(
                 {
-                    "name": "" if start.given is None else bank.name,
+                    "name": start.what.whose(bank.name),
                     "n": bank.n,
                     "variables": [[name, contact.chart.unit(name)] for name in names],
                     "states": [state.name for state in contact.chart.states],
                 }
             )
-        if start.given is None:
+        if not start.what.named:
             free = any(not body.driven for body in start.system.bodies)
             return {"contacts": contacts, "others": ["v"] if free else []}
         return {

@@ -197,7 +197,7 @@ class Branch:
         """Return the values of a contact at a row or point; without a name of the only one."""
         start = self.start
         name = start.program.layout.contact(contact).name
-        model = start.model if start.given is None else start.system.contact(name)
+        model = start.system.contact(name) if start.what.named else start.model
         return Scope.of(model, start.program, row.t, row.y, row.mode, name)
 
     def system_scope(self, row: BranchRow) -> SystemScope:
@@ -207,9 +207,8 @@ class Branch:
 
     def watches(self, row: BranchRow) -> dict[str, Any]:
         """Return the values at a row or point of the names allowed in conditions."""
-        if self.start.given is None:
-            return self.scope(row).watches()
-        return self.system_scope(row).watches()
+        named = self.start.what.named
+        return self.system_scope(row).watches() if named else self.scope(row).watches()
 
     def state(self, row: BranchRow, machine: int) -> str:
         """Return the active state of an element, counted over all contacts, at a row."""

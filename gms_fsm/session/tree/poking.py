@@ -55,16 +55,14 @@ class Edits:
                     place=what,
                     value=given,
                 )
-        if start.given is None:
-            own = _of_model(start, variables or {})
+        if start.what.named:
+            whole = {**(variables or {}), **({} if v is None else {"v": v})}
+            own, v = _of_system(start, whole), None
         else:
-            own, v = (
-                _of_system(start, {**(variables or {}), **({} if v is None else {"v": v})}),
-                None,
-            )
+            own = _of_model(start, variables or {})
         machines = {machine_of(element, start): name for element, name in (state or {}).items()}
         states: dict[int | str, str] = {
-            machine if start.given is None else element_name(start, machine): name
+            element_name(start, machine) if start.what.named else machine: name
             for machine, name in machines.items()
         }
         edits = cls(own, v, states)
@@ -201,7 +199,7 @@ def initial_with(edits: Edits, start: Problem, here: BranchRow) -> dict[str, Any
             initial[bank.of(AGE)] = [0.0 if i in poked else age for i, age in ages]
     for name, values in edits.variables.items():
         if isinstance(values, Mapping):
-            own = name if start.given is not None else layout.contact().of(name)
+            own = name if start.what.named else layout.contact().of(name)
             initial[own] = [values.get(i, old) for i, old in enumerate(initial[own])]
         else:
             initial[name] = values
