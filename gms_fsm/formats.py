@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.foundation.arguments import checked_path, one_of
 from gms_fsm.foundation.extras import EXTRAS
 from gms_fsm.foundation.files import write_whole
 
@@ -84,11 +84,7 @@ class Format:
 
     def __post_init__(self) -> None:
         for name, known in (("subject", get_args(Written)), ("extra", ("", *EXTRAS))):
-            value = getattr(self, name)
-            if value not in known:
-                raise ParameterError(
-                    f"it must be one of {', '.join(map(repr, known))}", place=name, value=value
-                )
+            one_of(name, getattr(self, name), known)
         dot = "" if self.subject == "friction" else "a dot and "
         pattern = r"\.[a-z0-9]+" if dot else "[a-z0-9]+"
         if not isinstance(self.name, str) or not re.fullmatch(pattern, self.name):

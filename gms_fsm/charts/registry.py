@@ -18,6 +18,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import Parameter, checked_values
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ChartError, GMSError, ParameterError, shown, why
+from gms_fsm.foundation.arguments import unknown
 
 __all__ = ["Demonstration", "Entry", "chart_named", "charts", "entry", "registered"]
 
@@ -305,8 +306,7 @@ def entry(name: str) -> Entry:
     'bristle'
     """
     if name not in registered():
-        said = f"name is {shown(name)}; it" if name else "a name is missing; it"
-        raise ParameterError(f"{said} must be one of {', '.join(registered())}")
+        raise unknown("model", name, registered())
     return registered()[name]
 
 
@@ -335,10 +335,6 @@ def chart_named(name: str) -> Chart:
     """
     known = charts()
     if name not in known:
-        raise ParameterError(
-            "no chart has this name",
-            place="chart",
-            value=name,
-            advice=f"there are {', '.join(known)}; the name of a chart file ends in .toml",
-        )
+        error = unknown("chart", name, known)
+        raise error.replaced(advice=f"{error.advice}; the name of a chart file ends in .toml")
     return known[name]

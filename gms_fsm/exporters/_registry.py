@@ -11,7 +11,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.formats import Format, of
-from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.foundation.arguments import checked_path, unknown
 from gms_fsm.foundation.display import asked
 from gms_fsm.foundation.files import output_folder, write_together
 from gms_fsm.run.settings import Settings
@@ -100,12 +100,7 @@ def export(
     """
     known = formats()
     if not isinstance(format, str) or format not in known:
-        raise ParameterError(
-            "there is no such format",
-            place="format",
-            value=format,
-            advice=f"there are {', '.join(known)}",
-        )
+        raise unknown("format", format, known)
     where = checked_path("folder", folder)
     form = known[format]
     subject = Subject.of(

@@ -1,16 +1,33 @@
-"""Checks of argument types for the public API; checks of numbers are in `charts.parameters`."""
+"""Checks of arguments: their types, and names that nobody knows.
+
+Checks of numbers are in `charts.parameters`.
+"""
 
 from __future__ import annotations
 
+import difflib
 import operator
 import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.errors import GMSError, ParameterError, shown
 
-__all__ = ["checked_integer", "checked_kind", "checked_path", "listed"]
+__all__ = [
+    "checked_integer",
+    "checked_kind",
+    "checked_path",
+    "either",
+    "listed",
+    "meant",
+    "nearest",
+    "one_of",
+    "some_of",
+    "unknown",
+]
+
+MOST_NAMED = 12  # of all names: more are a wall that nobody reads
 
 
 def checked_kind(name: str, value: Any, kind: type | tuple[type, ...], wanted: str) -> Any:
@@ -69,3 +86,82 @@ def checked_integer(
 def listed(name: str, value: Any, wanted: str) -> list[Any]:
     """Return an iterable as a list; raise a `ParameterError` for anything else."""
     return list(checked_kind(name, value, Iterable, wanted))
+
+
+# --------------------------------------------------------------------------- names
+def nearest(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """Return the known name most like a wrong one, whatever its case; empty if none is.
+
+    Examples
+    --------
+    >>> nearest("SIGMA2", ["k", "sigma_2"]), nearest("mass", ["k"])
+    ('sigma_2', '')
+    """
+    by_case = {each.casefold(): each for each in known}
+    near = difflib.get_close_matches(str(name)[:100].casefold(), by_case, n=1, cutoff=cutoff)
+    return by_case[near[0]] if near else ""
+
+
+def meant(name: object, known: Iterable[str]) -> str:
+    """Return the question whether the nearest name was meant, with a blank after it."""
+    near = nearest(name, known)
+    return f"did you mean {near!r}? " if near else ""
+
+
+def some_of(known: Iterable[str]) -> str:
+    """Return names as one text; of very many the first.
+
+    Examples
+    --------
+    >>> some_of(["k", "sigma_2"]), some_of([])
+    ('k, sigma_2', 'none')
+    """
+    names = [*known]
+    more = len(names) - MOST_NAMED
+    if more > 1:
+        return f"{', '.join(names[:MOST_NAMED])} and {more} more"
+    return ", ".join(names) or "none"
+
+
+def either(choices: Iterable[str]) -> str:
+    """Return choices as one text.
+
+    Examples
+    --------
+    >>> either(["a", "b", "c"])
+    "'a', 'b' or 'c'"
+    """
+    *first, last = map(repr, choices)
+    return f"{', '.join(first)} or {last}" if first else last
+
+
+def unknown(
+    noun: str, name: object, known: Iterable[str], kind: type[GMSError] = ParameterError, **at: Any
+) -> GMSError:
+    """Return the error of a name that is not known; `at` is its place and key.
+
+    Examples
+    --------
+    >>> print(unknown("parameter", "K", ["k", "sigma_2"]))
+    there is no parameter 'K'; did you mean 'k'? there are k, sigma_2
+    """
+    names = [*known]
+    advice = f"{meant(name, names)}there {'is' if len(names) == 1 else 'are'} {some_of(names)}"
+    return kind(f"there is no {noun} {shown(name)}", advice=advice, **at)
+
+
+def one_of(
+    place: str, value: Any, choices: Iterable[str], kind: type[GMSError] = ParameterError
+) -> str:
+    """Return one of several texts.
+
+    Examples
+    --------
+    >>> one_of("search", "hop", ["hops", "local"])
+    Traceback (most recent call last):
+    gms_fsm.errors.ParameterError: search is 'hop'; it must be 'hops' or 'local'
+    """
+    known = [*choices]
+    if not isinstance(value, str) or value not in known:
+        raise kind(f"it must be {either(known)}", place=place, value=value)
+    return value

@@ -5,7 +5,6 @@ The sentence gives key, value, rule, and the nearest key; it names no file.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
@@ -13,6 +12,7 @@ from typing import Annotated, Any, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
 
 from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, shown
+from gms_fsm.foundation.arguments import nearest, some_of
 from gms_fsm.foundation.files import output_folder, write_whole
 from gms_fsm.foundation.toml import LARGEST_FILE, Key, data_of, line_of, override, text_of, written
 
@@ -165,9 +165,9 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
     if kind == "extra_forbidden":
         valid = _valid_keys(places[:-1], data, root)
         wanted = str(places[-1])[:LONGEST_SHOWN]
-        near = difflib.get_close_matches(wanted, valid, n=1) or _elsewhere(wanted, data, root)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        return f"{key} = {shown(value)}: unknown key; {hint}valid here: {', '.join(valid)}"
+        near = nearest(wanted, valid) or _elsewhere(wanted, data, root)
+        hint = f"did you mean {near!r}? " if near else ""
+        return f"{key} = {shown(value)}: unknown key; {hint}valid here: {some_of(valid)}"
     if kind == "missing":
         return f"{key} is missing"
     if kind == "union_tag_not_found":
@@ -184,7 +184,7 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
     return f"{key} = {shown(value)}: {text}"
 
 
-def _elsewhere(key: str, data: dict[str, Any], root: type[BaseModel]) -> list[str]:
+def _elsewhere(key: str, data: dict[str, Any], root: type[BaseModel]) -> str:
     """Return the most similar key of another table, with its table."""
     tables = [
         name
@@ -194,7 +194,7 @@ def _elsewhere(key: str, data: dict[str, Any], root: type[BaseModel]) -> list[st
     places = {
         name: f"{table}.{name}" for table in tables for name in _valid_keys((table,), data, root)
     }
-    return [places[name] for name in difflib.get_close_matches(key, places, n=1)]
+    return places.get(nearest(key, places), "")
 
 
 def _written_key(loc: tuple[int | str, ...], data: Any) -> Key:

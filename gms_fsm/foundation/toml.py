@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gms_fsm.errors import GMSError, ScenarioError, cut, shown
+from gms_fsm.foundation.arguments import unknown
 
 __all__ = ["LARGEST_FILE", "Key", "data_of", "line_of", "override", "parsed", "text_of", "written"]
 
@@ -136,9 +137,7 @@ def _index(tables: Sequence[Mapping[str, Any]], part: str, here: str) -> int:
         return names.index(part)
     if part.isdecimal() and int(part) < len(tables):
         return int(part)
-    raise ScenarioError(
-        f"there is no {shown(part)}", place=here, advice=f"choose from {', '.join(names)}"
-    )
+    raise unknown("table", part, names, ScenarioError, place=here)
 
 
 # --------------------------------------------------------------------------- lines

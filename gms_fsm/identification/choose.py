@@ -18,7 +18,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
-from gms_fsm.foundation.arguments import checked_kind, listed
+from gms_fsm.foundation.arguments import checked_kind, listed, one_of
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, FitStart
 from gms_fsm.identification.certainty.statistics import correlation_time
 from gms_fsm.identification.fit import fitted, options_of, task_of, window_of
@@ -267,8 +267,7 @@ class _Folds:
 def _folds(records: Sequence[Record], fold: Any, options: FitOptions) -> _Folds:
     if fold is None:
         fold = FOLDS[0] if len(records) > 1 else FOLDS[1]
-    if not isinstance(fold, str) or fold not in FOLDS:
-        raise ParameterError("it must be 'record' or 'cycles'", place="fold", value=fold)
+    one_of("fold", fold, FOLDS)
     every = tuple(records)
     if fold == "record":
         if len(every) < 2:

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import checked_scalar
-from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
-from gms_fsm.foundation.arguments import checked_integer, checked_kind, listed
+from gms_fsm.errors import GMSError, ParameterError, RecordError
+from gms_fsm.foundation.arguments import checked_integer, checked_kind, listed, one_of, unknown
 from gms_fsm.identification.certainty.assess import (
     NO_INFLUENCE,
     Assessed,
@@ -177,11 +177,11 @@ def options_of(**given: Any) -> FitOptions:
     for name in ("cycles", "smoothing"):
         if given[name] is not None:
             given[name] = checked_scalar(name, given[name], "> 0" if name == "cycles" else ">= 0")
-    _one_of("search", given["search"], SEARCHES)
+    one_of("search", given["search"], SEARCHES)
     if given["begin"] is not None:
-        _one_of("begin", given["begin"], BEGINS)
+        one_of("begin", given["begin"], BEGINS)
     for name in given["nuisance"]:
-        _one_of("nuisance", name, tuple(NUISANCE))
+        one_of("nuisance", name, tuple(NUISANCE))
         if given["nuisance"].count(name) > 1:
             raise ParameterError(f"{name!r} is given twice", place="nuisance")
     checked_kind("bounds", given["bounds"], Mapping, "a mapping, for example {'C': (1e-5, 1e-2)}")
@@ -190,11 +190,6 @@ def options_of(**given: Any) -> FitOptions:
             "nothing is to be found", place="free", advice="name parameters, for example ['k']"
         )
     return FitOptions(**given)
-
-
-def _one_of(name: str, given: object, known: tuple[str, ...]) -> None:
-    if not isinstance(given, str) or given not in known:
-        raise ParameterError(f"it must be {' or '.join(map(repr, known))}", place=name, value=given)
 
 
 def _names(name: str, given: Any) -> tuple[str, ...]:
@@ -267,11 +262,7 @@ def task_of(
         )
     for name in options.linear:
         if name not in known_in(subject):
-            raise ParameterError(
-                f"there is no parameter {shown(name)}",
-                place="linear",
-                advice=f"known here are {', '.join(known_in(subject))}",
-            )
+            raise unknown("parameter", name, known_in(subject), place="linear")
     _check_records(task)
     _check_linear(task)
     return task
@@ -281,11 +272,7 @@ def _with_fixed(subject: Mounted, fixed: Any, free: tuple[str, ...]) -> Mounted:
     checked_kind("fixed", fixed, Mapping, "a mapping, for example {'v_c': 1e-6}")
     for name in fixed:
         if name not in known_in(subject):
-            raise ParameterError(
-                f"there is no parameter {shown(name)}",
-                place="fixed",
-                advice=f"known here are {', '.join(known_in(subject))}",
-            )
+            raise unknown("parameter", name, known_in(subject), place="fixed")
         if name in free:
             raise ParameterError(
                 f"{name!r} is free, too", place="fixed", advice="leave it out of one of them"

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError, RecordError, shown
-from gms_fsm.foundation.arguments import checked_integer, checked_kind, checked_path, listed
+from gms_fsm.foundation.arguments import (
+    checked_integer,
+    checked_kind,
+    checked_path,
+    listed,
+    unknown,
+)
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import missing
 from gms_fsm.identification.certainty.assess import Assessed, Estimate
@@ -115,8 +121,7 @@ class Fit:
         for each in self.table:
             if each.name == name:
                 return each
-        known = ", ".join(each.name for each in self.table)
-        raise ParameterError(f"the fit has no parameter {shown(name)}", advice=f"it has {known}")
+        raise unknown("parameter", name, (each.name for each in self.table), place="fit")
 
     @property
     def covariance(self) -> FloatArray:
@@ -382,10 +387,7 @@ class Fit:
         """
         names = [each.name for each in self.table if each.name not in self.nuisance]
         if name not in names:
-            known = ", ".join(names)
-            raise ParameterError(
-                f"the fit has no parameter {shown(name)}", advice=f"profiles of {known} can be made"
-            )
+            raise unknown("profile of", name, names)
         return profiled(
             self.task, self.point, self[name], self.effective_rows, restarts=restarts, seed=seed
         )

@@ -7,7 +7,6 @@ accepted. An error gives the position in the text and what would be allowed.
 from __future__ import annotations
 
 import ast
-import difflib
 import functools
 import math
 import re
@@ -16,6 +15,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from gms_fsm.errors import ExpressionError, shown
+from gms_fsm.foundation.arguments import nearest, some_of
 from gms_fsm.foundation.parser import PARSER
 from gms_fsm.language.functions import CONSTANTS, FUNCTIONS, NAMESPACE, SEVERAL
 from gms_fsm.language.tree import (
@@ -231,10 +231,8 @@ def _parsed(text: str) -> ast.expr:
 
 def _suggestion(name: str, known: Iterable[str]) -> str:
     """Return a question that suggests the known name closest to a wrong one."""
-    by_case = {each.casefold(): each for each in known}
-    wanted = _ALIASES.get(name, name).casefold()
-    near = difflib.get_close_matches(wanted[:100], by_case, n=1, cutoff=0.75)
-    return f" (did you mean {by_case[near[0]]!r}?)" if near else ""
+    near = nearest(_ALIASES.get(name, name), known, 0.75)
+    return f" (did you mean {near!r}?)" if near else ""
 
 
 class _Reader:
@@ -304,11 +302,10 @@ class _Reader:
             return Number(CONSTANTS[name])
         if name in FUNCTIONS:
             raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
-        known = ", ".join(self.names) or "none"
         raise self.refuse(
             f"unknown name {shown(name)}{_suggestion(name, self.names)}",
             node,
-            f"the names {known}, and pi",
+            f"the names {some_of(self.names)}, and pi",
         )
 
     @functools.cached_property

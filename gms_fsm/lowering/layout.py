@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import some_of, unknown
 from gms_fsm.language import names_in
 from gms_fsm.lowering.log_columns import LOG_TEXTS
 from gms_fsm.lowering.places import ElementPlaces, Places
@@ -221,13 +222,13 @@ class SystemLayout:
         for bank in self.banks:
             if bank.name == name:
                 return bank
-        known = ", ".join(repr(bank.name) for bank in self.banks)
+        known = [bank.name for bank in self.banks]
         if not name:
             raise ParameterError(
-                f"the system has the contacts {known}",
-                advice=f"say which one: .contact({self.banks[0].name!r})",
+                f"the system has the contacts {some_of(known)}",
+                advice=f"say which one: .contact({known[0]!r})",
             )
-        raise ParameterError(f"there is no contact {shown(name)}", advice=f"there are {known}")
+        raise unknown("contact", name, known)
 
     @cached_property
     def recorded(self) -> tuple[list[int], list[list[int]]]:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.integrate import Radau
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.system import Body, Contact, System
 from gms_fsm.traces.failures import StepLimitError
@@ -103,9 +103,7 @@ class Bench:
         known = [each.name for each in dataclasses.fields(cls)]
         for name in values:
             if name not in known:
-                raise ParameterError(
-                    f"the bench has no number {shown(name)}", advice=f"it has {', '.join(known)}"
-                )
+                raise unknown("number", name, known, place="bench")
         return cls(**values)
 
     @property

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from gms_fsm.errors import GMSError, ParameterError, shown
-from gms_fsm.foundation.arguments import checked_kind, listed
+from gms_fsm.errors import GMSError
+from gms_fsm.foundation.arguments import checked_kind, listed, unknown
 from gms_fsm.phenomena import _break_away, _sliding, presliding
 from gms_fsm.phenomena._bench import Bench
 from gms_fsm.phenomena.results import Cell, PhenomenaTable, Phenomenon, PhenomenonResult
@@ -103,9 +103,7 @@ def chosen_phenomena(names: Iterable[str] | None) -> tuple[Phenomenon, ...]:
         wanted = listed("phenomena", given, "names of phenomena")
     for name in wanted:
         if not isinstance(name, str) or name not in PHENOMENA:
-            raise ParameterError(
-                f"there is no phenomenon {shown(name)}", advice=f"there are {', '.join(PHENOMENA)}"
-            )
+            raise unknown("phenomenon", name, PHENOMENA)
     return tuple(each for name, each in PHENOMENA.items() if name in wanted)
 
 

@@ -10,6 +10,7 @@ from typing import Literal, get_args
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, shown
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.phenomena.limits import LIMITS, Limit
 
 __all__ = [
@@ -114,8 +115,7 @@ class PhenomenonResult:
         for each in self.numbers:
             if each.name == name:
                 return each.value
-        known = ", ".join(repr(each.name) for each in self.numbers) or "none"
-        raise ParameterError(f"there is no number {shown(name)}", advice=f"there are: {known}")
+        raise unknown("number", name, (each.name for each in self.numbers))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.registry import Entry, registered
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ExpressionError, ParameterError, shown
-from gms_fsm.foundation.arguments import checked_kind, listed
+from gms_fsm.foundation.arguments import checked_kind, listed, unknown
 from gms_fsm.language import parse_value
 from gms_fsm.phenomena._bench import Bench, BenchMotion, run
 from gms_fsm.systems.gms_parameters import GMSParameters
@@ -142,9 +142,7 @@ def specimens_of(
         elif model in known:
             found.append(_included(name, *known[model], bench))
         else:
-            raise ParameterError(
-                f"there is no model {shown(model)}", advice=f"there are {', '.join(known)}"
-            )
+            raise unknown("model", model, known)
     return tuple(found)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, ParameterError, RecordError, UnitError, shown
+from gms_fsm.foundation.arguments import one_of
 from gms_fsm.language import evaluate, names_in, parse_condition
 from gms_fsm.records._columns import LOADS, QUANTITIES
 from gms_fsm.records._table import Words
@@ -113,10 +114,7 @@ def selected(
     """Select rows, treat gaps as asked, and check the result."""
     if not isinstance(where, str):
         raise ParameterError("it must be a condition, as a text", place="where", value=where)
-    if missing not in MISSING:
-        raise ParameterError(
-            f"it must be one of {', '.join(map(repr, MISSING))}", place="missing", value=missing
-        )
+    one_of("missing", missing, MISSING)
     chosen = _chosen(origin, values, where, rows.size)
     if not chosen.any():
         if words:

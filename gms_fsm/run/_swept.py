@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
-from gms_fsm.errors import OutputError, ParameterError, TraceFileError, cut, shown, why
-from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
+from gms_fsm.foundation.arguments import checked_path, unknown
 from gms_fsm.foundation.extras import require
 from gms_fsm.foundation.files import write_whole
 from gms_fsm.foundation.logs import Log
@@ -130,8 +130,7 @@ class Sweep:
             If there is no such contact.
         """
         if name not in self.contacts:
-            known = ", ".join(map(repr, self.contacts)) or "none, this is a model on a rig"
-            raise ParameterError(f"there is no contact {shown(name)}", advice=f"there are {known}")
+            raise unknown("contact", name, self.contacts)
         if len(self.contacts) == 1:
             return self
         which, mine = self.contacts.index(name), np.flatnonzero(self.owners == name)

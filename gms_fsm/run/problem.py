@@ -14,6 +14,7 @@ import integrators
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.lowering.floor import floor_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.log_columns import LogRecord
@@ -329,9 +330,7 @@ def _component(layout: SystemLayout, key: object, owner: str) -> str:
     """Return the name in the layout of what a user calls a component."""
     if not isinstance(key, str) or key not in layout.keys:
         known = [layout.label(name) for name in (*layout.y.shared, *layout.y.own)]
-        raise ParameterError(
-            f"{owner} has the key {shown(key)}", advice=f"known are {', '.join(map(repr, known))}"
-        )
+        raise unknown("key", key, known, place=owner)
     return layout.keys[key]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike
 import integrators
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import meant, one_of
 from gms_fsm.lowering.scales import Tolerance
 
 __all__ = ["ENGINES", "EVENTS", "MOST_STEPS", "OUTPUTS", "RunOptions", "SettingOptions", "Settings"]
@@ -137,7 +137,7 @@ class Settings:
         elif self.atol is not None:
             put(self, "atol", checked_scalar("atol", self.atol, "> 0"))
         _check_count(self.max_steps)
-        _check_choice("events", self.events, EVENTS)
+        one_of("events", self.events, EVENTS)
         if self.events == "step" and self.step is None and not math.isfinite(self.max_step):
             raise ParameterError(
                 "events='step' checks the guards once per step: give step=... or a finite max_step"
@@ -189,7 +189,7 @@ class Settings:
     def _output(self) -> str:
         if self.output is None:
             return "all" if self.t_eval is None else "t_eval"
-        _check_choice("output", self.output, OUTPUTS)
+        one_of("output", self.output, OUTPUTS)
         if (self.output == "t_eval") != (self.t_eval is not None):
             raise ParameterError(
                 "output='t_eval' needs t_eval=..., the times of the rows"
@@ -247,9 +247,8 @@ class Settings:
         fields = [each.name for each in dataclasses.fields(cls)]
         for name in options:
             if name not in fields:
-                near = difflib.get_close_matches(name, fields, 1)
-                hint = f"did you mean {near[0]!r}?" if near else f"it takes {', '.join(fields)}"
-                raise ParameterError(f"{whose} takes no argument {name!r}", advice=hint)
+                hint = meant(name, fields) or f"it takes {', '.join(fields)}"
+                raise ParameterError(f"{whose} takes no argument {name!r}", advice=hint.strip())
         if settings is None:
             return cls(**options)
         if "t_eval" in options and "output" not in options:
@@ -260,14 +259,6 @@ class Settings:
     def method_name(self) -> str:
         """The method's name, also for a class."""
         return self.method if isinstance(self.method, str) else self.method.__name__
-
-
-def _check_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
-    if not isinstance(given, str) or given not in choices:
-        said = [repr(each) for each in choices]
-        raise ParameterError(
-            f"it must be {', '.join(said[:-1])} or {said[-1]}", place=name, value=given
-        )
 
 
 def _check_count(max_steps: object) -> None:

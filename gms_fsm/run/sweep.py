@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut
-from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.arguments import checked_kind, unknown
 from gms_fsm.foundation.logs import Log
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
@@ -168,9 +168,7 @@ def _values(
     arrays: dict[str, FloatArray] = {}
     for name, value in given.items():
         if name not in names:
-            raise ParameterError(
-                f"parameters has {name!r}", advice=f"known here are {', '.join(names)}"
-            )
+            raise unknown("parameter", name, names, place="parameters")
         try:
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):

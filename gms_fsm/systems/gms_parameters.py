@@ -20,6 +20,7 @@ from gms_fsm.charts.parameters import (
 )
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.display import displayed, short_repr
 
 __all__ = ["GMSParameters"]
@@ -119,9 +120,7 @@ class GMSParameters:
         """
         for name in given:
             if name not in EVERY and name != "stribeck":
-                raise ParameterError(
-                    f"there is no parameter {name!r}", advice=f"there are {', '.join(vars(self))}"
-                )
+                raise unknown("parameter", name, vars(self))
         new = object.__new__(GMSParameters)
         vars(new).update(vars(self) | _checked(given, self.n))
         return new
@@ -166,10 +165,7 @@ class GMSParameters:
         [0.1, 0.05, 0.025, 0.0001]
         """
         if not isinstance(column, str) or column not in TABLE_I:
-            raise ParameterError(
-                f"Table I has no column {column!r}",
-                advice=f"it has {' and '.join(map(repr, TABLE_I))}",
-            )
+            raise unknown("column of Table I", column, TABLE_I)
         found = TABLE_I[column]
         numbers: Any = found.values
         assert found.stribeck is not None

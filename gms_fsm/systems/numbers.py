@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.gms import GMS_ELEMENT
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import one_of, unknown
 from gms_fsm.systems.models import GMS, ChartModel, Model, parameters_of
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.parts import Contact
@@ -188,9 +189,7 @@ def number_of(what: Mounted, name: object) -> NamedNumber:
             f"the elements differ in {name}",
             advice=f"name that of one element, for example {column_name(str(name), 0)!r}",
         )
-    raise ParameterError(
-        f"there is no number {shown(name)}", advice=f"known here are {', '.join(numbers)}"
-    )
+    raise unknown("number", name, numbers)
 
 
 def with_numbers(what: Mounted, values: Mapping[str, float]) -> Mounted:
@@ -225,9 +224,7 @@ def law_of(what: Mounted) -> str | None:
 
 def with_law(what: Mounted, law: str) -> Mounted:
     """Return the same with another slip law; raise `ParameterError` if there is none."""
-    if law not in GMS_ELEMENT:
-        known = " or ".join(map(repr, GMS_ELEMENT))
-        raise ParameterError(f"it must be {known}", place="law", value=law)
+    one_of("law", law, GMS_ELEMENT)
     if law_of(what) is None:
         raise ParameterError("only a GMS model has a slip law", place="law", value=law)
     contacts = tuple(

@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.language import Binary, Name, Negative, Number, Value, parse_value
 from gms_fsm.systems.given import Text, check_name, check_text, constant
 from gms_fsm.systems.parts import Body
@@ -93,12 +94,8 @@ def spring_forces(system: System) -> Iterator[tuple[str, int, Value]]:
         bodies = {body.name: body for body in system.bodies}
         for end, name in ends.items():
             if name not in bodies and (end, name) != ("second", None):
-                raise ParameterError(
-                    f"there is no body {shown(name)}",
-                    place=_place(system, i).words,
-                    advice=f"the bodies are {', '.join(map(repr, bodies))}",
-                    key=("springs", i, end),
-                )
+                where, key = _place(system, i).words, ("springs", i, end)
+                raise unknown("body", name, bodies, place=where, key=key)
         terms = pull(spring, bodies, partial(field_of, system, i))
         if spring.second is None:
             yield from ((spring.first, sign, term) for sign, term in terms)

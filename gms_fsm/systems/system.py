@@ -18,7 +18,7 @@ import numpy as np
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, cut, shown
-from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.foundation.arguments import checked_path, unknown
 from gms_fsm.foundation.display import displayed
 from gms_fsm.language import (
     Binary,
@@ -316,7 +316,7 @@ class System:
         ParameterError
             If there is none.
         """
-        return _found(self.bodies, name, f"system {self.name!r} has no body")
+        return _found(self.bodies, name, "body")
 
     def contact(self, name: str) -> Contact:
         """Return a contact by name.
@@ -336,7 +336,7 @@ class System:
         ParameterError
             If there is none.
         """
-        return _found(self.contacts, name, f"system {self.name!r} has no contact")
+        return _found(self.contacts, name, "contact")
 
 
 MOST_READ = 64
@@ -346,12 +346,11 @@ _read_before: dict[Any, System] = {}  # by its texts
 Named = TypeVar("Named", "Body", "Contact")
 
 
-def _found(parts: tuple[Named, ...], name: str, reason: str) -> Named:
+def _found(parts: tuple[Named, ...], name: str, noun: str) -> Named:
     for each in parts:
         if each.name == name:
             return each
-    known = ", ".join(repr(each.name) for each in parts)
-    raise ParameterError(f"{reason} {shown(name)}", advice=f"there are {known}")
+    raise unknown(noun, name, (each.name for each in parts))
 
 
 def with_model(system: System, model: Model, rig: Rig) -> System:

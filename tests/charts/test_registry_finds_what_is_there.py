@@ -105,7 +105,7 @@ def test_a_law_is_chosen_where_there_are_several_and_only_there(
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ParameterError, match=r"name is 'coulomb'; it must be one of .*gms.*lugre"):
+    with pytest.raises(ParameterError, match=r"there is no model 'coulomb'; .*there are .*gms"):
         entry("coulomb")
 
 

@@ -71,7 +71,7 @@ def test_which_signal_is_asked_for() -> None:
     record = measured(bank([2e4], [5e-5]), sine(2e-4, 2.0, 3.0), 0.01, 0)
     with pytest.raises(ParameterError, match=r"drive: it cannot be told which signal.*w, u"):
         fit(record, two, free=["pad.k"])
-    with pytest.raises(ParameterError, match=r"system 'two' has no signal 'q'.*there are w, u"):
+    with pytest.raises(ParameterError, match=r"drive: there is no signal 'q'; there are w, u"):
         fit(record, two, free=["pad.k"], drive="q")
     found = fit(record, two, free=["pad.k"], drive="w", search="local")
     assert found["pad.k1"].told

@@ -137,7 +137,7 @@ def test_a_tolerance_may_be_a_number_or_given_by_name():
     ("atol", "says"),
     [
         (0.0, "atol is 0.0; it must be > 0"),
-        ({"w": 1e-9}, "atol has the key 'w'; known are 'x', 'v', 'z'"),
+        ({"w": 1e-9}, "atol: there is no key 'w'; there are x, v, z"),
         ({"z": [1e-9, 1e-9]}, r"atol\['z'\] has 2 entries, but there are 4 elements"),
         ({"v": -1.0}, r"atol\['v'\] is -1.0; it must be > 0"),
         ("fine", "atol is 'fine'; it must be a number"),

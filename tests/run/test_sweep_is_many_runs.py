@@ -258,12 +258,12 @@ def test_a_dataframe_has_columns_of_elements() -> None:
     np.testing.assert_array_equal(again.F, one.F)
     with pytest.raises(ParameterError, match=r"'k' for some elements, but not k3"):
         sweep(model, rig, 6.0, frame.drop(columns="k3"), engine="ifelse")
-    with pytest.raises(ParameterError, match=r"'k5'; known here are k, sigma"):
+    with pytest.raises(ParameterError, match=r"'k5'; did you mean 'k'"):
         sweep(model, rig, 6.0, frame.assign(k5=1.0), engine="ifelse")
 
 
 REFUSED: dict[str, tuple[Mapping[str, Any], tuple[str, ...]]] = {
-    "unknown": ({"q": [1, 2]}, ("'q'", "known here are k, sigma, C, v_c, weights", "stiffness")),
+    "unknown": ({"q": [1, 2]}, ("'q'", "there are k, sigma, C, v_c, weights", "stiffness")),
     "the rig's of another kind": ({"F_a": [1, 2]}, ("'F_a'", "speed")),
     "a misspelling": ({"f_c": [1, 2]}, ("'f_c'", "F_c")),
     "empty": ({}, ("parameters is empty",)),
@@ -292,7 +292,7 @@ def test_wrong_names_and_shapes_are_refused_before_anything_runs(case: str) -> N
 
 
 def test_lugre_has_no_weights() -> None:
-    with pytest.raises(ParameterError, match=r"'weights'; known here are sigma_0, sigma_1"):
+    with pytest.raises(ParameterError, match=r"'weights'; there are sigma_0, sigma_1"):
         sweep(BRISTLE, Prescribed("0.1"), 1.0, {"weights": [1.0]}, engine="machines")
 
 

@@ -119,14 +119,14 @@ def test_a_single_contact_has_plain_columns() -> None:
     assert result.F.shape == (2,)
     assert result.sequence(0) == [(0, "release_forward")]
     assert result.contact("pad") is result
-    with pytest.raises(ParameterError, match="there is no contact 'pat'; there are 'pad'"):
+    with pytest.raises(ParameterError, match="there is no contact 'pat'; did you mean 'pad'"):
         result.contact("pat")
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (({"m": [1.0]},), "parameters has 'm'; known here are numbers.m, pad.F_c"),
+        (({"m": [1.0]},), "there is no parameter 'm'; there are numbers.m, pad.F_c"),
         (({"pad.F_s": [[1.5, 1.6]]},), r"parameters\['pad.F_s'\] has shape \(1, 2\)"),
         (({"bank.k": [[1.0, 2.0]]},), r"it must be \(runs,\) or \(runs, 4\)"),
         (([1.0],), r"sweep\(system, t_end, parameters\)"),

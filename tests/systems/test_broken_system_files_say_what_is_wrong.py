@@ -66,7 +66,13 @@ CASES = {
     "an unbound input": ("inputs.s = 1\n", "", 20, "contact.0", "reads the input 's'"),
     "an input": ("inputs.s = 1", 'inputs.s = "z9"', 25, "contact.0.inputs.s", "'z9'"),
     "a value": ("31.6", "-31.6", 20, "contact.0", "must be >= 0"),
-    "an unknown chart": ('"lugre"', '"lugree"', 23, "contact.0.chart", "no chart has this name"),
+    "an unknown chart": (
+        '"lugre"',
+        '"lugree"',
+        23,
+        "contact.0.chart",
+        "no chart 'lugree'",
+    ),
     "a chart elsewhere": ('"lugre"', '"../a.toml"', 23, "contact.0.chart", "outside the folder"),
     "no chart file": ('"lugre"', '"a.toml"', 23, "contact.0.chart", "no such file"),
     "neither chart nor model": (

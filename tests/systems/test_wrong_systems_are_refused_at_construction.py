@@ -78,7 +78,7 @@ REFUSED: dict[str, tuple[Callable[[], object], type[GMSError], str]] = {
     "a spring at no body": (
         lambda: system(springs=(Spring("s", "mas", k=1.0),)),
         ParameterError,
-        "spring 's': there is no body 'mas'; the bodies are 'mass'",
+        "spring 's': there is no body 'mas'; did you mean 'mass'",
     ),
     "a spring with one end": (
         lambda: Spring("s", "mass", "mass", k=1.0),

@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 from gms_fsm.charts.files.imported import ImportedEdge, Texts, built
 from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
 from gms_fsm.errors import ChartError, why
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.language import ECMASCRIPT
 
 if TYPE_CHECKING:
@@ -160,11 +161,7 @@ def _states(root: ET.Element, here: str) -> list[ET.Element]:
     ids = [str(each.get("id")) for each in states]
     first = root.get("initial", ids[0] if ids else "")
     if first not in ids:
-        raise ChartError(
-            f"its initial state is {first!r}",
-            place=here,
-            advice=f"there are {', '.join(map(repr, ids)) or 'none'}",
-        )
+        raise unknown("initial state", first, ids, ChartError, place=here)
     return sorted(states, key=lambda each: each.get("id") != first)
 
 

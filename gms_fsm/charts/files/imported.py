@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.parts import State, Transition, texts_of
-from gms_fsm.errors import ChartError, shown
+from gms_fsm.errors import ChartError
+from gms_fsm.foundation.arguments import unknown
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
@@ -66,11 +67,7 @@ class Texts:
         known = [each.name for each in fields(cls)]
         for name in given:
             if name not in known:
-                raise ChartError(
-                    f"there is no argument {name!r}",
-                    place=here,
-                    advice=f"there are {', '.join(known)}",
-                )
+                raise unknown("argument", name, known, ChartError, place=here)
         return cls(**given)
 
 
@@ -170,11 +167,7 @@ def _known(
 def _check_known(given: Mapping[str, object], names: list[str], kind: str, place: str) -> None:
     for name in given:
         if name not in names:
-            raise ChartError(
-                f"there is no {kind} {shown(name)}",
-                place=place,
-                advice=f"there are {', '.join(map(repr, names)) or 'none'}",
-            )
+            raise unknown(kind, name, names, ChartError, place=place)
 
 
 def _several(given: object, place: str) -> Iterable[Any]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
-from gms_fsm.errors import GMSError, ParameterError, shown
-from gms_fsm.foundation.arguments import checked_integer
+from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.foundation.arguments import checked_integer, unknown
 from gms_fsm.identification.certainty.assess import Estimate
 from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from gms_fsm.identification.certainty.region import values_of
@@ -65,9 +65,7 @@ class Bootstrap:
             If there is no such parameter, or the level is not between 0 and 1.
         """
         if name not in self.names:
-            raise ParameterError(
-                f"there is no parameter {shown(name)}", advice=f"there are {', '.join(self.names)}"
-            )
+            raise unknown("parameter", name, self.names)
         checked_scalar("level", level, "> 0 and < 1")
         column = self.draws[:, self.names.index(name)]
         low, high = np.nanquantile(column, [(1.0 - level) / 2.0, (1.0 + level) / 2.0])

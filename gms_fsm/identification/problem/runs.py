@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ParameterError, shown
+from gms_fsm.foundation.arguments import some_of, unknown
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.program import Program, arguments, same_text
 from gms_fsm.records.record import Record
@@ -102,7 +103,7 @@ class ComparedColumn:
         raise ParameterError(
             f"there is nothing called {shown(text)} to compare with the record",
             place="measured",
-            advice=f"it can be {', '.join(known)}",
+            advice=f"it can be {some_of(known)}",
         )
 
     @property
@@ -344,11 +345,7 @@ def driver_of(subject: Mounted, drive: str | None, rtol: float, budgets: int) ->
         return Driver("v", rtol, budgets)
     if drive is not None:
         if drive not in system.signals:
-            raise ParameterError(
-                f"system {system.name!r} has no signal {shown(drive)}",
-                place="drive",
-                advice=f"there are {', '.join(system.signals) or 'none'}",
-            )
+            raise unknown("signal", drive, system.signals, place="drive")
         return Driver(drive, rtol, budgets)
     driven = [each.velocity for each in system.bodies if each.driven]
     if not driven:

@@ -6,7 +6,6 @@ A positive number is searched by its logarithm, a number with a lower bound that
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray, Parameter, checked_scalar
 from gms_fsm.errors import ParameterError, shown
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import NamedNumber, joined, known_in, parts_of, value_in
 
@@ -117,14 +117,8 @@ def _named(subject: Mounted, name: str, tied: Sequence[str]) -> list[Unknown]:
     """Return the unknowns that one name stands for."""
     found = parts_of(subject, name)
     if not found:
-        names = known_in(subject)
-        near = difflib.get_close_matches(str(name), names, 1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise ParameterError(
-            f"there is no parameter {shown(name)}",
-            place="free",
-            advice=f"{hint}known here are {', '.join(names)}; k2 is k of the second element",
-        )
+        error = unknown("parameter", name, known_in(subject), place="free")
+        raise error.replaced(advice=f"{error.advice}; k2 is k of the second element")
     if name in tied and found[0].whole == name:
         mean = float(np.mean(value_in(subject, name)))
         found = [replace(found[0], name=name, value=mean, element=None)]
