@@ -10,18 +10,6 @@ from integrators.crossings import listed
 from integrators.loop import MOST_SWITCHES, Buffers
 from integrators.steps import Vector
 
-__all__ = [
-    "Entangled",
-    "HybridError",
-    "Livelock",
-    "NotFinite",
-    "Refused",
-    "StepTooSmall",
-    "TooManySteps",
-    "failure",
-    "modes_of",
-]
-
 
 class HybridError(Exception):
     """The run cannot continue; carries the time, state and modes."""

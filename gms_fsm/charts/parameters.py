@@ -19,22 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import ChartError, ParameterError, shown
 
-__all__ = [
-    "QUANTITIES",
-    "SIGMA_2",
-    "STRIBECK",
-    "WEIGHTS",
-    "Bound",
-    "FloatArray",
-    "Parameter",
-    "as_floats",
-    "as_numbers",
-    "checked_array",
-    "checked_scalar",
-    "checked_values",
-    "with_shared",
-]
-
 FloatArray: TypeAlias = NDArray[np.float64]
 
 ANY = "finite"  # the rule that applies to every number

@@ -8,8 +8,6 @@ from typing import Any
 
 from gms_fsm.errors import ChartError, shown
 
-__all__ = ["State", "Transition", "texts_of"]
-
 
 @dataclass(frozen=True)
 class State:

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
     from gms_fsm.charts.parts import State
 
-__all__ = ["AGE", "ChartReader"]
-
 AGE = "age"  # s since the state was entered; a variable of every chart that reads it
 
 

@@ -24,8 +24,6 @@ from gms_fsm.charts.parameters import STRIBECK, FloatArray, checked_values
 from gms_fsm.language import Value, parse_value, values_of
 from integrators import elementary
 
-__all__ = ["Stribeck", "dip_of", "flat_of", "stribeck_text"]
-
 DIP_WIDTH = 6.1  # in v_s: beyond this exp(-(v/v_s)**2) is below 1e-16 and the curve is flat
 GAUSSIAN = 2.0  # the exponent of eq. (2)
 FINEST = 2.0**55  # its inverse is a quarter of the last bit of 1

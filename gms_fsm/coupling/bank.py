@@ -16,8 +16,6 @@ from gms_fsm.foundation.arguments import listed
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
-__all__ = ["FrictionBank"]
-
 
 class FrictionBank:
     """The frictions of m joints, as `FrictionState` does it for one.

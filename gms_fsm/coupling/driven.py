@@ -19,8 +19,6 @@ from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Body, Contact, System
 
-__all__ = ["Driven"]
-
 
 @dataclass(frozen=True, eq=False)
 class Driven:

@@ -27,8 +27,6 @@ from integrators.crossings import watched
 from integrators.loop import FIRED, FIRING, PAUSED, run_to_event
 from integrators.steps import ArcMotion
 
-__all__ = ["FrictionEquations"]
-
 
 class FrictionEquations:
     """One friction as equations with events.

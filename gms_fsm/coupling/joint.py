@@ -34,8 +34,6 @@ from integrators import advance, hybrid, loop
 from integrators.runners import states
 from integrators.runners.stepping import FULL_LOG
 
-__all__ = ["FAILURES", "Asked", "ElementSwitch", "Joint", "Line"]
-
 Line = tuple[Any, Any]  # an input at the start and at the end of a sample
 ARGUMENTS = ("self", "v0", "v1", "dt")  # of `FrictionState.advance`
 # What the loop keeps only between two events at one time.

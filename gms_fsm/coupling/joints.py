@@ -21,8 +21,6 @@ from gms_fsm.run.problem import LATEST
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
-__all__ = ["Joints", "Snapshot", "content_of", "input_lines", "made_again"]
-
 CHANGE = 1e-4  # of the last velocity, for a derivative by differences
 Lost = dict[Joint, list[ElementSwitch]]  # switches that did not fit into the log of a sample
 # When it began, v0, v1, further inputs, lost switches, and a copy of the state before it.

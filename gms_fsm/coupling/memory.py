@@ -27,16 +27,6 @@ from integrators.sliding import Functions
 if TYPE_CHECKING:
     from integrators.runners.compiled import CompiledStepper as MachineCode
 
-__all__ = [
-    "BlockMemory",
-    "JointMemory",
-    "ListMemory",
-    "arguments_of",
-    "fast",
-    "machine_code",
-    "prepared",
-]
-
 MOST_SWITCHES = 64  # in the log of a sample; when it is full, it is emptied and the sample goes on
 SAMPLED, LOGGED = tuple(numbers_of(Sample)), ("t", "machine", "edge")
 

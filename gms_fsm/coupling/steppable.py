@@ -19,8 +19,6 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners, Function
 from gms_fsm.systems.system import Body, Contact, System
 
-__all__ = ["alone", "begin", "other_inputs", "start_of", "start_of_system"]
-
 WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*")  # not the exponent of a number
 GIVEN = ("t", "x", "v")  # what a contact knows by itself: x is the integral of v
 

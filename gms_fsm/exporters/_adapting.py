@@ -19,16 +19,6 @@ from integrators.machine_code.layout import BlockLayout
 from integrators.runners.compiled import is_known
 from integrators.runners.stepping import step_to
 
-__all__ = [
-    "STEPS",
-    "ExportArguments",
-    "adapting_of",
-    "check_first_call",
-    "step_arguments",
-    "translate",
-    "word_of",
-]
-
 # The functions, and the parts of the block that are their arguments.
 STEPS: Mapping[str, tuple[Any, str]] = {
     "step": (step_to, "functions machines buffers sample"),

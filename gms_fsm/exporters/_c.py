@@ -27,17 +27,6 @@ from integrators.machine_code.layout import BlockLayout, MemoryBlock
 from integrators.runners.compiled import INLINE
 from integrators.runners.stepping import FULL_LOG
 
-__all__ = [
-    "TAKES",
-    "TEMPLATES",
-    "WORDS",
-    "CEngine",
-    "engine_of",
-    "filled",
-    "image_of",
-    "safe",
-]
-
 FIELDS = ("t", "switches", "logged", "word")  # of the struct
 TEMPLATES = Path(__file__).parent / "_templates"
 TAKES = ("initial", "t_start", "settings")  # what the engine uses

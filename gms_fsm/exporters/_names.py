@@ -8,8 +8,6 @@ from collections.abc import Iterable
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import Dialect, Node, spell
 
-__all__ = ["check_functions", "identifier", "slug"]
-
 LONGEST = 63  # characters that C99 compilers and MATLAB tell apart
 
 

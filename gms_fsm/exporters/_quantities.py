@@ -14,8 +14,6 @@ from gms_fsm.run.problem import Problem
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.system import Contact, System
 
-__all__ = ["Quantity", "outputs_of", "parameters_of"]
-
 CURVE, MODEL, WEIGHT = "curve ", "model ", "threshold weight"
 DERIVED = ("v dip", "v flat")  # computed from the other numbers of a curve
 

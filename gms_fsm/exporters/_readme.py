@@ -5,8 +5,6 @@ from __future__ import annotations
 from gms_fsm.exporters.plain.element import NamedFriction
 from gms_fsm.exporters.plain.parts import Constant
 
-__all__ = ["about_friction"]
-
 
 def about_friction(element: NamedFriction) -> str:
     """Return the model, its inputs, its numbers and its states, as Markdown.

@@ -18,8 +18,6 @@ from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact, System
 
-__all__ = ["export", "formats"]
-
 
 def formats() -> dict[str, Format]:
     """Return what `export` can write: the formats of friction, and those of its chart.

@@ -18,8 +18,6 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners
 from gms_fsm.systems.system import Contact, System
 
-__all__ = ["Subject"]
-
 
 @dataclass(frozen=True, eq=False)
 class Subject:

@@ -16,8 +16,6 @@ from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.system import Body, Contact, System
 
-__all__ = ["check_moved_from_outside", "element_numbers", "fields_of", "one_line", "slow_velocity"]
-
 PERIOD, STEP = 25.0, 1e-3  # s: of a demonstration, as in the paper's first experiment
 AMPLITUDES = (0.15, 0.015, 1.5e-3, 1.5e-4, 1.5e-5)  # m/s; the first is the paper's
 AGREEMENT = 0.01

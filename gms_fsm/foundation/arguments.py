@@ -14,19 +14,6 @@ from typing import Any
 
 from gms_fsm.errors import GMSError, ParameterError, shown
 
-__all__ = [
-    "checked_integer",
-    "checked_kind",
-    "checked_path",
-    "either",
-    "listed",
-    "meant",
-    "nearest",
-    "one_of",
-    "some_of",
-    "unknown",
-]
-
 MOST_NAMED = 12  # of all names: more are a wall that nobody reads
 
 

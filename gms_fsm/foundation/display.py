@@ -18,8 +18,6 @@ from typing import Any, TypeAlias, TypeVar
 
 from gms_fsm.errors import cut
 
-__all__ = ["Form", "asked", "displayed", "full_text", "register_figures", "short_repr"]
-
 Form: TypeAlias = str  # as in the names of the methods that IPython asks: html, png or svg
 Shown = TypeVar("Shown", bound=type)
 

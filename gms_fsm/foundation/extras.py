@@ -8,8 +8,6 @@ from typing import Any
 
 from gms_fsm.errors import MissingExtraError, why
 
-__all__ = ["EXTRAS", "missing", "require"]
-
 # For each extra: the feature that needs it, and the alternative without it.
 EXTRAS: Mapping[str, tuple[str, str]] = {
     "plots": ("figures and animations need", "runs, traces and charts need no extra"),

@@ -26,17 +26,6 @@ from gms_fsm.errors import OutputError
 if sys.platform != "win32":  # on Windows nothing is locked, and no leftovers are removed
     import fcntl
 
-__all__ = [
-    "folder_lock",
-    "inside",
-    "leftovers",
-    "output_folder",
-    "refuse_input",
-    "remove_leftovers",
-    "write_together",
-    "write_whole",
-]
-
 LIST = ".gms-fsm-files.json"  # in an output folder: checksums of the files written there
 _prepared: set[Path] = set()  # output folders of this process
 _LEFT = re.compile(r"\..+\.[0-9a-f]{16}\.gms-fsm-(part|rest)")

@@ -8,8 +8,6 @@ import numpy as np
 
 from gms_fsm.foundation.display import displayed
 
-__all__ = ["Log"]
-
 
 @displayed("html")
 class Log(np.recarray[Any, Any]):

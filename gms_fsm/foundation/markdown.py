@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-__all__ = ["plain", "table_lines"]
-
 
 def plain(text: str) -> str:
     r"""Return Markdown that displays a text literally.

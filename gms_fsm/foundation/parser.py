@@ -9,6 +9,4 @@ from __future__ import annotations
 
 import threading
 
-__all__ = ["PARSER"]
-
 PARSER = threading.Lock()

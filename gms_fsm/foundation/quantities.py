@@ -6,8 +6,6 @@ import math
 import re
 from collections.abc import Sequence
 
-__all__ = ["quantity", "sparkline"]
-
 PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate(["a", *"fpnµm", "", *"kMGT"])}
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
 TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns)(?=$|[/*·])")

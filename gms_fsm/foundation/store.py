@@ -18,8 +18,6 @@ from pathlib import Path
 from gms_fsm.errors import OutputError
 from gms_fsm.foundation.files import remove_leftovers, write_whole
 
-__all__ = ["CodeFolder"]
-
 
 @dataclass(frozen=True)
 class CodeFolder:

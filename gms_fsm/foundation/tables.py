@@ -16,21 +16,6 @@ from gms_fsm.foundation.arguments import nearest, some_of
 from gms_fsm.foundation.files import output_folder, write_whole
 from gms_fsm.foundation.toml import LARGEST_FILE, Key, data_of, line_of, override, text_of, written
 
-__all__ = [
-    "LIST",
-    "ONE",
-    "TABLE",
-    "TEXT",
-    "Numbers",
-    "Table",
-    "Texts",
-    "Value",
-    "built",
-    "explained",
-    "read_file",
-    "write_file",
-]
-
 # Tags of union members in pydantic's errors; no key of a file looks like these.
 ONE, LIST, TEXT, TABLE = "<one>", "<list>", "<text>", "<table>"
 

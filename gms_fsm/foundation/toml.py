@@ -12,8 +12,6 @@ from typing import Any
 from gms_fsm.errors import GMSError, ScenarioError, cut, shown
 from gms_fsm.foundation.arguments import unknown
 
-__all__ = ["LARGEST_FILE", "Key", "data_of", "line_of", "override", "parsed", "text_of", "written"]
-
 Key = tuple[str | int, ...]  # names of keys, and places in arrays from 0
 
 LARGEST_FILE = 1_000_000  # bytes

@@ -16,8 +16,6 @@ from gms_fsm.systems.signals import Corners, Signal
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
-__all__ = ["save"]
-
 LONGEST = 5000  # corners of a signal in the file itself
 
 

@@ -8,8 +8,6 @@ from gms_fsm.language._fold import fold
 from gms_fsm.language.functions import SEVERAL
 from gms_fsm.language.tree import Binary, Call, Negative, Number, Value, names_in
 
-__all__ = ["derivative"]
-
 ZERO, ONE = Number(0.0), Number(1.0)
 
 

@@ -10,25 +10,6 @@ from typing import NamedTuple
 
 from gms_fsm.language.functions import COMPARISONS, FUNCTIONS, OPERATIONS
 
-__all__ = [
-    "ATOM",
-    "C99",
-    "ECMASCRIPT",
-    "LATEX",
-    "LEVELS",
-    "MATHEMATICS",
-    "MATLAB",
-    "MATLAB_LIKE",
-    "MODELICA",
-    "PYTHON",
-    "STRUCTURED_TEXT",
-    "Dialect",
-    "Form",
-    "Printed",
-    "latex_name",
-    "raised",
-]
-
 # How tightly each operator binds (its precedence).
 LEVELS = {"or": 1, "and": 2, "not": 3, "<": 4, "+": 5, "-": 5, "*": 6, "/": 6, "neg": 7, "**": 8}
 ATOM = 9

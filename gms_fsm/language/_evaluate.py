@@ -10,8 +10,6 @@ from gms_fsm.language._powers import product_power
 from gms_fsm.language.functions import COMPARISONS, FUNCTIONS, NAMESPACE, OPERATIONS
 from gms_fsm.language.tree import Binary, Both, Call, Either, Negative, Node, Not, Relation
 
-__all__ = ["evaluate"]
-
 
 def evaluate(node: Node, values: Mapping[str, Any]) -> float | bool:
     """Evaluate a tree, rounding exactly as the generated code does.

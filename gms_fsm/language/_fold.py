@@ -25,8 +25,6 @@ from gms_fsm.language.tree import (
     Value,
 )
 
-__all__ = ["Algebra", "ValueAlgebra", "fold"]
-
 V = TypeVar("V")
 C = TypeVar("C")
 

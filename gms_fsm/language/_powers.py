@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from gms_fsm.language.tree import Binary, Name, Negative, Number, Value
 
-__all__ = ["LARGEST_PRODUCT_POWER", "integer_power", "product_power"]
-
 LARGEST_PRODUCT_POWER = 8  # x**8 and below are printed as products ...
 LARGEST_PRODUCT = 64  # ... unless the text would exceed this many parts
 

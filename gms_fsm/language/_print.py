@@ -9,8 +9,6 @@ from gms_fsm.language._fold import fold
 from gms_fsm.language._powers import product_power
 from gms_fsm.language.tree import Binary, Both, Call, Either, Name, Negative, Node, Not, Relation
 
-__all__ = ["spell"]
-
 
 def spell(node: Node, dialect: Dialect = PYTHON, rename: Mapping[str, str] | None = None) -> str:
     """Write a tree as text.

@@ -33,8 +33,6 @@ from gms_fsm.language.tree import (
     Value,
 )
 
-__all__ = ["Owner", "parse_condition", "parse_value"]
-
 LONGEST_TEXT = 10_000  # characters; a chart's text is a line, not a program
 DEEPEST_TREE = 60  # levels; keeps every recursive reader far below Python's recursion limit
 MOST_ARGUMENTS = 50  # of min and max

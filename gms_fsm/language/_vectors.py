@@ -30,8 +30,6 @@ from gms_fsm.language.tree import (
 )
 from integrators.runners import quick
 
-__all__ = ["truths", "values_of"]
-
 Truths = NDArray[np.bool_]
 
 

@@ -9,18 +9,6 @@ from typing import Any
 
 from integrators import elementary
 
-__all__ = [
-    "COMPARISONS",
-    "CONSTANTS",
-    "ELEMENTARY",
-    "FUNCTIONS",
-    "NAMESPACE",
-    "OPERATIONS",
-    "ROUGH",
-    "SEVERAL",
-    "sgn",
-]
-
 OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": operator.add,
     "-": operator.sub,

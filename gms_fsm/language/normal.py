@@ -25,19 +25,6 @@ from gms_fsm.language.tree import (
     walk,
 )
 
-__all__ = [
-    "Comparison",
-    "Requirement",
-    "Split",
-    "clauses",
-    "comparisons",
-    "renamed",
-    "rough_points",
-    "split",
-    "substitute",
-    "turning_inside",
-]
-
 
 def clauses(condition: Condition) -> tuple[Condition, ...]:
     """Return the parts of a conjunction, or the condition alone.

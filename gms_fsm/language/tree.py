@@ -6,26 +6,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
-__all__ = [
-    "Binary",
-    "Both",
-    "Call",
-    "Condition",
-    "Either",
-    "InState",
-    "Name",
-    "Negative",
-    "Node",
-    "Not",
-    "Number",
-    "Relation",
-    "Value",
-    "names_in",
-    "rebuilt",
-    "states_in",
-    "walk",
-]
-
 
 @dataclass(frozen=True)
 class Number:

@@ -27,8 +27,6 @@ from gms_fsm.systems.system import LEAST_LOAD
 from integrators.loop import START, Buffers
 from integrators.steps import Vector
 
-__all__ = ["FUNCTIONS", "SHARE", "Adapting", "Adaptive", "adapt", "adaptive", "bind"]
-
 FUNCTIONS = ("bend", "scale", "enter", "raise_floor")
 # The default absolute tolerance is rtol times the scale times this: near zero, a component is as
 # accurate as at a tenth of its scale.

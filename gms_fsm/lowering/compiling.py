@@ -28,18 +28,6 @@ if TYPE_CHECKING:
     from integrators.machine_code.layout import MemoryBlock
     from integrators.runners.compiled import CompiledFunction, RecordArguments
 
-__all__ = [
-    "Prepared",
-    "check_llvmlite",
-    "engine",
-    "functions",
-    "notify",
-    "observe_rows",
-    "packed",
-    "store",
-    "text_of",
-]
-
 Packed = tuple[FloatArray, FloatArray, FloatArray]
 MOST_ENGINES = 256  # in memory
 MOST_SPARE = 4  # blocks that are kept for further calls

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from gms_fsm.errors import SignalError
 from gms_fsm.lowering.program import Program
 
-__all__ = ["floor_of"]
-
 
 def floor_of(
     program: Program,

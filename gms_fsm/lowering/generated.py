@@ -26,18 +26,6 @@ from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 from integrators import elementary
 from integrators.runners import quick
 
-__all__ = [
-    "SIGNALS",
-    "bare",
-    "elementary_text",
-    "ieee",
-    "load",
-    "load_careful",
-    "quickened",
-    "standalone",
-]
-
-
 # What generated text calls besides the functions of the expression language.
 SIGNALS: Mapping[str, Any] = {
     "piecewise_linear": piecewise_linear,

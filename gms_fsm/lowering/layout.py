@@ -30,8 +30,6 @@ from gms_fsm.lowering.log_columns import LOG_TEXTS
 from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.systems.reading.assembly import Assembly, Bank, of
 
-__all__ = ["BankPlaces", "SystemLayout", "held_of", "sizes_of"]
-
 
 @dataclass(frozen=True)
 class BankPlaces:

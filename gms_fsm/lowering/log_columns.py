@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["CONTACT", "LOG_NUMBERS", "LOG_TEXTS", "LogRecord"]
-
 
 class LogRecord(NamedTuple):
     """One firing, as recorded in the transition log.

@@ -17,8 +17,6 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import Program
 from integrators import Functions, Held, arm_on, look, sliding_scratch, slope_on
 
-__all__ = ["armed", "observe", "on_surfaces", "rate", "sigmas"]
-
 
 def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
     """Return the observed quantities of a state, by place (`gms_fsm.lowering.layout`)."""

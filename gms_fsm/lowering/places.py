@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, TypeVar
 
-__all__ = ["ElementPlaces", "Places", "total"]
-
 Name = TypeVar("Name", bound=Hashable)
 
 

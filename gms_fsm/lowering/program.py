@@ -55,8 +55,6 @@ from gms_fsm.systems.signals import (
 from gms_fsm.systems.system import System
 from integrators import LIVE
 
-__all__ = ["Arguments", "Program", "arguments", "equations", "lower", "same_text"]
-
 Arguments = tuple[list[float], list[list[float]], list[list[float]]]
 
 

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.language import Value, values_of
 
-__all__ = ["SAMPLES", "waking_times"]
-
 SAMPLES = 4096  # a pulse that lies between two of them is missed
 REST = 1e-5  # of the whole range: smaller changes between two samples count as none
 LONG = SAMPLES // 100  # samples; a rest must be at least this long to count

@@ -25,8 +25,6 @@ from gms_fsm.systems.system import Body, Contact, System
 from gms_fsm.traces.failures import StepLimitError
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Bench", "BenchMotion", "ForcePath", "fastest_engine", "path", "run"]
-
 MOST_STEPS = 1_000_000
 # A run that needs more is stiff, or chatters; it is then made with an implicit method, whose steps
 # are slower and fewer.

@@ -17,8 +17,6 @@ from gms_fsm.phenomena.results import Curve, MeasuredNumber, Phenomenon, Phenome
 if TYPE_CHECKING:
     from gms_fsm.phenomena.specimens import Specimen
 
-__all__ = ["PHENOMENA", "RATES", "pulled"]
-
 RATES = (0.1 / 1.5, 0.2, 2 / 3, 2.0, 20 / 3, 50 / 1.5)  # of the force, in F_s per s
 TRAVEL = 10.0  # in F_s / sigma_0: a slider that has moved so far has broken away
 LONGEST = 8.0  # in F_s: where the search for the break-away ends

@@ -16,8 +16,6 @@ from gms_fsm.phenomena.results import Curve, MeasuredNumber, Phenomenon, Phenome
 if TYPE_CHECKING:
     from gms_fsm.phenomena.specimens import Specimen
 
-__all__ = ["PHENOMENA"]
-
 MEAN, SWING = 1.5, 1.0  # in v_s
 OMEGAS = (1.0, 10.0, 25.0)  # rad/s
 SETTLED = 1.0  # s

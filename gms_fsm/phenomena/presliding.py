@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from gms_fsm.phenomena.specimens import Specimen
     from gms_fsm.traces.trace import Trace
 
-__all__ = ["PHENOMENA", "nested"]
-
 # Forces in units of the break-away force, rates in units of it per s.
 RATE = 0.095
 OUTER = (0.95, -0.95, 0.95)

@@ -20,8 +20,6 @@ from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import ChartModel, Model, demonstration, is_model
 from gms_fsm.systems.system import Contact
 
-__all__ = ["Specimen", "specimens_of"]
-
 # Charts that do not take part, with the reason.
 UNFIT = {
     "backlash": "backlash is play with elastic flanks, not friction",

@@ -11,8 +11,6 @@ from gms_fsm.records.units import FACTORS, factor
 if TYPE_CHECKING:
     from gms_fsm.charts.parameters import FloatArray
 
-__all__ = ["LOADS", "QUANTITIES", "Column", "ColumnLike", "columns_of"]
-
 QUANTITIES = ("time", "position", "velocity", "force", "normal")
 LOADS = ("force", "normal")  # needed only in selected rows; motion is needed in between too
 

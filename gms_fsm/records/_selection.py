@@ -21,8 +21,6 @@ from gms_fsm.records._columns import LOADS, QUANTITIES
 from gms_fsm.records._table import Words
 from gms_fsm.records.units import convert_numbers
 
-__all__ = ["FEWEST", "MISSING", "Origin", "RecordRows", "gaps_in", "selected"]
-
 FEWEST = 5  # rows of a record
 GAP = 5.0  # time steps longer than this many median steps are reported
 MISSING = ("error", "drop", "interpolate")

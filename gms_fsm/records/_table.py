@@ -23,8 +23,6 @@ from gms_fsm.errors import ParameterError, RecordError, cut, shown
 from gms_fsm.records._columns import Column
 from gms_fsm.records.units import FACTORS, plain
 
-__all__ = ["Cells", "TextFormat", "Words", "read_cells"]
-
 LONGEST_LINE = 100_000  # characters
 LONGEST_FILE = 5_000_000  # rows
 SEARCHED = 200  # lines in which a header is looked for

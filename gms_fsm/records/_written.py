@@ -14,8 +14,6 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.arguments import checked_path
 from gms_fsm.foundation.files import output_folder, write_whole
 
-__all__ = ["HEADINGS", "write_csv"]
-
 # With the unit, as `Record.from_csv` names them in its examples.
 HEADINGS = {
     "time": "t_s",

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from gms_fsm.records.record import Record
 
-__all__ = ["only", "some_rows", "thinned"]
-
 
 def some_rows(record: Record, rows: NDArray[np.bool_] | slice) -> Record:
     """Return a record with some of its rows."""

@@ -28,8 +28,6 @@ from gms_fsm.traces.files.archives import member
 from integrators import hybrid
 from integrators.runners import states
 
-__all__ = ["Checkpointer"]
-
 _FORMAT = "gms-fsm checkpoint 2"
 
 

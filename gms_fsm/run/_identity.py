@@ -23,8 +23,6 @@ import numpy as np
 
 from gms_fsm.errors import SignalError
 
-__all__ = ["identity"]
-
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(...))
 _PATHS = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")]
 _PLACES = tuple(  # where libraries are installed

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["LOG", "LONGEST", "Sweep"]
-
 LOG = np.dtype(
     [
         ("run", "i8"),

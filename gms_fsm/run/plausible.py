@@ -12,8 +12,6 @@ from gms_fsm.run.problem import Problem
 from integrators import FOR_A_GUARD, FOR_A_SIGN, LET_GO, WAITING, hybrid, loop
 from integrators.runners import states
 
-__all__ = ["bounds_of", "check_ranges", "check_state", "last_edges", "last_states"]
-
 
 def last_states(start: Problem) -> NDArray[np.int64]:
     """Return of each machine the number of its last state."""

@@ -9,8 +9,6 @@ from gms_fsm.lowering.generated import standalone
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.ticks import clocks_of
 
-__all__ = ["printed"]
-
 FIRST, MOST = 1000, 128_000  # steps of a demonstration
 
 

@@ -33,8 +33,6 @@ from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import LoopOptions
 
-__all__ = ["STEPS_A_TICK", "Problem"]
-
 STEPS_A_TICK = 4  # after each tick the steps begin anew
 LATEST = 1e9  # s; one tick of a double is then 1e-7 s
 

@@ -17,8 +17,6 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import meant, one_of
 from gms_fsm.lowering.scales import Tolerance
 
-__all__ = ["ENGINES", "EVENTS", "MOST_STEPS", "OUTPUTS", "RunOptions", "SettingOptions", "Settings"]
-
 MOST_STEPS = 1_000_000  # default limit for a run
 ENGINES = ("machines", "ifelse", "compiled")
 EVENTS = ("located", "step", "held")

@@ -18,8 +18,6 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.systems.system import System
 from integrators import Ticks
 
-__all__ = ["EXACT", "Clock", "Units", "clocks_of", "in_units", "ticks_of"]
-
 MOST_TICKS = 10_000_000  # of a clock in a run: their times are kept
 MOST_CLOCKS = 62  # each is a bit of an int64
 EXACT = 2**53  # up to here doubles hold every whole number

@@ -22,9 +22,6 @@ from gms_fsm.language import (
     names_in,
 )
 
-__all__ = ["Text", "check_name", "check_text", "checked_numbers", "constant"]
-__all__ += ["derivative_free", "is_positive", "mapping_of", "several", "texts_of"]
-
 Text: TypeAlias = str | float  # an expression, or just a number
 
 

@@ -23,8 +23,6 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.display import displayed, short_repr
 
-__all__ = ["GMSParameters"]
-
 RULES = {each.name: each.rule for each in PARAMETERS}
 EVERY = {each.name: each for each in (*PARAMETERS, SIGMA_2, WEIGHTS)}  # in the order of checks
 

@@ -34,19 +34,6 @@ from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.systems.given import Text, texts_of
 from gms_fsm.systems.gms_parameters import GMSParameters
 
-__all__ = [
-    "GMS",
-    "ChartModel",
-    "LuGre",
-    "Model",
-    "check_bank",
-    "demonstration",
-    "is_model",
-    "parameter_names",
-    "parameters_of",
-    "with_values",
-]
-
 
 class Model(Protocol):
     """The interface of a friction model to a simulation."""

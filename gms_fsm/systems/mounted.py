@@ -17,8 +17,6 @@ from gms_fsm.systems.rigs import Prescribed, Rig
 from gms_fsm.systems.signals import Signal
 from gms_fsm.systems.system import System, system_of
 
-__all__ = ["Mounted", "Mounting", "Several", "arguments_of", "mounted", "mounted_alone", "shifted"]
-
 
 @dataclass(frozen=True)
 class Mounting:

@@ -22,9 +22,6 @@ from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.rigs import with_numbers as with_numbers_of_rig
 
-__all__ = ["NamedNumber", "column_name", "joined", "known_in", "law_of", "number_of", "numbers_of"]
-__all__ += ["parts_of", "value_in", "varied", "with_law", "with_numbers"]
-
 NUMBERS = "numbers"  # the owner of those that belong to no contact
 
 

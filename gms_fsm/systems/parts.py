@@ -25,8 +25,6 @@ from gms_fsm.systems.given import (
 )
 from gms_fsm.systems.models import Model, check_bank, is_model, with_values
 
-__all__ = ["LEAST_LOAD", "LOAD", "Body", "Contact", "Sampled", "loaded"]
-
 LOAD = "N"  # the input of a contact that multiplies its Stribeck curve
 LEAST_LOAD = 1e-9  # N; charts divide by thresholds
 

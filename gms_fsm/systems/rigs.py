@@ -17,8 +17,6 @@ from gms_fsm.foundation.display import short_repr
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring
 
-__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "TextRig", "with_numbers"]
-
 MASS = Parameter("mass", "kg", "> 0", per_element=False, meaning="mass")
 
 

@@ -17,8 +17,6 @@ from gms_fsm.systems.parts import Body
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
 
-__all__ = ["Spring", "added", "check_springs", "field_of", "on_ground", "pull"]
-__all__ += ["spring_forces", "summed"]
 
 ZERO, ONE = Number(0.0), Number(1.0)
 Terms = tuple[tuple[int, Value], ...]  # each with its sign

@@ -36,9 +36,6 @@ from gms_fsm.verification._prover import (
 from gms_fsm.verification._subject import ChartSubject
 from gms_fsm.verification.findings import Finding
 
-__all__ = ["after", "chattering", "determinism", "livelock", "moving", "moving_names"]
-__all__ += ["reachability", "stability", "ways"]
-
 MOST_CYCLES = 200  # cycles; a friction chart has a handful
 MOST_WAYS = 64  # alternatives per guard
 

@@ -38,21 +38,6 @@ from gms_fsm.language import (
 from gms_fsm.verification._subject import subject_of
 from gms_fsm.verification.findings import Check, Finding, Status, listed
 
-__all__ = [
-    "Answer",
-    "Dual",
-    "Duals",
-    "GaveUp",
-    "Prover",
-    "Reading",
-    "Undecided",
-    "by_example",
-    "enabled",
-    "names_of",
-    "refuted",
-    "shown",
-]
-
 PATIENCE = 5.0  # s, per query to z3
 HIGHEST_DEGREE = 16  # of a text as a polynomial; above it z3 runs out of memory before time
 # Preferred numbers in an example, so that it is easy to follow.

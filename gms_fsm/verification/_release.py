@@ -11,8 +11,6 @@ from gms_fsm.verification._checks import after, moving, moving_names, ways
 from gms_fsm.verification._prover import Answer, Prover, Reading, Undecided, names_of, refuted
 from gms_fsm.verification.findings import Finding
 
-__all__ = ["release"]
-
 
 def release(prover: Prover) -> Iterator[Finding]:
     """Check that whoever lets go of a lock is not pushed back into one at once."""

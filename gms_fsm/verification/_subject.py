@@ -16,8 +16,6 @@ from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.language import Binary, Condition, Name, Number, Value, names_in, renamed
 from gms_fsm.language.normal import renamed_in
 
-__all__ = ["ChartSubject", "subject_of"]
-
 ZERO = Number(0.0)
 AGE = "age"
 

@@ -10,8 +10,6 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.verification._subject import subject_of
 
-__all__ = ["CHECKS", "Check", "Finding", "Report", "Status", "listed"]
-
 Check: TypeAlias = Literal[
     "determinism", "livelock", "reachability", "chattering", "stability", "release"
 ]

@@ -34,8 +34,6 @@ from integrators.machine_code.tree import (
     TypedFunction,
 )
 
-__all__ = ["javascript_text", "library_text", "script_number", "tables_of"]
-
 RESERVED = """
     B F Infinity Math NaN arguments async await break case catch class const continue debugger
     default delete div do else enum eval export extends false finally for function if implements in

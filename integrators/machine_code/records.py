@@ -7,8 +7,6 @@ import typing
 from collections.abc import Iterable
 from typing import Any
 
-__all__ = ["FIELDS", "arrays_of", "numbers_in", "numbers_of", "put_numbers"]
-
 # Kinds of fields; truth values that are not in lists take a word, as integers do.
 FIELDS: dict[Any, str] = {
     float: "f", int: "i", bool: "i", list[int]: "i", list[list[int]]: "i", list[bool]: "b",

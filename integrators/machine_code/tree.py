@@ -10,40 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = [
-    "SIZES",
-    "Address",
-    "AddressOf",
-    "Assign",
-    "AssignMany",
-    "Break",
-    "Callback",
-    "Choose",
-    "Const",
-    "ConstantTable",
-    "Continue",
-    "Do",
-    "Expr",
-    "For",
-    "Foreign",
-    "Global",
-    "If",
-    "Invoke",
-    "Load",
-    "Local",
-    "Logic",
-    "Module",
-    "Op",
-    "Put",
-    "Return",
-    "Statement",
-    "TypedFunction",
-    "While",
-    "locals_in",
-    "may_write",
-    "parts_of",
-]
-
 SIZES = {"f": 8, "i": 8, "b": 1, "p": 8}  # bytes in memory
 
 

@@ -25,8 +25,6 @@ from integrators.loop import (
 from integrators.sliding import Functions, Held, flow_on, follow_on, look, margins_on
 from integrators.steps import ArcMotion, Now, Vector
 
-__all__ = ["LogColumns", "Recorded", "record"]
-
 
 class Recorded(NamedTuple):
     """Where the numbers are that a log stores for each machine."""

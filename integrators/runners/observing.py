@@ -11,8 +11,6 @@ from typing import Any
 from integrators.sliding import LIVE, Functions, Held, Sliding, look
 from integrators.steps import Vector
 
-__all__ = ["is_turn", "observe_beside", "observe_row", "observe_rows"]
-
 
 def observe_rows(
     functions: Functions,

@@ -14,8 +14,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["FREE", "each", "scalar"]
-
 FREE = 100_000  # calls of about a microsecond before a function is compiled
 
 

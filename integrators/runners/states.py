@@ -10,8 +10,6 @@ from integrators.loop import Buffers, Memory
 from integrators.machine_code.records import arrays_of, numbers_in, numbers_of, put_numbers
 from integrators.steps import Now
 
-__all__ = ["CLOCK", "COUNTS", "CURSOR", "beginning", "put_state", "state_of"]
-
 # Numbers of the loop's state, in the order in which files and arrays have them.
 CLOCK, COUNTS = tuple(numbers_of(Now)), tuple(numbers_of(Memory))
 CURSOR = ("row", "next_time", "next_knot", "steps")

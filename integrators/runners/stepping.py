@@ -38,8 +38,6 @@ from integrators.step_size import INFINITY
 from integrators.steps import ArcMotion, Vector
 from integrators.switching.sliding_bounds import let_go, look_back
 
-__all__ = ["FULL_LOG", "Clocks", "Sample", "next_tick", "restart", "step_to"]
-
 FULL_LOG = 21  # the log is full: empty it, and call again
 EXACT = 2.0**53  # up to here every whole number is a float
 

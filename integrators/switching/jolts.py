@@ -11,8 +11,6 @@ from typing import Any
 from integrators.advance import RunPlan, tick_at
 from integrators.steps import Now, Vector, time_of
 
-__all__ = ["JUMPED", "LET_GO", "arrived", "forget", "jolted", "moves_a_lock", "only_let_go"]
-
 # The marks. LET_GO: what held the velocity does not.
 JUMPED, LET_GO = 1, 2
 

@@ -7,8 +7,6 @@ from typing import Any, NamedTuple, Protocol
 
 from integrators.steps import Vector
 
-__all__ = ["Machines", "Switching"]
-
 
 class Switching(Protocol):
     """The interface of the machines to the loop."""

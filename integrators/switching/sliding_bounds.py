@@ -20,20 +20,6 @@ from integrators.sliding import (
 )
 from integrators.steps import Now, Vector, time_of
 
-__all__ = [
-    "crossed",
-    "drop",
-    "entangled",
-    "leave",
-    "let_go",
-    "let_go_in_time",
-    "look_back",
-    "own_edge",
-    "release",
-    "repels",
-    "seize",
-]
-
 ROUNDING = 2.0**-52  # of a sum, relative to its terms
 SMALLEST = 1e-300  # distance to move where all terms are 0
 NEGLIGIBLE, NEARLY = 0.01, 1e-12  # a jump: more than this of an absolute tolerance, and of y

@@ -19,8 +19,6 @@ from gms_fsm.language import ECMASCRIPT
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
 
-__all__ = ["load"]
-
 LARGEST = 10_000_000  # bytes: no chart needs as many
 AT_TOP = ("datamodel", "state")
 IN_STATE = ("onentry", "onexit", "transition")

@@ -11,8 +11,6 @@ from transitions.extensions.nesting import HierarchicalMachine
 from gms_fsm.charts.files.imported import ImportedEdge
 from gms_fsm.errors import ChartError
 
-__all__ = ["read"]
-
 HERE = "transitions machine"
 KINDS = {HierarchicalMachine: "its states can nest", AsyncMachine: "its callbacks are awaited"}
 MACHINE_CALLBACKS = (

@@ -14,8 +14,6 @@ from gms_fsm.foundation.arguments import unknown
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
 
-__all__ = ["GivenTexts", "ImportedEdge", "Texts", "built"]
-
 
 @dataclass(frozen=True)
 class ImportedEdge:

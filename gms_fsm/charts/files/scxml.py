@@ -14,8 +14,6 @@ from gms_fsm.language.normal import renamed_in
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
 
-__all__ = ["OURS", "SCXML", "STEP", "VALUES", "assignments", "conditions", "written_out"]
-
 SCXML = "http://www.w3.org/2005/07/scxml"
 OURS = "urn:gms-fsm:chart:1"  # the namespace of what SCXML has no word for
 VALUES = "values"  # the event that brings the present values of what comes from outside

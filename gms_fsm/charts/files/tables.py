@@ -24,8 +24,6 @@ from gms_fsm.foundation.tables import ONE, TABLE, Table, Texts, built, read_file
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
 
-__all__ = ["ChartTable", "load", "save"]
-
 
 class ParameterTable(Table):
     """A parameter with its unit and rule."""

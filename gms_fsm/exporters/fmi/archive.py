@@ -28,8 +28,6 @@ from gms_fsm.exporters.fmi.model import FmuModel
 from gms_fsm.exporters.fmi.units import base_units
 from gms_fsm.exporters.fmi.variables import FmuVariable, types_of, variables_of
 
-__all__ = ["Described", "fmu", "tag", "units_of"]
-
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 _SYSTEMS = {  # by operating system: folders of FMI 2, system of FMI 3, ending
     "Linux": ("linux", "linux", ".so"),

@@ -26,8 +26,6 @@ from integrators.runners import exchange, stepping
 from integrators.runners.compiled import INLINE, is_known
 from integrators.runners.exchange import Exchange
 
-__all__ = ["FmuArguments", "FmuModel", "both_of"]
-
 ENTRIES: Mapping[str, tuple[Any, str]] = {
     **STEPS,
     "restart": (stepping.restart, "buffers sample.clocks"),

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-__all__ = ["base_units"]
-
 _SYMBOLS: Mapping[str, Mapping[str, int]] = {
     "1": {},
     "m": {"m": 1},

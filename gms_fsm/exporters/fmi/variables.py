@@ -17,8 +17,6 @@ from gms_fsm.lowering.scales import scales_of_system
 from gms_fsm.run.problem import Problem
 from integrators.sliding import MOST_SLIDING
 
-__all__ = ["FmuVariable", "Indicator", "indicators_of", "nominals_of", "types_of", "variables_of"]
-
 # How far behind its crossing an indicator is zero, as a part of the scale of what is compared: far
 # above the rounding errors at the root, far below the tolerances (which are 1e-7 of it).
 BEHIND = 1e-11

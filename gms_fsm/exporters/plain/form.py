@@ -14,23 +14,6 @@ from gms_fsm.exporters.plain.element import NamedFriction
 from gms_fsm.exporters.plain.parts import Leaving, Let
 from gms_fsm.language import Binary, Name, Number, Value
 
-__all__ = [
-    "ByState",
-    "Declare",
-    "Enter",
-    "ForEach",
-    "Guards",
-    "Keep",
-    "PlainForm",
-    "Recall",
-    "SetTo",
-    "Statement",
-    "TwoWays",
-    "Verbatim",
-    "declared",
-    "plain_form",
-]
-
 
 @dataclass(frozen=True)
 class SetTo:

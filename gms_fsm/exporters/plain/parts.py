@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from gms_fsm.language import Comparison, Condition, Value, comparisons, names_in, split
 from gms_fsm.lowering.printing.plan import RoughCall
 
-__all__ = ["Constant", "Expression", "Leaving", "Let", "StateParts", "Variable"]
-
 
 @dataclass(frozen=True)
 class Constant:

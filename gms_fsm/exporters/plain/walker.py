@@ -21,8 +21,6 @@ from gms_fsm.exporters.plain.form import (
 )
 from gms_fsm.language import Dialect, Node, spell
 
-__all__ = ["Forms", "Walker", "indented"]
-
 
 @dataclass(frozen=True)
 class Forms:

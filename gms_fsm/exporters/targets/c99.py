@@ -17,8 +17,6 @@ from gms_fsm.formats import Format, register
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.systems.signals import Corners
 
-__all__ = ["c99"]
-
 PERIOD, PERIODS, ROWS = 10.0, 2, 2000  # s; of the record that a single friction is given
 FAR, FAST = 3.0, 100.0  # its amplitude, in deflections; or its speed, in those of the guards
 SHOWN = 1000  # rows of 1 ms, of a system without records

@@ -45,8 +45,6 @@ from integrators.runners.compiled import INLINE, is_known
 from integrators.runners.observing import observe_rows
 from integrators.runners.stepping import FULL_LOG
 
-__all__ = ["js"]
-
 GROWING = {
     "buffers.out.rows_t": "rows_t",
     "buffers.out.rows_y": "rows_y",

@@ -26,8 +26,6 @@ from gms_fsm.identification.problem.unknowns import Unknown
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import known_in, value_in, varied
 
-__all__ = ["Assessed", "Estimate", "assessed", "sorted_elements", "unassessed"]
-
 FIRST_STEP, LEAST_STEP, MOST_STEP = 1e-3, 1e-4, 0.1
 OPEN = "cannot be told"
 NO_INFLUENCE = "cannot be told: no influence on this record"

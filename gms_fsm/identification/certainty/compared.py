@@ -9,8 +9,6 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 
-__all__ = ["Choice", "ChoiceRow", "FitComparison", "score_of"]
-
 
 @dataclass(frozen=True)
 class ChoiceRow:

@@ -9,8 +9,6 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 
-__all__ = ["LIMIT", "Profile", "shown_interval"]
-
 LIMIT = 3.841  # 95 % quantile of chi-squared with one degree of freedom
 
 

@@ -18,8 +18,6 @@ from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from gms_fsm.identification.problem.experiment import Experiment, Point
 from gms_fsm.identification.problem.runs import ThreadPool
 
-__all__ = ["Region", "values_of", "walked"]
-
 POINTS = 10  # of a profile on each side
 BETTER = 1.0  # fall of the rise below that of the best point
 HIGHEST = 4.0 * LIMIT  # rises shown in a profile

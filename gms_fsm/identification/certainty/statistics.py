@@ -23,16 +23,6 @@ from scipy.special import stdtrit
 
 from gms_fsm.charts.parameters import FloatArray
 
-__all__ = [
-    "LOOSE",
-    "NEGLIGIBLE",
-    "WIDE",
-    "Certainty",
-    "certainty",
-    "correlation_time",
-    "phase_floor",
-]
-
 WINDOW = 5.0  # correlation times over which the autocorrelation is summed
 BLOCK = 10.0  # correlation times in a block of the sandwich
 FEWEST_BLOCKS = 12

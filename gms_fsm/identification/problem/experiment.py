@@ -28,8 +28,6 @@ from gms_fsm.identification.problem.unknowns import Coordinates, Unknown, values
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import value_in, varied
 
-__all__ = ["MASS", "NUISANCE", "Experiment", "Point", "split_unknowns", "value_of"]
-
 # Terms of the measurement that are no part of the model, with what they are.
 NUISANCE: Mapping[str, str] = {
     "offset": "constant error of the sensor",

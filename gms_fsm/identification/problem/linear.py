@@ -15,8 +15,6 @@ from gms_fsm.language import Condition, Value, derivative, names_in, renamed
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import known_in
 
-__all__ = ["linear_names"]
-
 
 def linear_names(subject: Mounted) -> tuple[str, ...]:
     """Return the names of the parameters that the friction force is linear in.

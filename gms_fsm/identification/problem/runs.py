@@ -33,20 +33,6 @@ from gms_fsm.systems.signals import Corners
 from gms_fsm.traces.observed import Observed
 from gms_fsm.traces.trace import Trace
 
-__all__ = [
-    "BEGINS",
-    "LOST",
-    "ComparedColumn",
-    "Course",
-    "Driver",
-    "FinishedRun",
-    "ThreadPool",
-    "course_of",
-    "driver_of",
-    "engine",
-    "with_numbers",
-]
-
 BEGINS = ("relaxed", "run in")
 COVERED = 0.9  # share of the travel that a run-in must cover
 NEAR = 0.02  # of the travel: where the motion is back at its start

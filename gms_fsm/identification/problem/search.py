@@ -18,8 +18,6 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.identification.problem.experiment import Experiment, Point
 from gms_fsm.identification.problem.runs import ThreadPool
 
-__all__ = ["SEARCHES", "Best", "de", "hops", "refine"]
-
 SEARCHES = ("hops", "local", "de")
 SPREAD = 16  # proposals about the start
 FURTHER = 0.7  # their distance from it, in coordinates (0.7 is a factor of 2)

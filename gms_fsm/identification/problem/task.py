@@ -27,8 +27,6 @@ from gms_fsm.records.record import Record
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import varied
 
-__all__ = ["FitOptions", "Task", "Window", "inside", "training_rows"]
-
 Window = tuple[float, float]
 COARSE_ROWS, FEWEST_ROWS = 3000, 300  # of all records together, and of each
 COARSE_RTOL, FINE_RTOL = 1e-6, 1e-9

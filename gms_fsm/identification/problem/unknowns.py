@@ -19,8 +19,6 @@ from gms_fsm.foundation.arguments import unknown
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import NamedNumber, joined, known_in, parts_of, value_in
 
-__all__ = ["Coordinates", "Unknown", "unknowns_of", "values_by_key"]
-
 SPAN = 1e3  # by default a positive number is searched from 1/1000 to 1000 times its start
 LEAST_EXCESS, MOST_EXCESS = 1e-3, 20.0  # of F_s over F_c, relative
 LINEAR_SPAN = 100.0  # times the start

@@ -11,8 +11,6 @@ from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import BankPlan, Computed, Gradient, ProgramPlan, gradient_of
 from gms_fsm.systems.reading.assembly import Bank, of
 
-__all__ = ["ForceWriter"]
-
 
 class ForceWriter(ProgramWriter):
     """Writes what contacts give out.

@@ -17,8 +17,6 @@ from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall
 from gms_fsm.systems.reading.assembly import of
 from integrators import LIVE
 
-__all__ = ["CodeLine", "ProgramWriter", "Signs", "indented", "one_line", "reads_of"]
-
 # Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
 # may be marked as live.
 Signs = Literal["held", "live", "given"]

@@ -7,8 +7,6 @@ from gms_fsm.lowering.printing.lines import CodeLine
 from gms_fsm.lowering.printing.locks import ENDLESS
 from integrators import LET_GO
 
-__all__ = ["LockFunctions"]
-
 
 class LockFunctions(ForceWriter):
     """Writes these functions; without locks they are empty."""

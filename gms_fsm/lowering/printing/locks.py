@@ -30,8 +30,6 @@ from gms_fsm.lowering.printing.plan import times
 from gms_fsm.systems.system import Body
 from integrators import JUMPED, LET_GO
 
-__all__ = ["ENDLESS", "Lock", "Locks"]
-
 # A pivot under this part of the diagonal is one that rounding has left of zero.
 DEPENDENT = 1e-9
 # A force without limit, in units of an impulse; squared it is still finite.

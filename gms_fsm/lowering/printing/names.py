@@ -10,8 +10,6 @@ from gms_fsm.language import Binary, Name, Node, product_power
 from gms_fsm.lowering.layout import sizes_of
 from gms_fsm.systems.reading.assembly import Assembly, Bank
 
-__all__ = ["QuantityNames", "computed_names", "names_of"]
-
 # Names that the text uses itself. What a user calls like one of them is called otherwise there.
 TEXT = frozenset(
     {"dS", "dy", "edge", "held", "i", "j", "len", "machine", "mode", "n", "nan", "out", "own", "p"}

@@ -34,9 +34,6 @@ from gms_fsm.lowering.printing.names import QuantityNames, names_of
 from gms_fsm.systems.reading.assembly import ONE, Assembly, Bank, of
 from gms_fsm.systems.signals import Corners, Function
 
-__all__ = ["BankPlan", "Computed", "Gradient", "Pair", "ProgramPlan", "RoughCall", "StateFlow"]
-__all__ += ["both_sides", "gradient_of", "plan_of", "times"]
-
 
 @dataclass(frozen=True)
 class RoughCall:

@@ -26,8 +26,6 @@ from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sid
 from gms_fsm.systems.reading.assembly import Bank, ContactEdge, of
 from integrators import FOR_A_GUARD, FOR_A_SIGN, JUMPED, LIVE, WAITING
 
-__all__ = ["FUNCTIONS", "python"]
-
 FUNCTIONS = (
     "flow",
     "flow_live",

@@ -26,8 +26,6 @@ from gms_fsm.language import (
 )
 from gms_fsm.systems.reading.texts import ByIdentity
 
-__all__ = ["HELPERS", "known", "nearer", "scale_text"]
-
 INF = math.inf
 # A velocity in a guard is a window to pass through, not a typical size of motion: its weight.
 # With rtol = 1e-6 the velocity is then accurate to 1e-5 v_c; coarser, creep just below v_c is off.

@@ -33,8 +33,6 @@ from integrators.steps import Now
 if TYPE_CHECKING:
     from integrators.runners.compiled import RecordArguments
 
-__all__ = ["CompiledRun", "example_of"]
-
 WORTH_A_LOOK = 500_000  # steps: machine code takes fewer in less time than it takes to look ahead
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
 

@@ -14,8 +14,6 @@ from gms_fsm.traces.between import interpolated
 from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Moment", "Place", "Recording", "scope_of"]
-
 Place = tuple[float, list[float], tuple[int, ...]]  # time, state and modes
 
 

@@ -10,8 +10,6 @@ from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.run.machines import ElementMachines, MachineEngine
 from gms_fsm.run.problem import Problem
 
-__all__ = ["engine_of", "own_machines"]
-
 
 def own_machines(given: Any, start: Problem) -> dict[str, ElementMachines]:
     """Return the user's machines by contact."""

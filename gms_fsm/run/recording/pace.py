@@ -22,8 +22,6 @@ from gms_fsm.run.recording.moment import Place, Recording
 from gms_fsm.traces.failures import StepLimitError
 from integrators import Arc, HybridError, hybrid
 
-__all__ = ["LATER", "PATIENCE", "check_pace"]
-
 PATIENCE = 5_000  # steps before the first check
 LATER = 4  # times as many steps: the next one
 POWERS = 12  # iterations of the power method

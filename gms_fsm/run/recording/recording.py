@@ -47,13 +47,6 @@ from integrators import (
     TooManySteps,
 )
 
-__all__ = [
-    "Recorder",
-    "check_end",
-    "explained",
-    "interference_error",
-]
-
 SHRINKING = 4  # intervals that must shrink alike before they are said to shrink without end
 STEEP = 0.01  # ratio of each second interval below which there are fewer, and fewer will do
 CLEAR = 1e6  # ticks of the clock: shorter intervals are known too roughly

@@ -27,17 +27,6 @@ from gms_fsm.systems.springs import Spring
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
 
-__all__ = [
-    "ContactTable",
-    "FunctionTable",
-    "ModelTable",
-    "SignalField",
-    "StribeckTable",
-    "SystemTable",
-    "signal_of",
-    "signal_table",
-]
-
 
 # --------------------------------------------------------------------------- signals
 class FormulaTable(Table):

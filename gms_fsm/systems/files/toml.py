@@ -38,8 +38,6 @@ from gms_fsm.systems.parts import Contact
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
 
-__all__ = ["FileTable", "SystemFile", "load", "save", "save_as"]
-
 KNOWN, OWN = "<known>", "<own>"
 FILE, HERE = "<file>", "<here>"
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from gms_fsm.language import Condition, Value
 from gms_fsm.systems.signals import Signal
 
-__all__ = ["ContactEdge", "Definition"]
-
 
 @dataclass(frozen=True)
 class Definition:

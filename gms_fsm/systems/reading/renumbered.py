@@ -12,8 +12,6 @@ from gms_fsm.systems.springs import check_springs
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
 
-__all__ = ["check_numbers", "renumbered"]
-
 
 def renumbered(read: Assembly, system: System) -> Assembly:
     """Return what was read with the numbers of another system of the same texts."""

@@ -13,8 +13,6 @@ from gms_fsm.foundation.display import full_text
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
 
-__all__ = ["ByIdentity", "texts_of_system"]
-
 T = TypeVar("T")
 
 

@@ -9,8 +9,6 @@ import numpy as np
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
 
-__all__ = ["numbers_of", "of"]
-
 
 def of(contact: str, name: str) -> str:
     """Return what a name of a contact is called in the trees."""

@@ -19,8 +19,6 @@ from integrators.machine_code.front_end.values import (
 from integrators.machine_code.front_end.work import Again, Work, as_kind
 from integrators.machine_code.tree import AddressOf, Const, Expr, Local, Return
 
-__all__ = ["bind", "give", "own"]
-
 RESULT = "return"  # as a name; no variable can be called so
 
 

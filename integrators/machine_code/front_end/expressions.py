@@ -41,11 +41,6 @@ from integrators.machine_code.tree import (
     parts_of,
 )
 
-__all__ = [
-    "HostFunction", "call", "condition", "contains", "in_order", "integer", "negated", "number",
-    "operation", "steady", "value",
-]  # fmt: skip
-
 # Called as the C library has it, which is exact. What is rounded there differs from one library to
 # the next; instead of exp, sin ... of `math` there are those of `integrators.elementary`.
 FOREIGN: Mapping[Any, str] = {math.nextafter: "nextafter"}

@@ -22,8 +22,6 @@ from integrators.machine_code.front_end.values import (
 from integrators.machine_code.front_end.work import Work
 from integrators.machine_code.tree import AddressOf, Const, Expr, Local, locals_in
 
-__all__ = ["passed_of", "take"]
-
 
 def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
     """Return what is passed for some arguments."""

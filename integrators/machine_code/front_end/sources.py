@@ -9,8 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Source", "TranslationError", "source_of"]
-
 
 class TranslationError(Exception):
     """A line that cannot be translated.

@@ -45,8 +45,6 @@ from integrators.machine_code.tree import (
     While,
 )
 
-__all__ = ["body"]
-
 
 def body(work: Work) -> tuple[Statement, ...]:
     """Translate the statements of a function."""

@@ -18,18 +18,6 @@ from integrators.machine_code.tree import (
     Op,
 )
 
-__all__ = [
-    "ArrayValue",
-    "FixedValue",
-    "NumberValue",
-    "RecordValue",
-    "Value",
-    "leaves",
-    "plus",
-    "substituted",
-    "times",
-]
-
 
 @dataclass(frozen=True)
 class NumberValue:

@@ -22,8 +22,6 @@ from integrators.machine_code.tree import (
     locals_in,
 )
 
-__all__ = ["Again", "Learnt", "Specialised", "Translating", "Work", "as_kind", "common"]
-
 RANK = "bif"  # truth values are integers, integers are floats
 
 

@@ -31,8 +31,6 @@ from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["BOUC_WEN", "CHARTS"]
-
 BOUC_WEN = Chart(
     name="Bouc-Wen hysteresis",
     inputs=("x", "v"),

@@ -21,8 +21,6 @@ from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "DAHL"]
-
 DAHL = Chart(
     name="Dahl's model",
     variables=("z",),

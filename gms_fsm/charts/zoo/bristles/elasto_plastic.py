@@ -27,8 +27,6 @@ from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 from gms_fsm.charts.stribeck import Stribeck
 
-__all__ = ["CHARTS", "ELASTO_PLASTIC"]
-
 ELASTO_PLASTIC = Chart(
     name="Elasto-plastic model",
     inputs=("v", "s"),

@@ -20,8 +20,6 @@ from gms_fsm.charts.gms import TABLE_I
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["BENCHMARK", "CHARTS", "LUGRE"]
-
 LUGRE = Chart(
     name="LuGre bristle",
     inputs=("v", "s"),

@@ -24,8 +24,6 @@ from gms_fsm.charts.registry import Demonstration, Entry
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.charts.zoo.bristles.lugre import LUGRE
 
-__all__ = ["CHARTS", "LUGRE_SIGMA1"]
-
 LUGRE_SIGMA1 = Chart(
     name="LuGre, damping falls with speed",
     inputs=LUGRE.inputs,

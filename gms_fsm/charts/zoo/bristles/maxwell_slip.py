@@ -22,8 +22,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "MAXWELL_SLIP"]
-
 MAXWELL_SLIP = Chart(
     name="Maxwell-slip element",
     variables=("z",),

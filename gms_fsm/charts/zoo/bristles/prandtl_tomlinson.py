@@ -30,8 +30,6 @@ from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "PRANDTL_TOMLINSON"]
-
 PRANDTL_TOMLINSON = Chart(
     name="Prandtl-Tomlinson model",
     inputs=("x", "v"),

@@ -24,8 +24,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "RESET_INTEGRATOR"]
-
 RESET_INTEGRATOR = Chart(
     name="Reset integrator",
     variables=("z",),

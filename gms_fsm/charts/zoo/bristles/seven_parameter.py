@@ -38,8 +38,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "SEVEN_PARAMETER"]
-
 LAG = {"v_l": "(v - v_l) / tau_L"}
 SEVEN_PARAMETER = Chart(
     name="Seven-parameter friction with a lag",

@@ -18,8 +18,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["BACKLASH", "CHARTS"]
-
 BACKLASH = Chart(
     name="Backlash with elastic flanks",
     inputs=("x", "v"),

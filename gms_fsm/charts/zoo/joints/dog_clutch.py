@@ -20,8 +20,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "DOG_CLUTCH"]
-
 DOG_CLUTCH = Chart(
     name="Dog clutch",
     inputs=("t",),

@@ -21,8 +21,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "END_STOP"]
-
 END_STOP = Chart(
     name="End stop with impacts and rest",
     inputs=("x", "v"),

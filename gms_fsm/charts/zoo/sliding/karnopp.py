@@ -24,8 +24,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import SIGMA_2, Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "KARNOPP"]
-
 KARNOPP = Chart(
     name="Karnopp's model",
     parameters=(

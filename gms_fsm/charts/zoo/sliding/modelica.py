@@ -29,8 +29,6 @@ from gms_fsm.charts.parameters import SIGMA_2, Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 from gms_fsm.charts.stribeck import stribeck_text
 
-__all__ = ["CHARTS", "MODELICA"]
-
 MODELICA = Chart(
     name="Modelica's friction modes",
     inputs=("v", "N"),

@@ -26,8 +26,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "PLANAR_COULOMB"]
-
 PLANAR_COULOMB = Chart(
     name="Coulomb friction in the plane",
     inputs=(),

@@ -44,8 +44,6 @@ from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "RATE_STATE"]
-
 # dpsi/dt = dtheta/dt / theta. The logarithm of a square does not depend on the sign that abs(v)
 # keeps until the crossing of v = 0 is located; 1e-300 keeps it finite at v = 0.
 FLOWS = {

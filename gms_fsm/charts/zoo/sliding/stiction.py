@@ -23,8 +23,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["CHARTS", "STICTION"]
-
 STICTION = Chart(
     name="Coulomb friction with stiction",
     parameters=(
