@@ -55,6 +55,30 @@ def handout(
 ) -> Path:
     """Write a model on one A4 page: chart, equations, parameters, and a hysteresis loop.
 
+    Parameters
+    ----------
+    model : Model
+        For example `GMS`, or a `ChartModel` of a chart of the zoo.
+    path : str or Path
+        Its ending selects the format, for example ``.pdf``. An existing file is replaced.
+    velocity : str, optional
+        v(t) of the loop in m/s, as an expression in t. By default x(t) is a sine with an amplitude
+        at which the model slips; a model that locks is pulled through a spring instead.
+    t_end : float, optional
+        End of that motion, s; needed with `velocity`.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ParameterError
+        If the chart does not fit on the page, or no suitable amplitude is found.
+    MissingExtraError
+        If matplotlib or Graphviz is not installed.
+
     Examples
     --------
     >>> import tempfile

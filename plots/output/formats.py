@@ -8,35 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from gms_fsm.formats import (
-    FORMATS,
-    INSTEAD,
-    Format,
-    Written,
-    chosen,
-    either,
-    endings,
-    files,
-    listed,
-    of,
-    register,
-    save,
-)
+from gms_fsm import formats
+from gms_fsm.formats import *  # noqa: F403
+from gms_fsm.formats import Format, Written, of, register
 
-__all__ = [
-    "FORMATS",
-    "INSTEAD",
-    "Format",
-    "Written",
-    "chosen",
-    "either",
-    "endings",
-    "files",
-    "listed",
-    "of",
-    "register",
-    "save",
-]
+__all__: list[str] = []
+__all__ += formats.__all__
 
 
 # --------------------------------------------------------------------------- writers
