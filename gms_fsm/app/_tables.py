@@ -29,19 +29,6 @@ from gms_fsm.systems.files.toml import SystemFile
 from gms_fsm.systems.rigs import PulledSlider
 from integrators import METHODS
 
-__all__ = [
-    "FitTable",
-    "PrescribedTable",
-    "PulledTable",
-    "RecordTable",
-    "RecordedTable",
-    "Scenario",
-    "SignalField",
-    "SignalRecordTable",
-    "SliderTable",
-    "SystemScenario",
-]
-
 # Tags of union members in pydantic's errors; no key of a file looks like these.
 RAMPS = "<ramps>"
 SCIPY_METHODS = ("RK45", "DOP853", "Radau", "BDF", "LSODA")

@@ -20,8 +20,6 @@ from gms_fsm.language import evaluate
 from gms_fsm.session.explain import holds
 from gms_fsm.session.session import KINDS, Breakpoint, Session
 
-__all__ = ["Commands"]
-
 
 class Commands:
     """Commands on a session.

@@ -15,8 +15,6 @@ from gms_fsm.session.session import Session
 from gms_fsm.session.tree.poking import Edits, pokeable
 from gms_fsm.systems.models import parameter_names
 
-__all__ = ["Elements", "completions", "integer", "read_edits", "spelled"]
-
 
 @dataclass(frozen=True)
 class Elements:

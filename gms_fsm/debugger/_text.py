@@ -10,22 +10,6 @@ from gms_fsm.debugger._over_time import Ribbons
 from gms_fsm.debugger._view import BranchView, ContactView, Screen, StateView
 from gms_fsm.session.session import Breakpoint
 
-__all__ = [
-    "DRAWN",
-    "PLAIN",
-    "WIDTH",
-    "Marks",
-    "branch_lines",
-    "breakpoint_text",
-    "chart_lines",
-    "ending_lines",
-    "progress",
-    "ribbon_parts",
-    "screen_lines",
-    "short",
-    "wrapped",
-]
-
 WIDTH = 80  # columns, where there is no terminal
 BAR = 8  # characters for |z|/s = 1, and more in a wide terminal
 

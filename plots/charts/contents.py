@@ -9,16 +9,6 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.language import Value
 from plots.charts.notation import ChartWriter
 
-__all__ = [
-    "Texts",
-    "chart_texts",
-    "edge_text",
-    "edges_by_priority",
-    "ids_of",
-    "lines_of",
-    "state_texts",
-]
-
 SAID_ONCE = 3  # states: where so many have the same force, it is said once for all of them
 
 Texts = list[tuple[str, list[str]]]  # kinds, such as during, each with its texts

@@ -16,7 +16,6 @@ from plots.charts.layers import LayerEdge, Point, layered
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
-__all__ = ["Drawing", "DrawnLine", "Node", "graph_drawing", "thirds"]
 
 MARKED = "2.6"  # points; width of highlighted lines
 DOT_SIZE = 8.0  # diameter of the dot at the default state

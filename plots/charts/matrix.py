@@ -15,7 +15,6 @@ from plots.charts.layers import Point
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
-__all__ = ["matrix_drawing"]
 
 WIDEST = 2 * 595.0 - 60.0  # points: two pages of A4, less the frame of a region
 PAD = 5.0  # between a label and the lines of the table

@@ -47,8 +47,6 @@ from plots.charts.notation import NOTATIONS, ChartWriter
 from plots.output.drawings import DrawnGraph
 from plots.style import CHART_THEMES, SANS, ChartTheme
 
-__all__ = ["ChartGraph", "statechart"]
-
 DIRECTIONS = {"TB": "top to bottom", "LR": "left to right"}
 
 FORMS = {

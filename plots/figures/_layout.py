@@ -26,8 +26,6 @@ from plots.style.matplotlib import (
 )
 from plots.style.presets import SCREEN, current, inches, pt, room, settings
 
-__all__ = ["fitted", "legend_above", "legend_below", "low", "narrow", "sheet"]
-
 NARROW = 6.0  # inches of the screen: a narrower figure has one column of panels
 TRIES = 7  # of a layout: folded titles move the panels
 

@@ -21,15 +21,6 @@ from plots.style.matplotlib import Axes, Figure, rc_context
 from plots.style.presets import font, pt, settings, to_scale
 from plots.views.window import Window
 
-__all__ = [
-    "FIG3_PHASES",
-    "compare_laws",
-    "figure_3",
-    "figure_4",
-    "held_residuals",
-    "residuals",
-]
-
 Floats = NDArray[np.float64]
 REACHED = "± s(v) away from reversals"
 ZOOM = 0.012  # half of the time of an inset, of the whole time

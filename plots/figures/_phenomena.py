@@ -20,8 +20,6 @@ from plots.style import (
 from plots.style.matplotlib import Axes, Figure, Rectangle, rc_context
 from plots.style.presets import font, inches, pt, room, settings, to_scale
 
-__all__ = ["phenomena_matrix", "phenomenon_figure"]
-
 COLUMNS, PANEL, NARROWEST = 4, (2.7, 2.15), 1.9  # in
 TOO_LARGE = 4.0  # times the median range: such a panel has its own axis
 # Verdicts differ by shape; the grounds only help to find them.

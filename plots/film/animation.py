@@ -23,8 +23,6 @@ from plots.panels.parts.selection import shown as shown_rows
 from plots.style import RC, Theme
 from plots.style.matplotlib import rc_context
 
-__all__ = ["animate"]
-
 FASTEST = 50  # frames per second: GIF delays are in 10 ms, and readers reject a delay of 10 ms
 USUAL = 200  # frames
 

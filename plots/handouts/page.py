@@ -34,8 +34,6 @@ from plots.style import INK, PALE_GREY, TEXT_GREY, presets
 from plots.style.mathtext import Formulas, formula
 from plots.style.matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
 
-__all__ = ["handout", "handout_figure"]
-
 PAGE = (595.276, 841.89)  # A4
 MARGIN, GAP = 40.0, 14.0
 INNER = PAGE[0] - 2 * MARGIN

@@ -10,8 +10,6 @@ import graphviz
 from gms_fsm.errors import OutputError
 from plots.output.graphviz import drawn
 
-__all__ = ["DrawnGraph", "MermaidText", "PlantUMLText", "Svg", "TikzText", "image", "svg_of"]
-
 
 def image(picture: str | bytes, words: str) -> str:
     """Return a picture as an image in HTML, no wider than the page.

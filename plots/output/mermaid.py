@@ -23,8 +23,6 @@ from plots.charts.labels import printable
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import MermaidText
 
-__all__ = ["mermaid"]
-
 # Allowed besides letters and digits of any script. Of the rest, ; and : end a text, # begins a
 # code, < and & are markup, %% begins a comment, {} and " have special meanings.
 PLAIN = " _.,=+*/|()[]-!^"

@@ -44,7 +44,6 @@ from plots.systems.block_diagram import block_diagram
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
-__all__ = ["figure_png", "shown"]
 
 MOST_ELEMENTS = 4  # a larger bank is shown as one element, because all have the same chart
 MOST_ROWS = 10  # of a table

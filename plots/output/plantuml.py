@@ -21,8 +21,6 @@ from plots.charts.labels import printable
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import PlantUMLText
 
-__all__ = ["plantuml"]
-
 PLAIN = " .,=+()"  # allowed besides letters and digits of any script
 
 

@@ -23,8 +23,6 @@ from plots.charts.labels import printable
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import TikzText
 
-__all__ = ["tikz"]
-
 HEAD = r"""% {name}
 % \usepackage[T1]{{fontenc}} \usepackage{{tikz}} \usetikzlibrary{{arrows.meta,shapes.multipart}}
 \begin{{tikzpicture}}[

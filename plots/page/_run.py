@@ -32,8 +32,6 @@ from plots.page._rows import PageRows
 from plots.page._trees import Stored, tree_of
 from plots.views.plane import Plane, linear_threshold, plane_axes
 
-__all__ = ["stored_run"]
-
 FORCE = "F"  # names of forces begin like this; they are shown, not read by guards, in seven digits
 
 

@@ -47,8 +47,6 @@ from plots.page.chart import chart_svg
 from plots.style import CHART_THEMES, ELEMENT_STEPS, PAGE_THEMES
 from plots.views.window import window_of
 
-__all__ = ["Replay", "page_data", "page_html", "replay", "replay_html", "write_replay"]
-
 # In this order: later ones use what earlier ones define.
 SCRIPTS = (
     "js/base.js",

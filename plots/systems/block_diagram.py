@@ -42,8 +42,6 @@ from plots.systems.wires import (
     sides,
 )
 
-__all__ = ["block_diagram"]
-
 MOST_WIRES = 4  # elements; more are drawn as vectors
 
 # Columns from left to right and rows of the first element, in points; y points up.

@@ -28,8 +28,6 @@ from plots.style import (
 from plots.style.matplotlib import Artist, Axes, FancyArrowPatch, Figure, Rectangle, rc_context
 from plots.systems.mechanical_symbols import damper_points, spring_points
 
-__all__ = ["elements_at", "elements_figure"]
-
 ROW = 1.35  # height of one element
 WALL = 6.0  # position of the slider's face, to which springs and dampers are attached
 REST = 3.0  # length of a spring at z = 0

@@ -25,8 +25,6 @@ from plots.style.matplotlib import (
     rc_context,
 )
 
-__all__ = ["UNIT", "Pen", "damper_points", "formula", "spring_points", "width"]
-
 Point = tuple[float, float]
 Points = npt.NDArray[np.float64]
 

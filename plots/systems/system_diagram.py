@@ -42,8 +42,6 @@ from plots.style import INK, MONO, PANEL, PAPER, SANS, TEXT_GREY
 from plots.systems.system_routes import Box, DiagramSheet, Join, routed
 from plots.systems.wires import PLACED, caption, draw_wire, joint, position, sides
 
-__all__ = ["signal_text", "system_diagram"]
-
 # Column, corners, fill and width of the outline of each kind.
 LOOKS = {
     "signal": (0, "rounded,filled", PAPER, 1.1),

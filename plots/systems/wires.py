@@ -12,8 +12,6 @@ import graphviz
 
 from plots.style import INK
 
-__all__ = ["PLACED", "THICK", "THIN", "Point", "caption", "draw_wire", "joint", "position", "sides"]
-
 Point = tuple[float, float]
 
 THIN, THICK = 1.1, 3.0  # lines of one value and of several

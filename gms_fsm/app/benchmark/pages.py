@@ -9,8 +9,6 @@ from pathlib import Path
 from gms_fsm.app.benchmark.card import Card, Row, Section
 from gms_fsm.foundation.files import output_folder, write_whole
 
-__all__ = ["FILES", "page", "table", "write"]
-
 FILES = ("benchmark.md", "benchmark.json")
 COMMAND = "gms-fsm benchmark --data FOLDER -o FOLDER"
 NOTES = {

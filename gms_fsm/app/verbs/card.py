@@ -14,8 +14,6 @@ from gms_fsm.app.verbs.options import INTERRUPTED
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-__all__ = ["benchmark_command"]
-
 
 def benchmark_command(
     data: Annotated[

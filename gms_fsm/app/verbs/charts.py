@@ -21,15 +21,6 @@ if TYPE_CHECKING:
 
 SECONDS = 10.0  # of a demonstration of a system, whose file has no [run]
 
-__all__ = [
-    "blocks_command",
-    "chart_command",
-    "check_command",
-    "code_command",
-    "handout_command",
-    "no_contact",
-]
-
 
 class RigName(enum.StrEnum):
     """Rig that the friction acts on."""

@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
-__all__ = ["error_line", "messages", "note", "progress_bars"]
-
 
 def messages(**options: Any) -> Console:
     """Return the console for messages and progress, separate from the results."""

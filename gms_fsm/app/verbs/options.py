@@ -7,19 +7,6 @@ from typing import Annotated
 
 import typer
 
-__all__ = [
-    "INTERRUPTED",
-    "ChartName",
-    "ContactName",
-    "End",
-    "Law",
-    "Overrides",
-    "PresetName",
-    "ScenarioFile",
-    "Start",
-    "TraceFile",
-]
-
 INTERRUPTED = 130  # the conventional exit code after Ctrl-C
 
 ScenarioFile = Annotated[

@@ -18,16 +18,6 @@ from gms_fsm.app.verbs.options import INTERRUPTED, ContactName, Overrides, Prese
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-__all__ = [
-    "debug_command",
-    "lesson_command",
-    "paper_command",
-    "phenomena_command",
-    "run_command",
-    "schema_command",
-    "sweep_command",
-]
-
 
 class EngineName(enum.StrEnum):
     """Engine that executes the chart."""

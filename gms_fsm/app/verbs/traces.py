@@ -16,8 +16,6 @@ from gms_fsm.foundation.files import output_folder, refuse_input
 if TYPE_CHECKING:
     from gms_fsm import Chart, Trace
 
-__all__ = ["animate_command", "plot_command", "replay_command"]
-
 
 def _of_contact(path: Path, contact: str) -> Trace:
     """Return a saved run as one contact sees it: the one chosen, or the only one."""

@@ -33,8 +33,6 @@ from gms_fsm.debugger.tui._spans import DARK, LIGHT, PanelLine, line, painted
 from gms_fsm.debugger.tui._widgets import Help, Keys, Panel, Prompt, Ribbon
 from gms_fsm.session.session import Session
 
-__all__ = ["FullScreen"]
-
 GROUNDS = {
     "gms-dark": Theme(
         "gms-dark", primary="#6cc4f5", background="#10151b", surface="#171d25", dark=True

@@ -11,8 +11,6 @@ from gms_fsm.debugger._view import ContactView, Screen
 from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line, state_role
 from gms_fsm.foundation.quantities import quantity, sparkline
 
-__all__ = ["RIBBON", "axis", "curve_rows", "labels", "ranges", "ribbon_rows"]
-
 RIBBON = "─▓═┼▒┄"  # one mark per state, as at the line prompt
 UNITS = {"v": "m/s", "F": "N"}
 

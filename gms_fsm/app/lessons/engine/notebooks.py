@@ -20,8 +20,6 @@ from typing import Any
 from gms_fsm.app.lessons import lesson
 from gms_fsm.foundation.files import output_folder, write_whole
 
-__all__ = ["cells_of", "composed", "notebook", "write_notebook"]
-
 TEMPLATE = Template(Path(__file__).with_name("notebook.md").read_text(encoding="utf-8"))
 NEW = "<!-- a new cell -->\n"
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
