@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Unpack
 
 import numpy as np
 
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import MANY, VECTOR_ROWS, Artists, lanes, time_axis
-from plots.panels.parts.selection import checked_elements, checked_window
+from plots.panels.parts.selection import PartOptions, selected
 from plots.style import INK, PAPER, state_look
 from plots.style.matplotlib import Axes, RendererBase, Text
 from plots.style.presets import font, pt, to_scale
@@ -73,13 +74,7 @@ def spans(trace: Trace, i: int, window: Window) -> Iterator[tuple[str, float, fl
             yield str(name), float(begin), float(end)
 
 
-def ribbons(
-    ax: Axes,
-    trace: Trace,
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-) -> Artists:
+def ribbons(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     """Draw the active state of every element as a ribbon, as in a logic analyser.
 
     Parameters
@@ -88,10 +83,8 @@ def ribbons(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Which elements, counted from 0; by default all.
+    **part
+        ``window`` and ``elements``.
 
     Returns
     -------
@@ -100,8 +93,8 @@ def ribbons(
         of more than six elements; then a band for each interval in which a sign is held, for
         example on v = 0, or in which an element is between two states.
     """
-    chosen = checked_elements(trace, elements)
-    begin, end = checked_window(trace, window)
+    this = selected(trace, **part)
+    chosen, (begin, end) = this.elements, this.window
     states = [state.name for state in trace.model.chart.states]
     # Between many narrow rows there is no room for thicker outlines.
     look = to_scale if len(chosen) <= MANY else dict
