@@ -8,8 +8,10 @@ process can lock was left behind by a killed process, and is removed.
 from __future__ import annotations
 
 import contextlib
+import csv
 import errno
 import hashlib
+import io
 import json
 import os
 import re
@@ -27,12 +29,14 @@ if sys.platform != "win32":  # on Windows nothing is locked, and no leftovers ar
     import fcntl
 
 __all__ = [
+    "csv_text",
     "folder_lock",
     "inside",
     "leftovers",
     "output_folder",
     "refuse_input",
     "remove_leftovers",
+    "write_text",
     "write_together",
     "write_whole",
 ]
@@ -132,6 +136,18 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
     """Write a file atomically through a temporary one: it is the old file or the new one."""
     write_together({path: write})
     return path
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text as `write_whole` does."""
+    return write_whole(path, lambda file: file.write(text.encode()))
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as the text of a CSV file."""
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def write_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:

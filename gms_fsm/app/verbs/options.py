@@ -16,6 +16,7 @@ ScenarioFile = Annotated[
         show_default=False,
     ),
 ]
+OutputFolder = Annotated[Path, typer.Option("--output", "-o", help="Output folder.")]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", help="Override a key, for example --set model.law=published."),
