@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gms_fsm.traces.trace import Trace
 from plots.panels._many import counted_away, place_of
 from plots.panels.parts.axes import VECTOR_ROWS, Artists, draw_curve, log_axis
-from plots.panels.parts.selection import Part, PartOptions, scaled, selected
+from plots.panels.parts.selection import PartOptions, RunPart, scaled, selected
 from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
 from plots.style.matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots.style.presets import pt, to_scale
@@ -30,7 +30,7 @@ OVERLAP, REPEATED = 0.22, 0.7  # inches between arrows, and between those of the
 SHAFT = 0.05  # inches of the path whose direction an arrow has
 
 
-def _by_slipping(ax: Axes, x: NDArray[np.float64], part: Part) -> LineCollection:
+def _by_slipping(ax: Axes, x: NDArray[np.float64], part: RunPart) -> LineCollection:
     """Draw F against x in pieces, coloured by how many elements have left their default state."""
     away = counted_away(part.rows, part.elements)
     points = np.column_stack([x, part.rows.F])

@@ -11,13 +11,14 @@ from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace, check_trace
 from plots.panels.parts.axes import (
     Artists,
+    beside,
     draw_curve,
     element_curves,
     element_look,
     no_threshold,
     time_axis,
 )
-from plots.panels.parts.selection import Part, PartOptions, has_threshold, is_number, selected
+from plots.panels.parts.selection import PartOptions, RunPart, has_threshold, is_number, selected
 from plots.style import INK, LINE_GREY, PAPER
 from plots.style.matplotlib import Axes
 from plots.style.presets import font, pt
@@ -85,7 +86,7 @@ def cascade_window(
     return max(first, float(group[0]) - pad), min(last, float(group[-1]) + pad)
 
 
-def _in_window(part: Part) -> Any:
+def _in_window(part: RunPart) -> Any:
     """Return the log's records of a part of a run."""
     log, (begin, end) = part.run.transitions, part.window
     return log[(log.t >= begin) & (log.t <= end) & np.isin(log.element, part.elements)]
@@ -127,21 +128,11 @@ def marks(ax: Axes, trace: Trace, *, labels: bool = True, **part: Unpack[PartOpt
         while len(groups) > 1 and _meet(groups[-2], groups[-1], letter):
             after = groups.pop()
             groups[-1] = [groups[-1][0] + after[0], groups[-1][1], after[2]]
-    for members, t0, t1 in groups:
-        drawn.append(
-            ax.annotate(
-                _joined(members),
-                ((t0 + t1) / 2, 1.0),
-                (0, 2),
-                xycoords=ax.get_xaxis_transform(),
-                textcoords="offset points",
-                ha="center",
-                va="bottom",
-                fontsize=font(8),
-                color=INK,
-            )
-        )
-    return drawn
+    top = ax.get_xaxis_transform()
+    return drawn + [
+        beside(ax, _joined(members), ((t0 + t1) / 2, 1.0), (0, 2), xycoords=top)
+        for members, t0, t1 in groups
+    ]
 
 
 def _joined(members: list[int]) -> str:

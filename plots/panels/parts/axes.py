@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
-from plots.panels.parts.selection import Part, scaled
-from plots.style import ELEMENT_DASHES, TEXT_GREY, element_colour
+from plots.panels.parts.selection import RunPart, scaled
+from plots.style import ELEMENT_DASHES, INK, TEXT_GREY, element_colour
 from plots.style.matplotlib import Artist, Axes, MaxNLocator
 from plots.style.presets import font
 
@@ -43,7 +43,7 @@ def draw_curve(ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], **look:
     return list(ax.plot(x, y, rasterized=x.size > VECTOR_ROWS, **look))
 
 
-def element_curves(ax: Axes, part: Part, values: NDArray[np.float64], label: str) -> Artists:
+def element_curves(ax: Axes, part: RunPart, values: NDArray[np.float64], label: str) -> Artists:
     """Draw a column of values for each element over time; labels have its number from 1."""
     lines: Artists = []
     for i in part.elements:
@@ -88,6 +88,14 @@ def lanes(ax: Axes, elements: Sequence[int]) -> None:
         yticklabels=[f"E{i + 1}" for i in elements],
     )
     ax.tick_params(axis="y", length=0, labelsize=font(9 if len(elements) <= MANY else 8))
+
+
+def beside(
+    ax: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **look: Any
+) -> Artist:
+    """Write a text at a distance from a point, in points; by default above it."""
+    plain: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": font(8), "color": INK}
+    return ax.annotate(text, at, shift, textcoords="offset points", **(plain | look))
 
 
 def no_threshold(ax: Axes, trace: Trace) -> Artist:

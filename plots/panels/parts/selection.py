@@ -47,7 +47,7 @@ class PartOptions(TypedDict, total=False):
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class RunPart:
     """The part of a run that a panel shows: elements, counted from 0, in a time interval."""
 
     run: Trace
@@ -67,10 +67,10 @@ class Part:
 
 def selected(
     trace: Trace, window: Window | None = None, elements: Sequence[int] | None = None
-) -> Part:
+) -> RunPart:
     """Return the part of a run that the options of a panel choose."""
     check_trace(trace)
-    return Part(trace, window, checked_elements(trace, elements))
+    return RunPart(trace, window, checked_elements(trace, elements))
 
 
 def shown(trace: Trace, window: Window | None = None) -> Trace:
