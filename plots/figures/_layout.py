@@ -207,7 +207,8 @@ def _above_legend(ax: Axes, renderer: RendererBase) -> bool:
         lettered(ax, ax.title.get_text(), title.get_text(), pad=pad)
     else:
         ax.set_title(title.get_text(), pad=pad)
-    return True
+    # A letter that reaches below the line meets the legend there, too.
+    return abs(title.get_window_extent(renderer).y0 - own.y0) > 0.5
 
 
 def legend_below(
