@@ -208,7 +208,7 @@ def _above_legend(ax: Axes, renderer: RendererBase) -> bool:
     else:
         ax.set_title(title.get_text(), pad=pad)
     # A letter that reaches below the line meets the legend there, too.
-    return abs(title.get_window_extent(renderer).y0 - own.y0) > 0.5
+    return bool(abs(title.get_window_extent(renderer).y0 - own.y0) > 0.5)
 
 
 def legend_below(
