@@ -7,8 +7,8 @@ models, systems and runs is made by `plots.output.notebook`; they need no import
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from gms_fsm.foundation.extras import require
@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from gms_fsm.systems.rigs import Rig
     from gms_fsm.systems.system import System
     from gms_fsm.traces.trace import Trace
-    from gms_fsm.verification.prove import Report
+    from plots.figures import landscape, phase, unfold
+    from plots.film.animation import animate
+    from plots.handouts.page import handout
     from plots.widget.explorer import Explorer
 
 __all__ = [
@@ -51,33 +53,24 @@ __all__ = [
     "write_replay",
 ]
 
+# What needs matplotlib is imported when it is asked for.
+_LATE = {
+    "animate": "film.animation",
+    "handout": "handouts.page",
+    "landscape": "figures",
+    "phase": "figures",
+    "unfold": "figures",
+}
 
-def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
-    """Make a film of a run, slowed at transitions; see `plots.film.animation.animate`.
 
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-    path : str or Path
-        Its file ending selects the format, for example ``.gif``.
-    **options
-        Options of `plots.film.animation.animate`: elements, frames, t_start, t_end, fps, notation,
-        theme.
+def __getattr__(name: str) -> Any:
+    if name not in _LATE:
+        raise AttributeError(f"module 'plots' has no attribute {name!r}")
+    return getattr(import_module(f"plots.{_LATE[name]}"), name)
 
-    Returns
-    -------
-    Path
-        The file.
 
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib or Pillow is not installed.
-    """
-    from plots.film import animation
-
-    return animation.animate(trace, path, **options)
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LATE})
 
 
 def explore(
@@ -141,37 +134,6 @@ def explore(
     return Explorer(model, rig, t_end, sliders=sliders, height=height, **options)
 
 
-def handout(model: Model, path: str | Path, **options: Any) -> Path:
-    """Write a model on one A4 page: chart, equations, parameters, and a hysteresis loop.
-
-    Parameters
-    ----------
-    model : Model
-        For example `GMS`, or a `ChartModel` of a chart of the zoo.
-    path : str or Path
-        Its ending selects the format, for example ``.pdf``. An existing file is replaced.
-    **options
-        ``velocity``, v(t) of the loop in m/s as an expression in t, and ``t_end``, its end in s. By
-        default x(t) is a sine with an amplitude at which the model slips; a model that locks is
-        pulled through a spring instead.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    ParameterError
-        If the chart does not fit on the page, or no suitable amplitude is found.
-    MissingExtraError
-        If matplotlib or Graphviz is not installed.
-    """
-    from plots.handouts import page
-
-    return page.handout(model, path, **options)
-
-
 def overview(trace: Trace, title: str = "") -> Figure:
     """Draw an overview of a run; see `plots.figures.overview`.
 
@@ -195,123 +157,3 @@ def overview(trace: Trace, title: str = "") -> Figure:
     from plots import figures
 
     return figures.overview(trace, title=title)
-
-
-def landscape(
-    trace: Trace,
-    element: int,
-    *,
-    row: int = -1,
-    t: float | None = None,
-    window: tuple[float, float] | None = None,
-    checks: Report | None = None,
-    title: str = "",
-) -> Figure:
-    """Draw the guards of an element over v and z, and how far each is; `plots.figures.landscape`.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-    element : int
-        Which element, counted from 0.
-    row : int
-        Row of the run; negative rows count from the end.
-    t : float, optional
-        Instead of a row: the last row at or before this time, s.
-    window : (float, float), optional
-        Time interval in which the path is drawn, s.
-    checks : Report, optional
-        From `gms_fsm.prove`: its counterexamples are drawn as pins.
-    title : str
-        Of the figure.
-
-    Returns
-    -------
-    Figure
-        A matplotlib figure.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    """
-    from plots import figures
-
-    return figures.landscape(
-        trace, element, row=row, t=t, window=window, checks=checks, title=title
-    )
-
-
-def unfold(
-    trace: Trace,
-    t0: float,
-    t1: float,
-    *,
-    elements: Sequence[int] | None = None,
-    title: str = "",
-) -> Figure:
-    """Draw the micro-steps in a time interval in equal columns; see `plots.figures.unfold`.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-    t0, t1 : float
-        The interval, s; both ends belong to it.
-    elements : sequence of int, optional
-        Which elements, counted from 0; by default all.
-    title : str
-        Of the figure.
-
-    Returns
-    -------
-    Figure
-        A matplotlib figure.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    """
-    from plots import figures
-
-    return figures.unfold(trace, t0, t1, elements=elements, title=title)
-
-
-def phase(
-    trace: Trace,
-    *,
-    row: int | None = None,
-    window: tuple[float, float] | None = None,
-    elements: Sequence[int] | None = None,
-    title: str = "",
-) -> Figure:
-    """Draw F over x and over v, with the direction of time; see `plots.figures.phase`.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-    row : int, optional
-        Row of the dot; by default the last one in the window.
-    window : (float, float), optional
-        Time interval to show, s; by default the whole run.
-    elements : sequence of int, optional
-        Elements that are counted by the colour, from 0; by default all.
-    title : str
-        Of the figure.
-
-    Returns
-    -------
-    Figure
-        A matplotlib figure.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    """
-    from plots import figures
-
-    return figures.phase(trace, row=row, window=window, elements=elements, title=title)

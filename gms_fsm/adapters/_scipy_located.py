@@ -15,8 +15,6 @@ from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
 from integrators import Arc, Firing, Held, HybridError, Livelock, NotFinite, hybrid, look
 
-__all__ = ["Located"]
-
 NUDGE = 1e-6  # of a component of y, to see how the velocities depend on it
 
 

@@ -18,8 +18,6 @@ from gms_fsm.errors import ParameterError, shown
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
-__all__ = ["Caller", "Carried", "ContactSwitch", "Solution", "SteppedFriction", "numbers"]
-
 
 class ContactSwitch(NamedTuple):
     """An edge taken by an element.

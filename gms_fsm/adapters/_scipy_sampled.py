@@ -15,8 +15,6 @@ from gms_fsm.coupling.stepping import FrictionState
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.failures import SimulationError
 
-__all__ = ["Solver", "sampled", "samples"]
-
 MOST_SAMPLES = 10_000_000  # their times are kept
 ROUNDING = 1e-9  # of a sample: a last one shorter than this is none
 

@@ -26,6 +26,7 @@ from gms_fsm.coupling.bank import FrictionBank
 from gms_fsm.coupling.driven import Driven
 from gms_fsm.coupling.stepping import FrictionState
 from gms_fsm.errors import ParameterError, shown
+from gms_fsm.foundation.arguments import checked_integer
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.run.settings import MOST_STEPS
 from gms_fsm.systems.models import Model
@@ -142,7 +143,7 @@ def solve_ivp(
             rtol,
             _of_host(scales, atol, len(y)),
             limit,
-            _count(max_steps),
+            checked_integer("max_steps", max_steps, 1),
         )
         return sampled(caller, stepped, y, samples(start, end, sample), how)
     carried = _carried(friction, start, initial)
@@ -156,7 +157,7 @@ def solve_ivp(
         atol=_tolerances(driven, rtol, atol, len(y)),
         max_step=limit,
         time_scale=driven.start.options.time_scale,
-        max_steps=_count(max_steps),
+        max_steps=checked_integer("max_steps", max_steps, 1),
         located=True,
         times=None if t_eval is None else _wanted(t_eval, start, end),
     )
@@ -239,14 +240,6 @@ def _span(t_span: Sequence[float]) -> tuple[float, float]:
             f"t_span ends at {end!r} s and begins at {start!r} s", advice="the end must be later"
         )
     return start, end
-
-
-def _count(max_steps: int) -> int:
-    if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
-        raise ParameterError(
-            "it must be an integer, at least 1", place="max_steps", value=max_steps
-        )
-    return max_steps
 
 
 def _wanted(t_eval: ArrayLike, start: float, end: float) -> list[float]:

@@ -19,8 +19,6 @@ from gms_fsm.foundation.toml import parsed
 from gms_fsm.systems.models import ChartModel, Model
 from gms_fsm.systems.system import System, system_of
 
-__all__ = ["OwnFile", "any_model", "domain_of", "own_file"]
-
 
 @dataclass(frozen=True)
 class OwnFile:

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import scipy.integrate
 from pydantic import (
     AfterValidator,
     Discriminator,
     Field,
-    GetCoreSchemaHandler,
     PositiveFloat,
     Tag,
     model_validator,
 )
-from pydantic_core import CoreSchema, PydanticKnownError
-from pydantic_core.core_schema import literal_schema
+from pydantic_core import PydanticKnownError
 
 from gms_fsm.foundation.tables import LIST, ONE, TABLE, TEXT, Numbers, Table
 from gms_fsm.identification.problem.task import FitOptions
@@ -28,19 +26,6 @@ from gms_fsm.systems.files.model_tables import ModelTable
 from gms_fsm.systems.files.toml import SystemFile
 from gms_fsm.systems.rigs import PulledSlider
 from integrators import METHODS
-
-__all__ = [
-    "FitTable",
-    "PrescribedTable",
-    "PulledTable",
-    "RecordTable",
-    "RecordedTable",
-    "Scenario",
-    "SignalField",
-    "SignalRecordTable",
-    "SliderTable",
-    "SystemScenario",
-]
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
 RAMPS = "<ramps>"
@@ -82,19 +67,10 @@ class TextTable(Table):
     def read(self, path: Path, columns: Mapping[str, Column]) -> Record:
         """Return the record with these columns and the time."""
         given: dict[str, Any] = dict.fromkeys(("position", "velocity", "force", "normal"))
+        options = ("where", "missing", "delimiter", "decimal", "comment", "header", "encoding")
+        given |= {name: getattr(self, name) for name in options}
         given |= columns
-        return Record.from_csv(
-            path,
-            time=self.time.build(),
-            where=self.where,
-            missing=self.missing,
-            delimiter=self.delimiter,
-            decimal=self.decimal,
-            comment=self.comment,
-            header=self.header,
-            encoding=self.encoding,
-            **given,
-        )
+        return Record.from_csv(path, time=self.time.build(), **given)
 
 
 class RecordTable(TextTable):
@@ -172,24 +148,13 @@ class PulledTable(Table):
 
 
 # --------------------------------------------------------------------------- the run
-class OneOf:
-    """Restricts a string to given values, in a file and in its schema.
-
-    Parameters
-    ----------
-    *choices : str
-        The allowed values.
-    """
-
-    def __init__(self, *choices: str) -> None:
-        self.choices = choices
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Return the schema used by pydantic."""
-        return literal_schema(list(self.choices))
-
+if TYPE_CHECKING:  # the names are those of tables elsewhere
+    MethodName: TypeAlias = str
+    EventsName: TypeAlias = str
+    EngineName: TypeAlias = str
+else:
+    MethodName = Literal[(*METHODS, *SCIPY_METHODS)]
+    EventsName, EngineName = Literal[tuple(EVENTS)], Literal[tuple(ENGINES)]
 
 _DEFAULT = Settings()
 
@@ -199,7 +164,7 @@ class RunTable(Table):
 
     t_end: float | None = Field(None, description="s; by default the end of the record")
     t_start: float | None = Field(None, description="s; by default 0, or the start of the record")
-    method: Annotated[str, OneOf(*METHODS, *SCIPY_METHODS)] = _DEFAULT.method_name
+    method: MethodName = _DEFAULT.method_name
     step: float | None = Field(_DEFAULT.step, gt=0, description="fixed step, s")
     rtol: float = Field(_DEFAULT.rtol, gt=0)
     atol: PositiveFloat | dict[str, PositiveFloat | list[PositiveFloat]] | None = Field(
@@ -209,8 +174,8 @@ class RunTable(Table):
     )
     max_step: float | None = Field(None, gt=0, description="s; no limit by default")
     max_steps: int = Field(_DEFAULT.max_steps, ge=1, description="error if a run needs more")
-    events: Annotated[str, OneOf(*EVENTS)] = _DEFAULT.events
-    engine: Annotated[str, OneOf(*ENGINES)] = _DEFAULT.engine
+    events: EventsName = _DEFAULT.events
+    engine: EngineName = _DEFAULT.engine
     monitors: list[str] = Field(
         [],
         description='monitors: "chattering", "passivity", "coverage", "all" of these, '
@@ -305,23 +270,13 @@ class FitTable(Table):
 
     def options(self, smoothing: float | None) -> FitOptions:
         """Return the options of a fit, with the smoothing of the record."""
-        return FitOptions(
-            free=tuple(self.free),
-            tied=tuple(self.tied),
-            nuisance=tuple(self.nuisance),
-            linear=tuple(self.linear),
-            measured=self.measured,
-            drive=self.drive,
-            train=None if self.train is None else (self.train[0], self.train[1]),
-            test=None if self.test is None else (self.test[0], self.test[1]),
-            cycles=self.cycles,
-            search=self.search,
-            bounds={name: (pair[0], pair[1]) for name, pair in self.bounds.items()},
-            seed=self.seed,
-            most_steps=self.most_steps,
-            smoothing=smoothing,
-            begin=self.begin,
-        )
+        given: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value
+            for name, value in self
+            if name != "fixed"
+        }
+        given["bounds"] = {name: tuple(pair) for name, pair in self.bounds.items()}
+        return FitOptions(**given, smoothing=smoothing)
 
 
 class Scenario(Table):

@@ -38,8 +38,6 @@ from gms_fsm.app.verbs.runs import (
 from gms_fsm.app.verbs.traces import animate_command, plot_command, replay_command
 from gms_fsm.errors import GMSError
 
-__all__ = ["app", "main"]
-
 
 @dataclass
 class CliOptions:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.errors import MissingExtraError, OutputError
 from gms_fsm.foundation.arguments import checked_kind, checked_path
-from gms_fsm.foundation.files import output_folder, refuse_input, write_whole
+from gms_fsm.foundation.files import csv_text, output_folder, refuse_input, write_text
 from gms_fsm.foundation.markdown import plain, table_lines
 from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
@@ -57,8 +54,8 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
     place = report_folder(folder, inputs)
     residuals, written, lacking = fit.residuals(), [PARAMETERS, RESIDUALS], []
     unit = fit.task.measured.unit
-    _write_csv(place / PARAMETERS, _parameter_rows(fit.table))
-    _write_csv(place / RESIDUALS, _residual_rows(residuals, unit))
+    write_text(place / PARAMETERS, csv_text(_parameter_rows(fit.table)))
+    write_text(place / RESIDUALS, csv_text(_residual_rows(residuals, unit)))
     try:
         fit.save(place / FITTED)
         written += [name for name in (FITTED, MOTION) if (place / name).exists()]
@@ -72,8 +69,7 @@ def write_report(fit: Fit, folder: str | Path) -> Path:
         lacking.append(f"no figure was drawn: {error}")
     for each in lacking:
         warnings.warn(each, stacklevel=2)
-    text = _page(fit, residuals, written, lacking).encode()
-    return write_whole(place / PAGE, lambda file: file.write(text))
+    return write_text(place / PAGE, _page(fit, residuals, written, lacking))
 
 
 def report_folder(folder: str | Path, inputs: Sequence[Path] = ()) -> Path:
@@ -128,14 +124,6 @@ def _draw(fit: Fit, folder: Path) -> list[str]:
 
 
 # --------------------------------------------------------------------------- tables
-def _write_csv(path: Path, rows: Iterator[Sequence[object]]) -> Path:
-    with io.StringIO(newline="") as text:
-        csv.writer(text, lineterminator="\n").writerows(rows)
-        raw = text.getvalue().encode()
-    write: Callable[[IO[bytes]], object] = lambda file: file.write(raw)  # noqa: E731
-    return write_whole(path, write)
-
-
 def _parameter_rows(table: Sequence[Estimate]) -> Iterator[Sequence[object]]:
     yield "name", "value", "low", "high", "unit", "note", "meaning"
     for each in table:

@@ -18,8 +18,6 @@ from gms_fsm.foundation.quantities import quantity, sparkline
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.run.simulate import Moment
 
-__all__ = ["LiveView"]
-
 BETWEEN_FRAMES = 0.1  # s; drawing more often would cost more than the simulation
 BETWEEN_LINES = 1.0  # s of the clock, without a terminal
 LATE = 1.0  # s of the clock by which a run may be behind before the clock waits for it

@@ -9,7 +9,7 @@ from pathlib import Path
 from gms_fsm.app._own_files import OwnFile, own_file
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
-from gms_fsm.foundation.files import output_folder, write_whole
+from gms_fsm.foundation.files import output_folder, write_text
 from gms_fsm.phenomena.measure import Bench, Progress, chosen_phenomena, measure_phenomena
 from gms_fsm.phenomena.results import MARKS, PhenomenaTable
 from gms_fsm.systems.models import ChartModel, Model
@@ -72,10 +72,7 @@ def write_table(table: PhenomenaTable, folder: Path) -> list[Path]:
         ``phenomena.md`` first.
     """
     texts = {"phenomena.md": page(table), "phenomena.csv": table.csv()}
-    files = [
-        write_whole(folder / name, lambda file, text=text: file.write(text.encode()))  # type: ignore[misc]
-        for name, text in texts.items()
-    ]
+    files = [write_text(folder / name, text) for name, text in texts.items()]
     try:
         files += _draw(table, folder)
     except MissingExtraError as error:

@@ -14,7 +14,7 @@ import numpy as np
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
-from gms_fsm.foundation.files import output_folder, refuse_input, write_whole
+from gms_fsm.foundation.files import output_folder, refuse_input, write_text
 from gms_fsm.foundation.markdown import plain, table_lines
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.records.motion import Motion
@@ -170,12 +170,10 @@ def run_scenario(
 
 def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[Path]:
     """Write the report of a run and return all files."""
-    log = trace.transitions_csv().encode()
-    text = summary_text(loaded, trace).encode()
     files = [
-        write_whole(folder / "summary.md", lambda file: file.write(text)),
+        write_text(folder / "summary.md", summary_text(loaded, trace)),
         saved,
-        write_whole(folder / "transitions.csv", lambda file: file.write(log)),
+        write_text(folder / "transitions.csv", trace.transitions_csv()),
     ]
     if loaded.scenario.output.csv:
         files.append(trace.save(folder / "trace.csv"))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,8 +13,8 @@ import numpy as np
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import ParameterError, cut
-from gms_fsm.foundation.files import output_folder, refuse_input, write_whole
-from gms_fsm.foundation.markdown import plain
+from gms_fsm.foundation.files import csv_text, output_folder, refuse_input, write_text
+from gms_fsm.foundation.markdown import plain, table_lines
 from gms_fsm.run.sweep import Sweep, sweep
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in
@@ -146,11 +144,9 @@ def sweep_scenario(
     options.pop("t_end")
     result = sweep(*(*loaded.subject, parameters), engine=engine, **options)
     saved = result.save(folder / "sweep.npz")  # first, so that no later failure can lose the runs
-    table = _csv(result).encode()
-    text = sweep_summary(loaded, axes, result, engine).encode()
     return result, [
-        write_whole(folder / "summary.md", lambda file: file.write(text)),
-        write_whole(folder / "runs.csv", lambda file: file.write(table)),
+        write_text(folder / "summary.md", sweep_summary(loaded, axes, result, engine)),
+        write_text(folder / "runs.csv", _csv(result)),
         saved,
     ]
 
@@ -183,11 +179,7 @@ def _check(axes: Sequence[Axis], known: Sequence[Parameter]) -> None:
 # --------------------------------------------------------------------------- what is written
 def _csv(result: Sweep) -> str:
     columns = {"run": np.arange(len(result)), **result.columns()}
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(columns)
-    table.writerows(zip(*(each.tolist() for each in columns.values()), strict=True))
-    return out.getvalue()
+    return csv_text([columns, *zip(*(each.tolist() for each in columns.values()), strict=True)])
 
 
 def sweep_summary(loaded: Loaded, axes: Sequence[Axis], result: Sweep, engine: str) -> str:
@@ -237,7 +229,7 @@ def sweep_summary(loaded: Loaded, axes: Sequence[Axis], result: Sweep, engine: s
         f"- result: {len(result.transitions)} transitions, {bad} runs failed",
         *(f"- run {run}: {plain(message)}" for run, message in failures(result)),
         "",
-        *("| " + " | ".join(row) + " |" for row in [heads, ["---"] * len(heads), *rows]),
+        *table_lines(heads, rows),
     ]
     if len(result) > LONGEST_TABLE:
         lines += ["", f"The first {LONGEST_TABLE} runs; `runs.csv` has all {len(result)}."]

@@ -20,8 +20,6 @@ from gms_fsm.language import evaluate
 from gms_fsm.session.explain import holds
 from gms_fsm.session.session import KINDS, Breakpoint, Session
 
-__all__ = ["Commands"]
-
 
 class Commands:
     """Commands on a session.
@@ -287,10 +285,9 @@ class Commands:
     def do_list(self, arg: str) -> Iterator[str]:
         """Draw the chart."""
         _nothing("list", arg)
-        session, bank = self.session, self.elements.bank(self.element)
-        chart = session.system.contact(bank.name).chart
-        who = self.elements.name(self.element)
-        yield f"{who} of {bank.n}: {chart.name}, t = {session.here.t:.9g} s"
+        session, elements = self.session, self.elements
+        count, chart = elements.bank(self.element).n, elements.chart(self.element)
+        yield f"{elements.name(self.element)} of {count}: {chart.name}, t = {session.here.t:.9g} s"
         states = chart_states(session, self.element)
         yield from text_of.chart_lines(states, self.marks, self.width)
 

@@ -7,15 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from gms_fsm.charts.chart import Chart
 from gms_fsm.debugger._help import help_of
 from gms_fsm.errors import SessionError
 from gms_fsm.lowering.layout import BankPlaces
-from gms_fsm.session.elements import element_name
+from gms_fsm.session.elements import chart_of, element_name
 from gms_fsm.session.session import Session
 from gms_fsm.session.tree.poking import Edits, pokeable
 from gms_fsm.systems.models import parameter_names
-
-__all__ = ["Elements", "completions", "integer", "read_edits", "spelled"]
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,10 @@ class Elements:
     def bank(self, machine: int) -> BankPlaces:
         """Return the contact of an element."""
         return self.session.start.program.layout.bank(machine)
+
+    def chart(self, machine: int) -> Chart:
+        """Return the chart of an element."""
+        return chart_of(self.session.start, self.bank(machine))
 
     def name(self, machine: int) -> str:
         """Return what an element is called: ``element 2``, ``gear 1``."""

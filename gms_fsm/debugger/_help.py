@@ -9,8 +9,6 @@ from gms_fsm.session.here import why_at
 from gms_fsm.session.session import Session
 from gms_fsm.session.tree.poking import pokeable
 
-__all__ = ["ALIASES", "COMMANDS", "MOVES", "Command", "help_of", "names_for", "overview"]
-
 
 @dataclass(frozen=True)
 class Command:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from gms_fsm.session.session import Fired, Session
 from gms_fsm.session.tree.branch import Branch
 
-__all__ = ["EventView", "Ribbons", "curves", "events", "ribbons"]
-
 
 @dataclass(frozen=True)
 class Ribbons:

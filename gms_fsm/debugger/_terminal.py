@@ -20,8 +20,6 @@ from gms_fsm.debugger._commands import Commands
 from gms_fsm.debugger._text import DRAWN, PLAIN, WIDTH, wrapped
 from gms_fsm.session.session import Session
 
-__all__ = ["Debugger"]
-
 NARROWEST = 40  # columns; a narrower terminal breaks the lines itself
 COLOURS = ("34", "33", "35", "36", "32")  # for states
 WORDS = {"true": "32", "false": "31", "fired": "1", "FIRED": "1", "error:": "1;31", "ACTIVE": "1"}

@@ -10,22 +10,6 @@ from gms_fsm.debugger._over_time import Ribbons
 from gms_fsm.debugger._view import BranchView, ContactView, Screen, StateView
 from gms_fsm.session.session import Breakpoint
 
-__all__ = [
-    "DRAWN",
-    "PLAIN",
-    "WIDTH",
-    "Marks",
-    "branch_lines",
-    "breakpoint_text",
-    "chart_lines",
-    "ending_lines",
-    "progress",
-    "ribbon_parts",
-    "screen_lines",
-    "short",
-    "wrapped",
-]
-
 WIDTH = 80  # columns, where there is no terminal
 BAR = 8  # characters for |z|/s = 1, and more in a wide terminal
 
@@ -134,30 +118,30 @@ def _bar(ratio: float, marks: Marks, wide: int) -> str:
 
 def _ribbon_lines(ribbons: Ribbons, contacts: Sequence[ContactView], marks: Marks) -> Iterator[str]:
     """Yield the states of every element over time, and the current position."""
-    drawn, labels = marks.ribbon, _labels(contacts)
-    lead = _lead(labels)
+    drawn, names = marks.ribbon, labels(contacts)
+    lead = _lead(names)
     scale = f"{ribbons.start:g} s"
     yield f"{' ' * lead}{scale}{f'{ribbons.end:g} s':>{len(ribbons.modes) - len(scale)}}"
-    for i, label in enumerate(labels):
-        states = (" " if mode is None else drawn[mode[i] % len(drawn)] for mode in ribbons.modes)
-        yield f" {short(label, lead - 2):<{lead - 2}} {''.join(states)}".rstrip()
+    for i, label in enumerate(names):
+        parts = (" " if mode is None else drawn[mode[i] % len(drawn)] for mode in ribbons.modes)
+        yield f" {short(label, lead - 2):<{lead - 2}} {''.join(parts)}".rstrip()
     yield f"{' ' * lead}{' ' * ribbons.now}^"
     keys: dict[tuple[str, ...], list[str]] = {}
     for contact in contacts:
         keys.setdefault(tuple(s.name for s in contact.chart.states), []).append(contact.name)
-    for number, (names, whose) in enumerate(keys.items(), start=1):
+    for number, (states, whose) in enumerate(keys.items(), start=1):
         who = f"{', '.join(whose)}: " if len(keys) > 1 else ""
-        key = "  ".join(f"{drawn[j % len(drawn)]} {name}" for j, name in enumerate(names))
+        key = "  ".join(f"{drawn[j % len(drawn)]} {name}" for j, name in enumerate(states))
         last = "  ^ now  (blank: not computed)" if number == len(keys) else ""
         yield f"      {who}{key}{last}"
 
 
 def ribbon_parts(view: Screen, width: int = WIDTH) -> int:
     """Return the number of characters for the states over time."""
-    return width - _lead(_labels(view.contacts))
+    return width - _lead(labels(view.contacts))
 
 
-def _labels(contacts: Sequence[ContactView]) -> list[str]:
+def labels(contacts: Sequence[ContactView]) -> list[str]:
     """Return the labels of all elements."""
     return [
         f"{contact.name} {each.number}" if contact.name else f"E{each.number}"

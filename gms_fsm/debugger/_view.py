@@ -12,21 +12,6 @@ from gms_fsm.session.here import why_at
 from gms_fsm.session.session import Session
 from gms_fsm.session.tree.branch import Branch
 
-__all__ = [
-    "BodyView",
-    "BranchView",
-    "ContactView",
-    "EdgeView",
-    "ElementView",
-    "Screen",
-    "StateView",
-    "ValueView",
-    "branches",
-    "chart_states",
-    "ending",
-    "view",
-]
-
 
 @dataclass(frozen=True)
 class EdgeView:

@@ -8,8 +8,10 @@ process can lock was left behind by a killed process, and is removed.
 from __future__ import annotations
 
 import contextlib
+import csv
 import errno
 import hashlib
+import io
 import json
 import os
 import re
@@ -121,6 +123,18 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
     """Write a file atomically through a temporary one: it is the old file or the new one."""
     write_together({path: write})
     return path
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text as `write_whole` does."""
+    return write_whole(path, lambda file: file.write(text.encode()))
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as the text of a CSV file."""
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def write_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:

@@ -12,8 +12,6 @@ from gms_fsm.session.elements import chart_of, contact_named, machine_of, source
 from gms_fsm.session.explain import holds
 from gms_fsm.session.tree.branch import Branch
 
-__all__ = ["KINDS", "Breakpoint", "hits", "new_breakpoint"]
-
 Kind = Literal["tested", "valid", "fires", "enter", "leave"]
 KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave")
 

@@ -14,8 +14,6 @@ from gms_fsm.session.tree.branch import Branch, BranchRow
 from gms_fsm.traces.scope import watch_names
 from gms_fsm.traces.system_scope import owners_of, system_names
 
-__all__ = ["holds_at", "names_of", "read", "value_of"]
-
 
 def names_of(start: Problem) -> list[str]:
     """Return the names allowed in conditions and watches."""

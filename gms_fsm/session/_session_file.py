@@ -24,7 +24,6 @@ from gms_fsm.traces.files.header import Header
 if TYPE_CHECKING:
     from gms_fsm.session.session import Session
 
-__all__ = ["blamed", "read", "write"]
 
 FORMAT = "gms-fsm session 1"
 

@@ -6,8 +6,6 @@ from gms_fsm.errors import ParameterError, SessionError
 from gms_fsm.foundation.arguments import checked_integer
 from gms_fsm.run.settings import SettingOptions, Settings
 
-__all__ = ["check_count", "check_row", "checked_settings"]
-
 
 def checked_settings(settings: Settings | None, options: SettingOptions) -> Settings:
     """Return the settings of a session; raise `ParameterError` for those it does not support."""

@@ -15,8 +15,6 @@ from gms_fsm.errors import SessionError, shown
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.run.problem import Problem
 
-__all__ = ["chart_of", "contact_named", "element_name", "machine_of", "source_of", "title_of"]
-
 
 def machine_of(element: int | str, start: Problem) -> int:
     """Return the machine that an argument means."""

@@ -9,8 +9,6 @@ from gms_fsm.session.results import BodyHere, ContactHere, Here
 from gms_fsm.session.tree.branch import Branch
 from gms_fsm.traces.scope import Scope
 
-__all__ = ["here_at", "why_at"]
-
 
 def here_at(branch: Branch, row: int) -> Here:
     """Return the values at a row, or at the located point after it, if the cursor is there."""

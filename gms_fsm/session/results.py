@@ -13,8 +13,6 @@ from gms_fsm.errors import SessionError, shown
 from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["BodyHere", "BranchComparison", "ContactHere", "Fired", "Here", "compared"]
-
 SAMPLES = 2000  # number of common times at which two branches are compared
 Part = TypeVar("Part")
 MANY = 4  # contacts; with more, a row prints only those that fired

@@ -13,8 +13,6 @@ from gms_fsm.lowering.observing import armed, rate
 from gms_fsm.lowering.program import Program
 from gms_fsm.traces.rows import Rows
 
-__all__ = ["between", "first_true", "interpolated", "slopes"]
-
 HALVINGS = 60  # bisections between two rows
 
 

@@ -16,8 +16,6 @@ from gms_fsm.foundation.logs import Log
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRecord
 
-__all__ = ["Firings"]
-
 Codes = NDArray[np.int32]
 
 

@@ -14,7 +14,6 @@ from gms_fsm.systems.reading.assembly import Bank, of
 if TYPE_CHECKING:
     from gms_fsm.traces.trace import Trace
 
-__all__ = ["impulses_of"]
 
 FIELDS = ("t", "microstep", "contact", "edge", "carrier", "velocity", "P", "energy")
 NONE = 1e-12  # of the largest impulse: less is rounding

@@ -15,8 +15,6 @@ from gms_fsm.lowering.program import Program
 from gms_fsm.traces.rows import Rows
 from integrators.runners.observing import is_turn, observe_beside, observe_row
 
-__all__ = ["Observed"]
-
 FEW = 8  # rows that are observed without machine code
 
 

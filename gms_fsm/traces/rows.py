@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.display import short_repr
 
-__all__ = ["Rows", "merged"]
-
 
 @short_repr
 @dataclass(frozen=True, eq=False)

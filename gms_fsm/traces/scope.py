@@ -28,15 +28,6 @@ from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.trace import Trace
 
-__all__ = [
-    "GuardValues",
-    "Scope",
-    "guard_columns",
-    "invariant_names",
-    "parameter_values",
-    "watch_names",
-]
-
 FORCE = "F_elements"  # the observed quantity that F1, F2 ... refer to
 
 

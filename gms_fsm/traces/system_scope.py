@@ -25,8 +25,6 @@ from gms_fsm.systems.system import Contact, System
 from gms_fsm.traces.scope import Scope, watch_names
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["SystemScope", "given_values", "owners_of", "system_names"]
-
 
 def system_names(system: System) -> list[str]:
     """Return the names allowed in conditions and watches over the run of a system.

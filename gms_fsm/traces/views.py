@@ -22,18 +22,6 @@ from gms_fsm.traces.rows import Rows, merged
 if TYPE_CHECKING:
     from gms_fsm.traces.trace import Trace
 
-__all__ = [
-    "BodyTrace",
-    "driven_velocity",
-    "dwell_times",
-    "picked",
-    "read_parts",
-    "sigma_at",
-    "sliding_of",
-    "steps_of",
-    "write_trace",
-]
-
 
 @short_repr
 @dataclass(frozen=True, eq=False)

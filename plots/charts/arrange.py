@@ -22,7 +22,6 @@ from plots.charts.matrix import matrix_drawing
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
-__all__ = ["arrange"]
 
 MARGIN = 12.0  # around what is in a region
 APART = 12.0  # between regions

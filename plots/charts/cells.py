@@ -14,8 +14,6 @@ from plots.charts.labels import Piece, Row, escape, printable
 from plots.style import MONO, SANS, ChartTheme
 from plots.style.fonts import width
 
-__all__ = ["CellWriter", "Label"]
-
 PLAIN = 10  # points, of formulas
 LEAST = 7  # points, of every text but an index
 SMALLER = 0.72  # a lowered index

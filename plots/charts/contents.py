@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 
-from gms_fsm.charts.chart import Chart, State
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.language import Value
 from plots.charts.notation import ChartWriter
-
-__all__ = ["Texts", "chart_texts", "state_texts"]
 
 SAID_ONCE = 3  # states: where so many have the same force, it is said once for all of them
 
@@ -76,6 +75,29 @@ def _forces(chart: Chart, state: State) -> dict[str, Value]:
     return {name: tree for name, tree in forces.items() if tree is not None}
 
 
+def lines_of(texts: Texts) -> list[str]:
+    """Return texts as lines, each with its kind."""
+    return [f"{kind}: {text}" for kind, own in texts for text in own]
+
+
+def edges_by_priority(chart: Chart) -> Iterator[tuple[int, Transition]]:
+    """Yield all edges, state by state, each with its priority among those that leave its state."""
+    for state in chart.states:
+        yield from enumerate((edge for _, edge in chart.leaving(state.name)), start=1)
+
+
+def edge_text(write: ChartWriter, priority: int, edge: Transition) -> str:
+    """Return the text of an edge: priority, guard, action."""
+    actions = write.actions(write.chart.assignments["action", edge.name])
+    return f"{priority} [{write.chart.guard_text(edge.name)}] {actions}".rstrip()
+
+
+def ids_of(chart: Chart) -> dict[str, str]:
+    """Return an identifier for each state; a bare name could be a keyword, such as end or note."""
+    names = [state.name for state in chart.states]
+    return {name: f"s{i}_" + re.sub(r"[^A-Za-z0-9_]", "_", name) for i, name in enumerate(names, 1)}
+
+
 def chart_in_words(chart: Chart) -> str:
     """Return a chart as text for people: shown where no picture can be drawn.
 
@@ -97,10 +119,9 @@ def chart_in_words(chart: Chart) -> str:
     write, lines = ChartWriter(chart, "stateflow"), [chart.name]
     for state in chart.states:
         lines.append(f"{state.name}{' (default)' * (state == chart.default_state)}")
-        lines += [f"  {kind}: {text}" for kind, own in state_texts(write, state) for text in own]
+        lines += [f"  {line}" for line in lines_of(state_texts(write, state))]
         for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
             actions = write.actions(chart.assignments["action", edge.name])
             line = f"  {priority} -> {edge.target} [{chart.guard_text(edge.name)}] {actions}"
             lines.append(line.rstrip())
-    lines += [f"{kind}: {text}" for kind, own in chart_texts(write) for text in own]
-    return "\n".join(lines)
+    return "\n".join([*lines, *lines_of(chart_texts(write))])

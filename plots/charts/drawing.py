@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from plots.charts.cells import Label
+from plots.charts.contents import edges_by_priority
 from plots.charts.labels import edge_id, element_id, part_id
 from plots.charts.layers import LayerEdge, Point, layered
 
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
-__all__ = ["Drawing", "DrawnLine", "Node", "graph_drawing", "thirds"]
 
 MARKED = "2.6"  # points; width of highlighted lines
 DOT_SIZE = 8.0  # diameter of the dot at the default state
@@ -89,11 +89,7 @@ class Drawing:
 def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
     """Return an element as states and arrows."""
     chart, element, cells = sheet.chart, element_id(number), sheet.cells
-    edges = [
-        (edge, priority)
-        for state in chart.states
-        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1)
-    ]
+    edges = [(edge, priority) for priority, edge in edges_by_priority(chart)]
     boxes = [
         cells.guard(sheet.guard_rows(edge, priority, number), edge.name in sheet.marked)
         for edge, priority in edges

@@ -14,20 +14,6 @@ from plots.charts.contents import chart_texts, state_texts
 from plots.charts.notation import ChartWriter
 from plots.style.fonts import missing_glyphs
 
-__all__ = [
-    "Piece",
-    "Row",
-    "Tally",
-    "edge_id",
-    "element_id",
-    "escape",
-    "part_id",
-    "printable",
-    "warn_of_missing_glyphs",
-    "with_indices",
-    "wrapped",
-]
-
 SAID = 5  # missing characters in a warning
 LONGEST_LINE = 52  # characters; longer texts are wrapped
 DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"

@@ -17,8 +17,6 @@ from itertools import pairwise
 
 from plots.charts.places import Segment, places
 
-__all__ = ["ARROW", "Laid", "LayerEdge", "Point", "layered"]
-
 Point = tuple[float, float]
 Size = tuple[float, float]
 

@@ -29,16 +29,6 @@ from plots.charts.statechart import ChartSheet, chosen
 from plots.output.drawings import Svg, image
 from plots.output.graphviz import picture
 
-__all__ = [
-    "ElementLook",
-    "ElementParts",
-    "LiveChart",
-    "Marks",
-    "live_statechart",
-    "marks_of",
-    "plain_tree",
-]
-
 SVG = "http://www.w3.org/2000/svg"
 THIN, THICK, BORDER = "1.1", "2.6", "3"
 VALUES_PER_LINE = 3

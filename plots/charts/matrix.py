@@ -7,6 +7,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from plots.charts.cells import Label
+from plots.charts.contents import edges_by_priority
 from plots.charts.drawing import Drawing, DrawnLine, Node
 from plots.charts.labels import DOT, Piece, edge_id, element_id, part_id
 from plots.charts.layers import Point
@@ -14,7 +15,6 @@ from plots.charts.layers import Point
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
-__all__ = ["matrix_drawing"]
 
 WIDEST = 2 * 595.0 - 60.0  # points: two pages of A4, less the frame of a region
 PAD = 5.0  # between a label and the lines of the table
@@ -67,14 +67,12 @@ def _boxes(sheet: ChartSheet, number: int) -> list[Label]:
 def _entries(sheet: ChartSheet, number: int) -> Entries:
     """Return id, classes and label of the edges in each cell."""
     chart, entries = sheet.chart, Entries()
-    for state in chart.states:
-        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-            place = chart.state_index(edge.source), chart.state_index(edge.target)
-            marked = edge.name in sheet.marked
-            label = sheet.cells.guard(sheet.guard_rows(edge, priority, number), marked)
-            name = edge_id(chart, element_id(number), "guard", edge)
-            kind = "guard marked" if marked else "guard"
-            entries.setdefault(place, []).append((name, kind, label))
+    for priority, edge in edges_by_priority(chart):
+        place = chart.state_index(edge.source), chart.state_index(edge.target)
+        marked = edge.name in sheet.marked
+        label = sheet.cells.guard(sheet.guard_rows(edge, priority, number), marked)
+        name = edge_id(chart, element_id(number), "guard", edge)
+        entries.setdefault(place, []).append((name, "guard marked" if marked else "guard", label))
     return entries
 
 

@@ -19,8 +19,6 @@ from gms_fsm.language import (
     spell,
 )
 
-__all__ = ["NOTATIONS", "ChartWriter"]
-
 NOTATIONS = ("stateflow", "math")
 
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")

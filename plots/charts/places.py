@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-__all__ = ["Segment", "places"]
-
 Segment = tuple[int, int]
 
 STRAIGHT = 3.0  # weight of the parts of a line that passes rows, against 1 at a state

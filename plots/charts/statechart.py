@@ -22,7 +22,13 @@ from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
 from plots.charts.arrange import arrange
 from plots.charts.cells import CellWriter
-from plots.charts.contents import Texts, chart_in_words, chart_texts, state_texts
+from plots.charts.contents import (
+    Texts,
+    chart_in_words,
+    chart_texts,
+    edges_by_priority,
+    state_texts,
+)
 from plots.charts.drawing import graph_drawing
 from plots.charts.labels import (
     DOT,
@@ -40,8 +46,6 @@ from plots.charts.matrix import WIDEST
 from plots.charts.notation import NOTATIONS, ChartWriter
 from plots.output.drawings import DrawnGraph
 from plots.style import CHART_THEMES, SANS, ChartTheme
-
-__all__ = ["ChartGraph", "statechart"]
 
 DIRECTIONS = {"TB": "top to bottom", "LR": "left to right"}
 
@@ -277,7 +281,7 @@ class ChartSheet:
         if self.scale < 1 or self.numbered:
             return self
         long, every = (self._numbers(all_of_them=flag) for flag in (False, True))
-        many = self.form == "auto" and not self.live and len(self._leaving) > MOST_EDGES
+        many = self.form == "auto" and not self.live and len(self.chart.transitions) > MOST_EDGES
         if self.form == "matrix" or many:
             return replace(self, form="matrix", numbered=every)
         for numbered, scale in ((long, 1.0), (every, 1.0), (every, SMALLEST)):
@@ -288,16 +292,11 @@ class ChartSheet:
             return sheet
         return replace(self, form="matrix", numbered=every)
 
-    @property
-    def _leaving(self) -> list[Transition]:
-        states = self.chart.states
-        return [edge for state in states for _, edge in self.chart.leaving(state.name)]
-
     def _numbers(self, all_of_them: bool) -> dict[str, int]:
         """Return numbers for guards; edges with the same guard and action share one."""
         texts: dict[str, int] = {}
         numbers: dict[str, int] = {}
-        for edge in self._leaving:
+        for _, edge in edges_by_priority(self.chart):
             if all_of_them or len(self._lines_of(edge)) > MOST_LINES:
                 numbers[edge.name] = texts.setdefault(self.legend_text(edge), len(texts) + 1)
         return numbers
@@ -333,7 +332,7 @@ class ChartSheet:
         """Return the guards that stand below the picture: ``g1 = ...``, wrapped."""
         rows: list[Row] = []
         written = 0
-        for edge in self._leaving:
+        for _, edge in edges_by_priority(self.chart):
             number = self.numbered.get(edge.name, 0)
             if number > written:
                 written, head = number, f"g{number} = "

@@ -23,7 +23,6 @@ from plots.views.window import Window
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Estimate, Fit, Residuals
 
-__all__ = ["fit_figure"]
 
 Floats = NDArray[np.float64]
 

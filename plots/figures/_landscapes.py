@@ -20,8 +20,6 @@ from plots.style.presets import current, font, inches, pt, room, settings
 from plots.views.plane import Plane
 from plots.views.window import Window
 
-__all__ = ["landscape"]
-
 # Inches: figure, panels, above them, a line of text.
 WIDTH, PLOT, TOP, LINE = 11.6, 5.2, 0.95, 0.165
 LEFT, RIGHT, BETWEEN = 0.72, 0.15, 0.43  # inches: beside the panels

@@ -26,8 +26,6 @@ from plots.style.matplotlib import (
 )
 from plots.style.presets import SCREEN, current, inches, pt, room, settings
 
-__all__ = ["fitted", "legend_above", "legend_below", "low", "narrow", "sheet"]
-
 NARROW = 6.0  # inches of the screen: a narrower figure has one column of panels
 TRIES = 7  # of a layout: folded titles move the panels
 
@@ -209,7 +207,8 @@ def _above_legend(ax: Axes, renderer: RendererBase) -> bool:
         lettered(ax, ax.title.get_text(), title.get_text(), pad=pad)
     else:
         ax.set_title(title.get_text(), pad=pad)
-    return True
+    # A letter that reaches below the line meets the legend there, too.
+    return bool(abs(title.get_window_extent(renderer).y0 - own.y0) > 0.5)
 
 
 def legend_below(

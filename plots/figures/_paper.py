@@ -14,21 +14,12 @@ from plots import panels
 from plots.figures._layout import fitted, legend_below, low, narrow, sheet
 from plots.figures._parts import element_legend, lanes_height, letter_panels
 from plots.panels.held_outputs import HeldLag
-from plots.panels.parts.axes import MANY, first_variable
+from plots.panels.parts.axes import MANY, beside, first_variable
 from plots.panels.parts.selection import checked_elements, checked_window, scaled, shown
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 from plots.style.matplotlib import Axes, Figure, rc_context
 from plots.style.presets import font, pt, settings, to_scale
 from plots.views.window import Window
-
-__all__ = [
-    "FIG3_PHASES",
-    "compare_laws",
-    "figure_3",
-    "figure_4",
-    "held_residuals",
-    "residuals",
-]
 
 Floats = NDArray[np.float64]
 REACHED = "± s(v) away from reversals"
@@ -95,16 +86,8 @@ def figure_3(
             x_peak = scale[0] * (trace.x[peak] - trace.x[0])
             if limit is not None and trace.F[peak] > limit:
                 ax.set_ylim(min(0.0, trace.F.min()) - 0.03 * limit, limit)
-                ax.annotate(
-                    f"peak {trace.F[peak]:.2f} N\nat t = {trace.t[peak]:.3f} s",
-                    (x_peak, limit),
-                    (-8, -4),
-                    textcoords="offset points",
-                    ha="right",
-                    va="top",
-                    color=TEXT_GREY,
-                    fontsize=font(8),
-                )
+                said = f"peak {trace.F[peak]:.2f} N\nat t = {trace.t[peak]:.3f} s"
+                beside(ax, said, (x_peak, limit), (-8, -4), ha="right", va="top", color=TEXT_GREY)
         names = ["applied force (chosen by us)", f"{chart.model.title}; chart"]
         letter_panels(axes, [*names, "the same; if-else", "LuGre"])
         if len(phases) > 1:

@@ -26,8 +26,6 @@ from plots.style.matplotlib import Axes, Figure, LineCollection, rc_context
 from plots.style.presets import pt, settings
 from plots.views.window import Window
 
-__all__ = ["phase"]
-
 
 def phase(
     trace: Trace,

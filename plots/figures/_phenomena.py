@@ -9,6 +9,7 @@ import numpy as np
 
 from gms_fsm.phenomena.results import MARKS, VERDICTS, PhenomenaTable, Phenomenon, PhenomenonResult
 from plots.figures._layout import fitted, sheet
+from plots.panels.parts.axes import beside
 from plots.style import (
     INK,
     LINE_GREY,
@@ -19,8 +20,6 @@ from plots.style import (
 )
 from plots.style.matplotlib import Axes, Figure, Rectangle, rc_context
 from plots.style.presets import font, inches, pt, room, settings, to_scale
-
-__all__ = ["phenomena_matrix", "phenomenon_figure"]
 
 COLUMNS, PANEL, NARROWEST = 4, (2.7, 2.15), 1.9  # in
 TOO_LARGE = 4.0  # times the median range: such a panel has its own axis
@@ -101,16 +100,8 @@ def _panel(
     ax.tick_params(labelsize=font(7.5), length=2.5)
     ax.set_title(model, fontsize=font(9), fontweight="bold", pad=inches(15))
     brief = f"{MARKS[found.verdict]} {found.numbers[0]}" + (", own scale" if own else "")
-    ax.annotate(
-        brief,
-        (0.0, 1.0),
-        (0, inches(4)),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=font(8),
-        color=INK,
-        family="DejaVu Sans",
-    )
+    look = {"xycoords": "axes fraction", "ha": "left", "va": "baseline", "family": "DejaVu Sans"}
+    beside(ax, brief, (0.0, 1.0), (0, inches(4)), **look)
 
 
 def _range(found: Sequence[PhenomenonResult], axis: str) -> tuple[float, float]:

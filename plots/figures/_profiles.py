@@ -19,7 +19,6 @@ from plots.style.presets import font, pt, room, settings, to_scale
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
-__all__ = ["profiles_figure"]
 
 MOST_PROFILES = 12
 COLUMNS, PANEL, NARROWEST = 4, (2.7, 1.9), 2.1  # inches

@@ -29,8 +29,6 @@ from plots.style.matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc
 from plots.style.presets import pt, settings
 from plots.views.window import Window
 
-__all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
-
 LOW = 2  # panels below each other, on a slide
 MOST_SPANS = 30  # per element: more states are not readable side by side
 

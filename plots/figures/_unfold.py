@@ -23,8 +23,6 @@ from plots.style import state_look
 from plots.style.matplotlib import Figure, Rectangle, rc_context
 from plots.style.presets import inches, room, settings, to_scale
 
-__all__ = ["unfold"]
-
 COLUMN, NARROWEST, WIDEST, SIDES = 1.15, 6.4, 11.6, 1.0  # inches: a column, the figure, margins
 FORCE, ROW, FLATTEST = 2.3, 0.34, 0.22  # inches: the upper panel, a row of the lower one
 TOP, BELOW = 0.95, 1.25  # inches: above and below the panels

@@ -9,8 +9,6 @@ from io import BytesIO
 from plots.style import RC
 from plots.style.matplotlib import Figure, rc_context
 
-__all__ = ["picture"]
-
 
 def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
     """Return a figure as bytes."""

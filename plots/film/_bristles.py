@@ -19,8 +19,6 @@ from plots.panels.parts.selection import has_threshold, scaled
 from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme, ramp
 from plots.style.matplotlib import Artist, Axes, Line2D, LineCollection, Rectangle, patches
 
-__all__ = ["Bristles", "panel_height"]
-
 HEAD, FOOT = 0.12, 0.08  # inches above and below the rows
 LEAST = 1.15  # inches, so that the numbers next to the slider have room
 TALLEST, LOWEST, ROOM = 0.46, 0.2, 3.6  # inches of a row; of all rows, if there are many

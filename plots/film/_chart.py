@@ -16,8 +16,6 @@ from plots.output.graphviz import picture as rendered
 from plots.style import CHART_THEMES
 from plots.style.matplotlib import to_hex, to_rgb
 
-__all__ = ["FilmChart", "blend"]
-
 
 def blend(ground: str, colour: str, share: float) -> str:
     """Return a mixture of two colours; a share of 0 is the ground."""

@@ -10,8 +10,6 @@ from plots.film._pace import FADE
 from plots.film._picture import FilmPicture
 from plots.style.matplotlib import Image
 
-__all__ = ["Movie"]
-
 
 @dataclass(frozen=True, eq=False)
 class Movie:

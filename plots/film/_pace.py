@@ -18,8 +18,6 @@ from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from plots.views.window import Window
 
-__all__ = ["FADE", "Frame", "Pace", "paced"]
-
 HOLD = 0.4  # s of the film that a micro-step is shown, if there are frames enough
 HELD = 0.5  # at most this share of the frames stands still, or SQUEEZED if each needs one frame
 SQUEEZED = 0.75

@@ -22,8 +22,6 @@ from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme
 from plots.style.matplotlib import Artist, Axes, Figure, FigureCanvasAgg, Image
 from plots.views.window import Window
 
-__all__ = ["FilmPicture"]
-
 POINTS = 72.0  # per inch
 DPI = 100
 RIGHT, LEAST_LEFT = 4.9, 4.9  # inches, of the columns

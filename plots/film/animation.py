@@ -23,8 +23,6 @@ from plots.panels.parts.selection import shown as shown_rows
 from plots.style import RC, Theme
 from plots.style.matplotlib import rc_context
 
-__all__ = ["animate"]
-
 FASTEST = 50  # frames per second: GIF delays are in 10 ms, and readers reject a delay of 10 ms
 USUAL = 200  # frames
 
@@ -55,9 +53,45 @@ def animate(
     bristles are contacts on the ground, with a spring each to the slider. Where the chart has no
     deflection, they are rods.
 
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    path : str or Path
+        Its file ending selects the format, for example ``.gif``. An existing file is replaced.
+    elements : int or sequence of int, optional
+        How many elements, or which ones, counted from 0; by default all.
+    frames : int, optional
+        Number of frames, at least 2; by default 200.
+    seconds : float, optional
+        Length of the film instead of frames, s.
+    t_start, t_end : float, optional
+        Part of the run to show, s; by default all of it.
+    fps : float
+        Frames per second, at most 50.
+    notation : {"stateflow", "math"}
+        Notation of guards.
+    theme : {"light", "dark"}
+        Colours.
+    progress : callable, optional
+        Called after each frame with the number of frames done and in all.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not as above, or part of the time is outside the run.
+    MissingExtraError
+        If matplotlib or Pillow is not installed, or PyAV for a video.
+
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> from plots import animate
     >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
     ...                  Prescribed("0.2"), 3.0)
     >>> animate(trace, "run.gif", frames=1)

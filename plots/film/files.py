@@ -17,8 +17,6 @@ from gms_fsm.foundation.extras import require
 from plots.film._movie import Movie
 from plots.style.matplotlib import Image, to_rgb
 
-__all__ = ["gif", "video"]
-
 COLOURS = 255  # of a GIF; one more is the transparent one
 SAMPLES = 12  # frames from which the colours are taken
 LONGEST = 65_535  # hundredths of a second that a frame of a GIF can last

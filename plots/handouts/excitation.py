@@ -13,8 +13,6 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Prescribed, Rig, TextRig
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Excited", "excited"]
-
 PERIOD, CYCLES = 10.0, 2.25  # s; the first quarter leaves the origin
 SMALLEST, FACTOR, TRIES = 1e-7, 4.0, 14  # m: amplitudes that are tried, up to 6.7 m
 UNSCALED = 0.1  # m: of a model that does the same at every amplitude

@@ -34,8 +34,6 @@ from plots.style import INK, PALE_GREY, TEXT_GREY, presets
 from plots.style.mathtext import Formulas, formula
 from plots.style.matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
 
-__all__ = ["handout", "handout_figure"]
-
 PAGE = (595.276, 841.89)  # A4
 MARGIN, GAP = 40.0, 14.0
 INNER = PAGE[0] - 2 * MARGIN
@@ -54,6 +52,30 @@ def handout(
     model: Model, path: str | Path, *, velocity: str | None = None, t_end: float | None = None
 ) -> Path:
     """Write a model on one A4 page: chart, equations, parameters, and a hysteresis loop.
+
+    Parameters
+    ----------
+    model : Model
+        For example `GMS`, or a `ChartModel` of a chart of the zoo.
+    path : str or Path
+        Its ending selects the format, for example ``.pdf``. An existing file is replaced.
+    velocity : str, optional
+        v(t) of the loop in m/s, as an expression in t. By default x(t) is a sine with an amplitude
+        at which the model slips; a model that locks is pulled through a spring instead.
+    t_end : float, optional
+        End of that motion, s; needed with `velocity`.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ParameterError
+        If the chart does not fit on the page, or no suitable amplitude is found.
+    MissingExtraError
+        If matplotlib or Graphviz is not installed.
 
     Examples
     --------

@@ -10,8 +10,6 @@ import graphviz
 from gms_fsm.errors import OutputError
 from plots.output.graphviz import drawn
 
-__all__ = ["DrawnGraph", "MermaidText", "PlantUMLText", "Svg", "TikzText", "image", "svg_of"]
-
 
 def image(picture: str | bytes, words: str) -> str:
     """Return a picture as an image in HTML, no wider than the page.
@@ -65,7 +63,17 @@ class DrawnGraph(graphviz.Digraph):  # type: ignore[misc]
         return {"text/html": html, "image/svg+xml": picture, "text/plain": repr(self)}
 
 
-class Svg(str):
+class _ShownText(str):
+    """Text of a picture, which a prompt shows by its length."""
+
+    __slots__ = ()
+    kind = ""
+
+    def __repr__(self) -> str:
+        return f"<{self.kind} of {len(self)} characters>"
+
+
+class Svg(_ShownText):
     """An SVG document as text, which a notebook shows as a picture.
 
     Examples
@@ -75,9 +83,7 @@ class Svg(str):
     """
 
     __slots__ = ()
-
-    def __repr__(self) -> str:
-        return f"<SVG document of {len(self)} characters>"
+    kind = "SVG document"
 
     def _repr_svg_(self) -> str:
         return str(self)
@@ -86,7 +92,7 @@ class Svg(str):
         return image(self, "a picture")
 
 
-class MermaidText(str):
+class MermaidText(_ShownText):
     """Mermaid text, which a notebook shows as a diagram where it knows Mermaid.
 
     Examples
@@ -96,15 +102,13 @@ class MermaidText(str):
     """
 
     __slots__ = ()
-
-    def __repr__(self) -> str:
-        return f"<Mermaid text of {len(self)} characters>"
+    kind = "Mermaid text"
 
     def _repr_markdown_(self) -> str:
         return f"```mermaid\n{self}```"
 
 
-class PlantUMLText(str):
+class PlantUMLText(_ShownText):
     """PlantUML text.
 
     Examples
@@ -114,12 +118,10 @@ class PlantUMLText(str):
     """
 
     __slots__ = ()
-
-    def __repr__(self) -> str:
-        return f"<PlantUML text of {len(self)} characters>"
+    kind = "PlantUML text"
 
 
-class TikzText(str):
+class TikzText(_ShownText):
     r"""A TikZ picture as text.
 
     Examples
@@ -129,6 +131,4 @@ class TikzText(str):
     """
 
     __slots__ = ()
-
-    def __repr__(self) -> str:
-        return f"<TikZ text of {len(self)} characters>"
+    kind = "TikZ text"

@@ -6,45 +6,24 @@ A format is added by one row here, or with `register` from anywhere else.
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
-from gms_fsm.formats import (
-    FORMATS,
-    INSTEAD,
-    Format,
-    Written,
-    chosen,
-    either,
-    endings,
-    files,
-    listed,
-    of,
-    register,
-    save,
-)
+from gms_fsm import formats
+from gms_fsm.formats import *  # noqa: F403
+from gms_fsm.formats import Format, Written, of, register
 
-__all__ = [
-    "FORMATS",
-    "INSTEAD",
-    "Format",
-    "Written",
-    "chosen",
-    "either",
-    "endings",
-    "files",
-    "listed",
-    "of",
-    "register",
-    "save",
-]
+__all__: list[str] = []
+__all__ += formats.__all__
 
 
 # --------------------------------------------------------------------------- writers
-def _graphviz(form: str) -> Callable[[Any], bytes]:
-    def write(graph: Any) -> bytes:
-        from plots.output.graphviz import picture
+def _late(module: str, name: str, *more: Any) -> Callable[[Any], bytes]:
+    """Return a writer of a module of `plots` that is imported when something is written."""
 
-        return picture(graph, form)
+    def write(subject: Any) -> bytes:
+        written = getattr(import_module(f"plots.{module}"), name)(subject, *more)
+        return written.encode() if isinstance(written, str) else bytes(written)
 
     return write
 
@@ -54,48 +33,6 @@ def _dot(graph: Any) -> bytes:
     return text.encode()
 
 
-def _mermaid(chart: Any) -> bytes:
-    from plots.output.mermaid import mermaid
-
-    return mermaid(chart).encode()
-
-
-def _plantuml(chart: Any) -> bytes:
-    from plots.output.plantuml import plantuml
-
-    return plantuml(chart).encode()
-
-
-def _tikz(chart: Any) -> bytes:
-    from plots.output.tikz import tikz
-
-    return tikz(chart).encode()
-
-
-def _matplotlib(form: str, **metadata: None) -> Callable[[Any], bytes]:
-    def write(figure: Any) -> bytes:
-        from plots.figures.saving import picture
-
-        return picture(figure, form, metadata)
-
-    return write
-
-
-def _gif(movie: Any) -> bytes:
-    from plots.film.files import gif
-
-    return gif(movie)
-
-
-def _video(form: str, codec: str) -> Callable[[Any], bytes]:
-    def write(movie: Any) -> bytes:
-        from plots.film.files import video
-
-        return video(movie, form, codec)
-
-    return write
-
-
 def _html(page: Any) -> bytes:
     text: str = page.html
     return text.encode()
@@ -103,22 +40,30 @@ def _html(page: Any) -> bytes:
 
 # --------------------------------------------------------------------------- the table
 # The same trace must give the same file, so matplotlib writes no dates.
-_svg, _pdf = _matplotlib("svg", Date=None), _matplotlib("pdf", CreationDate=None)
+_png = _late("figures.saving", "picture", "png", {})
+_svg = _late("figures.saving", "picture", "svg", {"Date": None})
+_pdf = _late("figures.saving", "picture", "pdf", {"CreationDate": None})
+_graph = {form: _late("output.graphviz", "picture", form) for form in ("svg", "png", "pdf")}
+_mp4 = _late("film.files", "video", "mp4", "libx264")
+_webm = _late("film.files", "video", "webm", "libvpx-vp9")
+_mermaid, _plantuml, _tikz = (
+    _late(f"output.{name}", name) for name in ("mermaid", "plantuml", "tikz")
+)
 for _row in (
-    Format(".svg", "graph", "a picture", "Graphviz", _graphviz("svg"), "render", usual=True),
-    Format(".png", "graph", "a picture", "Graphviz", _graphviz("png"), "render", usual=True),
-    Format(".pdf", "graph", "a picture", "Graphviz", _graphviz("pdf"), "render"),
+    Format(".svg", "graph", "a picture", "Graphviz", _graph["svg"], "render", usual=True),
+    Format(".png", "graph", "a picture", "Graphviz", _graph["png"], "render", usual=True),
+    Format(".pdf", "graph", "a picture", "Graphviz", _graph["pdf"], "render"),
     Format(".dot", "graph", "DOT text", "gms-fsm", _dot),
     Format(".gv", "graph", "DOT text", "gms-fsm", _dot),
     Format(".mmd", "chart", "Mermaid text", "gms-fsm", _mermaid),
     Format(".puml", "chart", "PlantUML text", "gms-fsm", _plantuml),
     Format(".tikz", "chart", "TikZ text", "gms-fsm", _tikz),
-    Format(".png", "figure", "a figure", "matplotlib", _matplotlib("png"), "plots", usual=True),
+    Format(".png", "figure", "a figure", "matplotlib", _png, "plots", usual=True),
     Format(".svg", "figure", "a figure", "matplotlib", _svg, "plots", usual=True),
     Format(".pdf", "figure", "a figure", "matplotlib", _pdf, "plots"),
-    Format(".gif", "animation", "an animation", "Pillow", _gif, "plots"),
-    Format(".mp4", "animation", "an animation", "PyAV", _video("mp4", "libx264"), "film"),
-    Format(".webm", "animation", "an animation", "PyAV", _video("webm", "libvpx-vp9"), "film"),
+    Format(".gif", "animation", "an animation", "Pillow", _late("film.files", "gif"), "plots"),
+    Format(".mp4", "animation", "an animation", "PyAV", _mp4, "film"),
+    Format(".webm", "animation", "an animation", "PyAV", _webm, "film"),
     Format(".html", "page", "a replay page", "gms-fsm", _html, "replay", usual=True),
 ):
     register(_row)

@@ -16,8 +16,6 @@ import graphviz
 from gms_fsm.errors import OutputError
 from gms_fsm.foundation.extras import missing
 
-__all__ = ["available", "drawn", "picture"]
-
 PNG_DPI = "144"  # twice a screen point: crisp on dense displays
 
 

@@ -7,8 +7,6 @@ from html import escape
 
 from gms_fsm.errors import cut
 
-__all__ = ["listing", "paragraph", "table"]
-
 LONGEST = 400  # characters of a cell
 
 

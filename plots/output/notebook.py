@@ -44,7 +44,6 @@ from plots.systems.block_diagram import block_diagram
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
-__all__ = ["figure_png", "shown"]
 
 MOST_ELEMENTS = 4  # a larger bank is shown as one element, because all have the same chart
 MOST_ROWS = 10  # of a table
@@ -62,11 +61,15 @@ def shown(thing: object, form: Form) -> Any:
 
 def figure_png(figure: Any) -> tuple[bytes, dict[str, int]]:
     """Return a matplotlib figure for IPython."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, bbox_inches="tight")
-    png = buffer.getvalue()
+    png = _png(figure, dpi=DPI, bbox_inches="tight")
     width, height = (int.from_bytes(png[place : place + 4]) for place in (16, 20))
     return png, {"width": width // 2, "height": height // 2}
+
+
+def _png(figure: Any, **options: Any) -> bytes:
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", **options)
+    return buffer.getvalue()
 
 
 # --------------------------------------------------------------------------- drawings
@@ -103,9 +106,7 @@ def trace_png(trace: Trace) -> bytes | None:
         from plots.figures import overview
     except MissingExtraError:
         return None
-    buffer = BytesIO()
-    overview(trace).savefig(buffer, format="png", dpi=100)
-    return buffer.getvalue()
+    return _png(overview(trace), dpi=100)
 
 
 def trace_html(trace: Trace) -> str | None:
@@ -176,9 +177,7 @@ def fit_png(fit: Fit) -> bytes | None:
         from plots.figures import fit_figure
     except MissingExtraError:
         return None
-    buffer = BytesIO()
-    fit_figure(fit).savefig(buffer, format="png", dpi=100)
-    return buffer.getvalue()
+    return _png(fit_figure(fit), dpi=100)
 
 
 # --------------------------------------------------------------------------- sessions

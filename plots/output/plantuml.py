@@ -7,15 +7,19 @@ could read as syntax or as markup is written as ``&#code;``, which it displays a
 
 from __future__ import annotations
 
-import re
-
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.arguments import checked_kind
-from plots.charts.contents import chart_texts, state_texts
+from plots.charts.contents import (
+    chart_texts,
+    edge_text,
+    edges_by_priority,
+    ids_of,
+    lines_of,
+    state_texts,
+)
+from plots.charts.labels import printable
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import PlantUMLText
-
-__all__ = ["plantuml"]
 
 PLAIN = " .,=+()"  # allowed besides letters and digits of any script
 
@@ -38,36 +42,24 @@ def plantuml(chart: Chart) -> str:
     <BLANKLINE>
     """
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
-    ids = {state.name: _id(i, state.name) for i, state in enumerate(chart.states, start=1)}
-    write = ChartWriter(chart, "stateflow")
-    lines = ["@startuml", f"title {_escape(chart.name)}"]
-    lines += ["hide empty description", f"[*] --> {ids[chart.default_state.name]}"]
+    ids, write = ids_of(chart), ChartWriter(chart, "stateflow")
+    first = ids[chart.default_state.name]
+    lines = ["@startuml", f"title {_escape(chart.name)}", "hide empty description"]
+    lines.append(f"[*] --> {first}")
     for state in chart.states:
         own = ids[state.name]
         lines.append(f'state "{_escape(state.name)}" as {own}')
-        for kind, texts in state_texts(write, state):
-            lines += [f"{own} : {_escape(f'{kind}: {text}')}" for text in texts]
-    for state in chart.states:
-        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-            label = f"{priority} [{chart.guard_text(edge.name)}]"
-            actions = write.actions(chart.assignments["action", edge.name])
-            label += f" {actions}" if actions else ""
-            lines.append(f"{ids[edge.source]} --> {ids[edge.target]} : {_escape(label)}")
-    shared = [f"{kind}: {text}" for kind, texts in chart_texts(write) for text in texts]
-    if shared:
-        lines.append(f"note right of {ids[chart.default_state.name]}")
-        lines += [*map(_escape, shared), "end note"]
+        lines += [f"{own} : {_escape(line)}" for line in lines_of(state_texts(write, state))]
+    for priority, edge in edges_by_priority(chart):
+        label = _escape(edge_text(write, priority, edge))
+        lines.append(f"{ids[edge.source]} --> {ids[edge.target]} : {label}")
+    if shared := lines_of(chart_texts(write)):
+        lines += [f"note right of {first}", *map(_escape, shared), "end note"]
     return PlantUMLText("\n".join([*lines, "@enduml", ""]))
 
 
-def _id(place: int, name: str) -> str:
-    # A bare name could be a word of PlantUML, such as end or note.
-    return f"s{place}_" + re.sub(r"[^A-Za-z0-9_]", "_", name)
-
-
 def _escape(text: str) -> str:
-    said = "".join(c if c.isprintable() else " " for c in text)
-    return "".join(c if c.isalnum() or c in PLAIN else _code(c) for c in said)
+    return "".join(c if c.isalnum() or c in PLAIN else _code(c) for c in printable(text))
 
 
 def _code(character: str) -> str:

@@ -17,8 +17,6 @@ from gms_fsm.foundation.files import write_whole
 from plots.charts.statechart import ChartGraph
 from plots.output import formats
 
-__all__ = ["render"]
-
 
 def render(graph: graphviz.Digraph, path: str | Path) -> Path:
     """Write a picture, or the text of a graph; the file ending selects the format.

@@ -17,8 +17,6 @@ import numpy as np
 
 from plots.style.matplotlib import Artist, Axes, Curve, Figure, patches
 
-__all__ = ["EXACT", "SvgPart", "drawn", "smallest"]
-
 # matplotlib's fonts are wider than those used for the layout.
 WIDE, MONO = 0.88, 0.975
 # Letters are not moved to whole pixels, so that a line has the width of its cell.

@@ -12,11 +12,16 @@ from collections.abc import Mapping
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.arguments import checked_kind
-from plots.charts.contents import chart_texts, state_texts
+from plots.charts.contents import (
+    chart_texts,
+    edge_text,
+    edges_by_priority,
+    lines_of,
+    state_texts,
+)
+from plots.charts.labels import printable
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import TikzText
-
-__all__ = ["tikz"]
 
 HEAD = r"""% {name}
 % \usepackage[T1]{{fontenc}} \usepackage{{tikz}} \usetikzlibrary{{arrows.meta,shapes.multipart}}
@@ -59,13 +64,11 @@ def tikz(chart: Chart) -> str:
     """
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
     write, names = ChartWriter(chart, "stateflow"), [state.name for state in chart.states]
-    contents = {
-        state.name: [
-            f"{kind}: {text}" for kind, texts in state_texts(write, state) for text in texts
-        ]
-        for state in chart.states
-    }
-    labels = _labels(chart, write)
+    contents = {state.name: lines_of(state_texts(write, state)) for state in chart.states}
+    labels: dict[tuple[str, str], list[str]] = {}
+    for priority, edge in edges_by_priority(chart):
+        text = edge_text(write, priority, edge)
+        labels.setdefault((edge.source, edge.target), []).append(text)
     places = _places(names, contents, labels)
     lines = []
     for i, name in enumerate(names, start=1):
@@ -86,24 +89,13 @@ def tikz(chart: Chart) -> str:
             f"\\draw[->] (s{one}) to[{bend}] node[guard, auto]",
             f"  {{{_rows(rows_of)}}} (s{two});",
         ]
-    if shared := [f"{kind}: {text}" for kind, texts in chart_texts(write) for text in texts]:
+    if shared := lines_of(chart_texts(write)):
         lines.append(
             "\\node[guard, anchor=north] at ([yshift=-4mm]current bounding box.south) "
             f"{{{_rows(shared)}}};"
         )
-    head = HEAD.format(name=_printable(chart.name))
+    head = HEAD.format(name=printable(chart.name))
     return TikzText(head + "".join(f"  {line}\n" for line in lines) + "\\end{tikzpicture}\n")
-
-
-def _labels(chart: Chart, write: ChartWriter) -> dict[tuple[str, str], list[str]]:
-    """Return the texts of the edges, by source and target."""
-    found: dict[tuple[str, str], list[str]] = {}
-    for state in chart.states:
-        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-            actions = write.actions(chart.assignments["action", edge.name])
-            text = f"{priority} [{chart.guard_text(edge.name)}] {actions}".rstrip()
-            found.setdefault((edge.source, edge.target), []).append(text)
-    return found
 
 
 def _places(
@@ -137,8 +129,4 @@ def _rows(texts: list[str]) -> str:
 
 
 def _escape(text: str) -> str:
-    return "".join(CODES.get(c, c) for c in _printable(text))
-
-
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)
+    return "".join(CODES.get(c, c) for c in printable(text))

@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ColumnStore", "packed"]
-
 UNSIGNED = ("u1", "u2", "u4")
 
 

@@ -18,8 +18,6 @@ from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import picked
 
-__all__ = ["PageRows", "page_rows"]
-
 SMOOTH, FEWEST_ROWS = 4000, 200  # samples are added up to these; the first is for one element
 MOST_ROWS = 20_000  # away from transitions, for one element; a longer run is thinned
 MOST_AT_TRANSITIONS = 80_000  # of a page, at and next to instants with transitions

@@ -26,12 +26,11 @@ from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from gms_fsm.verification.prove import Report
+from plots.charts.contents import edges_by_priority
 from plots.page._columns import ColumnStore, packed
 from plots.page._rows import PageRows
 from plots.page._trees import Stored, tree_of
 from plots.views.plane import Plane, linear_threshold, plane_axes
-
-__all__ = ["stored_run"]
 
 FORCE = "F"  # names of forces begin like this; they are shown, not read by guards, in seven digits
 
@@ -120,22 +119,17 @@ def _contact(
 
 def _edges(chart: Chart, stored: Stored) -> list[dict[str, Any]]:
     """Return the edges in the order of the chart's picture."""
-    found = []
-    for state in chart.states:
-        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-            found.append(
-                {
-                    "name": edge.name,
-                    "priority": priority,
-                    "source": chart.state_index(edge.source),
-                    "target": chart.state_index(edge.target),
-                    "clauses": [
-                        _clause(chart, part, stored) for part in clauses(chart.guards[edge.name])
-                    ],
-                    "guard": tree_of(chart.guards[edge.name], stored),
-                }
-            )
-    return found
+    return [
+        {
+            "name": edge.name,
+            "priority": priority,
+            "source": chart.state_index(edge.source),
+            "target": chart.state_index(edge.target),
+            "clauses": [_clause(chart, part, stored) for part in clauses(chart.guards[edge.name])],
+            "guard": tree_of(chart.guards[edge.name], stored),
+        }
+        for priority, edge in edges_by_priority(chart)
+    ]
 
 
 def _clause(chart: Chart, part: Condition, stored: Stored) -> dict[str, Any]:

@@ -25,8 +25,6 @@ from gms_fsm.language import (
     product_power,
 )
 
-__all__ = ["Stored", "tree_of"]
-
 EXACT = ("abs", "sqrt", "sgn", "min", "max")  # functions that round the same everywhere
 Stored = dict[str, Value]  # by name, such as "#0"
 

@@ -10,8 +10,6 @@ from plots.charts.labels import Row, edge_id, element_id, part_id
 from plots.charts.statechart import ChartSheet
 from plots.output.graphviz import drawn
 
-__all__ = ["chart_svg"]
-
 MOST_CHARTS = 6  # a larger bank is shown as one chart, that of the selected element
 SVG = "http://www.w3.org/2000/svg"
 COLOURING = ("fill", "stroke", "stroke-dasharray", "stroke-width")

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
@@ -46,8 +46,6 @@ from plots.page._run import stored_run, views_of
 from plots.page.chart import chart_svg
 from plots.style import CHART_THEMES, ELEMENT_STEPS, PAGE_THEMES
 from plots.views.window import window_of
-
-__all__ = ["Replay", "page_data", "page_html", "replay", "replay_html", "write_replay"]
 
 # In this order: later ones use what earlier ones define.
 SCRIPTS = (
@@ -124,14 +122,19 @@ class Replay:
         return formats.save(self, path, "page")
 
 
+class PageOptions(TypedDict, total=False):
+    """What is chosen for a page; see `replay`."""
+
+    title: str
+    names: Sequence[str]
+    window: tuple[float, float] | None
+    checks: Report | Sequence[Report]
+
+
 def replay(
     trace: Trace,
     other: Trace | None = None,
-    *,
-    title: str = "",
-    names: Sequence[str] = (),
-    window: tuple[float, float] | None = None,
-    checks: Report | Sequence[Report] = (),
+    **options: Unpack[PageOptions],
 ) -> Replay:
     """Make a replay page, for a notebook.
 
@@ -172,19 +175,14 @@ def replay(
     ...                  Prescribed("0.2"), 3.0)
     >>> replay(trace).save("page.html")  # doctest: +SKIP
     """
-    page = replay_html(trace, other, title=title, names=names, window=window, checks=checks)
-    return Replay(page)
+    return Replay(replay_html(trace, other, **options))
 
 
 def write_replay(
     path: str | Path,
     trace: Trace,
     other: Trace | None = None,
-    *,
-    title: str = "",
-    names: Sequence[str] = (),
-    window: tuple[float, float] | None = None,
-    checks: Report | Sequence[Report] = (),
+    **options: Unpack[PageOptions],
 ) -> Path:
     """Write a replay page: a single file that needs neither a network nor a server.
 
@@ -192,7 +190,7 @@ def write_replay(
     ----------
     path : str or Path
         The file; its folder must exist, and its ending selects the format, such as ``.html``.
-    trace, other, title, names, window, checks
+    trace, other, **options
         See `replay`.
 
     Returns
@@ -210,23 +208,17 @@ def write_replay(
         If the folder cannot be written.
     """
     formats.chosen(path, "page")  # before any work
-    page = replay(trace, other, title=title, names=names, window=window, checks=checks)
-    return page.save(path)
+    return replay(trace, other, **options).save(path)
 
 
 def replay_html(
     trace: Trace,
     other: Trace | None = None,
-    *,
-    title: str = "",
-    names: Sequence[str] = (),
-    window: tuple[float, float] | None = None,
-    checks: Report | Sequence[Report] = (),
+    **options: Unpack[PageOptions],
 ) -> str:
     """Return a replay page as text."""
     traces = [trace] if other is None else [trace, other]
-    stored = page_data(traces, title=title, names=names, window=window, checks=checks)
-    return page_html(*stored)
+    return page_html(*page_data(traces, **options))
 
 
 def page_data(

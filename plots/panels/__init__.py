@@ -1,9 +1,10 @@
 """Single panels: each takes an Axes and a Trace (or differences), draws, and returns its artists.
 
-They share three arguments. ``window = (t0, t1)`` [s] zooms: the run is sampled again inside it.
-``elements`` selects elements, counted from 0 (labels count from 1). ``log`` requests a logarithmic
-axis where one makes sense. Times of switches and the forces on both sides of them come from the
-transition log, which is complete even if the rows are not.
+They share three options. ``window = (t0, t1)`` [s] zooms: the run is sampled again inside it; by
+default all is shown. ``elements`` selects elements, counted from 0 (labels count from 1), by
+default all. ``log`` requests a logarithmic axis where one makes sense. Times of switches and the
+forces on both sides of them come from the transition log, which is complete even if the rows are
+not.
 
 `landscape`, `race` and `pins` are about one element at one row. `unfolded_force` and
 `unfolded_states` take what `unfolded` returns.

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
-from plots.panels.parts.axes import Artists, lanes, note, time_axis
-from plots.panels.parts.selection import checked_elements, checked_window, has_threshold, shown
+from plots.panels.parts.axes import Artists, lanes, no_threshold, time_axis
+from plots.panels.parts.selection import PartOptions, has_threshold, selected
 from plots.style import INK, PAPER, ramp
 from plots.style.matplotlib import Axes, ListedColormap
 from plots.style.presets import font, pt
-from plots.views.window import Window
 
 __all__ = ["heat", "slipping"]
 
@@ -22,14 +22,7 @@ LEVELS = 256
 CROWDED = 40  # boundaries per lane that can be told apart
 
 
-def heat(
-    ax: Axes,
-    trace: Trace,
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-    bar: bool = True,
-) -> Artists:
+def heat(ax: Axes, trace: Trace, *, bar: bool = True, **part: Unpack[PartOptions]) -> Artists:
     """Draw |z| / s of each element as a row in grey levels, from white at 0 to ink at 1.
 
     Parameters
@@ -38,10 +31,8 @@ def heat(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Which elements, counted from 0; by default all.
+    **part
+        ``window`` and ``elements``.
     bar : bool
         Add a colour bar.
 
@@ -60,20 +51,19 @@ def heat(
     >>> len(boundaries), picture.get_clim()
     (4, (0.0, 1.0))
     """
-    chosen = checked_elements(trace, elements)
+    this = selected(trace, **part)
+    chosen, (begin, end) = this.elements, this.window
     if not has_threshold(trace):
-        missing = "input s" if trace.model.chart.transitions else "edges"
-        return [note(ax, f"no threshold:\nthis chart has no {missing}")]
-    begin, end = checked_window(trace, window)
-    part = shown(trace, (begin, end))
-    values = np.abs(part.z / part.s)[:, chosen]
+        return [no_threshold(ax, trace)]
+    rows = this.rows
+    values = np.abs(rows.z / rows.s)[:, chosen]
     edges = np.linspace(begin, end, COLUMNS + 1)
     middles = (edges[1:] + edges[:-1]) / 2
-    rows = np.array([np.interp(middles, part.t, column) for column in values.T])
+    shades = np.array([np.interp(middles, rows.t, column) for column in values.T])
     picture = ax.pcolormesh(
         edges,
         np.arange(len(chosen) + 1) + 0.5,
-        rows,
+        shades,
         cmap=ListedColormap(ramp("heat", LEVELS)),
         vmin=0.0,
         vmax=1.0,
@@ -81,11 +71,11 @@ def heat(
     )
     drawn: Artists = [picture]
     log = trace.transitions
-    for row, i in enumerate(chosen):
+    for lane, i in enumerate(chosen):
         times = log.t[(log.element == i) & (log.t >= begin) & (log.t <= end)]
         if times.size > CROWDED:
             times = times[:0]
-        ends = row + 0.58, row + 1.42
+        ends = lane + 0.58, lane + 1.42
         # White below ink, visible on every grey.
         ax.vlines(times, *ends, color=PAPER, linewidth=pt(2.4))
         drawn.append(ax.vlines(times, *ends, color=INK, linewidth=pt(0.9)))
@@ -99,13 +89,7 @@ def heat(
     return drawn
 
 
-def slipping(
-    ax: Axes,
-    trace: Trace,
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-) -> Artists:
+def slipping(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     """Draw how many elements have left their default state.
 
     Parameters
@@ -114,10 +98,8 @@ def slipping(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Elements that are counted, from 0; by default all.
+    **part
+        ``window`` and the ``elements`` that are counted.
 
     Returns
     -------
@@ -132,14 +114,12 @@ def slipping(
     >>> slipping(Figure().subplots(), run)[-1].get_text()
     'at the end 4 of 4 in slip'
     """
-    chosen = checked_elements(trace, elements)
-    begin, end = checked_window(trace, window)
-    part = shown(trace, (begin, end))
-    count = len(chosen)
-    away = counted_away(part, chosen)
+    this = selected(trace, **part)
+    rows, count = this.rows, len(this.elements)
+    away = counted_away(rows, this.elements)
     changes = np.flatnonzero(np.diff(away)) + 1
-    starts = part.t[np.concatenate([[0], changes])]
-    ends = np.concatenate([starts[1:], part.t[-1:]])
+    starts = rows.t[np.concatenate([[0], changes])]
+    ends = np.concatenate([starts[1:], rows.t[-1:]])
     numbers = away[np.concatenate([[0], changes])]
     shades = ramp("slipping", count + 1)
     drawn: Artists = []
@@ -147,10 +127,10 @@ def slipping(
         now = numbers == number
         pieces = np.column_stack([starts, ends - starts])[now & (ends > starts)]
         drawn.append(ax.broken_barh(pieces.tolist(), (0, number), facecolor=shades[number]))
-    drawn += ax.step(part.t, away, where="post", color=INK, linewidth=pt(0.9))
+    drawn += ax.step(rows.t, away, where="post", color=INK, linewidth=pt(0.9))
     ax.set(ylim=(0, 1.05 * count), ylabel=place_of(trace))
     ax.set_yticks([0, count // 2, count] if count > 1 else [0, 1])
-    time_axis(ax, begin, end)
+    time_axis(ax, *this.window)
     said = f"at the end {away[-1]} of {count} {place_of(trace)}"
     return [*drawn, ax.set_title(said, loc="right", fontsize=font(8))]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import (
     Artists,
     draw_curve,
+    element_curves,
     element_look,
     first_variable,
     log_axis,
@@ -17,10 +18,11 @@ from plots.panels.parts.axes import (
     time_axis,
 )
 from plots.panels.parts.selection import (
-    checked_elements,
+    PartOptions,
     checked_window,
     has_threshold,
     scaled,
+    selected,
     shown,
 )
 from plots.style import INK, LINE_GREY
@@ -52,24 +54,18 @@ def velocity(ax: Axes, trace: Trace, *, window: Window | None = None, log: bool 
     list of Artist
         The line.
     """
-    part = shown(trace, window)
-    factor, unit = scaled(part.v, "m/s")
-    v = factor * (np.abs(part.v) if log else part.v)
+    rows = shown(trace, window)
+    factor, unit = scaled(rows.v, "m/s")
+    v = factor * (np.abs(rows.v) if log else rows.v)
     ax.set_ylabel(f"{'|v|' if log else 'v'} [{unit}]")
-    lines = draw_curve(ax, part.t, v, color=INK)
+    lines = draw_curve(ax, rows.t, v, color=INK)
     if log:
         log_axis(ax, v, "y")
     time_axis(ax, *checked_window(trace, window))
     return lines
 
 
-def force(
-    ax: Axes,
-    trace: Trace,
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-) -> Artists:
+def force(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     """Draw the friction force F(t); at a transition both one-sided values are drawn.
 
     Parameters
@@ -78,25 +74,22 @@ def force(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Elements whose forces F_i are also drawn; by default none.
+    **part
+        ``window``, and ``elements`` whose forces F_i are also drawn; by default none.
 
     Returns
     -------
     list of Artist
         The line of F, then one per element.
     """
-    chosen = [] if elements is None else checked_elements(trace, elements)
-    part = shown(trace, window)
-    lines = draw_curve(ax, part.t, part.F, color=INK, label="F")
-    for i in chosen:
-        lines += draw_curve(
-            ax, part.t, part.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **element_look(i, trace.n)
-        )
+    this = selected(trace, **part)
+    rows = this.rows
+    lines = draw_curve(ax, rows.t, rows.F, color=INK, label="F")
+    for i in this.elements if part.get("elements") is not None else ():
+        look = element_look(i, trace.n)
+        lines += draw_curve(ax, rows.t, rows.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **look)
     ax.set_ylabel("F [N]")
-    time_axis(ax, *checked_window(trace, window))
+    time_axis(ax, *this.window)
     return lines
 
 
@@ -104,9 +97,8 @@ def deflections(
     ax: Axes,
     trace: Trace,
     *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
     scale: tuple[float, str] | None = None,
+    **part: Unpack[PartOptions],
 ) -> Artists:
     """Draw z_i(t) of every element, or the chart's first variable if it has another name.
 
@@ -116,10 +108,8 @@ def deflections(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Which elements, counted from 0; by default all.
+    **part
+        ``window`` and ``elements``.
     scale : (float, str), optional
         Factor and title of the axis, for panels that are compared; by default those that suit the
         run.
@@ -129,31 +119,18 @@ def deflections(
     list of Artist
         One line per element; for a chart without variables only a note.
     """
-    chosen = checked_elements(trace, elements)
+    this = selected(trace, **part)
+    time_axis(ax, *this.window)
     if not trace.model.chart.variables:
-        time_axis(ax, *checked_window(trace, window))
         return [note(ax, NO_VARIABLE)]
-    part = shown(trace, window)
-    factor, title = first_variable(trace, part.z[:, chosen]) if scale is None else scale
-    name = trace.model.chart.variables[0]
-    lines: Artists = []
-    for i in chosen:
-        label = f"$z_{{{i + 1}}}$" if name == "z" else f"{name}{i + 1}"
-        lines += draw_curve(
-            ax, part.t, factor * part.z[:, i], label=label, **element_look(i, trace.n)
-        )
+    z, name = this.rows.z, trace.model.chart.variables[0]
+    factor, title = first_variable(trace, z[:, this.elements]) if scale is None else scale
     ax.set_ylabel(title)
-    time_axis(ax, *checked_window(trace, window))
-    return lines
+    pattern = "$z_{{{}}}$" if name == "z" else f"{name}{{}}"
+    return element_curves(ax, this, factor * z, pattern)
 
 
-def ratio(
-    ax: Axes,
-    trace: Trace,
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-) -> Artists:
+def ratio(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     """Draw the deflection of each element over its threshold, z_i / s_i(v), with lines at ±1.
 
     A chart without edges has no threshold: its z / s(v) is drawn with its unit, without the lines.
@@ -164,10 +141,8 @@ def ratio(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Which elements, counted from 0; by default all.
+    **part
+        ``window`` and ``elements``.
 
     Returns
     -------
@@ -175,27 +150,21 @@ def ratio(
         One line per element, then the lines at +1 and -1; for a chart without variables only a
         note.
     """
-    chosen = checked_elements(trace, elements)
+    this = selected(trace, **part)
+    time_axis(ax, *this.window)
     if not trace.model.chart.variables:
-        time_axis(ax, *checked_window(trace, window))
         return [note(ax, NO_VARIABLE)]
-    part = shown(trace, window)
-    values, threshold = part.z, has_threshold(trace)
+    values, threshold = this.rows.z, has_threshold(trace)
     if "s" in trace.model.chart.inputs:
-        values = part.z / part.s
+        values = this.rows.z / this.rows.s
         factor, unit = (1.0, "–") if threshold else scaled(values, "m/N")
         title = f"{trace.model.chart.variables[0]} / s(v) [{unit}]"
     else:
         factor, title = first_variable(trace, values)
-    lines: Artists = []
-    for i in chosen:
-        lines += draw_curve(
-            ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i, trace.n)
-        )
+    lines = element_curves(ax, this, factor * values, "E{}")
     if threshold:
         lines += [
             ax.axhline(level, color=LINE_GREY, linewidth=pt(0.8), zorder=1) for level in (1.0, -1.0)
         ]
     ax.set_ylabel(title)
-    time_axis(ax, *checked_window(trace, window))
     return lines

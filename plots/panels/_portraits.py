@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from gms_fsm.traces.trace import Trace
 from plots.panels._many import counted_away, place_of
 from plots.panels.parts.axes import VECTOR_ROWS, Artists, draw_curve, log_axis
-from plots.panels.parts.selection import checked_elements, scaled, shown
+from plots.panels.parts.selection import PartOptions, RunPart, scaled, selected
 from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
 from plots.style.matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots.style.presets import pt, to_scale
-from plots.views.window import Window
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
 
@@ -31,16 +30,14 @@ OVERLAP, REPEATED = 0.22, 0.7  # inches between arrows, and between those of the
 SHAFT = 0.05  # inches of the path whose direction an arrow has
 
 
-def _by_slipping(
-    ax: Axes, x: NDArray[np.float64], trace: Trace, chosen: Sequence[int]
-) -> LineCollection:
+def _by_slipping(ax: Axes, x: NDArray[np.float64], part: RunPart) -> LineCollection:
     """Draw F against x in pieces, coloured by how many elements have left their default state."""
-    away = counted_away(trace, chosen)
-    points = np.column_stack([x, trace.F])
+    away = counted_away(part.rows, part.elements)
+    points = np.column_stack([x, part.rows.F])
     # A piece has one colour; the next piece begins where it ends.
     cuts = np.concatenate([[0], np.flatnonzero(np.diff(away)) + 1, [len(points)]])
     pieces = [points[a : b + 1] for a, b in pairwise(cuts)]
-    count = len(chosen)
+    count = len(part.elements)
     # The more elements slip, the darker, also in grey.
     shades = ListedColormap(ramp("slipping", count + 1))
     lines = LineCollection(
@@ -52,7 +49,7 @@ def _by_slipping(
         capstyle="round",
         rasterized=len(points) > VECTOR_ROWS,
     )
-    if not trace.model.chart.transitions:  # one state: nothing to count
+    if not part.run.model.chart.transitions:  # one state: nothing to count
         lines.set_array(None)
         lines.set_color(INK)
     ax.add_collection(lines)
@@ -91,10 +88,9 @@ def portrait(
     ax: Axes,
     trace: Trace,
     *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
     log: bool = False,
     bar: bool = True,
+    **part: Unpack[PartOptions],
 ) -> Artists:
     """Draw F against v, darker where more elements have left their default state.
 
@@ -104,10 +100,8 @@ def portrait(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Elements that are counted; by default all.
+    **part
+        ``window`` and the ``elements`` that are counted.
     log : bool
         Draw against |v| on a logarithmic axis.
     bar : bool
@@ -118,15 +112,14 @@ def portrait(
     list of Artist
         The collection of lines.
     """
-    chosen = checked_elements(trace, elements)
-    part = shown(trace, window)
-    factor, unit = scaled(part.v, "m/s")
-    v = factor * part.v
+    this = selected(trace, **part)
+    factor, unit = scaled(this.rows.v, "m/s")
+    v = factor * this.rows.v
     if log:
         v = np.abs(v)
         v[v == 0] = np.nan
         log_axis(ax, v, "x")
-    lines = _by_slipping(ax, v, part, chosen)
+    lines = _by_slipping(ax, v, this)
     ax.set(xlabel=f"{'|v|' if log else 'v'} [{unit}]", ylabel="F [N]")
     if bar:
         slip_bar(lines, trace, ax)
@@ -138,10 +131,9 @@ def hysteresis(
     trace: Trace,
     phases: Sequence[tuple[str, float]] = (),
     *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
     slipping: bool = False,
     scale: tuple[float, str] | None = None,
+    **part: Unpack[PartOptions],
 ) -> Artists:
     """Draw F against x, in one colour, in phases, or by the number of elements slipping.
 
@@ -153,10 +145,8 @@ def hysteresis(
         The run.
     phases : sequence of (str, float), optional
         Names and end times [s] of parts drawn in separate colours; by default one part.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Elements that are counted with `slipping`; by default all.
+    **part
+        ``window`` and the ``elements`` that are counted with `slipping`.
     slipping : bool
         Colour as in `portrait`, instead of phases.
     scale : (float, str), optional
@@ -167,21 +157,21 @@ def hysteresis(
     list of Artist
         One line per phase, or the collection of lines.
     """
-    chosen = checked_elements(trace, elements)
-    part = shown(trace, window)
-    x = part.x - trace.x[0]
+    this = selected(trace, **part)
+    rows = this.rows
+    x = rows.x - trace.x[0]
     factor, unit = scaled(x, "m") if scale is None else scale
     ax.set(xlabel=f"x [{unit}]", ylabel="F [N]")
     if slipping:
-        return [_by_slipping(ax, factor * x, part, chosen)]
+        return [_by_slipping(ax, factor * x, this)]
     begin = -np.inf
     lines: Artists = []
     for number, (name, end) in enumerate(phases or [("", np.inf)]):
-        now = (part.t >= begin) & (part.t <= end)
+        now = (rows.t >= begin) & (rows.t <= end)
         lines += draw_curve(
             ax,
             factor * x[now],
-            part.F[now],
+            rows.F[now],
             label=name,
             zorder=3 - number % 3,
             **to_scale(PHASES[number % len(PHASES)]),

@@ -78,28 +78,13 @@ def stribeck(
         drawn += draw_curve(
             ax, factor * v, curve + model.sigma_2 * v, color=INK, label=r"s(v) + $\sigma_2$ |v|"
         )
-    drawn += ax.plot(
-        factor * speeds[steady],
-        np.abs(part.F[steady]),
-        "s",
-        markersize=pt(5),
-        color=PALE_GREY,
-        markeredgewidth=0,
-        label="run, steady sliding",
-        rasterized=True,
-        zorder=1,
-    )
+    look: dict[str, Any] = {"color": PALE_GREY, "markeredgewidth": 0, "zorder": 1}
+    look |= {"markersize": pt(5), "rasterized": True, "label": "run, steady sliding"}
+    drawn += ax.plot(factor * speeds[steady], np.abs(part.F[steady]), "s", **look)
     if points is not None:
-        drawn += ax.plot(
-            factor * points[0],
-            points[1],
-            "o",
-            markersize=pt(4.5),
-            color=INK,
-            markerfacecolor=PAPER,
-            label="measured",
-            zorder=4,
-        )
+        look = {"color": INK, "markerfacecolor": PAPER, "zorder": 4}
+        look |= {"markersize": pt(4.5), "label": "measured"}
+        drawn += ax.plot(factor * points[0], points[1], "o", **look)
     ax.set(xlabel=f"|v| [{unit}]", ylabel="|F| [N]")
     if log:
         ax.set(xscale="log", xlim=(factor * low, 1.15 * factor * top))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any, Unpack
 
 import numpy as np
 
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import MANY, VECTOR_ROWS, Artists, lanes, time_axis
-from plots.panels.parts.selection import checked_elements, checked_window
+from plots.panels.parts.selection import PartOptions, selected
 from plots.style import INK, PAPER, state_look
 from plots.style.matplotlib import Axes, RendererBase, Text
 from plots.style.presets import font, pt, to_scale
@@ -73,13 +74,7 @@ def spans(trace: Trace, i: int, window: Window) -> Iterator[tuple[str, float, fl
             yield str(name), float(begin), float(end)
 
 
-def ribbons(
-    ax: Axes,
-    trace: Trace,
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-) -> Artists:
+def ribbons(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     """Draw the active state of every element as a ribbon, as in a logic analyser.
 
     Parameters
@@ -88,10 +83,8 @@ def ribbons(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Which elements, counted from 0; by default all.
+    **part
+        ``window`` and ``elements``.
 
     Returns
     -------
@@ -100,27 +93,21 @@ def ribbons(
         of more than six elements; then a band for each interval in which a sign is held, for
         example on v = 0, or in which an element is between two states.
     """
-    chosen = checked_elements(trace, elements)
-    begin, end = checked_window(trace, window)
+    this = selected(trace, **part)
+    chosen, (begin, end) = this.elements, this.window
     states = [state.name for state in trace.model.chart.states]
     # Between many narrow rows there is no room for thicker outlines.
-    look = to_scale if len(chosen) <= MANY else dict
-    looks = [look(state_look(number)) for number in range(len(states))]
+    sized = to_scale if len(chosen) <= MANY else dict
+    looks: list[dict[str, Any]] = [sized(state_look(number)) for number in range(len(states))]
     drawn: Artists = []
     names: Artists = []
     for row, i in enumerate(chosen):
         found = list(spans(trace, i, (begin, end)))
         for number, state in enumerate(states):
             mine = [(a, b - a) for name, a, b in found if name == state]
-            drawn.append(
-                ax.broken_barh(
-                    mine,
-                    (row + 1.0 - LANE / 2, LANE),
-                    label=state if row == 0 else None,
-                    rasterized=len(mine) > VECTOR_ROWS // 20,
-                    **looks[number],
-                )
-            )
+            look = looks[number] | {"label": state if row == 0 else None}
+            look["rasterized"] = len(mine) > VECTOR_ROWS // 20
+            drawn.append(ax.broken_barh(mine, (row + 1.0 - LANE / 2, LANE), **look))
         # A name never fits into less than one hundredth of the axis. In many narrow rows names
         # would hide what they name: fill and hatch say it.
         few = len(chosen) <= MANY
@@ -139,6 +126,8 @@ def _held_bands(ax: Axes, trace: Trace, chosen: Sequence[int], window: Window) -
     drawn: dict[str, Artists] = {}
     names, machines = trace.program.surface_names, trace.program.surfaces.machine
     first, last = ax.get_ylim()
+    look: Any = {"facecolor": "none", "edgecolor": INK, "hatch": "xxx", "zorder": 3}
+    look["linewidth"] = pt(0.8)
     for stretch in trace.sliding:
         begin, end = max(window[0], float(stretch.t_start)), min(window[1], float(stretch.t_end))
         machine, low, high = machines[names.index(stretch.surface)], 0.0, 1.0
@@ -151,19 +140,6 @@ def _held_bands(ax: Axes, trace: Trace, chosen: Sequence[int], window: Window) -
             low, high = min(ends), max(ends)
         if begin <= end:
             label = f"held on {stretch.surface} = 0"
-            text = "" if label in drawn else label
-            drawn.setdefault(label, []).append(
-                ax.axvspan(
-                    begin,
-                    end,
-                    low,
-                    high,
-                    facecolor="none",
-                    edgecolor=INK,
-                    hatch="xxx",
-                    linewidth=pt(0.8),
-                    zorder=3,
-                    label=text,
-                )
-            )
+            band = ax.axvspan(begin, end, low, high, label="" if label in drawn else label, **look)
+            drawn.setdefault(label, []).append(band)
     return [band for bands in drawn.values() for band in bands]

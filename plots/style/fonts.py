@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import unicodedata
 
-__all__ = ["missing_glyphs", "width"]
-
 MONO_EM = 0.602  # width of every character, in sizes of the font
 
 # Widths of Helvetica Bold from the space to the tilde, in thousandths of the size.

@@ -7,8 +7,6 @@ from collections.abc import Collection, Mapping
 from gms_fsm.charts.chart import Chart
 from gms_fsm.language import LATEX, Value, latex_name, spell
 
-__all__ = ["Formulas", "formula"]
-
 
 def formula(tree: Value, names: Mapping[str, str] | None = None) -> str:
     r"""Return a value as a formula, without dollar signs.

@@ -4,7 +4,8 @@ Modules of `plots` import these names from here and not from matplotlib, so that
 place that handles a missing matplotlib.
 """
 
-# ruff: noqa: E402  require() must come before the imports that it checks
+# ruff: noqa: E402, F401  require() must come before the imports that it checks; all are handed on
+# mypy: implicit-reexport
 
 from __future__ import annotations
 
@@ -30,34 +31,3 @@ from matplotlib.text import Annotation, Text
 from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullLocator
 from matplotlib.transforms import Bbox, IdentityTransform, ScaledTranslation
 from PIL import Image
-
-__all__ = [
-    "Annotation",
-    "Artist",
-    "AutoLocator",
-    "Axes",
-    "Axis",
-    "Bbox",
-    "BoundaryNorm",
-    "Curve",
-    "FancyArrowPatch",
-    "Figure",
-    "FigureCanvasAgg",
-    "IdentityTransform",
-    "Image",
-    "Legend",
-    "Line2D",
-    "LineCollection",
-    "ListedColormap",
-    "LogLocator",
-    "MaxNLocator",
-    "NullLocator",
-    "Rectangle",
-    "RendererBase",
-    "ScaledTranslation",
-    "Text",
-    "patches",
-    "rc_context",
-    "to_hex",
-    "to_rgb",
-]

@@ -28,21 +28,19 @@ import graphviz
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems.system import System
 from plots.output.drawings import DrawnGraph
-from plots.style import INK, PANEL, PAPER, SANS, TEXT_GREY
+from plots.style import INK, PANEL, PAPER, TEXT_GREY
 from plots.systems.system_diagram import system_diagram
 from plots.systems.wires import (
-    PLACED,
     THICK,
     THIN,
     Point,
+    blank,
     caption,
     draw_wire,
     joint,
+    placed,
     position,
-    sides,
 )
-
-__all__ = ["block_diagram"]
 
 MOST_WIRES = 4  # elements; more are drawn as vectors
 
@@ -141,20 +139,7 @@ _drawn.register(System, system_diagram)
 
 
 def _model_diagram(elements: int) -> DrawnGraph:
-    graph = DrawnGraph(
-        name="block diagram",
-        engine="neato",
-        graph_attr=PLACED | {"bgcolor": PAPER},
-        node_attr={
-            "fontname": SANS,
-            "fontsize": "12",
-            "fontcolor": INK,
-            "color": INK,
-            "fixedsize": "true",
-            "margin": "0",
-        },
-        edge_attr={"color": INK, "arrowsize": "0.7", "penwidth": "1.1"},
-    )
+    graph = blank("block diagram", fontsize="12")
     graph.text = (
         f"GMS model, {elements} element{'s' * (elements != 1)}: F is the sum of the forces of the "
         "elements, and of sigma_2 v.\nEach element: v and s(v) -> chart (stick, slip) -> dz, "
@@ -278,7 +263,7 @@ def _block(
     graph: graphviz.Digraph, name: str, at: Point, size: Point, label: str, **look: str
 ) -> None:
     plain = {"class": "block", "shape": "box", "style": "filled", "fillcolor": PAPER}
-    graph.node(name, label, id=name, pos=position(at), **sides(size), **(plain | look))
+    placed(graph, name, at, size, label, **(plain | look))
 
 
 def _indexed(symbol: str, index: str) -> str:
@@ -299,15 +284,8 @@ def _stroke(graph: graphviz.Digraph, wire: str, at: Point, count: int, colour: s
     for end, way in (("low", -1), ("high", 1)):
         place = (at[0] + way * 3.5, at[1] + way * 6.5)
         joint(graph, f"{wire}-{end}", place, colour, width=0.1)
-    graph.edge(
-        f"{wire}-low",
-        f"{wire}-high",
-        id=f"{wire}-stroke",
-        dir="none",
-        color=colour,
-        tailclip="false",
-        headclip="false",
-        **{"class": "stroke"},
-    )
+    look = {"dir": "none", "color": colour, "tailclip": "false", "headclip": "false"}
+    look |= {"id": f"{wire}-stroke", "class": "stroke"}
+    graph.edge(f"{wire}-low", f"{wire}-high", **look)
     text = f'<FONT POINT-SIZE="10">{count}</FONT>'
     caption(graph, f"{wire}-count", (at[0] + 13, at[1] + 9), text, width=20)

@@ -20,15 +20,17 @@ from plots.style import (
     LINE_GREY,
     PALE_GREY,
     PANEL,
-    PAPER,
     RC,
     element_colour,
     state_look,
 )
-from plots.style.matplotlib import Artist, Axes, FancyArrowPatch, Figure, Rectangle, rc_context
-from plots.systems.mechanical_symbols import damper_points, spring_points
-
-__all__ = ["elements_at", "elements_figure"]
+from plots.style.matplotlib import Artist, Axes, Figure, Rectangle, rc_context
+from plots.systems.mechanical_symbols import (
+    arrow_between,
+    damper_points,
+    hatched,
+    spring_points,
+)
 
 ROW = 1.35  # height of one element
 WALL = 6.0  # position of the slider's face, to which springs and dampers are attached
@@ -147,19 +149,7 @@ def _contact(
     """Draw the contact on its piece of ground, and its state."""
     ground = y - GROUND
     low, high = WALL - REST - SWING - CONTACT, WALL - REST + SWING + CONTACT
-    drawn: list[Artist] = [
-        Rectangle(
-            (low, ground - 0.1),
-            high - low,
-            0.1,
-            facecolor=PAPER,
-            edgecolor=PALE_GREY,
-            hatch="/////",
-            linewidth=0,
-            zorder=0,
-        )
-    ]
-    ax.add_patch(drawn[0])  # type: ignore[arg-type]
+    drawn = [hatched(ax, low, ground - 0.1, high - low, 0.1, PALE_GREY, "/////")]
     drawn += ax.plot([low, high], [ground, ground], "-", color=LINE_GREY, linewidth=0.9, zorder=1)
     chart = None if trace is None else trace.model.chart
     name = "stick" if trace is None else str(trace.states[row, i])
@@ -167,29 +157,19 @@ def _contact(
     alone = chart is not None and not chart.transitions  # one state: neither stick nor slip
     mode = 0 if chart is None else chart.state_index(name)
     look = {"facecolor": PALE_GREY, "edgecolor": LINE_GREY} if alone else state_look(mode)
-    box = Rectangle(
-        (contact - CONTACT / 2, ground),
-        CONTACT,
-        GROUND + 0.22,
-        zorder=3,
-        gid=f"contact {i + 1}",
-        **(look | {"linewidth": 1.4}),
-    )
+    look |= {"linewidth": 1.4, "zorder": 3, "gid": f"contact {i + 1}"}
+    box = Rectangle((contact - CONTACT / 2, ground), CONTACT, GROUND + 0.22, **look)
     drawn.append(ax.add_patch(box))
     label = f"E{i + 1}" if trace is None else f"E{i + 1} {name}"
     drawn.append(ax.text(low - 0.15, y, label, ha="right", va="center", fontsize=8.5, color=INK))
     if held and not alone:  # a peg into the ground
-        drawn += ax.plot(
-            [contact, contact],
-            [ground + 0.1, ground - 0.16],
-            "-",
-            color=INK,
-            linewidth=2.0,
-            zorder=4,
-        )
+        ends = [ground + 0.1, ground - 0.16]
+        drawn += ax.plot([contact, contact], ends, "-", color=INK, linewidth=2.0, zorder=4)
     elif trace is not None and not held:
         way = 1.0 if trace.v[row] >= 0 else -1.0
-        drawn.append(_arrow(ax, (contact, y), (contact + 0.85 * way * CONTACT, y), INK))
+        drawn.append(
+            arrow_between(ax, (contact, y), (contact + 0.85 * way * CONTACT, y), size=11, lw=1.2)
+        )
     return drawn
 
 
@@ -198,29 +178,18 @@ def _deflection(
 ) -> list[Artist]:
     """Draw the distance from the contact's rest position, and its symbol."""
     rest, height = WALL - REST, y - GROUND - 0.22
-    drawn: list[Artist] = [
-        *ax.plot(
-            [rest, rest],
-            [y - GROUND, height - 0.08],
-            color=LINE_GREY,
-            linewidth=0.8,
-            linestyle=":",
-            zorder=1,
-        )
-    ]
+    ends = [y - GROUND, height - 0.08]
+    drawn: list[Artist] = []
+    drawn += ax.plot([rest, rest], ends, color=LINE_GREY, linewidth=0.8, linestyle=":", zorder=1)
     label = f"$z_{{{i + 1}}}$"
     if trace is not None:
         factor, unit = scaled(trace.z[row], "m")
         shown = factor * trace.z[row]
         label += f" = {_signed(shown[i], _decimals(shown))} {unit}"
     if abs(contact - rest) > 0.15:
-        drawn.append(_arrow(ax, (contact, height), (rest, height), INK, size=7))
-    drawn.append(
-        ax.text(
-            min(contact, rest) - 0.12, height, label, ha="right", va="center", fontsize=8, color=INK
-        )
-    )
-    return drawn
+        drawn.append(arrow_between(ax, (contact, height), (rest, height), size=7, lw=1.2))
+    look: dict[str, Any] = {"ha": "right", "va": "center", "fontsize": 8, "color": INK}
+    return [*drawn, ax.text(min(contact, rest) - 0.12, height, label, **look)]
 
 
 def _decimals(values: FloatArray) -> int:
@@ -236,21 +205,11 @@ def _signed(value: float, decimals: int) -> str:
 
 def _slider(ax: Axes, n: int, trace: Trace | None, row: int) -> list[Artist]:
     """Draw the slider with its velocity and the friction on it."""
-    body = Rectangle(
-        (WALL, 0.05),
-        0.9,
-        ROW * n - 0.1,
-        facecolor=PANEL,
-        edgecolor=INK,
-        linewidth=1.3,
-        gid="slider",
-    )
+    look: dict[str, Any] = {"facecolor": PANEL, "edgecolor": INK, "linewidth": 1.3}
+    body = Rectangle((WALL, 0.05), 0.9, ROW * n - 0.1, gid="slider", **look)
     drawn: list[Artist] = [ax.add_patch(body)]
-    drawn.append(
-        ax.text(
-            WALL + 0.45, ROW * n / 2, "slider", rotation=90, ha="center", va="center", fontsize=9
-        )
-    )
+    look = {"ha": "center", "va": "center", "fontsize": 9}
+    drawn.append(ax.text(WALL + 0.45, ROW * n / 2, "slider", rotation=90, **look))
     v, F = (0.0, 0.0) if trace is None else (float(trace.v[row]), float(trace.F[row]))
     speed, push = "$v$", "$F$"
     if trace is not None:
@@ -264,23 +223,6 @@ def _slider(ax: Axes, n: int, trace: Trace | None, row: int) -> list[Artist]:
         (0.5 * ROW * n - 0.3, push, trace is not None and F < 0),
     ):
         ends = ((edge + 0.1, height), (edge + 0.8, height))
-        drawn.append(_arrow(ax, *(ends if forward else ends[::-1]), INK))
+        drawn.append(arrow_between(ax, *(ends if forward else ends[::-1]), size=11, lw=1.2))
         drawn.append(ax.text(edge + 0.9, height, text, ha="left", va="center", fontsize=9))
     return drawn
-
-
-def _arrow(
-    ax: Axes, start: tuple[float, float], end: tuple[float, float], colour: str, size: float = 11
-) -> Artist:
-    arrow = FancyArrowPatch(
-        start,
-        end,
-        arrowstyle="-|>",
-        mutation_scale=size,
-        color=colour,
-        linewidth=1.2,
-        shrinkA=0,
-        shrinkB=0,
-        zorder=5,
-    )
-    return ax.add_patch(arrow)

@@ -36,8 +36,6 @@ from plots.systems.mechanical_symbols import (
 )
 from plots.systems.system_diagram import signal_text
 
-__all__ = ["mechanical_figure"]
-
 MARGIN = 0.3
 FOOT = 90  # characters of a line below the drawing
 

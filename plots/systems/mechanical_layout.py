@@ -30,22 +30,6 @@ from gms_fsm.systems.system import Body, Contact, Spring, System
 from plots.charts.labels import printable, wrapped
 from plots.systems.mechanical_symbols import LINE, NAME, formula, width
 
-__all__ = [
-    "ABOVE",
-    "BRISTLE",
-    "STUB",
-    "BodyColumn",
-    "DrawnSpring",
-    "Item",
-    "MechanismLayout",
-    "Slot",
-    "Touch",
-    "arranged",
-    "force_of",
-    "label_of",
-    "written",
-]
-
 LONGEST = 30  # characters of a line of a force
 NARROW = 20  # characters of a line under a contact
 ABOVE = 0.75  # from the top of a contact's lane to the middle of its symbol

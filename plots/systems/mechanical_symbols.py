@@ -6,8 +6,9 @@ Lengths are those of the axes; `UNIT` inches are one of them.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +25,6 @@ from plots.style.matplotlib import (
     RendererBase,
     rc_context,
 )
-
-__all__ = ["UNIT", "Pen", "damper_points", "formula", "spring_points", "width"]
 
 Point = tuple[float, float]
 Points = npt.NDArray[np.float64]
@@ -135,8 +134,22 @@ def damper_points(left: float, right: float, y: float) -> Points:
         [(piston, y), (right, y)],
         [(piston, y - 0.08), (piston, y + 0.08)],
     )
-    points = [point for stroke in strokes for point in (*stroke, (np.nan, np.nan))]
-    return np.array(points[:-1])
+    return np.array(_joined(strokes))
+
+
+def arrow_between(ax: Axes, start: Point, end: Point, *, size: float, lw: float) -> Artist:
+    """Draw an arrow."""
+    look: dict[str, Any] = {"color": INK, "linewidth": lw, "linestyle": "-", "zorder": 5}
+    look |= {"arrowstyle": "-|>", "mutation_scale": size, "shrinkA": 0, "shrinkB": 0}
+    return ax.add_patch(FancyArrowPatch(start, end, **look))
+
+
+def hatched(
+    ax: Axes, left: float, bottom: float, wide: float, high: float, ink: str, hatch: str
+) -> Artist:
+    """Draw hatched ground."""
+    look: dict[str, Any] = {"facecolor": PAPER, "edgecolor": ink, "hatch": hatch}
+    return ax.add_patch(Rectangle((left, bottom), wide, high, linewidth=0, zorder=0, **look))
 
 
 class Pen:
@@ -165,6 +178,10 @@ class Pen:
         )
         self.keep(drawn, gid)
 
+    def strokes(self, *lines: Sequence[Point], gid: str = "") -> None:
+        """Draw several lines as one."""
+        self.line(_joined(lines), gid=gid)
+
     def keep(self, artist: Artist, gid: str = "") -> None:
         """Keep an artist under a group id."""
         if gid:
@@ -190,17 +207,7 @@ class Pen:
 
     def ground(self, left: float, bottom: float, wide: float, high: float) -> None:
         """Draw hatched ground."""
-        patch = Rectangle(
-            (left, bottom),
-            wide,
-            high,
-            facecolor=PAPER,
-            edgecolor=LINE_GREY,
-            hatch="//////",
-            linewidth=0,
-            zorder=0,
-        )
-        self.keep(self.ax.add_patch(patch))
+        self.keep(hatched(self.ax, left, bottom, wide, high, LINE_GREY, "//////"))
 
     def wall(self, x: float, bottom: float, top: float, way: int) -> None:
         """Draw a wall whose face is at x; its material is on the side `way`."""
@@ -234,117 +241,75 @@ class Pen:
 
     def arrow(self, start: Point, end: Point, gid: str = "", *, lw: float = 1.3) -> None:
         """Draw an arrow."""
-        patch = FancyArrowPatch(
-            start,
-            end,
-            arrowstyle="-|>",
-            mutation_scale=10,
-            color=INK,
-            linewidth=lw,
-            linestyle="-",
-            shrinkA=0,
-            shrinkB=0,
-            zorder=5,
-        )
-        self.keep(self.ax.add_patch(patch), gid)
+        self.keep(arrow_between(self.ax, start, end, size=10, lw=lw), gid)
 
     # ----------------------------------------------------------------- contacts, level
     def friction_between(self, left: float, right: float, y: float, gid: str) -> None:
         """Draw two plates that slide on each other, with bristles between them."""
         middle, half = 0.5 * (left + right), 0.55
-        gap = (np.nan, np.nan)
-        points: list[Point] = [
-            (left, y - 0.16),
-            (middle + half, y - 0.16),
-            gap,
-            (middle - half, y + 0.16),
-            (right, y + 0.16),
-            gap,
-        ]
-        self.line(
-            [*points, *_bristles(middle - half + 0.1, middle + half - 0.1, y + 0.16, y - 0.16)],
+        low, high = y - 0.16, y + 0.16
+        self.strokes(
+            [(left, low), (middle + half, low)],
+            [(middle - half, high), (right, high)],
+            *_bristles(middle - half + 0.1, middle + half - 0.1, high, low),
             gid=gid,
         )
 
     def backlash(self, left: float, right: float, y: float, gid: str) -> None:
         """Draw a tongue with play in a fork."""
-        middle, gap = 0.5 * (left + right), (np.nan, np.nan)
+        middle = 0.5 * (left + right)
         a, b = middle - 0.45, middle + 0.45
-        self.line(
-            [
-                (left, y),
-                (a, y),
-                gap,
-                (a, y - 0.28),
-                (a, y + 0.28),
-                (b, y + 0.28),
-                (b, y + 0.1),
-                gap,
-                (a, y - 0.28),
-                (b, y - 0.28),
-                (b, y - 0.1),
-                gap,
-                (middle, y - PLATE + 0.06),
-                (middle, y + PLATE - 0.06),
-                gap,
-                (middle, y),
-                (right, y),
-            ],
+        self.strokes(
+            [(left, y), (a, y)],
+            [(a, y - 0.28), (a, y + 0.28), (b, y + 0.28), (b, y + 0.1)],
+            [(a, y - 0.28), (b, y - 0.28), (b, y - 0.1)],
+            [(middle, y - PLATE + 0.06), (middle, y + PLATE - 0.06)],
+            [(middle, y), (right, y)],
             gid=gid,
         )
 
     def clutch(self, left: float, right: float, y: float, gid: str) -> None:
         """Draw two plates with teeth that fit into each other."""
-        middle, gap = 0.5 * (left + right), (np.nan, np.nan)
-        points: list[Point] = []
+        middle = 0.5 * (left + right)
+        lines: list[list[Point]] = []
         for end, way in ((left, 1), (right, -1)):
             plate = middle - 0.2 * way
+            edge = [(plate, y - 0.28)]
             # Teeth of one plate face the spaces of the other one.
-            teeth = (-0.24, 0.04) if way > 0 else (-0.1, 0.18)
-            points += [(end, y), (plate, y), gap, (plate, y - 0.28)]
-            for low in teeth:
+            for low in (-0.24, 0.04) if way > 0 else (-0.1, 0.18):
                 tip = plate + 0.14 * way
-                points += [(plate, y + low), (tip, y + low), (tip, y + low + 0.1)]
-                points += [(plate, y + low + 0.1)]
-            points += [(plate, y + 0.28), gap]
-        self.line(points[:-1], gid=gid)
+                edge += [(plate, y + low), (tip, y + low), (tip, y + low + 0.1)]
+                edge += [(plate, y + low + 0.1)]
+            lines += [[(end, y), (plate, y)], [*edge, (plate, y + 0.28)]]
+        self.strokes(*lines, gid=gid)
 
     def stop(self, face: float, post: float, y: float, gid: str) -> None:
         """Draw an end stop: a plate on the body's side and a block that it hits."""
         way = 1 if post > face else -1
-        inner, gap = post - 0.55 * way, (np.nan, np.nan)
-        touch = face + 0.35 * way
-        self.line(
-            [
-                (face, y),
-                (touch, y),
-                gap,
-                (touch, y - PLATE),
-                (touch, y + PLATE),
-                gap,
-                (inner, y - PLATE),
-                (inner, y + PLATE),
-                (post, y + PLATE),
-                gap,
-                (inner, y - PLATE),
-                (post, y - PLATE),
-            ],
+        inner, touch = post - 0.55 * way, face + 0.35 * way
+        low, high = y - PLATE, y + PLATE
+        self.strokes(
+            [(face, y), (touch, y)],
+            [(touch, low), (touch, high)],
+            [(inner, low), (inner, high), (post, high)],
+            [(inner, low), (post, low)],
             gid=gid,
         )
 
     # ----------------------------------------------------------------- contacts, upright
     def bristles(self, left: float, right: float, top: float, bottom: float, gid: str) -> None:
         """Draw bristles from a body to what it slides on."""
-        self.line(
-            [(left, top), (right, top), (np.nan, np.nan), *_bristles(left, right, top, bottom)],
-            gid=gid,
-        )
+        lines = _bristles(left, right, top, bottom)
+        self.strokes([(left, top), (right, top)], *lines, gid=gid)
 
 
-def _bristles(left: float, right: float, top: float, bottom: float) -> list[Point]:
+def _bristles(left: float, right: float, top: float, bottom: float) -> list[list[Point]]:
     count = max(4, round((right - left) / 0.2))
     lean = 0.35 * (top - bottom)
-    points: list[Point] = []
-    for x in np.linspace(left, right - lean, count):
-        points += [(float(x) + lean, top), (float(x), bottom), (np.nan, np.nan)]
-    return points[:-1]
+    places = np.linspace(left, right - lean, count).tolist()
+    return [[(x + lean, top), (x, bottom)] for x in places]
+
+
+def _joined(lines: Iterable[Sequence[Point]]) -> list[Point]:
+    """Return lines as one with gaps."""
+    return [point for each in lines for point in (*each, (np.nan, np.nan))][:-1]

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import graphviz
 
@@ -40,9 +41,7 @@ from plots.charts.labels import escape, printable, wrapped
 from plots.output.drawings import DrawnGraph
 from plots.style import INK, MONO, PANEL, PAPER, SANS, TEXT_GREY
 from plots.systems.system_routes import Box, DiagramSheet, Join, routed
-from plots.systems.wires import PLACED, caption, draw_wire, joint, position, sides
-
-__all__ = ["signal_text", "system_diagram"]
+from plots.systems.wires import blank, caption, draw_path, placed
 
 # Column, corners, fill and width of the outline of each kind.
 LOOKS = {
@@ -105,14 +104,7 @@ class DiagramBlock:
 def system_diagram(system: System) -> DrawnGraph:
     """Draw a system."""
     blocks = list(_blocks(system))
-    graph = DrawnGraph(
-        name=graphviz.escape(printable(system.name)),
-        engine="neato",
-        graph_attr=PLACED | {"bgcolor": PAPER},
-        node_attr={"fontname": SANS, "fontcolor": INK, "color": INK, "fixedsize": "true"}
-        | {"margin": "0"},
-        edge_attr={"color": INK, "arrowsize": "0.7", "penwidth": "1.1"},
-    )
+    graph = blank(graphviz.escape(printable(system.name)))
     graph.text = "\n".join([system.name, *map(_in_words, blocks)])
     columns = sorted({LOOKS[block.kind][0] for block in blocks})
     boxes = [Box(block.id, *_size(block), columns.index(LOOKS[block.kind][0])) for block in blocks]
@@ -295,18 +287,10 @@ def _reading(blocks: Iterable[DiagramBlock], owners: Mapping[str, str]) -> Itera
 # --------------------------------------------------------------------------- drawing
 def _draw_block(graph: graphviz.Digraph, block: DiagramBlock, box: Box) -> None:
     _, style, fill, line = LOOKS[block.kind]
-    graph.node(
-        block.id,
-        f"<{_rows(_lines(block), box)}>",
-        id=block.id,
-        pos=position((box.x, box.y)),
-        shape="box",
-        style=style,
-        fillcolor=fill,
-        penwidth=f"{line:g}",
-        **{"class": block.kind},
-        **sides((box.width, box.height)),
-    )
+    look = {"shape": "box", "style": style, "fillcolor": fill, "penwidth": f"{line:g}"}
+    look["class"] = block.kind
+    label = f"<{_rows(_lines(block), box)}>"
+    placed(graph, block.id, (box.x, box.y), (box.width, box.height), label, **look)
     for k, places in enumerate(MARKS.get(block.mark, ())):
         _draw_mark(graph, f"{block.id}-{block.mark}{k or ''}", block.mark, places, box)
 
@@ -318,31 +302,18 @@ def _draw_mark(
     wide, high = MARK
     x, y = box.x + 0.5 * box.width - wide - 7.0, box.y + 0.5 * box.height - high - 8.0
     corners = [(x + wide * a, y + high * b) for a, b in places]
-    first, last = f"{name}-first", f"{name}-last"
-    joint(graph, first, corners[0])
-    joint(graph, last, corners[-1])
-    draw_wire(graph, name, first, corners[1:-1], last, arrow="none", kind=kind)
+    draw_path(graph, name, corners, arrow="none", kind=kind)
 
 
 def _draw_join(
     graph: graphviz.Digraph, join: Join, path: list[tuple[float, float]], *, dashed: bool
 ) -> None:
-    first, last = f"{join.id}-first", f"{join.id}-last"
-    acts = join.id.startswith("acts-")
-    joint(graph, first, path[0])
-    joint(graph, last, path[-1])
-    draw_wire(
-        graph,
-        join.id,
-        first,
-        path[1:-1],
-        last,
-        arrow="both" if acts else "forward",
-        width=ACTS if acts else 1.1,
-        tip=ACTS if acts else 1.1,
-        kind="acts" if acts else "reads",
-        style="dashed" if dashed else "solid",
-    )
+    style = "dashed" if dashed else "solid"
+    if join.id.startswith("acts-"):
+        look: dict[str, Any] = {"arrow": "both", "width": ACTS, "tip": ACTS, "kind": "acts"}
+    else:
+        look = {"arrow": "forward", "kind": "reads"}
+    draw_path(graph, join.id, path, style=style, **look)
     if join.text:
         wide = WIDE * len(join.text)
         at = (path[0][0] + 4.0 + 0.5 * wide, path[0][1] + 8.0)
@@ -358,14 +329,8 @@ def _draw_title(graph: graphviz.Digraph, system: System, sheet: DiagramSheet) ->
     wide = max(BOLD * len(system.name), NARROW * len(key))
     box = Box("title", wide, 40.0, 0)
     at = (sheet.left + 0.5 * wide, sheet.top + 42.0)
-    graph.node(
-        "title",
-        f"<{_rows(rows, box)}>",
-        pos=position(at),
-        shape="plaintext",
-        id="title",
-        **sides((wide, 40.0)),
-    )
+    label = f"<{_rows(rows, box)}>"
+    placed(graph, "title", at, (wide, 40.0), label, shape="plaintext")
 
 
 # --------------------------------------------------------------------------- texts

@@ -13,8 +13,6 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-__all__ = ["Box", "DiagramSheet", "Join", "routed"]
-
 Point = tuple[float, float]
 
 GAP = 34.0  # between blocks of a column

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import graphviz
 
-from plots.style import INK
-
-__all__ = ["PLACED", "THICK", "THIN", "Point", "caption", "draw_wire", "joint", "position", "sides"]
+from plots.output.drawings import DrawnGraph
+from plots.style import INK, PAPER, SANS
 
 Point = tuple[float, float]
 
@@ -26,30 +26,41 @@ PLACED = {
 }
 
 
+def blank(name: str, **node: str) -> DrawnGraph:
+    """Return an empty diagram, whose nodes get places and sizes."""
+    plain = {"fontname": SANS, "fontcolor": INK, "color": INK, "fixedsize": "true", "margin": "0"}
+    return DrawnGraph(
+        name=name,
+        engine="neato",
+        graph_attr=PLACED | {"bgcolor": PAPER},
+        node_attr=plain | node,
+        edge_attr={"color": INK, "arrowsize": "0.7", "penwidth": "1.1"},
+    )
+
+
+def placed(
+    graph: graphviz.Digraph, name: str, at: Point, size: Point, label: str = "", **look: str
+) -> None:
+    """Draw a node around a place."""
+    graph.node(name, label, id=name, pos=position(at), **(sides(size) | look))
+
+
 def caption(
     graph: graphviz.Digraph, name: str, at: Point, text: str, width: float = 40, **look: str
 ) -> None:
     """Write a text, in the markup of Graphviz, around a place."""
     # With this, Graphviz does not warn of a text that it takes to be larger than its room.
-    plain = {"shape": "plaintext", "fixedsize": "shape"} | sides((width, 18))
-    graph.node(name, f"<{text}>", id=name, pos=position(at), **(plain | look))
+    plain = {"shape": "plaintext", "fixedsize": "shape"}
+    placed(graph, name, at, (width, 18), f"<{text}>", **(plain | look))
 
 
 def joint(
     graph: graphviz.Digraph, name: str, at: Point, colour: str = INK, width: float = THIN
 ) -> None:
     """Draw a square of a wire's width where wires end or turn, so that corners have no notch."""
-    graph.node(
-        name,
-        "",
-        id=name,
-        pos=position(at),
-        shape="box",
-        style="filled",
-        fillcolor=colour,
-        peripheries="0",  # an outline would make it wider than its wire
-        **sides((width, width)),
-    )
+    # An outline would make it wider than its wire.
+    look = {"shape": "box", "style": "filled", "fillcolor": colour, "peripheries": "0"}
+    placed(graph, name, at, (width, width), **look)
 
 
 def draw_wire(
@@ -87,6 +98,14 @@ def draw_wire(
             headclip=str(last).lower(),
             dir=shown,
         )
+
+
+def draw_path(graph: graphviz.Digraph, name: str, path: Sequence[Point], **look: Any) -> None:
+    """Draw a wire between two places, where no node is."""
+    ends = f"{name}-first", f"{name}-last"
+    joint(graph, ends[0], path[0])
+    joint(graph, ends[1], path[-1])
+    draw_wire(graph, name, ends[0], path[1:-1], ends[1], **look)
 
 
 def position(at: Point) -> str:

@@ -42,8 +42,6 @@ from gms_fsm.session.explain import Why, explain, values_at
 from gms_fsm.systems.system import loaded
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Plane", "checked_axes", "linear_threshold", "plane_axes", "turning_points"]
-
 Floats = NDArray[np.float64]
 FALLBACK = 1e-3  # of the largest speed, where no guard turns at a speed
 SEARCHED = np.geomspace(1e-15, 1e6, 1200)  # distances from 0 at which guards are compared

@@ -6,8 +6,6 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Window", "window_of"]
-
 Window = tuple[float, float]
 
 

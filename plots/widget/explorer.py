@@ -43,24 +43,14 @@ __all__ = ["Explorer"]
 HERE = Path(__file__).parent
 WIDE = 100.0  # a positive range with such a ratio of its ends has a logarithmic slider
 TIMER = "age"  # a variable that is not poked
-# Names of the style sheet, and the roles of their colours.
-COLOURS = {
-    "ink": "ink",
-    "soft": "soft",
-    "paper": "paper",
-    "panel": "panel",
-    "line": "line",
-    "chosen": "chosen",
-    "now": "now",
-}
+COLOURS = ("ink", "soft", "paper", "panel", "line", "chosen", "now")  # roles in the style sheet
 
 
 def _style() -> str:
     """Return the style sheet, with the colours of both themes as variables."""
     themes: list[Theme] = ["light", "dark"]
     light, dark = (
-        "".join(f"--gms-{name}:{colour(role, theme)};" for name, role in COLOURS.items())
-        for theme in themes
+        "".join(f"--gms-{role}:{colour(role, theme)};" for role in COLOURS) for theme in themes
     )
     return (
         f".gms-explore{{{light}}}\n"

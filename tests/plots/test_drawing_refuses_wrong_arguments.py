@@ -24,6 +24,7 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 import plots
 from plots import LiveChart, block_diagram, figures, live_statechart, panels, statechart
 from plots.page.replay import replay_html
+from plots.panels.parts.selection import PartOptions
 from plots.style.matplotlib import Axes, Figure
 from plots.style.presets import Preset
 from plots.systems import elements
@@ -57,9 +58,10 @@ def panels_with(argument: str) -> dict[str, Callable[..., object]]:
     """Return all panels that take an argument, and otherwise need only Axes and Trace."""
     found = {}
     for name in panels.__all__:
-        taken = inspect.signature(getattr(panels, name)).parameters
+        taken = dict(inspect.signature(getattr(panels, name)).parameters)
+        shared = PartOptions.__annotations__ if taken.pop("part", None) else {}
         needed = [each for each, how in taken.items() if how.default is how.empty]
-        if needed == ["ax", "trace"] and argument in taken:
+        if needed == ["ax", "trace"] and argument in {*taken, *shared}:
             found[name] = getattr(panels, name)
     return found
 

@@ -18,8 +18,6 @@ from gms_fsm.app.benchmark.methods import METHODS, Method, Predictor
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError
 
-__all__ = ["Card", "Row", "Section", "make"]
-
 Told = Callable[[str, float], object]
 
 

@@ -15,8 +15,6 @@ from gms_fsm.records import damper, tribometer
 from gms_fsm.records.parts import only
 from gms_fsm.records.record import Record
 
-__all__ = ["DATA_SETS", "DataSet", "Split", "data_set", "held_rows", "score"]
-
 TRAIN = (20.0, 100.0)  # s; the rows from 100 s on are held out
 
 

@@ -23,8 +23,6 @@ from gms_fsm.records.parts import thinned
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import ChartModel, LuGre
 
-__all__ = ["METHODS", "Method", "Predictor"]
-
 FEW = 1500  # rows of each of several records that a fit is made with; all are predicted
 
 

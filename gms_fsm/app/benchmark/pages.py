@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gms_fsm.app.benchmark.card import Card, Row, Section
-from gms_fsm.foundation.files import output_folder, write_whole
-
-__all__ = ["FILES", "page", "table", "write"]
+from gms_fsm.foundation.files import output_folder, write_text
 
 FILES = ("benchmark.md", "benchmark.json")
 COMMAND = "gms-fsm benchmark --data FOLDER -o FOLDER"
@@ -111,7 +109,4 @@ def write(card: Card, folder: Path) -> list[Path]:
     """Write a card."""
     target = output_folder(folder, FILES)
     texts = (page(card), json.dumps(card.as_data(), indent=1, ensure_ascii=False) + "\n")
-    return [
-        write_whole(target / name, lambda file, text=text: file.write(text.encode()))  # type: ignore[misc]
-        for name, text in zip(FILES, texts, strict=True)
-    ]
+    return [write_text(target / name, text) for name, text in zip(FILES, texts, strict=True)]

@@ -23,7 +23,7 @@ from pathlib import Path
 
 from gms_fsm.app.lessons.engine.lesson import Lesson, Result
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
-from gms_fsm.foundation.files import output_folder, write_whole
+from gms_fsm.foundation.files import output_folder, write_text
 
 __all__ = ["LESSONS", "Lesson", "Result", "Taught", "lesson", "listed", "numbered", "teach"]
 
@@ -151,8 +151,7 @@ def teach(number: int, folder: str | Path) -> Taught:
     pictures, pages = formats.files(stem, "figure"), formats.files(stem, "page")
     folder = output_folder(folder, [f"{stem}.txt", *pictures, *pages])
     result = chosen.run()
-    text = ("\n".join(result.lines()) + "\n").encode()
-    files = [write_whole(folder / f"{stem}.txt", lambda file: file.write(text))]
+    files = [write_text(folder / f"{stem}.txt", "\n".join([*result.lines(), ""]))]
     for kind, names, write in (("figure", pictures, _draw), ("replay page", pages, _replay)):
         try:
             files += write(result, [folder / name for name in names])

@@ -172,24 +172,10 @@ def run_one(experiment: PaperExperiment, progress: Progress | None = None) -> Tr
         if progress is not None:
             progress(experiment.name, moment.t / experiment.t_end)
 
-    arguments = (experiment.model, experiment.rig, experiment.t_end)
+    options: dict[str, Any] = {"engine": experiment.engine, "progress": reached}
     if experiment.paper_settings:
-        return simulate(
-            *arguments,
-            engine=experiment.engine,
-            progress=reached,
-            events="step",
-            max_step=PAPER_STEP,
-            rtol=PAPER_RTOL,
-        )
-    if experiment.held is not None:
-        ticks = experiment.held * np.arange(round(experiment.t_end / experiment.held))
-        return simulate(
-            *arguments,
-            engine=experiment.engine,
-            progress=reached,
-            events="held",
-            step=experiment.held,
-            t_eval=np.append(ticks, experiment.t_end),
-        )
-    return simulate(*arguments, engine=experiment.engine, progress=reached)
+        options |= {"events": "step", "max_step": PAPER_STEP, "rtol": PAPER_RTOL}
+    elif (h := experiment.held) is not None:
+        ticks = h * np.arange(round(experiment.t_end / h))
+        options |= {"events": "held", "step": h, "t_eval": np.append(ticks, experiment.t_end)}
+    return simulate(experiment.model, experiment.rig, experiment.t_end, **options)

@@ -17,7 +17,7 @@ from gms_fsm.app.paper.held import OSCILLATION, PAPERS_FORCE, PAPERS_PLACE, RAMP
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.zoo.bristles.lugre import BENCHMARK
 from gms_fsm.errors import MissingExtraError
-from gms_fsm.foundation.files import output_folder, write_whole
+from gms_fsm.foundation.files import output_folder, write_text
 from gms_fsm.language import evaluate
 from gms_fsm.systems.signals import Formula
 from gms_fsm.traces.failures import SimulationError
@@ -79,8 +79,7 @@ def write(
             kept = error.trace.save(folder / "partial.npz")
             raise error.replaced(kept=kept).inside(name) from error.__cause__
         files += _keep(folder, name, traces[name])
-    text = claims_text(traces, force, velocity)
-    claims = write_whole(folder / "claims.md", lambda file: file.write(text.encode()))
+    claims = write_text(folder / "claims.md", claims_text(traces, force, velocity))
     files += _draw_charts(folder)
     try:
         files += _draw_figures(folder, traces, force)
@@ -91,12 +90,8 @@ def write(
 
 def _keep(folder: Path, name: str, trace: Trace) -> list[Path]:
     """Write a run as soon as it is complete, so that a later failure cannot lose it."""
-    log = trace.transitions_csv().encode()
-    path = folder / "transitions" / f"{name}.csv"
-    return [
-        trace.save(folder / "traces" / f"{name}.npz"),
-        write_whole(path, lambda file: file.write(log)),
-    ]
+    saved = trace.save(folder / "traces" / f"{name}.npz")
+    return [saved, write_text(folder / "transitions" / f"{name}.csv", trace.transitions_csv())]
 
 
 def _draw_charts(folder: Path) -> list[Path]:

@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gms_fsm.app.verbs.console import note, progress_bars
-from gms_fsm.app.verbs.options import INTERRUPTED
+from gms_fsm.app.verbs.options import INTERRUPTED, OutputFolder
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
-
-__all__ = ["benchmark_command"]
 
 
 def benchmark_command(
@@ -25,9 +23,7 @@ def benchmark_command(
             show_default=False,
         ),
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
-        "benchmark"
-    ),
+    output: OutputFolder = Path("benchmark"),
     only: Annotated[
         list[str] | None,
         typer.Option("--only", help="Data set: tribometer or damper; repeat for several."),

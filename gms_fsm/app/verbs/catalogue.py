@@ -9,8 +9,6 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.registry import Entry, entry, registered
 from gms_fsm.errors import ParameterError
 
-__all__ = ["catalogue", "checkable", "chosen"]
-
 WIDTH = 78
 OWN = "give a chart file, such as own.toml"
 

@@ -12,7 +12,7 @@ import typer
 from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.app.verbs.options import ChartName, ContactName, Law
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.files import output_folder, write_whole
+from gms_fsm.foundation.files import output_folder, write_text
 
 if TYPE_CHECKING:
     from gms_fsm import Model, Report, Rig
@@ -20,15 +20,6 @@ if TYPE_CHECKING:
     from gms_fsm.run.problem import Problem
 
 SECONDS = 10.0  # of a demonstration of a system, whose file has no [run]
-
-__all__ = [
-    "blocks_command",
-    "chart_command",
-    "check_command",
-    "code_command",
-    "handout_command",
-    "no_contact",
-]
 
 
 class RigName(enum.StrEnum):
@@ -197,8 +188,7 @@ def _write_reports(text: str, reports: list[Report], folder: Path) -> list[Path]
     stems = [f"{number}-{finding.check}" for number, (_, finding) in enumerate(found, start=1)]
     pictures = [name for stem in stems for name in formats.files(stem, "graph")]
     output_folder(folder, ["report.txt", *pictures])
-    whole = f"{text}\n".encode()
-    written = [write_whole(folder / "report.txt", lambda file: file.write(whole))]
+    written = [write_text(folder / "report.txt", f"{text}\n")]
     for stem, (report, finding) in zip(stems, found, strict=True):
         edges = report.chart.guards
         marked = [part for part in finding.where if part in edges] or finding.where

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress
-
-__all__ = ["error_line", "messages", "note", "progress_bars"]
+    from rich.progress import Progress, TaskID
 
 
 def messages(**options: Any) -> Console:
@@ -31,6 +29,24 @@ def progress_bars(*columns: Any) -> Iterator[Progress]:
     finally:
         if bars.live.is_started:
             bars.stop()
+
+
+@contextlib.contextmanager
+def named_bars() -> Iterator[Callable[[str, float], None]]:
+    """Provide a function that is told a name and how much of it is done: a bar for each name."""
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
+    with progress_bars(*columns) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, done: float) -> None:
+            if name not in tasks:
+                bars.start()
+                tasks[name] = bars.add_task(name, total=1.0)
+            bars.update(tasks[name], completed=done)
+
+        yield show
 
 
 def error_line(text: str) -> None:

@@ -13,7 +13,6 @@ from gms_fsm.errors import ParameterError
 if TYPE_CHECKING:
     from gms_fsm import Chart, Contact, Model, System
 
-__all__ = ["export_command"]
 
 SETTINGS = ("method", "step", "rtol", "atol", "max_step", "max_steps", "events")  # of a scenario
 

@@ -13,7 +13,6 @@ from gms_fsm.app.verbs.options import INTERRUPTED, Overrides, PresetName, Scenar
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
-__all__ = ["fit_command"]
 
 NARROWEST = 80  # characters: numbers are not cut in a narrow terminal
 

@@ -7,19 +7,6 @@ from typing import Annotated
 
 import typer
 
-__all__ = [
-    "INTERRUPTED",
-    "ChartName",
-    "ContactName",
-    "End",
-    "Law",
-    "Overrides",
-    "PresetName",
-    "ScenarioFile",
-    "Start",
-    "TraceFile",
-]
-
 INTERRUPTED = 130  # the conventional exit code after Ctrl-C
 
 ScenarioFile = Annotated[
@@ -29,6 +16,7 @@ ScenarioFile = Annotated[
         show_default=False,
     ),
 ]
+OutputFolder = Annotated[Path, typer.Option("--output", "-o", help="Output folder.")]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", help="Override a key, for example --set model.law=published."),

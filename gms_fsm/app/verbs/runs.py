@@ -7,26 +7,20 @@ import enum
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import messages, note, progress_bars
-from gms_fsm.app.verbs.options import INTERRUPTED, ContactName, Overrides, PresetName, ScenarioFile
-
-if TYPE_CHECKING:
-    from rich.progress import TaskID
-
-__all__ = [
-    "debug_command",
-    "lesson_command",
-    "paper_command",
-    "phenomena_command",
-    "run_command",
-    "schema_command",
-    "sweep_command",
-]
+from gms_fsm.app.verbs.console import messages, named_bars, note
+from gms_fsm.app.verbs.options import (
+    INTERRUPTED,
+    ContactName,
+    OutputFolder,
+    Overrides,
+    PresetName,
+    ScenarioFile,
+)
 
 
 class EngineName(enum.StrEnum):
@@ -38,7 +32,7 @@ class EngineName(enum.StrEnum):
 
 
 def paper_command(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path("paper"),
+    output: OutputFolder = Path("paper"),
     force: Annotated[
         str, typer.Option(help="Applied force of Fig. 3 in N, an expression of t (s).")
     ] = FORCE,
@@ -48,21 +42,10 @@ def paper_command(
     preset: PresetName = "screen",
 ) -> None:
     """Run the paper's two experiments; write figures, traces, logs and claims.md."""
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-
     import plots
     from gms_fsm.app.paper import writing
 
-    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
-    with plots.preset(preset), progress_bars(*columns) as bars:
-        tasks: dict[str, TaskID] = {}
-
-        def show(name: str, done: float) -> None:
-            if name not in tasks:
-                bars.start()
-                tasks[name] = bars.add_task(name, total=1.0)
-            bars.update(tasks[name], completed=done)
-
+    with plots.preset(preset), named_bars() as show:
         files = writing.write(output, force, velocity, show)
     typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
 
@@ -188,9 +171,7 @@ def phenomena_command(
             "--phenomenon", help="Such as lag or drift; repeat for several. All by default."
         ),
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
-        "phenomena"
-    ),
+    output: OutputFolder = Path("phenomena"),
     bench: Annotated[
         list[str] | None,
         typer.Option(
@@ -204,24 +185,13 @@ def phenomena_command(
     contact: ContactName = "",
 ) -> None:
     """Measure which phenomena friction models show; write a table and figures."""
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-
     from gms_fsm.app import phenomena as room
     from gms_fsm.phenomena.measure import Bench
     from gms_fsm.phenomena.results import VERDICTS
 
     own = room.own_models(files or (), contact, room.numbers_given("--value", value or []))
     models: dict[str, Any] | None = {**{name: name for name in model or ()}, **own} or None
-    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
-    with progress_bars(*columns) as bars:
-        tasks: dict[str, TaskID] = {}
-
-        def show(name: str, done: float) -> None:
-            if name not in tasks:
-                bars.start()
-                tasks[name] = bars.add_task(name, total=1.0)
-            bars.update(tasks[name], completed=done)
-
+    with named_bars() as show:
         numbers = Bench.of(room.numbers_given("--set", bench or []))
         table, written = room.write(output, models, phenomenon, bench=numbers, progress=show)
     counts = collections.Counter(cell.measured.verdict for cell in table)
@@ -267,9 +237,7 @@ def lesson_command(
         str,
         typer.Argument(help="Number of the lesson; omit it to list all.", show_default=False),
     ] = "",
-    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
-        "lessons"
-    ),
+    output: OutputFolder = Path("lessons"),
     notebook: Annotated[
         bool, typer.Option("--notebook", help="Write it as a notebook instead, without running it.")
     ] = False,

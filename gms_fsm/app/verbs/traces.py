@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gms_fsm.app.verbs.console import progress_bars
-from gms_fsm.app.verbs.options import ContactName, End, PresetName, Start, TraceFile
+from gms_fsm.app.verbs.options import ContactName, End, OutputFolder, PresetName, Start, TraceFile
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.foundation.files import output_folder, refuse_input
 
 if TYPE_CHECKING:
     from gms_fsm import Chart, Trace
-
-__all__ = ["animate_command", "plot_command", "replay_command"]
 
 
 def _of_contact(path: Path, contact: str) -> Trace:
@@ -56,9 +54,7 @@ def _window(run: Trace, start: float | None, end: float | None) -> tuple[float, 
 
 def plot_command(
     trace: TraceFile,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
-        "figures"
-    ),
+    output: OutputFolder = Path("figures"),
     start: Start = None,
     end: End = None,
     contact: ContactName = "",

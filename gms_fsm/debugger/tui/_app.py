@@ -23,7 +23,7 @@ from gms_fsm.debugger._commands import Commands
 from gms_fsm.debugger._help import overview
 from gms_fsm.debugger._over_time import curves, ribbons
 from gms_fsm.debugger._over_time import events as events_of
-from gms_fsm.debugger._text import DRAWN
+from gms_fsm.debugger._text import DRAWN, labels
 from gms_fsm.debugger._view import Screen, branches, chart_states, view
 from gms_fsm.debugger.tui import _guards, _time
 from gms_fsm.debugger.tui import _panels as drawn
@@ -32,8 +32,6 @@ from gms_fsm.debugger.tui._keys import KEYS, help_rows, with_number
 from gms_fsm.debugger.tui._spans import DARK, LIGHT, PanelLine, line, painted
 from gms_fsm.debugger.tui._widgets import Help, Keys, Panel, Prompt, Ribbon
 from gms_fsm.session.session import Session
-
-__all__ = ["FullScreen"]
 
 GROUNDS = {
     "gms-dark": Theme(
@@ -242,10 +240,8 @@ class FullScreen(App[int]):
         """Draw the chart of the chosen element, with the names of edges if they take no lines."""
         commands, panel = self.commands, self.panels["chart"]
         states = chart_states(commands.session, commands.element)
-        bank = commands.elements.bank(commands.element)
-        chart = commands.session.system.contact(bank.name).chart
         name = commands.elements.name(commands.element)
-        title = f"{name}: {chart.name}"
+        title = f"{name}: {commands.elements.chart(commands.element).name}"
         panel.border_title = title if len(title) <= width - 2 else name
         art, shorter = (chart_art(states, width, names=names) for names in (True, False))
         if len(art) > len(shorter):
@@ -271,7 +267,7 @@ class FullScreen(App[int]):
             return
         session, element = self.commands.session, self.commands.element
         states = max(len(each.state) for each in self.seen.elements)
-        names = max(map(len, _time.labels(self.seen.contacts)))
+        names = max(map(len, labels(self.seen.contacts)))
         lead = min(names, 14) + min(states, 9) + 3
         parts, span = max(10, panel.columns - lead), self.span
         shown, parent = ribbons(session, parts, span=span), session.branch.parent
@@ -292,9 +288,8 @@ class FullScreen(App[int]):
 
     def _key(self) -> list[str]:
         """Return the marks of the states, of the chosen element's chart."""
-        bank = self.commands.elements.bank(self.commands.element)
-        chart = self.commands.session.system.contact(bank.name).chart
-        marks = _time.RIBBON
+        chart = self.commands.elements.chart(self.commands.element)
+        marks = DRAWN.ribbon
         return [f"{marks[i % len(marks)]} {each.name}" for i, each in enumerate(chart.states)]
 
     @property
@@ -441,9 +436,8 @@ class FullScreen(App[int]):
         """Begin a poke of the chosen element."""
         elements, element = self.commands.elements, self.commands.element
         bank = elements.bank(element)
-        chart = self.commands.session.system.contact(bank.name).chart
         lead = f"{bank.name}." if elements.named else ""
-        name = (*chart.variables, "state")[0]
+        name = (*elements.chart(element).variables, "state")[0]
         self.action_prompt(f"poke {lead}{name}{element - bank.first + 1}=")
 
     def action_branch(self) -> None:

@@ -15,8 +15,6 @@ from itertools import groupby
 from gms_fsm.debugger._view import EdgeView, StateView
 from gms_fsm.debugger.tui._spans import Line, Span
 
-__all__ = ["MARKS", "chart_art"]
-
 MARKS = {True: "✓", False: "✗", None: "?"}
 LIGHT, HEAVY = 1, 2
 # The box-drawing character for weights 0, 1, 2 of the arms up, right, down and left: base 3.

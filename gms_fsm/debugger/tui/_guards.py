@@ -14,8 +14,6 @@ from gms_fsm.foundation.quantities import quantity
 from gms_fsm.session.explain import Clause, Why
 from gms_fsm.session.session import Breakpoint
 
-__all__ = ["margin_bar", "why_rows"]
-
 DECADES = 6  # of a margin, relative to the larger side
 VALUE = 13  # columns of a value in the table of clauses
 VALUES = VALUE + 4  # columns around text and bar

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 from gms_fsm.debugger.tui._spans import PanelLine, line
 
-__all__ = ["KEYS", "Key", "help_rows", "with_number"]
-
 
 class Key(NamedTuple):
     """A key: names for Textual, how it is shown, a label (or none), an action, its help."""

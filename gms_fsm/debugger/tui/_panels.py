@@ -16,15 +16,6 @@ from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line, state_role
 from gms_fsm.foundation.quantities import quantity
 from gms_fsm.session.session import Breakpoint, Fired
 
-__all__ = [
-    "answer_rows",
-    "element_rows",
-    "event_rows",
-    "fitted",
-    "session_rows",
-    "status_lines",
-]
-
 BAR = 8  # characters for |z|/s = 1
 TIME = " " * 16  # columns of the time of a transition
 

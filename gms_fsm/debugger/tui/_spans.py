@@ -10,8 +10,6 @@ from typing import NamedTuple
 
 from rich.text import Text
 
-__all__ = ["DARK", "LIGHT", "Line", "PanelLine", "Span", "line", "painted", "plain", "state_role"]
-
 STATES = 6  # colours of states; the ribbons' marks repeat in the same rhythm
 
 

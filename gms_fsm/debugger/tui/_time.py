@@ -6,24 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 
 from gms_fsm.debugger._over_time import Ribbons
-from gms_fsm.debugger._text import short
-from gms_fsm.debugger._view import ContactView, Screen
+from gms_fsm.debugger._text import DRAWN, labels, short
+from gms_fsm.debugger._view import Screen
 from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line, state_role
 from gms_fsm.foundation.quantities import quantity, sparkline
 
-__all__ = ["RIBBON", "axis", "curve_rows", "labels", "ranges", "ribbon_rows"]
-
-RIBBON = "─▓═┼▒┄"  # one mark per state, as at the line prompt
 UNITS = {"v": "m/s", "F": "N"}
-
-
-def labels(contacts: Sequence[ContactView]) -> list[str]:
-    """Return the label of each element: ``E1``, in a system ``gear 1``."""
-    return [
-        f"{contact.name} {each.number}" if contact.name else f"E{each.number}"
-        for contact in contacts
-        for each in contact.elements
-    ]
 
 
 def axis(start: float, end: float, width: int) -> str:
@@ -49,7 +37,7 @@ def ribbon_rows(
     ribbons: Ribbons, parent: Ribbons | None, view: Screen, chosen: int, lead: int
 ) -> list[PanelLine]:
     """Return the states of all elements over time; the cursor is a column."""
-    rows = []
+    rows, marks = [], DRAWN.ribbon
     states = [each.state for each in view.elements]
     roles = [
         state_role([state.name for state in contact.chart.states].index(each.state))
@@ -64,16 +52,16 @@ def ribbon_rows(
         room = lead - len(text) - 1
         spans.append(Span(f"{short(states[i], room):<{room}} ", roles[i]))
         for part, mode in enumerate(ribbons.modes):
-            shown = " " if mode is None else RIBBON[mode[i] % len(RIBBON)]
+            shown = " " if mode is None else marks[mode[i] % len(marks)]
             role = "dim" if mode is None else state_role(mode[i])
             spans.append(Span("┃", "now") if part == ribbons.now else Span(shown, role))
         rows.append(PanelLine(_joined(spans)))
     if parent is not None:
-        marks = [
+        differs = [
             "≠" if None not in (a, b) and a != b else " "
             for a, b in zip(ribbons.modes, parent.modes, strict=True)
         ]
-        rows.append(PanelLine(line((f"{' differs':<{lead}}", "dim"), ("".join(marks), "fired"))))
+        rows.append(PanelLine(line((f"{' differs':<{lead}}", "dim"), ("".join(differs), "fired"))))
     return rows
 
 

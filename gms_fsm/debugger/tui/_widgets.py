@@ -22,8 +22,6 @@ from textual.widgets import Input, Static
 
 from gms_fsm.debugger.tui._spans import PanelLine, painted
 
-__all__ = ["Help", "Keys", "Panel", "Prompt", "Ribbon"]
-
 
 class Panel(ScrollableContainer, can_focus=True, inherit_bindings=False):
     """Lines in a frame; a click on a line gives its command."""

@@ -36,8 +36,6 @@ from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from integrators import Firing, Stop
 
-__all__ = ["Branch", "BranchRow", "Continuation"]
-
 
 class BranchRow(NamedTuple):
     """A row of a branch, or a point between two rows (then with micro-step 0)."""

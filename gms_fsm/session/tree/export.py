@@ -16,8 +16,6 @@ from gms_fsm.run.settings import Settings
 from gms_fsm.session.tree.branch import BranchRow
 from gms_fsm.session.tree.poking import initial_values
 
-__all__ = ["save_scenario"]
-
 NAMES = ("step", "rtol", "atol", "max_step", "max_steps")  # any engine gives the same run
 
 

@@ -15,7 +15,6 @@ from gms_fsm.systems.models import parameter_names
 if TYPE_CHECKING:
     from gms_fsm.session.tree.branch import BranchRow
 
-__all__ = ["Edits", "initial_values", "initial_with", "pokeable"]
 
 AGE = "age"  # restarts in a state that was poked
 

@@ -12,17 +12,6 @@ from gms_fsm.session.arguments import check_count
 from gms_fsm.session.tree.branch import Branch, BranchRow
 from gms_fsm.traces.between import first_true
 
-__all__ = [
-    "back",
-    "forward",
-    "goto",
-    "next_firing",
-    "previous_firing",
-    "reaches",
-    "step",
-    "walk_to",
-]
-
 LOOKS = 16  # points between two rows at which a condition is evaluated
 
 

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from gms_fsm.errors import TraceFileError
 from gms_fsm.foundation.parser import PARSER
 
-__all__ = ["member", "write_arrays"]
-
 ROOM = 2**26  # bytes that any array in a file may have
 DENSEST = 200  # no header, time column or log is compressed by a larger factor than this
 

@@ -13,7 +13,6 @@ from gms_fsm.traces.files.parts import stored_names
 if TYPE_CHECKING:
     from gms_fsm.traces.trace import Trace
 
-__all__ = ["column_title", "columns_of"]
 
 FORCES = "_elements"  # how the names of the elements' forces end in a layout
 

@@ -29,8 +29,6 @@ from gms_fsm.traces.files.parts import Parts, RunDescription
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
 
-__all__ = ["AT_ONCE", "log_path", "log_texts", "read", "write"]
-
 AT_ONCE = 4096  # rows in memory as text or as Python numbers
 
 

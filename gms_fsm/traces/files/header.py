@@ -21,8 +21,6 @@ from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider, TextRig
 from gms_fsm.systems.system import System
 from gms_fsm.traces.verdicts import Verdict
 
-__all__ = ["FORMATS", "Header"]
-
 FORMATS = ("gms-fsm trace 1", "gms-fsm trace 2")  # CSV files are of the first
 
 RigKind = Literal["Prescribed", "Slider", "PulledSlider", "custom"]

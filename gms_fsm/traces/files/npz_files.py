@@ -23,8 +23,6 @@ from gms_fsm.traces.files.parts import Parts, RunDescription
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
 
-__all__ = ["read", "write"]
-
 Member = Callable[..., Any]  # name of an array and, optionally, its largest size in bytes
 
 

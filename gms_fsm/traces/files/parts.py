@@ -21,8 +21,6 @@ from gms_fsm.traces.rows import Rows
 if TYPE_CHECKING:
     from gms_fsm.traces.files.header import Header
 
-__all__ = ["Parts", "RunDescription", "checked", "stored_names"]
-
 
 @dataclass(frozen=True, eq=False)
 class RunDescription:

@@ -14,8 +14,6 @@ from gms_fsm.traces.monitors._words import elements_text, values_text
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import ChatteringVerdict, Episode
 
-__all__ = ["chattering"]
-
 
 def chattering(monitor: Chattering, trace: Trace, error: Exception | None) -> ChatteringVerdict:
     livelock = isinstance(error, LivelockError) and _switched_last(trace)

@@ -12,8 +12,6 @@ from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import ClauseSeen, CoverageVerdict
 
-__all__ = ["coverage"]
-
 
 def coverage(trace: Trace) -> CoverageVerdict:
     chart, log, mode = trace.model.chart, trace.transitions, trace.modes.T

@@ -25,8 +25,6 @@ from gms_fsm.traces.monitors._passivity import passivity
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import Verdict
 
-__all__ = ["checked", "examine", "watched"]
-
 
 def checked(
     monitors: str | Iterable[str | Monitor], what: Mounted, output: str = "all"

@@ -24,8 +24,6 @@ from gms_fsm.traces.system_scope import SystemScope, owners_of, system_names
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import InvariantVerdict
 
-__all__ = ["invariant_verdict", "read_invariant"]
-
 
 def read_invariant(monitor: Invariant, what: Mounted) -> Condition:
     """Parse an invariant of what runs, or of its contact."""

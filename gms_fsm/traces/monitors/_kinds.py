@@ -9,8 +9,6 @@ from typing import TypeAlias
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ParameterError
 
-__all__ = ["ALL", "KNOWN", "Chattering", "Coverage", "Invariant", "Monitor", "Passivity"]
-
 
 def named(contact: str, name: str) -> str:
     """Return the name of a monitor, with that of its contact: ``gear: passivity``."""

@@ -20,8 +20,6 @@ from gms_fsm.traces.monitors._words import elements_text
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import PassivityVerdict
 
-__all__ = ["passivity"]
-
 
 def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
     spring = _spring(trace.model)

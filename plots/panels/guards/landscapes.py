@@ -27,7 +27,7 @@ from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.findings import Finding, Report
 from plots.panels.guards.line_names import LineNames, NamedLine
-from plots.panels.parts.axes import Artists
+from plots.panels.parts.axes import Artists, beside
 from plots.panels.parts.selection import checked_row, checked_window, one_element, scaled, shown
 from plots.style import (
     EDGE_COLOURS,
@@ -458,18 +458,9 @@ def pins(ax: Axes, trace: Trace, element: int, checks: Report, *, row: int = -1)
         v, z = (float(finding.counterexample[name]) for name in plane.names)
         point = float(np.clip(v, *ax.get_xlim())), float(np.clip(factor * z, *ax.get_ylim()))
         places.setdefault(point, []).append(str(number))
+    look: Any = {"ha": "left", "va": "baseline", "fontweight": "bold", "zorder": 11}
+    look["bbox"] = {"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK}
     for (v, z), numbers in places.items():
         drawn += ax.plot(v, z, "D", color=PAPER, markeredgecolor=INK, clip_on=False, zorder=10)
-        drawn.append(
-            ax.annotate(
-                ", ".join(numbers),
-                (v, z),
-                (7, 7),
-                textcoords="offset points",
-                fontsize=font(8),
-                fontweight="bold",
-                bbox={"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK},
-                zorder=11,
-            )
-        )
+        drawn.append(beside(ax, ", ".join(numbers), (v, z), (7, 7), **look))
     return drawn

@@ -12,8 +12,6 @@ from plots.style import PAPER
 from plots.style.matplotlib import Artist, Axes, Bbox, IdentityTransform, RendererBase, Text
 from plots.style.presets import font
 
-__all__ = ["LineNames", "NamedLine"]
-
 Floats = NDArray[np.float64]
 STEP, PAD, CLEAR = 7.0, 1.5, 9.0  # points: between candidates, around a name, around the dot
 CROSSING, OUTSIDE = 1.0, 0.6  # costs: of a covered point of a line, of the distance from an edge

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace, check_trace
-from plots.panels.parts.axes import Artists, draw_curve, element_look, note, time_axis
-from plots.panels.parts.selection import (
-    checked_elements,
-    checked_window,
-    has_threshold,
-    is_number,
-    shown,
+from plots.panels.parts.axes import (
+    Artists,
+    beside,
+    draw_curve,
+    element_curves,
+    element_look,
+    no_threshold,
+    time_axis,
 )
+from plots.panels.parts.selection import PartOptions, RunPart, has_threshold, is_number, selected
 from plots.style import INK, LINE_GREY, PAPER
 from plots.style.matplotlib import Axes
 from plots.style.presets import font, pt
@@ -85,20 +86,13 @@ def cascade_window(
     return max(first, float(group[0]) - pad), min(last, float(group[-1]) + pad)
 
 
-def _in_window(trace: Trace, window: Window, chosen: Sequence[int]) -> Any:
-    """Return the log's records of the chosen elements in a window."""
-    log = trace.transitions
-    return log[(log.t >= window[0]) & (log.t <= window[1]) & np.isin(log.element, chosen)]
+def _in_window(part: RunPart) -> Any:
+    """Return the log's records of a part of a run."""
+    log, (begin, end) = part.run.transitions, part.window
+    return log[(log.t >= begin) & (log.t <= end) & np.isin(log.element, part.elements)]
 
 
-def marks(
-    ax: Axes,
-    trace: Trace,
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-    labels: bool = True,
-) -> Artists:
+def marks(ax: Axes, trace: Trace, *, labels: bool = True, **part: Unpack[PartOptions]) -> Artists:
     """Draw a vertical line at every transition, labelled with its element.
 
     Parameters
@@ -107,10 +101,8 @@ def marks(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Which elements, counted from 0; by default all.
+    **part
+        ``window`` and ``elements``.
     labels : bool
         Write ``E1`` and so on above the axes; labels that would overlap are joined.
 
@@ -119,8 +111,9 @@ def marks(
     list of Artist
         One line per transition, then the labels.
     """
-    begin, end = checked_window(trace, window)
-    log = _in_window(trace, (begin, end), checked_elements(trace, elements))
+    this = selected(trace, **part)
+    begin, end = this.window
+    log = _in_window(this)
     drawn: Artists = [
         ax.axvline(t, linewidth=pt(0.9), zorder=1, **element_look(int(i), trace.n))
         for t, i in zip(log.t.tolist(), log.element.tolist(), strict=True)
@@ -135,21 +128,11 @@ def marks(
         while len(groups) > 1 and _meet(groups[-2], groups[-1], letter):
             after = groups.pop()
             groups[-1] = [groups[-1][0] + after[0], groups[-1][1], after[2]]
-    for members, t0, t1 in groups:
-        drawn.append(
-            ax.annotate(
-                _joined(members),
-                ((t0 + t1) / 2, 1.0),
-                (0, 2),
-                xycoords=ax.get_xaxis_transform(),
-                textcoords="offset points",
-                ha="center",
-                va="bottom",
-                fontsize=font(8),
-                color=INK,
-            )
-        )
-    return drawn
+    top = ax.get_xaxis_transform()
+    return drawn + [
+        beside(ax, _joined(members), ((t0 + t1) / 2, 1.0), (0, 2), xycoords=top)
+        for members, t0, t1 in groups
+    ]
 
 
 def _joined(members: list[int]) -> str:
@@ -163,13 +146,7 @@ def _meet(a: list[Any], b: list[Any], letter: float) -> bool:
     return bool(gap < letter * (len(_joined(a[0])) + len(_joined(b[0])) + 1) / 2)
 
 
-def margins(
-    ax: Axes,
-    trace: Trace,
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-) -> Artists:
+def margins(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     """Draw the relative margin of each element to its threshold, 1 - |z| / s.
 
     Parameters
@@ -178,10 +155,8 @@ def margins(
         Axes to draw on.
     trace : Trace
         The run.
-    window : (float, float), optional
-        Time interval, s; by default a cascade (see `cascade_window`).
-    elements : sequence of int, optional
-        Which elements, counted from 0; by default all.
+    **part
+        ``window``, by default a cascade (see `cascade_window`), and ``elements``.
 
     Returns
     -------
@@ -190,39 +165,29 @@ def margins(
         switches), then the marks. For a chart without edges, or without the input s, there is no
         threshold, and only a note is drawn.
     """
-    chosen = checked_elements(trace, elements)
+    window = part.get("window")
+    this = selected(
+        trace, cascade_window(trace) if window is None else window, part.get("elements")
+    )
     if not has_threshold(trace):
-        missing = "input s" if trace.model.chart.transitions else "edges"
-        return [note(ax, f"no threshold:\nthis chart has no {missing}")]
-    limits = checked_window(trace, cascade_window(trace) if window is None else window)
-    part = shown(trace, limits)
-    values = 1 - np.abs(part.z / part.s)
-    largest = float(np.nanmax(np.abs(values[:, chosen])))
+        return [no_threshold(ax, trace)]
+    values = 1 - np.abs(this.rows.z / this.rows.s)
+    largest = float(np.nanmax(np.abs(values[:, this.elements])))
     power = max(0, int(np.ceil(-np.log10(largest)))) if largest > 0 else 0
     power = 3 * -(-power // 3) if power > 1 else 0
     factor = 10.0**power
-    log = _in_window(trace, limits, chosen)
-    lines: Artists = []
+    log = _in_window(this)
+    lines = element_curves(ax, this, factor * values, "E{}")
     dots: Artists = []
-    for i in chosen:
-        lines += draw_curve(
-            ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i, trace.n)
-        )
-        mine = log[log.element == i]
+    look: dict[str, Any] = {"markersize": pt(4), "clip_on": False, "zorder": 4}
+    for i in this.elements:
+        mine, ink = log[log.element == i], element_look(i, trace.n)["color"]
         if mine.size:
-            dots += ax.plot(
-                mine.t,
-                factor * (1 - np.abs(mine.z / mine.s)),
-                "o",
-                color=element_look(i, trace.n)["color"],
-                markersize=pt(4),
-                clip_on=False,
-                zorder=4,
-            )
+            dots += ax.plot(mine.t, factor * (1 - np.abs(mine.z / mine.s)), "o", color=ink, **look)
     lines.append(ax.axhline(0.0, color=LINE_GREY, linewidth=pt(0.8), zorder=1))
     ax.set_ylabel(f"10$^{power}$ (1 − |z|/s) [–]" if power else "1 − |z|/s [–]")
-    time_axis(ax, *limits)
-    return [*lines, *dots, *marks(ax, trace, window=limits, elements=chosen)]
+    time_axis(ax, *this.window)
+    return [*lines, *dots, *marks(ax, trace, window=this.window, elements=this.elements)]
 
 
 def cascade(
@@ -230,9 +195,8 @@ def cascade(
     trace: Trace,
     *,
     around: float | None = None,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
     within: float = CASCADE,
+    **part: Unpack[PartOptions],
 ) -> Artists:
     """Draw the jumps of F at a break-away, with both one-sided values of every jump.
 
@@ -244,36 +208,26 @@ def cascade(
         The run.
     around, within : float, optional
         Which cascade; see `cascade_window`. A run without break-aways is drawn whole.
-    window : (float, float), optional
-        Time interval to show instead, s.
-    elements : sequence of int, optional
-        Elements whose jumps are marked; by default all.
+    **part
+        ``window`` to show instead, and the ``elements`` whose jumps are marked.
 
     Returns
     -------
     list of Artist
         The line; the values before (open dots); the values after (filled dots); then the marks.
     """
-    chosen = checked_elements(trace, elements)
+    window = part.get("window")
     if window is None:
         window = cascade_window(trace, around, within=within)
-    limits = checked_window(trace, window)
-    part = shown(trace, limits)
-    log = _in_window(trace, limits, chosen)
-    lines = draw_curve(ax, part.t, part.F, color=INK)
+    this = selected(trace, window, part.get("elements"))
+    log = _in_window(this)
+    lines = draw_curve(ax, this.rows.t, this.rows.F, color=INK)
+    look: dict[str, Any] = {"markersize": pt(4.5), "color": INK}
+    before, after = look | {"markerfacecolor": PAPER, "zorder": 3}, look | {"zorder": 4}
     dots = [
-        *ax.plot(
-            log.t,
-            log.F_before,
-            "o",
-            markersize=pt(4.5),
-            color=INK,
-            markerfacecolor=PAPER,
-            label="F before",
-            zorder=3,
-        ),
-        *ax.plot(log.t, log.F_after, "o", markersize=pt(4.5), color=INK, label="F after", zorder=4),
+        *ax.plot(log.t, log.F_before, "o", label="F before", **before),
+        *ax.plot(log.t, log.F_after, "o", label="F after", **after),
     ]
     ax.set_ylabel("F [N]")
-    time_axis(ax, *limits)
-    return [*lines, *dots, *marks(ax, trace, window=limits, elements=chosen)]
+    time_axis(ax, *this.window)
+    return [*lines, *dots, *marks(ax, trace, window=this.window, elements=this.elements)]

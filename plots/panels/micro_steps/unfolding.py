@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace, check_trace
 from gms_fsm.traces.views import steps_of
-from plots.panels.parts.axes import Artists
+from plots.panels.parts.axes import Artists, beside
 from plots.panels.parts.selection import checked_elements, checked_window, is_number, scaled
 from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, state_look
 from plots.style.matplotlib import Axes, Rectangle
@@ -249,19 +249,8 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
     wide = column_width(ax.get_window_extent().width / ax.figure.dpi, part)
     upright = wide < LETTER * max(map(len, texts)) + 0.06
     for each, text in zip(part.columns, texts, strict=True):
-        drawn.append(
-            ax.annotate(
-                text,
-                (each.left + 0.5, factor * each.F),
-                (0, pt(4)),
-                textcoords="offset points",
-                ha="center",
-                va="bottom",
-                rotation=90 if upright else 0,
-                fontsize=font(8),
-                color=INK,
-            )
-        )
+        at = each.left + 0.5, factor * each.F
+        drawn.append(beside(ax, text, at, (0, pt(4)), rotation=90 if upright else 0))
     ax.set(ylabel=f"F [{unit}]", xlim=(-0.1, part.width + 0.1))
     ax.set_xticks([])
     low, high = float(np.nanmin(factor * F)), float(np.nanmax(factor * F))
@@ -367,23 +356,16 @@ def _edge_names(ax: Axes, part: Unfolded, wide: float) -> Artists:
     """Write the edges above their columns."""
     texts, upright, _ = edge_texts(part, wide)
     firsts = [part.of(instant)[0] for instant in range(part.times.size)]
-    return [
-        ax.annotate(
-            texts.get(each.edge, "others"),
-            (each.left + 0.5, 1.0),
-            (0, pt(3)),
-            xycoords=ax.get_xaxis_transform(),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            rotation=90 if upright else 0,
-            fontsize=font(8),
-            linespacing=1.15,
-            color=INK if each.edge else TEXT_GREY,
-            annotation_clip=False,
-        )
+    look: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "annotation_clip": False}
+    look |= {"rotation": 90 if upright else 0, "linespacing": 1.15}
+    names = [
+        (each, texts.get(each.edge, "others"), INK if each.edge else TEXT_GREY)
         for each in part.columns
         if each.edge or each not in firsts
+    ]
+    return [
+        beside(ax, name, (each.left + 0.5, 1.0), (0, pt(3)), color=ink, **look)
+        for each, name, ink in names
     ]
 
 
@@ -400,25 +382,15 @@ def time_texts(part: Unfolded, wide: float) -> tuple[list[str], bool, float]:
 
 def _times(ax: Axes, part: Unfolded, texts: Sequence[str], upright: bool, lower: float) -> Artists:
     """Write the time of the first instant, and the time between instants."""
-    look: dict[str, Any] = {
-        "xycoords": ax.get_xaxis_transform(),
-        "textcoords": "offset points",
-        "va": "top",
-        "fontsize": font(8.5),
-        "fontweight": "bold",
-        "annotation_clip": False,
-    }
+    look: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "annotation_clip": False}
+    look |= {"va": "top", "fontsize": font(8.5), "fontweight": "bold"}
     # The first time is too long to stand between the others.
     low = -31 - lower if texts else -18
-    first = ax.annotate(
-        f"t = {part.times[0]:.9g} s", (0.0, 0.0), (0, inches(low)), ha="left", **look
-    )
-    look |= {"ha": "center", "rotation": 90 if upright else 0}
+    first = f"t = {part.times[0]:.9g} s"
+    drawn = [beside(ax, first, (0.0, 0.0), (0, inches(low)), ha="left", **look)]
+    look["rotation"] = 90 if upright else 0
     between = zip(part.gaps, texts, strict=True)
-    return [
-        first,
-        *(ax.annotate(text, (x, 0.0), (0, inches(-18)), **look) for x, text in between),
-    ]
+    return drawn + [beside(ax, text, (x, 0.0), (0, inches(-18)), **look) for x, text in between]
 
 
 def _breaks(ax: Axes, part: Unfolded) -> Artists:

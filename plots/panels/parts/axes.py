@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
-from plots.panels.parts.selection import scaled
-from plots.style import ELEMENT_DASHES, TEXT_GREY, element_colour
+from plots.panels.parts.selection import RunPart, scaled
+from plots.style import ELEMENT_DASHES, INK, TEXT_GREY, element_colour
 from plots.style.matplotlib import Artist, Axes, MaxNLocator
 from plots.style.presets import font
 
@@ -41,6 +41,15 @@ def element_look(i: int, n: int) -> dict[str, Any]:
 def draw_curve(ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], **look: Any) -> Artists:
     """Draw a line; a very long one is rasterized."""
     return list(ax.plot(x, y, rasterized=x.size > VECTOR_ROWS, **look))
+
+
+def element_curves(ax: Axes, part: RunPart, values: NDArray[np.float64], label: str) -> Artists:
+    """Draw a column of values for each element over time; labels have its number from 1."""
+    lines: Artists = []
+    for i in part.elements:
+        look = element_look(i, part.run.n)
+        lines += draw_curve(ax, part.rows.t, values[:, i], label=label.format(i + 1), **look)
+    return lines
 
 
 def time_axis(ax: Axes, begin: float, end: float) -> None:
@@ -79,6 +88,20 @@ def lanes(ax: Axes, elements: Sequence[int]) -> None:
         yticklabels=[f"E{i + 1}" for i in elements],
     )
     ax.tick_params(axis="y", length=0, labelsize=font(9 if len(elements) <= MANY else 8))
+
+
+def beside(
+    ax: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **look: Any
+) -> Artist:
+    """Write a text at a distance from a point, in points; by default above it."""
+    plain: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": font(8), "color": INK}
+    return ax.annotate(text, at, shift, textcoords="offset points", **(plain | look))
+
+
+def no_threshold(ax: Axes, trace: Trace) -> Artist:
+    """Write why a panel of thresholds is empty."""
+    missing = "input s" if trace.model.chart.transitions else "edges"
+    return note(ax, f"no threshold:\nthis chart has no {missing}")
 
 
 def note(ax: Axes, text: str) -> Artist:

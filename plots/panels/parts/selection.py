@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
-from typing import Any
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,40 @@ def has_threshold(trace: Trace) -> bool:
         If False, neither |z|/s = 1 nor a margin to it has a meaning.
     """
     return "s" in trace.model.chart.inputs and bool(trace.model.chart.transitions)
+
+
+class PartOptions(TypedDict, total=False):
+    """What panels have in common; see `plots.panels`."""
+
+    window: Window | None
+    elements: Sequence[int] | None
+
+
+@dataclass(frozen=True, eq=False)
+class RunPart:
+    """The part of a run that a panel shows: elements, counted from 0, in a time interval."""
+
+    run: Trace
+    given: Window | None
+    elements: list[int]
+
+    @property
+    def window(self) -> Window:
+        """Begin and end, s."""
+        return checked_window(self.run, self.given)
+
+    @cached_property
+    def rows(self) -> Trace:
+        """The rows worth drawing."""
+        return shown(self.run, self.given)
+
+
+def selected(
+    trace: Trace, window: Window | None = None, elements: Sequence[int] | None = None
+) -> RunPart:
+    """Return the part of a run that the options of a panel choose."""
+    check_trace(trace)
+    return RunPart(trace, window, checked_elements(trace, elements))
 
 
 def shown(trace: Trace, window: Window | None = None) -> Trace:

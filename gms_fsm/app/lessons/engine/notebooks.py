@@ -18,9 +18,7 @@ from string import Template
 from typing import Any
 
 from gms_fsm.app.lessons import lesson
-from gms_fsm.foundation.files import output_folder, write_whole
-
-__all__ = ["cells_of", "composed", "notebook", "write_notebook"]
+from gms_fsm.foundation.files import output_folder, write_text
 
 TEMPLATE = Template(Path(__file__).with_name("notebook.md").read_text(encoding="utf-8"))
 NEW = "<!-- a new cell -->\n"
@@ -43,7 +41,7 @@ def write_notebook(number: int, folder: str | Path) -> Path:
     """
     content, name = notebook(composed(number)), f"lesson_{number}.ipynb"
     folder = output_folder(folder, [name])
-    return write_whole(folder / name, lambda file: file.write(content.encode()))
+    return write_text(folder / name, content)
 
 
 def composed(number: int) -> tuple[Cell, ...]:

@@ -9,8 +9,6 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-__all__ = ["reveal", "vary"]
-
 
 def reveal(predicted: float | str | None, measured: float | str, unit: str = "") -> None:
     """Print what was predicted next to what was measured.
