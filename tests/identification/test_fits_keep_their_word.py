@@ -13,6 +13,7 @@ import pytest
 
 from gms_fsm import ChartModel, LuGre, ParameterError, Record, RecordError, Stribeck, choose, fit
 from gms_fsm.identification.candidates import STIFFER_ONE_WAY
+from gms_fsm.identification.problem import task
 from tests.identification.records import bank, measured, sine
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
@@ -156,6 +157,23 @@ def test_an_interrupt_while_intervals_are_made_keeps_the_values(
     assert not found["k1"].told
     assert np.isfinite(found.effective_rows)
     assert str(found)
+
+
+def test_a_better_point_met_while_intervals_are_made_is_searched_from(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Here all searches before find nothing but the start."""
+    polish, calls = task.Task.polish, list[Any]()
+
+    def later(self: Any, u: Any, best: Any, pool: Any) -> None:
+        if calls:
+            polish(self, u, best, pool)
+        calls.append(u)
+
+    monkeypatch.setattr(task, "_local", lambda given, _, best, __: best.take([given.start_point()]))
+    monkeypatch.setattr(task.Task, "polish", later)
+    found = fit(_record(), bank([2e4, 5e3], [4.7e-5, 9.5e-5]), free=["weights"], **LOCAL)
+    assert found["weights1"].value == pytest.approx(5e-5, rel=1e-3)
 
 
 def test_a_choice_names_what_failed() -> None:
