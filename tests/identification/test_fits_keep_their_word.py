@@ -110,6 +110,10 @@ def test_bounds_of_stiction_hold_while_friction_is_free() -> None:
     for each in found.table:
         assert each.low <= each.value <= each.high, each
     assert found["F_c"].low < 2.0 < found["F_c"].high
+    places = found.task.fine.coordinates
+    assert [each.name for each in places.unknowns] == ["F_c", "F_s"]
+    further = np.array([places.start[0] + 0.3, places.limits[1][1]])
+    assert places.numbers(further)[1] == 5.0  # also above another F_c
     with pytest.raises(ParameterError, match=r"bounds of 'F_s': the highest value is 1.2, and F_c"):
         fit(record, start, free=["F_s"], bounds={"F_s": (1.0, 1.2)}, **LOCAL)
 
