@@ -249,5 +249,5 @@ def test_where_no_scale_is_known_forces_give_free_bodies_a_floor():
     )
     start = Problem.of(system, None, 10.0)
     floor = dict(zip(start.program.layout.y.shared, start.options.floor, strict=True))
-    assert floor == pytest.approx({"x": 1e-13, "v": 1e-14, "x_b": 0.0}, rel=1e-6)
+    assert floor == pytest.approx({"x": 1e-13, "v": 1e-14, "x_b": 0.0}, rel=1e-6, abs=0.0)
     assert {*called} == {0.0}
