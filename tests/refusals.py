@@ -34,6 +34,7 @@ from gms_fsm import (
     Prescribed,
     PulledSlider,
     Record,
+    Session,
     Slider,
     State,
     Stribeck,
@@ -1326,6 +1327,19 @@ rows = {
     "equality": ("invariant, column 6", ..., lambda: "z == s"),
 }
 group("monitors", ExpressionError, monitored, rows)
+
+
+# --------------------------------------------------------------------------- branches
+def forked(given: dict[str, Any]) -> None:
+    Session(stick_slip("signed"), Prescribed("0.1*t"), 1.0).fork(**given)
+
+
+rows = {
+    "values in a list": ("values", [], {"values": []}),
+    "a number for a law": ("law", 7, {"law": 7}),
+    "a number for a name": ("name", 7, {"name": 7}),
+}
+group("fork", ParameterError, forked, rows)
 
 
 # --------------------------------------------------------------------------- trace files

@@ -72,6 +72,12 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built(folder, "it", COMPILERS[0])
 
 
+def test_no_name_is_one_of_the_c_library(program: Path) -> None:
+    """Without -std=c99 its headers declare more of them: finite, gamma, j0 and others."""
+    command = [COMPILERS[0], "-fsyntax-only", "it.c", "it_plain.c"]
+    subprocess.run(command, cwd=program.parent, check=True)
+
+
 def test_settings_are_those_of_the_engine(tmp_path: Path) -> None:
     model = stick_slip("signed")
     sources = set()

@@ -13,6 +13,7 @@ import pytest
 
 from gms_fsm import ChartModel, LuGre, ParameterError, Record, RecordError, Stribeck, choose, fit
 from gms_fsm.identification.candidates import STIFFER_ONE_WAY
+from gms_fsm.identification.problem import task
 from tests.identification.records import bank, measured, sine
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
@@ -109,6 +110,10 @@ def test_bounds_of_stiction_hold_while_friction_is_free() -> None:
     for each in found.table:
         assert each.low <= each.value <= each.high, each
     assert found["F_c"].low < 2.0 < found["F_c"].high
+    places = found.task.fine.coordinates
+    assert [each.name for each in places.unknowns] == ["F_c", "F_s"]
+    further = np.array([places.start[0] + 0.3, places.limits[1][1]])
+    assert places.numbers(further)[1] == 5.0  # also above another F_c
     with pytest.raises(ParameterError, match=r"bounds of 'F_s': the highest value is 1.2, and F_c"):
         fit(record, start, free=["F_s"], bounds={"F_s": (1.0, 1.2)}, **LOCAL)
 
@@ -119,10 +124,10 @@ def test_a_false_declaration_of_linearity_is_refused() -> None:
 
 
 def test_profiles_stay_within_bounds() -> None:
-    bounds = {"k": (2.2e4, 1e5)}
+    bounds = {"k": (2.8e4, 1e5)}  # the best is 2.88e4
     found = fit(_record(), bank([3e4], [5e-5]), free=["k"], bounds=bounds, **LOCAL)
     profile = found.profile("k1", restarts=False)
-    assert profile.values.min() >= 2.2e4
+    assert profile.low == profile.values.min() == 2.8e4
     assert profile.rise.min() == 0.0
 
 
@@ -156,6 +161,23 @@ def test_an_interrupt_while_intervals_are_made_keeps_the_values(
     assert not found["k1"].told
     assert np.isfinite(found.effective_rows)
     assert str(found)
+
+
+def test_a_better_point_met_while_intervals_are_made_is_searched_from(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Here all searches before find nothing but the start."""
+    polish, calls = task.Task.polish, list[Any]()
+
+    def later(self: Any, u: Any, best: Any, pool: Any) -> None:
+        if calls:
+            polish(self, u, best, pool)
+        calls.append(u)
+
+    monkeypatch.setattr(task, "_local", lambda given, _, best, __: best.take([given.start_point()]))
+    monkeypatch.setattr(task.Task, "polish", later)
+    found = fit(_record(), bank([2e4, 5e3], [4.7e-5, 9.5e-5]), free=["weights"], **LOCAL)
+    assert found["weights1"].value == pytest.approx(5e-5, rel=1e-3)
 
 
 def test_a_choice_names_what_failed() -> None:

@@ -424,6 +424,15 @@ def test_same_bits(function, printer, inside, tmp_path):
     assert library
 
 
+def test_c_text_leaves_out_what_nobody_reads():
+    def forgets(g):
+        left = cos(g.x[0]) + 1.0  # noqa: F841  # a compiler would warn
+        return g.count
+
+    _, module = module_of(forgets, True)
+    assert "cos" not in c99_text(module).partition(" forgets(")[2]
+
+
 def asks(g):
     for j in range(len(g.out)):
         g.out[j] = signal(g.x[j]) + 1.0

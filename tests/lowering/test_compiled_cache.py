@@ -319,6 +319,17 @@ def test_changed_source_changes_the_edition() -> None:
     assert machine.edition() == usual
 
 
+def test_what_a_run_keeps_is_no_part_of_the_edition(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = set()
+    for kept in ({}, {"a system": 1.5}):
+        monkeypatch.setattr(loop, "kept", kept, raising=False)
+        machine.edition.cache_clear()
+        found.add(machine.edition())
+    monkeypatch.undo()
+    machine.edition.cache_clear()
+    assert len(found) == 1
+
+
 class _Names:
     """A store that knows nothing, keeps nothing, and remembers the name that it was asked for."""
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gms_fsm.errors import ExpressionError
-from gms_fsm.language import CONSTANTS, FUNCTIONS, SEVERAL, evaluate, parse_condition
+from gms_fsm.language import CONSTANTS, ELEMENTARY, FUNCTIONS, SEVERAL, evaluate, parse_condition
 from gms_fsm.session.session import Session
 from tests.plots.browser import (
     Open,
@@ -354,6 +354,18 @@ TEXTS = [
     *(f"{name}({'v, z1' if name in SEVERAL else 'v'}) > 0.1" for name in FUNCTIONS),
     *(f"{name} * v > 0.1" for name in CONSTANTS),
 ]  # fmt: skip
+
+
+def test_functions_have_the_bits_of_python(open_page: Open) -> None:
+    """Those of a browser, and its power, are rounded in another way."""
+    page = open_page("published")
+    pairs = np.random.default_rng(0).uniform(0.1, 9.0, (2000, 2)).tolist()
+    for name, function in ELEMENTARY.items():
+        own, given = ("**", pairs) if name == "pow" else (name, [pair[:1] for pair in pairs])
+        found = page.evaluate(
+            "([name, all]) => all.map((u) => FUNCTIONS[name](...u))", [own, given]
+        )
+        assert found == [function(*each) for each in given], name
 
 
 def test_until_reads_what_the_expression_language_reads(open_page: Open) -> None:

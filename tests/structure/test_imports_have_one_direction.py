@@ -13,7 +13,10 @@ from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 import gms_fsm
+from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.foundation import display
 from tests.helpers import ROOT
 
@@ -134,6 +137,12 @@ def test_what_draws_is_found_by_its_declaration() -> None:
     for name, declared in group[display.GROUP].items():
         found = display.asked(name)
         assert f"{found.__module__}:{found.__name__}" == declared
+
+
+def test_without_what_draws_a_notebook_shows_the_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(display, "asked", display.asked.__wrapped__)
+    monkeypatch.setattr(display, "_declared", lambda: iter(()))
+    assert GMS_ELEMENT["signed"]._repr_svg_() is None  # type: ignore[attr-defined]
 
 
 def test_the_walk_sees_imports_in_functions_and_skips_those_for_types() -> None:

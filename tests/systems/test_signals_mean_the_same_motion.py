@@ -115,6 +115,8 @@ def test_two_corners_at_one_time_are_a_jump_with_the_value_after_it(engine: str)
     assert trace.x.tolist() == pytest.approx([0.05, 0.1, -0.05], abs=1e-12)
     assert trace.z[:, 0].tolist() == pytest.approx([0.05, 0.1, -0.05], abs=1e-12)
     assert as_signal(jump).jumps.tolist() == [1.0]  # type: ignore[union-attr]
+    twice = [(0.0, 0.1), (1.0, 0.3), (1.0, 0.3), (2.0, 0.1)]
+    assert as_signal(twice).jumps.tolist() == []  # type: ignore[union-attr]
 
 
 def test_a_jump_can_release_an_element_at_once() -> None:

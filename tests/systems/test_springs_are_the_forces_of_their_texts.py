@@ -94,3 +94,12 @@ def test_a_rig_declares_its_spring_and_a_derived_one_with_another_force_does_not
     assert [each.name for each in pulled.springs] == ["spring"]
     assert forces(shaken) == {"body": "stiffness * (speed * t - x) + sin(t)"}
     assert shaken.springs == ()
+
+
+def test_rigs_that_differ_in_their_springs_share_no_system() -> None:
+    class Bare(PulledSlider):
+        springs = ()
+
+    model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    pulled, bare = (system_of(model, rig(1.0, 2.0, 0.1)) for rig in (PulledSlider, Bare))
+    assert (len(pulled.springs), len(bare.springs)) == (1, 0)
