@@ -22,7 +22,7 @@ from gms_fsm import Body, Chart, Contact, Prescribed, State, Stribeck, System, T
 from gms_fsm.charts.registry import entry
 from gms_fsm.systems.models import ChartModel, demonstration
 from tests.helpers import FIG4_SINE, SINE, bank, open_loop, pulled_mass, stick_slip, wear
-from tests.plots.systems_to_draw import BALL, BLOCKS, PULLED, SERVO, SHARED, TIMED
+from tests.plots.systems_to_draw import BALL, BLOCKS, SERVO, SHARED, TIMED
 from tests.plots.systems_to_draw import run as system_run
 from tests.systems_cases import puck
 from tests.zoo.zoo_cases import CASES
@@ -120,7 +120,6 @@ RUNS: dict[str, Callable[[], Trace]] = {
     "still": lambda: simulate(stick_slip("signed"), Prescribed("1e-3*sin(t)"), 2.0),
     "many": lambda: simulate(bank(20), Prescribed(SINE), 20.0),
     "wear": lambda: simulate(wear(), Prescribed("0.2 * sin(t)"), 20.0),
-    "pulled": lambda: system_run(PULLED),
     "ball": lambda: system_run(BALL),
     "blocks": lambda: system_run(BLOCKS),
     "pad1": lambda: system_run(BLOCKS).contact("pad1"),
@@ -129,7 +128,7 @@ RUNS: dict[str, Callable[[], Trace]] = {
     "timed": lambda: pushed(Contact("pad", TIMED, {"T_d": 0.3, "F_c": 1.0, "F_s": 1.5})),
     "shared": lambda: pushed(Contact("pad", SHARED, {"k": 10.0, "F_c": 1.0, "b": 0.2})),
     "puck": lambda: puck().run(),
-    **{name: partial(shown, name) for name in ("backlash", "dahl", "rate-state-ageing")},
+    **{name: partial(shown, name) for name in ("backlash", "dahl")},
     "karnopp": lambda: CASES["karnopp"](1.0).run(),
     "elasto-plastic": lambda: CASES["elasto-plastic"](1.0).run(),
     "microseconds": lambda: in_units(1e-6),
