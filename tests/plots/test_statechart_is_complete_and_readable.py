@@ -19,11 +19,9 @@ from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.language import MATLAB_LIKE, clauses, spell
 from plots.charts.labels import edge_id, part_id
-from plots.charts.notation import ChartWriter
 from plots.charts.statechart import statechart
 from tests.helpers import matrix
 from tests.plots.charts_to_draw import (
-    FIVE_STATES,
     HOSTILE,
     LONG_GUARDS,
     MANY_EDGES,
@@ -39,12 +37,10 @@ A4 = 595  # points
 AXIS = {"TB": 0, "LR": 1}
 # Chart, number of elements, options.
 OWN: dict[str, tuple[Chart, int, dict[str, Any]]] = {
-    "GMS published": (GMS_ELEMENT["published"], 1, {}),
     "GMS signed, 4 elements": (GMS_ELEMENT["signed"], 4, {}),
     "LuGre": (LUGRE, 1, {}),
     "3 states": (THREE_STATES, 1, {}),
-    "3 states, 5 elements": (THREE_STATES, 5, {}),
-    "5 states": (FIVE_STATES, 1, {}),
+    "hostile": (HOSTILE, 2, {}),
 }
 HARD: dict[str, tuple[Chart, int, dict[str, Any]]] = {
     "12 elements": (GMS_ELEMENT["published"], 12, {}),
@@ -52,7 +48,6 @@ HARD: dict[str, tuple[Chart, int, dict[str, Any]]] = {
     "40 edges, graph": (MANY_EDGES, 1, {"form": "graph"}),
     "loops": (THREE_LOOPS, 1, {"theme": "dark"}),
     "long guards": (LONG_GUARDS, 1, {"notation": "math"}),
-    "hostile": (HOSTILE, 2, {}),
     "hostile, math": (HOSTILE, 2, {"notation": "math", "theme": "dark"}),
     **{f"random {seed}": (any_chart(seed), 1, {}) for seed in range(5)},
     **{f"random {seed}": (any_chart(seed), 1, {"form": "graph"}) for seed in range(5, 9)},
@@ -63,8 +58,10 @@ ZOO: dict[str, tuple[Chart, int, dict[str, Any]]] = {
 }
 CASES = OWN | HARD | ZOO
 BOTH = [(name, direction) for name in CASES for direction in ("TB", "LR")]
-KEPT = [each for each in BOTH if each[0] in OWN]  # and the others alternately
-KEPT += [(name, ("TB", "LR")[k % 2]) for k, name in enumerate(HARD | ZOO)]
+# Each in one direction, and of the zoo and the random ones every third.
+SOME = [*OWN, *(name for name in HARD if "random" not in name)]
+SOME += [*(name for name in HARD if "random" in name), *ZOO][::3]
+KEPT = [(name, ("TB", "LR")[k % 2]) for k, name in enumerate(SOME)]
 
 
 @cache
@@ -94,8 +91,7 @@ def test_the_check_finds_an_overlap() -> None:
 
 
 # --------------------------------------------------------------------------- complete
-@pytest.mark.parametrize("direction", ["TB", "LR"])
-@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize(("name", "direction"), [each for each in KEPT if each[0] in OWN])
 def test_every_state_guard_edge_and_default_dot_is_there(name: str, direction: str) -> None:
     drawn, (chart, elements, _) = picture(name, direction), OWN[name]
     for element in (f"element{k}" for k in range(1, elements + 1)):
@@ -156,36 +152,8 @@ def assert_line(drawn: Picture, element: str, edge: Transition) -> None:
     assert not second.touches(guard, arrow)
 
 
-@pytest.mark.parametrize("direction", ["TB", "LR"])
-@pytest.mark.parametrize("name", ["hostile", "hostile, math"])
-def test_every_look_shows_the_whole_hostile_chart(name: str, direction: str) -> None:
-    drawn, notation = picture(name, direction), CASES[name][2].get("notation", "stateflow")
-    write = ChartWriter(HOSTILE, notation)
-
-    def plain(text: str) -> str:  # the index of a name is a text of its own, lowered
-        return squeezed(text).replace("_", "") if notation == "math" else squeezed(text)
-
-    for element in ("element1", "element2"):
-        for state in HOSTILE.states:
-            texts = squeezed(*drawn[f"{element}-state-{state.name}"].texts)
-            assert texts.startswith(state.name)
-            for variable in HOSTILE.variables:
-                assert plain(write.flow(variable, HOSTILE.flows[state.name, variable])) in texts
-        for edge in HOSTILE.transitions:
-            guard = plain(write.text(HOSTILE.guards[edge.name]))
-            texts = squeezed(*drawn[f"{element}-guard-{edge.name}"].texts)
-            assert texts == ("1[g1]" if edge.name == "länge" else f"1[{guard}]")
-            assert edge.name != "länge" or squeezed(*drawn["legend1"].texts) == f"g1={guard}"
-    assert max(len(text) for group in drawn.groups.values() for text in group.texts) <= 100
-
-
-@pytest.mark.parametrize(
-    ("notation", "direction", "theme"),
-    [("stateflow", "TB", "light"), ("math", "LR", "light"), ("math", "TB", "dark")],
-)
-def test_invalid_names_are_shown_literally(
-    notation: str, direction: str, theme: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("notation", ["stateflow", "math"])
+def test_invalid_names_are_shown_literally(notation: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)  # let them through
     bad = 'slip</B></TD></TR></TABLE>>]; "evil:n" [label=<<B>\\N" & \x01[x] \\'
     chart = Chart(
@@ -196,7 +164,7 @@ def test_invalid_names_are_shown_literally(
         transitions=(Transition('a"]; evil -> evil [x="', bad, bad, guard="v > 0"),),
         outputs={"F": "v"},
     )
-    drawn = chart_picture(chart, notation=notation, direction=direction, theme=theme)
+    drawn = chart_picture(chart, notation=notation)
     assert len(drawn.of_class("node")) == len(drawn.of_class("edge")) == 3
     (state,) = drawn.of_class("state")
     assert squeezed(drawn[state].texts[0]) == squeezed(bad.replace("\x01", ""))
@@ -227,7 +195,7 @@ def places(drawn: Picture, chart: Chart, element: str, direction: str) -> dict[s
     return found
 
 
-GRAPHS = [name for name in CASES if CASES[name][1] == 1 and name not in ("40 edges", *ZOO)]
+GRAPHS = [name for name in CASES if name not in ("40 edges", "12 elements", *ZOO)]
 GRAPHS = [name for name in GRAPHS if "random" not in name or "form" in CASES[name][2]]
 GRAPHS += [name for name in ZOO if len(CHARTS[name].transitions) > 2]
 
@@ -240,27 +208,9 @@ def test_edges_that_leave_a_state_are_in_the_order_of_priority(name: str, direct
     drawn, chart = picture(name, direction), CASES[name][0]
     if "element1-target-1" in drawn.groups:  # a matrix has its own test
         drawn = chart_picture(chart, direction=direction, form="graph")
-    for what, given in places(drawn, chart, "element1", direction).items():
-        assert all(a < b for a, b in pairwise(given)), what
-
-
-@pytest.mark.parametrize("direction", ["TB", "LR"])
-@pytest.mark.parametrize("chart", [GMS_ELEMENT["published"], FIVE_STATES], ids=["gms", "five"])
-def test_every_region_of_a_bank_is_like_the_single_chart(chart: Chart, direction: str) -> None:
-    one = chart_picture(chart, direction=direction)
-    single = places(one, chart, "element1", direction)
-    bank = chart_picture(chart, 4, direction=direction)
-    for element in (f"element{k}" for k in range(1, 5)):
-        for what, given in places(bank, chart, element, direction).items():
-            shift = given[0] - single[what][0]
-            assert given == pytest.approx([x + shift for x in single[what]], abs=0.05)
-        for edge in chart.transitions:  # the same order numbers
-            name = f"element{element[7:]}-guard-{edge.name}"
-            numbers = [
-                p[n].texts[0][0] for p, n in ((one, f"element1-guard-{edge.name}"), (bank, name))
-            ]
-            assert numbers[0] == numbers[1]
-            assert numbers[0].isdigit()
+    for element in range(1, CASES[name][1] + 1):
+        for what, given in places(drawn, chart, f"element{element}", direction).items():
+            assert all(a < b for a, b in pairwise(given)), what
 
 
 @pytest.mark.parametrize("direction", ["TB", "LR"])
@@ -282,7 +232,7 @@ def test_each_self_loop_has_a_level_of_its_own(direction: str) -> None:
 # --------------------------------------------------------------------------- several elements
 @pytest.mark.parametrize(
     ("elements", "direction", "rows"),
-    [(2, "TB", 1), (2, "LR", 2), (4, "TB", 2), (4, "LR", 4), (5, "TB", 3)],
+    [(2, "LR", 2), (5, "TB", 3)],
 )
 def test_several_elements_are_a_grid_of_parallel_regions(
     elements: int, direction: str, rows: int
@@ -325,9 +275,8 @@ def test_elements_are_chosen_from_0_and_shown_from_1() -> None:
 
 def test_sizes_of_texts_are_whole_points() -> None:
     """Graphviz cuts off the rest, and the text would be narrower than its cell."""
-    for chart in (MANY_EDGES, THREE_LOOPS, FIVE_STATES):
-        for direction in ("TB", "LR"):
-            graph = statechart(chart, direction=direction, notation="math", form="graph")
-            sizes = set(re.findall(r'POINT-SIZE="([^"]*)"', graph.source))
-            assert sizes
-            assert all(size.isdigit() for size in sizes)
+    for chart in (MANY_EDGES, THREE_LOOPS):
+        graph = statechart(chart, notation="math", form="graph")
+        sizes = set(re.findall(r'POINT-SIZE="([^"]*)"', graph.source))
+        assert sizes
+        assert all(size.isdigit() for size in sizes)
