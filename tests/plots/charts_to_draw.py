@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 
 from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.language import MATLAB_LIKE, spell
 
 CLAUSES = (
     "z - w * k > s * (1 + 0.5 * abs(v) / v_c)",
@@ -107,3 +108,29 @@ HOSTILE = Chart(
     ),
     outputs={"F": "k * z + σ_2 * v"},
 )
+
+
+def texts_of(chart: Chart, state: str) -> dict[str, list[str]]:
+    """Return what the box of a state must say, by the word that stands before it."""
+    alone = len(chart.states) < 3 or any(each.outputs or each.locked for each in chart.states)
+    trees = {
+        "entry": chart.assignments["entry", state],
+        "during": {f"d{v}": chart.flows[state, v] for v in chart.variables},
+        "force": {f: chart.forces[state, f] for f in chart.force_names if alone},
+        "exit": chart.assignments["exit", state],
+    }
+    return {
+        kind: [
+            f"{name} = {spell(tree, MATLAB_LIKE)};"
+            for name, tree in each.items()
+            if tree is not None
+        ]
+        for kind, each in trees.items()
+    }
+
+
+def label_of(chart: Chart, edge: str, order: str) -> str:
+    """Return what must stand at an edge: its order or number, guard and actions."""
+    assigned = chart.assignments["action", edge].items()
+    actions = " ".join(f"{name} = {spell(tree, MATLAB_LIKE)};" for name, tree in assigned)
+    return order % chart.guard_text(edge) + (f" {{{actions}}}" if actions else "")

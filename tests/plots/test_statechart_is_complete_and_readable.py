@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from itertools import combinations, pairwise
+from itertools import chain, combinations, pairwise
 from typing import Any
 
 import pytest
@@ -17,7 +17,6 @@ import pytest
 import gms_fsm.charts.chart
 from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.language import MATLAB_LIKE, clauses, spell
 from plots.charts.labels import edge_id, part_id
 from plots.charts.statechart import statechart
 from tests.helpers import matrix
@@ -28,6 +27,8 @@ from tests.plots.charts_to_draw import (
     THREE_LOOPS,
     THREE_STATES,
     any_chart,
+    label_of,
+    texts_of,
 )
 from tests.plots.pictures import Box, Picture, chart_picture, overlaps, squeezed
 
@@ -113,30 +114,17 @@ def test_every_state_guard_edge_and_default_dot_is_there(name: str, direction: s
 
 
 def state_lines(chart: Chart, name: str) -> list[str]:
-    lines, below = [name], len(chart.states) > 2
-    for kind, trees in (
-        ("entry", chart.assignments["entry", name]),
-        ("during", {f"d{v}": chart.flows[name, v] for v in chart.variables}),
-        ("force", {} if below else {f: chart.forces[name, f] for f in chart.force_names}),
-        ("exit", chart.assignments["exit", name]),
-    ):
-        lines += [f"{kind}:"] if trees else []
-        lines += [f"{target} = {spell(tree, MATLAB_LIKE)};" for target, tree in trees.items()]
-    return lines
+    texts = ([f"{kind}:", *each] for kind, each in texts_of(chart, name).items() if each)
+    return [name, *chain(*texts)]
 
 
 def assert_guard(chart: Chart, drawn: Picture, name: str, priority: int, edge: str) -> None:
-    shown, guard = squeezed(*drawn[name].texts), chart.guard_text(edge)
-    assigned = chart.assignments["action", edge].items()
-    actions = "".join(f"{target} = {spell(tree, MATLAB_LIKE)};" for target, tree in assigned)
-    action = f"{{{actions}}}" if actions else ""
+    shown = squeezed(*drawn[name].texts)
     number = re.fullmatch(rf"{priority}\[(g\d+)\]", shown)
     if number:  # the guard is below the picture
-        assert squeezed(f"{number[1]} = {guard}{action}") in drawn.legend()
-        return
-    assert shown == squeezed(f"{priority}[{guard}]{action}")
-    for clause in clauses(chart.guards[edge]):
-        assert spell(clause, MATLAB_LIKE) in guard
+        assert squeezed(label_of(chart, edge, f"{number[1]} = %s")) in drawn.legend()
+    else:
+        assert shown == squeezed(label_of(chart, edge, f"{priority} [%s]"))
 
 
 def assert_line(drawn: Picture, element: str, edge: Transition) -> None:

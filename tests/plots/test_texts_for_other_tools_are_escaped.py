@@ -26,11 +26,10 @@ from gms_fsm.charts import CHARTS as REGISTERED
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.language import MATLAB_LIKE, spell
 from plots.output.mermaid import mermaid
 from plots.output.plantuml import plantuml
 from plots.output.tikz import CODES, tikz
-from tests.plots.charts_to_draw import HOSTILE, THREE_STATES
+from tests.plots.charts_to_draw import HOSTILE, THREE_STATES, label_of, texts_of
 
 WORDS = Chart(
     name="---\nwords of Mermaid: %% {} <br/>",
@@ -110,30 +109,14 @@ def printable(text: str) -> str:
 
 
 def expected(chart: Chart) -> tuple[list[list[str]], list[tuple[int, int, str]]]:
-    states = []
+    states, edges = [], []
     for state in chart.states:
-        lines = [state.name]
-        flow = {f"d{v}": chart.flows[state.name, v] for v in chart.variables}
-        own = any(each.outputs or each.locked for each in chart.states)
-        names = chart.force_names if own or len(chart.states) < 3 else ()
-        forces = {name: chart.forces[state.name, name] for name in names}
-        for kind, trees in (
-            ("entry", chart.assignments["entry", state.name]),
-            ("during", flow),
-            ("force", {name: tree for name, tree in forces.items() if tree is not None}),
-            ("exit", chart.assignments["exit", state.name]),
-        ):
-            lines += [f"{kind}: {n} = {spell(tree, MATLAB_LIKE)};" for n, tree in trees.items()]
+        texts = texts_of(chart, state.name).items()
+        lines = [state.name, *(f"{kind}: {text}" for kind, each in texts for text in each)]
         states.append([printable(line) for line in lines])
-    edges = []
-    for state in chart.states:
         for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-            trees = chart.assignments["action", edge.name]
-            action = " ".join(f"{n} = {spell(tree, MATLAB_LIKE)};" for n, tree in trees.items())
-            label = f"{priority} [{chart.guard_text(edge.name)}]"
-            label += f" {{{action}}}" if action else ""
             ends = (chart.state_index(edge.source), chart.state_index(edge.target))
-            edges.append((*ends, printable(label)))
+            edges.append((*ends, printable(label_of(chart, edge.name, f"{priority} [%s]"))))
     return states, edges
 
 
