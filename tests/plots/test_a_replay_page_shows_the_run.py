@@ -381,19 +381,20 @@ def test_bristles_are_where_z_puts_them_and_move_with_the_ground_while_they_stic
 
 def test_bristles_of_every_kind_of_chart(open_page: Open) -> None:
     """A peg is a default state, or without bristles a locked one."""
-    for name in ("wear", "ball", "pad1", "backlash", "dahl", "puck"):
+    pegged = ("wear", "ball", "pad1")
+    for name in (*pegged, "backlash", "dahl", "puck", "rate-state-ageing"):
         page, trace = open_page(name, "laptop", "Bristles"), run(name)
         trace, chart = trace.contact(trace.contacts[0]), trace.model.chart
         held = {state.name for state in chart.states if state.locked}
         held = {chart.default_state.name} if name == "wear" else held
-        rows = some_rows(page, 40 if name in ("wear", "ball", "pad1") else 5)
+        rows = some_rows(page, 40 if name in pegged else 5)
         seen, drawn = set(), at_rows(page, [row for row, _ in rows], DRAWN)
         for (_, number), (elements, _, motion) in zip(rows, drawn, strict=True):
             springs = 3 if name in ("dahl", "wear") else 1
             assert motion[1].startswith("F = ")
             assert {element["springs"] for element in elements} == {springs}
             for element, state in zip(elements, trace.states[number], strict=True):
-                assert element["peg"] == (state in held) or name in ("backlash", "dahl", "puck")
+                assert element["peg"] == (state in held) or name not in pegged
                 seen.add(str(state))
         assert len(seen) > 1 or name not in ("wear", "pad1")
         notes = page.locator(".bristles .motion p").all_inner_texts()

@@ -124,10 +124,15 @@ REFUSED: list[tuple[str, Call, str, list[Any]]] = [
 ]  # fmt: skip
 
 
+SLOW = ("fit", "profiles", "landscape")
+
+
 @pytest.mark.parametrize(
     ("call", "argument", "wrongs"),
-    [row[1:] for row in REFUSED],
-    ids=[f"{name}: {argument}" for name, _, argument, _ in REFUSED],
+    [
+        pytest.param(*row, id=f"{name}: {row[1]}", marks=[pytest.mark.slow] * (name in SLOW))
+        for name, *row in REFUSED
+    ],
 )
 def test_an_argument_is_refused_by_its_name_and_value(
     call: Call, argument: str, wrongs: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

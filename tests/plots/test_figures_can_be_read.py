@@ -44,7 +44,7 @@ from gms_fsm import (
     prove,
     simulate,
 )
-from plots import figures
+from plots import figures, panels
 from plots.style import ROLES, presets, ramp
 from plots.style.presets import PRESETS, Preset
 from plots.systems.mechanism import schematic_figure
@@ -214,8 +214,8 @@ MADE = {name: functools.partial(lambda make: make(run("signed")), FIGURES[name])
         for name in FIGURES if name != "schematic"} | OTHERS  # fmt: skip
 # The largest type for those with most text; the narrowest page for all others that have panels or
 # elements of their own.
-LARGE = ("overview", "landscape with pins", "figure 3", "matrix")
-SIMILAR = ("ribbons", "cascade", "residuals", "landscape", "unfold of five states")
+LARGE = ("overview", "figure 3", "matrix")
+SIMILAR = ("cascade", "residuals", "landscape", "unfold of five states")
 PRINTED = [(name, "slide" if name in LARGE else "ieee1") for name in MADE if name not in SIMILAR]
 EVERY = [
     (name, preset)
@@ -325,7 +325,7 @@ def test_pyplot_is_never_imported(tmp_path: Path) -> None:
     code = """
 import sys
 from gms_fsm import GMS, GMSParameters, Prescribed, simulate
-from plots import figures
+from plots import figures, panels
 from plots.systems.mechanism import schematic_figure
 run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
 for number, make in enumerate((figures.overview, schematic_figure)):
@@ -375,6 +375,14 @@ def test_window_and_elements_reach_every_panel() -> None:
     assert end == 200.0
     assert 12.0 < end - begin < 18.0
     assert "last" in first.get_title(loc="left")
+
+
+def test_a_measurement_is_shown_with_the_model() -> None:
+    part = panels.shown(run("signed"))
+    measured = figures.Measured(part.t, part.x, part.F + 0.1)
+    model, data = figures.overview(run("signed"), measured).axes[1].lines[:2]
+    assert [model.get_label(), data.get_label()] == ["model", "measured"]
+    np.testing.assert_array_equal(data.get_ydata(), measured.F)
 
 
 # --------------------------------------------------------------------------- presets

@@ -30,6 +30,8 @@ from tests.identification.fits_made import (
 )
 from tests.plots.printed import drawn_texts, problems
 
+pytestmark = pytest.mark.slow
+
 
 def lettered(figure: Any) -> list[Any]:
     """Return the panels in the order of their letters."""

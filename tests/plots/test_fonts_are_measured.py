@@ -23,6 +23,7 @@ def mono_font() -> object:
     return FT2Font(str(Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSansMono.ttf")))
 
 
+@pytest.mark.slow
 def test_the_characters_are_those_of_the_font() -> None:
     private = range(0xE000, 0xF900)
     shown = {chr(c) for c in mono_font().get_charmap() if c not in private}  # type: ignore[attr-defined]

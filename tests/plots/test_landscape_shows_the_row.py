@@ -20,14 +20,16 @@ from gms_fsm.session.explain import explain
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation
 
 from plots import figures, panels
+from plots.panels.guards.line_names import LineNames, NamedLine
 from plots.views.plane import Plane, plane_axes
-from tests.helpers import FASTEST, pulled_mass, stick_slip
+from tests.helpers import FASTEST, pulled_mass, stick_slip, wear
 from tests.helpers import open_loop as sine
 from tests.zoo.zoo_cases import karnopp, modelica
 
@@ -107,6 +109,7 @@ def test_regions_end_where_the_guard_turns(run: Trace) -> None:
         assert path.contains_point((v, z)) == inside, (v, z)
 
 
+@pytest.mark.slow
 def test_a_row_made_by_a_firing_shows_the_row_before(run: Trace) -> None:
     row = row_of(run, "break_away_forward", 1)
     figure = figures.landscape(run, 1, row=row)
@@ -135,6 +138,34 @@ def test_bars_are_relative_margins_and_what_holds_an_edge_back_is_bold(run: Trac
     bold = [a.get_text() for a in drawn if getattr(a, "get_weight", str)() == "bold"]
     assert "✗  z >= s" in bold
     assert not [text for text in bold if text.startswith("✓")]
+
+
+@pytest.mark.slow
+def test_compound_clauses_have_a_mark_only_and_captions_say_what_is_held() -> None:
+    trace = simulate(wear(), sine(), 30.0)
+    row = int(np.flatnonzero(trace.states[:, 1] == "creep")[2])
+    drawn = panels.race(Figure().subplots(), trace, 1, row=row)
+    texts = [each.get_text() for each in drawn if hasattr(each, "get_text")]
+    compound = [text for text in texts if "||" in text or "!" in text]
+    assert len(compound) == 2
+    assert all(text[0] in "✓✗" for text in compound)
+    trace = modelica().run()
+    row = int(np.flatnonzero(trace.states[:, 0] == "stuck")[2])
+    said = figures.landscape(trace, 0, row=row).texts[1].get_text()
+    assert said == (
+        f"Held as at the row: F = {trace.F[row]:.4g} N. Computed at every point: load, F_0."
+    ).replace("-", "−")
+
+
+def test_names_of_one_line_stand_side_by_side_and_those_without_a_place_are_left_out() -> None:
+    figure = Figure()
+    names = LineNames(figure.subplots())
+    line = np.array([[0.0, 0.5], [1.0, 0.5]])
+    names.lines += [NamedLine(f"line {k}", "black", (line,)) for k in range(60)]
+    placed = names.placed(FigureCanvasAgg(figure).get_renderer())
+    boxes = [text.get_window_extent() for text in placed]
+    assert 4 <= len(placed) < 60
+    assert not any(b.overlaps(a) for k, b in enumerate(boxes) for a in boxes[:k])
 
 
 @pytest.mark.slow

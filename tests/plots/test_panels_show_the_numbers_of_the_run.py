@@ -62,6 +62,7 @@ def holds_all(x: np.ndarray, y: np.ndarray, xs: np.ndarray, ys: np.ndarray) -> b
     )
 
 
+@pytest.mark.slow
 def test_lines_over_time_contain_every_row_in_units_that_fit(run: Trace, ax: Axes) -> None:
     (line,) = panels.velocity(ax, run)
     assert holds_all(*drawn(line), run.t, run.v)
@@ -205,7 +206,7 @@ def test_differences_are_those_of_the_runs_and_of_many_points_the_envelope(run: 
 
 @pytest.mark.slow
 def test_thinned_rows_keep_extremes_and_switches_and_a_requested_grid_gets_them() -> None:
-    times = np.linspace(0.0, 100.0, 20_000)
+    times = np.linspace(0.0, 100.0, 30_000)
     run = simulate(stick_slip("published"), Prescribed(FIG4_SINE), 100.0, t_eval=times)
     part = panels.shown(run)
     assert len(part) <= MOST_ROWS
@@ -244,6 +245,7 @@ def spans_of(artists: list[object]) -> list[list[tuple[float, float]]]:
     ]
 
 
+@pytest.mark.slow
 def test_ribbons_equal_the_log(run: Trace, pulled: Trace) -> None:
     sparse = simulate(*pulled_mass(), 60.0, t_eval=np.linspace(0.0, 60.0, 7))
     for trace, window, elements in (
@@ -347,6 +349,7 @@ def once() -> Trace:
     return simulate(stick_slip("signed"), open_loop(), 14.0)
 
 
+@pytest.mark.slow
 def test_tips_of_arrows_are_later_than_tails(once: Trace) -> None:
     figure, fine = figures.phase(once), once.refined(5_000)
     for ax, across in zip(figure.axes[:2], (fine.x - fine.x[0], fine.v), strict=True):
@@ -363,6 +366,7 @@ def test_tips_of_arrows_are_later_than_tails(once: Trace) -> None:
     assert arrows_of(figures.phase(run).axes[0]) == []
 
 
+@pytest.mark.slow
 def test_the_dot_is_at_the_row_and_both_panels_have_one_colour_bar(once: Trace) -> None:
     in_window = int(np.flatnonzero(once.t <= 6.0)[-1])
     for row, window, place in ((40, None, 40), (None, None, -1), (None, (2.0, 6.0), in_window)):

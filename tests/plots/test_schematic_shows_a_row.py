@@ -37,6 +37,9 @@ def texts(drawn: list[Artist]) -> list[str]:
 
 
 def test_contact_positions_follow_the_deflections(run: Trace) -> None:
+    drawn = elements.elements_at(Figure().subplots(), elements=3)  # symbols without a run
+    assert len(parts(drawn, "contact")) == len(parts(drawn, "spring")) == 3
+    assert {"$k_{1}$", r"$\sigma_{3}$", "$z_{2}$", "E3"} <= set(texts(drawn))
     for row in (0, 400, -1):
         drawn = elements.elements_at(Figure().subplots(), run, row)
         centres = [c.get_x() + c.get_width() / 2 for c in parts(drawn, "contact")]  # type: ignore[attr-defined]
@@ -86,6 +89,7 @@ def test_numbers_have_units_equal_digits_and_a_true_minus(run: Trace) -> None:
         assert not [text for text in shown if "-" in text]
 
 
+@pytest.mark.slow
 def test_twelve_elements_fit_on_a_page_without_overlaps() -> None:
     run = simulate(GMS12, Prescribed("0.3*sin(t)"), 4.0)
     figure = schematic_figure(run, len(run) // 2)

@@ -172,6 +172,7 @@ def test_mermaid_says_the_same() -> None:
 
 
 # --------------------------------------------------------------------------- options
+@pytest.mark.slow
 def test_theme_direction_and_names_of_edges() -> None:
     colours, text = CHART_THEMES["dark"], statechart(SIGNED, 2, theme="dark").source
     assert colours.ink in text
@@ -276,6 +277,7 @@ def test_an_edge_with_several_sources_is_one_line_for_each() -> None:
 
 
 # --------------------------------------------------------------------------- matrices
+@pytest.mark.slow
 def test_a_chart_with_many_edges_a_wide_one_or_on_demand_is_a_matrix() -> None:
     names = [f"state_{i}" for i in range(12)]
     ring = Chart(  # would be wider than two pages from left to right

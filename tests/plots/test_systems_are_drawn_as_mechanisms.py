@@ -36,6 +36,7 @@ def forces(system: System) -> dict[str, str]:
     return {name: text for name, text in texts.items() if text != "0"}
 
 
+@pytest.mark.slow
 def test_springs_and_dampers_are_between_their_bodies() -> None:
     for system in (*systems().values(), BLOCKS):  # whose forces are texts, and no springs
         wanted = Counter[Any]()
@@ -87,7 +88,8 @@ def test_contacts_have_the_symbols_of_their_charts() -> None:
 
 
 # --------------------------------------------------------------------------- the picture
-DRAWN = ("ball_screw_table", "brake_squeal", "drill_string", "ball", "a train of four", "a puck")
+DRAWN = ("ball_screw_table", "belt_driven_mass", "brake_squeal", "friction_damper", "ball")
+DRAWN += ("two-mass servo", "a train of four", "a puck")
 
 
 @pytest.mark.slow
