@@ -215,7 +215,7 @@ MADE = {name: functools.partial(lambda make: make(run("signed")), FIGURES[name])
 # The largest type for those with most text; the narrowest page for all others that have panels or
 # elements of their own.
 LARGE = ("overview", "figure 3", "matrix")
-SIMILAR = ("cascade", "residuals", "landscape", "unfold of five states")
+SIMILAR = ("cascade", "residuals", "landscape", "unfold of ten instants")
 PRINTED = [(name, "slide" if name in LARGE else "ieee1") for name in MADE if name not in SIMILAR]
 EVERY = [
     (name, preset)

@@ -196,25 +196,9 @@ def test_edges_that_leave_a_state_are_in_the_order_of_priority(name: str, direct
     drawn, chart = picture(name, direction), CASES[name][0]
     if "element1-target-1" in drawn.groups:  # a matrix has its own test
         drawn = chart_picture(chart, direction=direction, form="graph")
-    for element in range(1, CASES[name][1] + 1):
-        for what, given in places(drawn, chart, f"element{element}", direction).items():
+    for element in drawn.of_class("region") or {"element1"}:
+        for what, given in places(drawn, chart, element, direction).items():
             assert all(a < b for a, b in pairwise(given)), what
-
-
-@pytest.mark.parametrize("direction", ["TB", "LR"])
-def test_each_self_loop_has_a_level_of_its_own(direction: str) -> None:
-    """From top to bottom, or from left to right."""
-    drawn, tops, ends = picture("loops", direction), [], []
-    for _, edge in THREE_LOOPS.leaving("state_3"):
-        if edge.source == edge.target:
-            name = edge_id(THREE_LOOPS, "element1", "guard", edge)
-            boxes = [box for own, box in drawn.texts if own == name]
-            (line,) = (p for n, p in drawn.lines if n == name.replace("guard", "edge", 1) + "-1")
-            tops.append(min(b.top if direction == "TB" else b.left for b in boxes))
-            ends.append(line[0][1 - AXIS[direction]])
-    assert len(tops) >= 3
-    assert tops == sorted(tops)
-    assert ends == sorted(ends)
 
 
 # --------------------------------------------------------------------------- several elements
@@ -238,15 +222,6 @@ def test_several_elements_are_a_grid_of_parallel_regions(
     assert reading_order == sorted(reading_order)
     assert len({top for top, _ in reading_order}) == rows
     assert Box.around([p for r in regions for p in r.line]).right < 482 * 10 / 7  # 170 mm
-
-
-def test_one_element_has_no_region_alike_ones_are_drawn_once_and_lugre_has_no_edges() -> None:
-    drawn = picture("LuGre", "TB")
-    assert drawn.of_class("region") == drawn.of_class("guard") == set()
-    assert drawn.of_class("edge") == {"element1-default-edge"}
-    drawn = picture("12 elements", "TB")
-    assert drawn.of_class("region") == {"element1"}
-    assert drawn["element1"].texts[:2] == ["Elements 1 to 12", "× 12"]
 
 
 def test_elements_are_chosen_from_0_and_shown_from_1() -> None:
