@@ -5,7 +5,14 @@ from __future__ import annotations
 import random
 
 from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.registry import registered
 from gms_fsm.language import MATLAB_LIKE, spell
+
+
+def every() -> list[tuple[str, str]]:
+    """Return the names of all charts with their laws."""
+    return [(name, law) for name, each in registered().items() for law in each.laws or ("",)]
+
 
 CLAUSES = (
     "z - w * k > s * (1 + 0.5 * abs(v) / v_c)",

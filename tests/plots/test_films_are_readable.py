@@ -27,18 +27,13 @@ from plots.film._movie import Movie
 from plots.film._pace import FADE, Frame, Pace, paced
 from plots.output.graphviz import available
 from plots.style import CHART_THEMES
-from tests.charts.test_registry_finds_what_is_there import every
-from tests.helpers import bank, matrix, open_loop, stick_slip
-from tests.plots.films import count, with_movie
+from tests.helpers import bank, matrix
+from tests.plots.charts_to_draw import every
+from tests.plots.films import cascade, count, with_movie
 from tests.plots.printed import drawn_texts
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not available(), reason="no Graphviz")]
 LABEL = re.compile(r"E\d+ (stick|slip)")  # of a bristle
-
-
-@cache
-def cascade() -> Trace:
-    return simulate(stick_slip("published"), open_loop(), 8.0)
 
 
 WINDOW = {"t_start": 3.3, "t_end": 5.0, "frames": 60}  # four micro-steps
@@ -178,14 +173,8 @@ def test_every_chart_has_a_film(name: str, law: str, tmp_path: Path) -> None:
 FPS = 20.0
 
 
-@cache
-def slowed() -> Trace:
-    """Four elements that break away in one instant, at 3.8 s, and are caught in one, at 10 s."""
-    return simulate(stick_slip("published"), open_loop(), 45.0)
-
-
 def film(frames: int = 200) -> Pace:
-    return paced(slowed(), (3.0, 14.0), frames, FPS)
+    return paced(cascade(), (3.0, 14.0), frames, FPS)
 
 
 def still(pace: Pace) -> list[Frame]:
@@ -228,5 +217,5 @@ def test_frames_are_as_many_as_wanted_and_show_many_transitions_for_less_time() 
     assert lit[:4] == [(), (1.0,) * 4, (0.75,) * 4, (0.5,) * 4]
     assert np.allclose(np.diff([frame.t for frame in frames]), 11.0 / 8)
     assert {frame.slowed for frame in frames} == {1.0}
-    quiet = paced(slowed(), (5.0, 9.0), 60, FPS)
+    quiet = paced(cascade(), (5.0, 9.0), 60, FPS)
     assert not any(frame.fired or frame.entry >= 0 for frame in quiet.frames)

@@ -6,7 +6,6 @@ of frames. A failure leaves the old file.
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +17,13 @@ pytest.importorskip("matplotlib", reason="films need the extra 'plots'")
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from gms_fsm import Trace, simulate
 from gms_fsm.errors import MissingExtraError, OutputError
 from plots.film import _chart
 from plots.film.animation import animate
 from plots.output.formats import endings
 from plots.output.graphviz import available
 from plots.style import CHART_THEMES
-from tests.helpers import open_loop, stick_slip
-from tests.plots.films import count, frames_of, with_movie
+from tests.plots.films import cascade, count, frames_of, with_movie
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not available(), reason="no Graphviz")]
 VIDEOS = [ending for ending in endings("animation") if ending != ".gif"]
@@ -34,22 +31,17 @@ FRAMES, FPS = 20, 10.0
 WINDOW = {"t_start": 3.3, "t_end": 5.0, "frames": FRAMES, "fps": FPS}  # four micro-steps at 3.8 s
 
 
-@cache
-def bank() -> Trace:
-    return simulate(stick_slip("published"), open_loop(), 45.0)
-
-
 @pytest.fixture(scope="module")
 def wanted(tmp_path_factory: pytest.TempPathFactory) -> list[Image.Image]:
     """The frames before they are written."""
     folder = tmp_path_factory.mktemp("frames")
-    return list(with_movie(bank(), folder, lambda movie: list(movie.pictures()), **WINDOW))
+    return list(with_movie(cascade(), folder, lambda movie: list(movie.pictures()), **WINDOW))
 
 
 def test_a_gif_shows_the_frames_for_the_right_time(
     wanted: list[Image.Image], tmp_path: Path
 ) -> None:
-    path = animate(bank(), tmp_path / "film.gif", **WINDOW)
+    path = animate(cascade(), tmp_path / "film.gif", **WINDOW)
     stored = frames_of(path)
     with Image.open(path) as film:
         lasts = []
@@ -72,7 +64,7 @@ def test_a_video_shows_the_frames_for_the_right_time(
     ending: str, wanted: list[Image.Image], tmp_path: Path
 ) -> None:
     av = pytest.importorskip("av", reason="videos need the extra 'film'")
-    path = animate(bank(), tmp_path / f"film{ending}", **WINDOW)
+    path = animate(cascade(), tmp_path / f"film{ending}", **WINDOW)
     assert list(tmp_path.iterdir()) == [path]
     with av.open(str(path)) as file:
         (stream,) = file.streams
@@ -94,7 +86,7 @@ def test_a_video_shows_the_frames_for_the_right_time(
 def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "av", None)
     with pytest.raises(MissingExtraError, match=r"videos need av.*gms-fsm\[film\].*as a \.gif"):
-        animate(bank(), tmp_path / "film.mp4", **WINDOW)
+        animate(cascade(), tmp_path / "film.mp4", **WINDOW)
     assert not list(tmp_path.iterdir())
 
 
@@ -106,7 +98,7 @@ def test_frames_have_the_theme_one_layout_the_active_states_and_the_cursor(
     monkeypatch.setattr(_chart, "rendered", lambda *each: layouts.append(each) or draw(*each))
     told: list[tuple[int, int]] = []
     more = {"theme": "dark", "notation": "math", "progress": lambda *each: told.append(each)}
-    path = animate(bank(), tmp_path / "run.gif", frames=3, fps=10, **more)
+    path = animate(cascade(), tmp_path / "run.gif", frames=3, fps=10, **more)
     assert list(tmp_path.iterdir()) == [path]
     assert len(layouts) == 1
     assert told == [(k, 3) for k in range(1, 4)]
@@ -132,8 +124,8 @@ def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        animate(bank(), path, frames=5, progress=stop)
+        animate(cascade(), path, frames=5, progress=stop)
     assert path.read_bytes() == b"the film of yesterday"
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(OutputError, match="nowhere"):
-        animate(bank(), tmp_path / "nowhere" / "run.gif", frames=2)
+        animate(cascade(), tmp_path / "nowhere" / "run.gif", frames=2)

@@ -21,18 +21,16 @@ from plots.handouts.excitation import excited
 from plots.handouts.page import PAGE, SMALLEST, handout_figure
 from plots.output.svg_artists import EXACT
 from tests.helpers import bank, matrix, stick_slip
+from tests.plots.charts_to_draw import every
 from tests.plots.printed import drawn_texts, problems
 from tests.plots.systems_to_draw import SCENARIOS
 from tests.scenario_files import CommandLine
 
 ZOO = [
     (name, law)
-    for name, each in registered().items()
-    if not each.wrong and name != "planar-coulomb"  # no model: it has two velocities
-    for law in each.laws or ("",)
+    for name, law in every()
+    if not registered()[name].wrong and name != "planar-coulomb"  # no model: it has two velocities
 ]
-
-
 MONO = "DejaVu Sans Mono"
 
 
