@@ -216,6 +216,7 @@ MADE = {name: functools.partial(lambda make: make(run("signed")), FIGURES[name])
 # elements of their own.
 LARGE = ("overview", "figure 3", "matrix")
 SIMILAR = ("cascade", "residuals", "landscape", "unfold of ten instants")
+SIMILAR += ("overview of the last cycles of 12",)
 PRINTED = [(name, "slide" if name in LARGE else "ieee1") for name in MADE if name not in SIMILAR]
 EVERY = [
     (name, preset)
@@ -239,7 +240,7 @@ def on_screen(name: str, n: int) -> Figure:
     return make(run(f"bank of {n}"))
 
 
-SIZES = [(name, 20) for name in ("ribbons", "laws", "landscape", "residuals", "unfold")]
+SIZES = [(name, 20) for name in ("ribbons", "laws", "unfold")]
 MANY = {*FIGURES, "unfold"} - {"schematic"}
 MORE = [*itertools.product(sorted(MANY), (4, 12, 20)), ("cascade", 1)]
 

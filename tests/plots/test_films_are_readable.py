@@ -24,7 +24,7 @@ from gms_fsm import Body, Contact, LivelockError, Prescribed, PulledSlider, Syst
 from gms_fsm.charts.registry import Entry, entry
 from gms_fsm.systems.models import demonstration
 from plots.film._movie import Movie
-from plots.film._pace import FADE, Frame, Pace, paced
+from plots.film._pace import FADE, SLOW, Frame, Pace, paced
 from plots.output.graphviz import available
 from plots.style import CHART_THEMES
 from tests.helpers import bank, matrix
@@ -219,3 +219,15 @@ def test_frames_are_as_many_as_wanted_and_show_many_transitions_for_less_time() 
     assert {frame.slowed for frame in frames} == {1.0}
     quiet = paced(cascade(), (5.0, 9.0), 60, FPS)
     assert not any(frame.fired or frame.entry >= 0 for frame in quiet.frames)
+
+
+def test_time_runs_slower_near_transitions() -> None:
+    steps: dict[float, set[float]] = {1.0: set(), SLOW: set()}
+    times = cascade().transitions.t
+    for a, b in pairwise(frame for frame in film().frames if frame.entry < 0):
+        if a.slowed == b.slowed and not any(a.t <= t <= b.t for t in times):
+            steps[a.slowed].add(round(b.t - a.t, 9))
+            near = min(abs(t - a.t) for t in times) <= 6 * (b.t - a.t) + 1e-9
+            assert near or a.slowed == 1.0
+    (far,), (close,) = steps[1.0], steps[SLOW]
+    assert far == pytest.approx(SLOW * close)

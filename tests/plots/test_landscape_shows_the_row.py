@@ -28,10 +28,11 @@ from matplotlib.text import Annotation
 
 from plots import figures, panels
 from plots.panels.guards.line_names import LineNames, NamedLine
-from plots.views.plane import Plane, plane_axes
-from tests.helpers import FASTEST, pulled_mass, stick_slip, wear
+from plots.panels.guards.racing import held_back_by
+from plots.views.plane import Plane, linear_threshold, plane_axes
+from tests.helpers import FASTEST, one_element, pulled_mass, stick_slip, wear
 from tests.helpers import open_loop as sine
-from tests.zoo.zoo_cases import karnopp, modelica
+from tests.zoo.zoo_cases import elasto_plastic, karnopp, modelica
 
 MM = 1e3
 
@@ -68,6 +69,13 @@ def test_the_axes_are_the_velocity_and_the_first_quantity_that_guards_read() -> 
     assert found.items() >= expected.items()
     assert plane_axes(stick_slip("signed").chart) == ("v", "z")
     assert plane_axes(CHARTS["prandtl-tomlinson"]) is None
+
+
+def test_the_axis_is_linear_a_decade_below_v_c() -> None:
+    run = simulate(one_element("signed", v_c=1e-3), sine(), 1.0)
+    assert linear_threshold(Plane.of(run, 0, 0), 0.2) == pytest.approx(1e-4)
+    plane = Plane.of(elasto_plastic().run(), 10, 0)  # without a turn the largest speed decides
+    assert linear_threshold(plane, 0.06) == pytest.approx(1e-5)
 
 
 def test_dot_path_ranges_and_arrows_are_those_of_the_row(run: Trace) -> None:
@@ -138,6 +146,12 @@ def test_bars_are_relative_margins_and_what_holds_an_edge_back_is_bold(run: Trac
     bold = [a.get_text() for a in drawn if getattr(a, "get_weight", str)() == "bold"]
     assert "✗  z >= s" in bold
     assert not [text for text in bold if text.startswith("✓")]
+    # In slip at speed, |v| <= v_c is far from true, and |z| < s false by little.
+    slips = np.flatnonzero((run.states[:, 0] == "slip") & (run.v > 0)).tolist()
+    told = (explain(run, row, 0)[0] for row in slips)
+    back = held_back_by(next(each for each in told if not any(c.holds for c in each.clauses)))
+    assert back is not None
+    assert back.text == "|v| <= v_c"
 
 
 @pytest.mark.slow
