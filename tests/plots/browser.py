@@ -22,7 +22,7 @@ from gms_fsm import Body, Chart, Contact, Prescribed, State, Stribeck, System, T
 from gms_fsm.charts.registry import entry
 from gms_fsm.systems.models import ChartModel, demonstration
 from tests.helpers import FIG4_SINE, SINE, bank, open_loop, pulled_mass, stick_slip, wear
-from tests.plots.systems_to_draw import BALL, BLOCKS, PULLED, SERVO, SHARED, TIMED
+from tests.plots.systems_to_draw import BALL, BLOCKS, SERVO, SHARED, TIMED
 from tests.plots.systems_to_draw import run as system_run
 from tests.systems_cases import puck
 from tests.zoo.zoo_cases import CASES
@@ -120,7 +120,6 @@ RUNS: dict[str, Callable[[], Trace]] = {
     "still": lambda: simulate(stick_slip("signed"), Prescribed("1e-3*sin(t)"), 2.0),
     "many": lambda: simulate(bank(20), Prescribed(SINE), 20.0),
     "wear": lambda: simulate(wear(), Prescribed("0.2 * sin(t)"), 20.0),
-    "pulled": lambda: system_run(PULLED),
     "ball": lambda: system_run(BALL),
     "blocks": lambda: system_run(BLOCKS),
     "pad1": lambda: system_run(BLOCKS).contact("pad1"),

@@ -5,6 +5,14 @@ from __future__ import annotations
 import random
 
 from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.registry import registered
+from gms_fsm.language import MATLAB_LIKE, spell
+
+
+def every() -> list[tuple[str, str]]:
+    """Return the names of all charts with their laws."""
+    return [(name, law) for name, each in registered().items() for law in each.laws or ("",)]
+
 
 CLAUSES = (
     "z - w * k > s * (1 + 0.5 * abs(v) / v_c)",
@@ -91,33 +99,6 @@ THREE_STATES = Chart(
     outputs={"F": "k * z"},
 )
 
-FIVE_STATES = Chart(
-    name="five states, two variables",
-    inputs=("v", "s"),
-    variables=("z", "w"),
-    parameters=("k", "v_c", "v_hi"),
-    states=(
-        State("rest", flow={"z": "v", "w": "0"}),
-        State("creep_forward", flow={"z": "v - k * abs(v) * z / s", "w": "v"}),
-        State("creep_backward", flow={"z": "v - k * abs(v) * z / s", "w": "-v"}),
-        State("slip_forward", flow={"z": "0", "w": "v - w"}, entry={"z": "s", "w": "0"}),
-        State("slip_backward", flow={"z": "0", "w": "-v - w"}),
-    ),
-    transitions=(
-        Transition("up", "rest", "creep_forward", guard="z > 0.5 * s and v > v_c"),
-        Transition("down", "rest", "creep_backward", guard="z < -0.5 * s and v < -v_c"),
-        Transition("tear_up", "creep_forward", "slip_forward", guard="z >= s and v > v_c"),
-        Transition("tear_down", "creep_backward", "slip_backward", guard="z <= -s and v < -v_c"),
-        Transition("stop_up", "slip_forward", "rest", guard="z < s and v <= v_c or v < -v_hi"),
-        Transition("stop_down", "slip_backward", "rest", guard="abs(v) <= v_c"),
-        Transition("calm_up", "creep_forward", "rest", guard="v < 0"),
-        Transition("calm_down", "creep_backward", "rest", guard="v > 0"),
-        Transition("turn_down", "slip_forward", "slip_backward", guard="v < -v_hi"),
-        Transition("turn_up", "slip_backward", "slip_forward", guard="v > v_hi"),
-    ),
-    outputs={"F": "k * z"},
-)
-
 LONG_CLAUSE = " + ".join(f"k * abs(z - {i}) ** 2" for i in range(10)) + " >= s"
 HOSTILE = Chart(
     name="größe & <b>]]></b> \"x\" 'y' \\N ; # ]",
@@ -134,3 +115,29 @@ HOSTILE = Chart(
     ),
     outputs={"F": "k * z + σ_2 * v"},
 )
+
+
+def texts_of(chart: Chart, state: str) -> dict[str, list[str]]:
+    """Return what the box of a state must say, by the word that stands before it."""
+    alone = len(chart.states) < 3 or any(each.outputs or each.locked for each in chart.states)
+    trees = {
+        "entry": chart.assignments["entry", state],
+        "during": {f"d{v}": chart.flows[state, v] for v in chart.variables},
+        "force": {f: chart.forces[state, f] for f in chart.force_names if alone},
+        "exit": chart.assignments["exit", state],
+    }
+    return {
+        kind: [
+            f"{name} = {spell(tree, MATLAB_LIKE)};"
+            for name, tree in each.items()
+            if tree is not None
+        ]
+        for kind, each in trees.items()
+    }
+
+
+def label_of(chart: Chart, edge: str, order: str) -> str:
+    """Return what must stand at an edge: its order or number, guard and actions."""
+    assigned = chart.assignments["action", edge].items()
+    actions = " ".join(f"{name} = {spell(tree, MATLAB_LIKE)};" for name, tree in assigned)
+    return order % chart.guard_text(edge) + (f" {{{actions}}}" if actions else "")

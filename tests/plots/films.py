@@ -18,15 +18,21 @@ import plots
 from gms_fsm import Trace
 from plots.film._movie import Movie
 from plots.output.formats import FORMATS, Format, register
+from tests.corpus import trace
 
 
-def with_movie(trace: Trace, folder: Path, use: Callable[[Movie], Any], **options: Any) -> Any:
+def cascade() -> Trace:
+    """Return four elements that break away in one instant, at 3.8 s, and are caught in one."""
+    return trace("open loop, published")
+
+
+def with_movie(run: Trace, folder: Path, use: Callable[[Movie], Any], **options: Any) -> Any:
     """Return what a function makes of a film."""
     found: list[Any] = []
     form = Format(".grab", "animation", "a film", "test", _keep(use, found))
     register(form)
     try:
-        plots.animate(trace, folder / "film.grab", **options)
+        plots.animate(run, folder / "film.grab", **options)
     finally:
         FORMATS.remove(form)
     return found[0]

@@ -7,7 +7,6 @@ integrator back to the chart; each element's force and the viscous force into th
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations
@@ -17,7 +16,7 @@ import pytest
 from plots.systems.block_diagram import block_diagram
 from tests.plots.pictures import SVG, Box, Picture, Point, points_of
 
-SIZES = [1, 3, 4, 5, 20]
+SIZES = [1, 4, 20]
 VECTORS = 5  # from here on the elements are drawn as vectors
 
 
@@ -117,34 +116,12 @@ def test_wires_are_those_of_the_paper(n: int) -> None:
             (f"chart-dz{i}", f"integrator{i}"),
             (f"integrator{i}", f"chart-z{i}"),
         }
-    assert connections(draw(n)) == expected
-
-
-@pytest.mark.parametrize("n", SIZES)
-def test_every_block_and_port_is_named(n: int) -> None:
-    diagram, of_all = draw(n), f"1…{n}"
-    expected = {
-        "v": "v",
-        "stribeck": "s(v)",
-        "sigma_2": "\N{GREEK SMALL LETTER SIGMA}2",
-        "sum-name": "\N{GREEK CAPITAL LETTER SIGMA}",
-        "F": "F",
-        "chart-title": "GMS element chart" + (f" \N{MULTIPLICATION SIGN} {n}" if n > 1 else ""),
-        "chart-v-name": "v",
-        "chart-s-name": "s(v)",
-        "sum-viscous-sign": "+",
-    }
-    for i in sets(n):
-        expected |= {
-            f"integrator{i}": "1s",
-            f"chart-F{i}-name": f"F{i or of_all}",
-            f"chart-dz{i}-name": f"dz{i or of_all}",
-            f"chart-z{i}-name": f"z{i or of_all}",
-            f"sum-F{i}-sign": "+",
-        }
-    assert {name: diagram.texts[name] for name in expected} == expected
+    diagram = draw(n)
+    assert connections(diagram) == expected
     blocks = {"v", "stribeck", "chart", "sigma_2", "sum", "F"}
     assert diagram.blocks() == blocks | {f"integrator{i}" for i in sets(n)}
+    for i in sets(n):
+        assert diagram.texts[f"chart-F{i}-name"] == f"F{i or f'1…{n}'}"
 
 
 @pytest.mark.parametrize("n", SIZES)
@@ -163,56 +140,25 @@ def test_ports_sit_on_the_edge_of_their_block(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", SIZES)
-def test_nothing_overlaps(n: int) -> None:
+def test_nothing_overlaps_feedback_lines_never_cross_and_pieces_meet(n: int) -> None:
     diagram = draw(n)
     blocks = {name: diagram.boxes[name] for name in diagram.blocks()}
     assert not [(a, b) for a, b in combinations(sorted(blocks), 2) if blocks[a].meets(blocks[b])]
+    ends = {wire.head: wire.end for wire in diagram.wires if "corner" in wire.head}
+    back: dict[str, list[Wire]] = {}
     for wire in diagram.wires:
         dx, dy = (abs(wire.end[k] - wire.start[k]) for k in (0, 1))
         assert min(dx, dy) < 0.5, f"{wire.id} is neither level nor upright"
         assert not [b for b in blocks if wire.box.meets(blocks[b], -2.5)], wire.id
+        if "corner" in wire.tail:  # begins where the one before it ends
+            assert wire.start == pytest.approx(ends[wire.tail], abs=0.05), wire.id
+        if wire.id.startswith("deflection"):
+            back.setdefault(wire.id.split("-")[0], []).append(wire)
     # Wires may cross at right angles; two on top of each other would read as one.
     assert not [(a.id, b.id) for a, b in combinations(diagram.wires, 2) if a.covers(b)]
-
-
-@pytest.mark.parametrize("n", SIZES)
-def test_feedback_lines_never_cross(n: int) -> None:
-    lines: dict[str, list[Wire]] = {}
-    for wire in draw(n).wires:
-        if wire.id.startswith("deflection"):
-            lines.setdefault(wire.id.split("-")[0], []).append(wire)
-    assert len(lines) == len(sets(n))
-    for one, other in combinations(lines.values(), 2):
+    assert len(back) == len(sets(n))
+    for one, other in combinations(back.values(), 2):
         assert not [(a.id, b.id) for a in one for b in other if a.box.meets(b.box, 1.0)]
-
-
-@pytest.mark.parametrize("n", SIZES)
-def test_pieces_of_a_line_meet(n: int) -> None:
-    """Each piece begins where the one before it ends: in the middle of the corner's square."""
-    diagram = draw(n)
-    ends = {wire.head: wire.end for wire in diagram.wires if "corner" in wire.head}
-    assert ends
-    for wire in diagram.wires:
-        if "corner" in wire.tail:
-            assert wire.start == pytest.approx(ends[wire.tail], abs=0.05), wire.id
-
-
-def test_texts_stay_apart() -> None:
-    """Signs, names and counts are in nodes of fixed size, which do not overlap."""
-    for n in SIZES:
-        rooms = {}
-        for line in block_diagram(n).body:
-            found = re.search(r'pos="(\S+?),(\S+?)!".*shape=plaintext', line)
-            if found:
-                name = re.search(r" id=\"?([\w-]+)", line)
-                sizes = [re.search(rf"{side}=([\d.]+)", line) for side in ("width", "height")]
-                assert name is not None
-                x, y = float(found[1]), float(found[2])
-                wide, high = (36 * float(size[1]) for size in sizes if size)
-                rooms[name[1]] = Box(x - wide, y - high, x + wide, y + high)
-        assert len(rooms) > 5
-        met = [(a, b) for a, b in combinations(sorted(rooms), 2) if rooms[a].meets(rooms[b], -1)]
-        assert not met, n
 
 
 def test_many_elements_are_vectors_and_take_no_more_room() -> None:

@@ -36,8 +36,7 @@ from tests.plots.systems_to_draw import run as system_run
 from tests.zoo.zoo_cases import prandtl_tomlinson
 
 NAN = math.nan
-WINDOWS = [(3.0, 1.0), (1.0, 1.0), (-1.0, 2.0), (1.0, 11.0), (1.0,), (1, 2, 3), 5.0, ("a", 2)]
-WINDOWS += [(NAN, 2.0)]
+WINDOWS = [(3.0, 1.0), (-1.0, 2.0), (1.0, 11.0), (1, 2, 3), 5.0, ("a", 2), (NAN, 2.0)]
 ELEMENTS = [[], [4], [-1], [0, 0], [1.0], [True], "01", 2]
 ROWS = [10_000, -10_000, 1.5, True, None]
 TIMES = [-1.0, 10.5, NAN, "x"]
@@ -127,10 +126,15 @@ REFUSED: list[tuple[str, Call, str, list[Any]]] = [
 ]  # fmt: skip
 
 
+SLOW = ("fit", "profiles", "landscape")
+
+
 @pytest.mark.parametrize(
     ("call", "argument", "wrongs"),
-    [row[1:] for row in REFUSED],
-    ids=[f"{name}: {argument}" for name, _, argument, _ in REFUSED],
+    [
+        pytest.param(*row, id=f"{name}: {row[1]}", marks=[pytest.mark.slow] * (name in SLOW))
+        for name, *row in REFUSED
+    ],
 )
 def test_an_argument_is_refused_by_its_name_and_value(
     call: Call, argument: str, wrongs: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -143,11 +147,6 @@ def test_an_argument_is_refused_by_its_name_and_value(
             call(wrong)
         assert str(error.value).startswith(f"{argument} is {wrong!r}"), str(error.value)
     assert not list(tmp_path.iterdir())
-
-
-def test_panels_are_found() -> None:
-    assert {"velocity", "cascade", "stribeck"} <= set(panels_with("window"))
-    assert {"force", "margins"} <= set(panels_with("elements"))
 
 
 LATE = np.array([20.0, 30.0])
@@ -220,25 +219,22 @@ DRAWN: dict[str, Call] = {
 }
 
 
-@pytest.mark.parametrize("name", DRAWN)
-def test_a_run_of_several_contacts_says_to_choose_one(name: str) -> None:
+def test_a_run_of_several_contacts_says_to_choose_one() -> None:
     said = (
         r"^system 'two blocks on a belt' has the contacts 'pad1', 'pad2'; "
         r"say which one: trace.contact\('pad1'\)$"
     )
-    with pytest.raises(ParameterError, match=said):
-        DRAWN[name](system_run(BLOCKS))
-
-
-def test_another_contact_can_be_chosen() -> None:
+    for call in DRAWN.values():
+        with pytest.raises(ParameterError, match=said):
+            call(system_run(BLOCKS))
     first, second = (system_run(BLOCKS).contact(name) for name in ("pad1", "pad2"))
     assert first.contact("pad2").transitions.t.tolist() == second.transitions.t.tolist()
     for name in set(OF_A_TRACE) - {"stribeck"}:  # and every panel takes it; it has no curve
         assert getattr(panels, name)(ax(), second)
 
 
-@pytest.mark.parametrize("wrong", ["run.npz", stick_slip("signed")], ids=["path", "model"])
-def test_pictures_of_runs_need_a_trace(wrong: Any) -> None:
+def test_pictures_of_runs_need_a_trace() -> None:
+    wrong = "run.npz"
     calls: dict[str, Call] = {"replay": plots.replay, "schematic_figure": schematic_figure}
     for name in ("overview", "ribbons_figure", "cascade_figure", "landscape", "unfold", "phase",
                  "animate", "velocity"):  # fmt: skip

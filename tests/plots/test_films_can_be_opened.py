@@ -6,7 +6,6 @@ of frames. A failure leaves the old file.
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +17,13 @@ pytest.importorskip("matplotlib", reason="films need the extra 'plots'")
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-import plots.charts.live_chart
-from gms_fsm import Trace, simulate
 from gms_fsm.errors import MissingExtraError, OutputError
+from plots.film import _chart
 from plots.film.animation import animate
 from plots.output.formats import endings
 from plots.output.graphviz import available
 from plots.style import CHART_THEMES
-from tests.helpers import one_element, open_loop, stick_slip
-from tests.plots.films import count, frames_of, with_movie
+from tests.plots.films import cascade, count, frames_of, with_movie
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not available(), reason="no Graphviz")]
 VIDEOS = [ending for ending in endings("animation") if ending != ".gif"]
@@ -34,22 +31,17 @@ FRAMES, FPS = 20, 10.0
 WINDOW = {"t_start": 3.3, "t_end": 5.0, "frames": FRAMES, "fps": FPS}  # four micro-steps at 3.8 s
 
 
-@cache
-def bank() -> Trace:
-    return simulate(stick_slip("published"), open_loop(), 45.0)
-
-
 @pytest.fixture(scope="module")
 def wanted(tmp_path_factory: pytest.TempPathFactory) -> list[Image.Image]:
     """The frames before they are written."""
     folder = tmp_path_factory.mktemp("frames")
-    return list(with_movie(bank(), folder, lambda movie: list(movie.pictures()), **WINDOW))
+    return list(with_movie(cascade(), folder, lambda movie: list(movie.pictures()), **WINDOW))
 
 
 def test_a_gif_shows_the_frames_for_the_right_time(
     wanted: list[Image.Image], tmp_path: Path
 ) -> None:
-    path = animate(bank(), tmp_path / "film.gif", **WINDOW)
+    path = animate(cascade(), tmp_path / "film.gif", **WINDOW)
     stored = frames_of(path)
     with Image.open(path) as film:
         lasts = []
@@ -67,35 +59,12 @@ def test_a_gif_shows_the_frames_for_the_right_time(
         assert count(shown, CHART_THEMES["light"].paper) > 0.5 * shown.size[0] * shown.size[1]
 
 
-def test_a_gif_of_constant_frames_is_one_frame(tmp_path: Path) -> None:
-    from plots.film.files import gif
-
-    class Still:
-        frames, fps, size, colours = 5, 7.0, (8, 6), ["black"]
-
-        def held(self) -> list[int]:
-            return []
-
-        def picture(self, number: int) -> Image.Image:
-            return Image.new("RGB", self.size, (12, 200, 31))
-
-        def pictures(self) -> list[Image.Image]:
-            return [self.picture(k) for k in range(self.frames)]
-
-    path = tmp_path / "still.gif"
-    path.write_bytes(gif(Still()))  # type: ignore[arg-type]
-    with Image.open(path) as film:
-        assert film.n_frames == 1  # type: ignore[attr-defined]
-        assert film.info["duration"] == 710
-        assert film.convert("RGB").getpixel((3, 3)) == (12, 200, 31)
-
-
 @pytest.mark.parametrize("ending", VIDEOS)
 def test_a_video_shows_the_frames_for_the_right_time(
     ending: str, wanted: list[Image.Image], tmp_path: Path
 ) -> None:
     av = pytest.importorskip("av", reason="videos need the extra 'film'")
-    path = animate(bank(), tmp_path / f"film{ending}", **WINDOW)
+    path = animate(cascade(), tmp_path / f"film{ending}", **WINDOW)
     assert list(tmp_path.iterdir()) == [path]
     with av.open(str(path)) as file:
         (stream,) = file.streams
@@ -117,71 +86,33 @@ def test_a_video_shows_the_frames_for_the_right_time(
 def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "av", None)
     with pytest.raises(MissingExtraError, match=r"videos need av.*gms-fsm\[film\].*as a \.gif"):
-        animate(bank(), tmp_path / "film.mp4", **WINDOW)
+        animate(cascade(), tmp_path / "film.mp4", **WINDOW)
     assert not list(tmp_path.iterdir())
 
 
-@cache
-def one() -> Trace:
-    return simulate(one_element("signed"), open_loop(), 45.0)
-
-
-def test_frames_have_the_theme_the_active_states_and_the_cursor(tmp_path: Path) -> None:
-    theme = "dark"
-    path = animate(bank(), tmp_path / "run.gif", frames=3, fps=10, theme=theme, notation="math")
+def test_frames_have_the_theme_one_layout_the_active_states_and_the_cursor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    layouts: list[Any] = []
+    draw = _chart.rendered
+    monkeypatch.setattr(_chart, "rendered", lambda *each: layouts.append(each) or draw(*each))
+    told: list[tuple[int, int]] = []
+    more = {"theme": "dark", "notation": "math", "progress": lambda *each: told.append(each)}
+    path = animate(cascade(), tmp_path / "run.gif", frames=3, fps=10, **more)
     assert list(tmp_path.iterdir()) == [path]
+    assert len(layouts) == 1
+    assert told == [(k, 3) for k in range(1, 4)]
     with Image.open(path) as film:
-        assert film.format == "GIF"
-        assert film.n_frames == 3  # type: ignore[attr-defined]
         assert film.info["duration"] == 100
         assert film.info["loop"] == 0
     pictures = frames_of(path)
-    assert {picture.size for picture in pictures} == {pictures[0].size}
     assert min(pictures[0].size) > 300
     assert len({picture.tobytes() for picture in pictures}) == 3
-    colours = CHART_THEMES[theme]
+    colours = CHART_THEMES["dark"]
     assert pictures[0].getpixel((3, 3)) == tuple(round(255 * c) for c in to_rgb(colours.paper))
     for picture in pictures:
         assert count(picture, colours.active) > 500
         assert count(picture, colours.fired) > 50  # the cursor
-
-
-def test_the_active_state_moves_with_the_run(tmp_path: Path) -> None:
-    trace, colours = one(), CHART_THEMES["light"]
-    first = float(trace.transitions.t[0])
-    path = animate(trace, tmp_path / "one.gif", frames=2, t_start=first - 0.5, t_end=first + 0.5)
-    before, after = frames_of(path)
-
-    def centre(picture: Image.Image) -> float:
-        """Return the height of the border of the active state."""
-        wanted = tuple(round(255 * part) for part in to_rgb(colours.active))
-        width, height = picture.size
-        rows = [
-            y
-            for y in range(height)
-            for x in range(0, width, 2)
-            if picture.getpixel((x, y)) == wanted
-        ]
-        return sum(rows) / len(rows)
-
-    assert centre(after) > centre(before) + 50  # slip is below stick
-    assert count(after, colours.fired) > count(before, colours.fired) + 40  # the edge
-
-
-def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[Any] = []
-    real = plots.charts.live_chart.picture
-
-    def counted(*arguments: Any) -> bytes:
-        calls.append(arguments)
-        return real(*arguments)
-
-    monkeypatch.setattr(plots.charts.live_chart, "picture", counted)
-    told: list[tuple[int, int]] = []
-    more = {"elements": [1], "frames": 3, "progress": lambda *each: told.append(each)}
-    animate(bank(), tmp_path / "run.gif", **more)
-    assert len(calls) == 1
-    assert told == [(k, 3) for k in range(1, 4)]
 
 
 def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
@@ -193,8 +124,8 @@ def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        animate(one(), path, frames=5, progress=stop)
+        animate(cascade(), path, frames=5, progress=stop)
     assert path.read_bytes() == b"the film of yesterday"
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(OutputError, match="nowhere"):
-        animate(one(), tmp_path / "nowhere" / "run.gif", frames=2)
+        animate(cascade(), tmp_path / "nowhere" / "run.gif", frames=2)

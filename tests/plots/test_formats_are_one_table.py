@@ -52,24 +52,22 @@ def new(subject: Written, **fields: Any) -> Format:
 
 
 # --------------------------------------------------------------------------- one new row
-def test_a_new_format_of_graphs(gms_fsm: CommandLine) -> None:
+@pytest.mark.slow
+def test_a_new_format_of_graphs_or_of_charts_only(gms_fsm: CommandLine) -> None:
     register(new("graph"))
+    register(new("chart", name=".own", kind="a text"))
     for verb in (["chart", "lugre"], ["blocks"]):
         assert gms_fsm(*verb, "-o", "a.new").out == "a.new\n"
         assert Path("a.new").read_text().endswith("aph")  # ChartGraph, Digraph
         assert ".new for a name" in gms_fsm(verb[0], "--help").out
         one_message(gms_fsm(*verb, "-o", "a.bmp"), "path is 'a.bmp'; it must", ".new for a name")
+    assert gms_fsm("chart", "lugre", "-o", "a.OWN").out == "a.OWN\n"
+    assert ".own" not in gms_fsm("blocks", "--help").out
+    one_message(gms_fsm("blocks", "-o", "a.own"), "it must end in .svg")
 
 
-def test_a_new_format_of_charts_only(gms_fsm: CommandLine) -> None:
-    register(new("chart"))
-    assert gms_fsm("chart", "lugre", "-o", "a.NEW").out == "a.NEW\n"
-    assert ".new" in gms_fsm("chart", "--help").out
-    assert ".new" not in gms_fsm("blocks", "--help").out
-    one_message(gms_fsm("blocks", "-o", "a.new"), "it must end in .svg")
-
-
-def test_a_new_format_of_figures(gms_fsm: CommandLine) -> None:
+@pytest.mark.slow
+def test_a_new_format_of_figures(gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
     register(new("figure"))
     Path("own.toml").write_text(OPEN_LOOP)
@@ -80,44 +78,27 @@ def test_a_new_format_of_figures(gms_fsm: CommandLine) -> None:
         gms_fsm("run", "own.toml", "--set", 'output.figures=["bmp"]'),
         "output.figures.0 = 'bmp': it must be 'png', 'svg', 'pdf' or 'new'",
     )
-
-
-def test_a_new_format_of_figures_in_the_debugger(
-    gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
-    register(new("figure"))
-    Path("own.toml").write_text(OPEN_LOOP)
     monkeypatch.setattr("sys.stdin", io.StringIO("plot a.new\nplot a.bmp\nquit\n"))
     done = gms_fsm("debug", "own.toml")
-    assert "written to a.new" in done.out
     assert ".png, .svg, .pdf for a figure or .new for" in " ".join(done.out.split())
     assert Path("a.new").read_text() == "Figure"
 
 
 @pytest.mark.slow
-def test_a_new_format_of_animations(gms_fsm: CommandLine, trace: Trace) -> None:
-    pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
-    pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
+def test_a_new_format_of_films_and_of_pages(gms_fsm: CommandLine, trace: Trace) -> None:
+    for module in ("matplotlib", "uplot", "pygraphviz"):
+        pytest.importorskip(module, reason="films and pages need the extras that draw them")
     count = new("animation", kind="an animation", write=lambda m: b"%d" % len(list(m.pictures())))
     register(count)
+    register(new("page", name=".own"))
     trace.save("t.npz")
     assert gms_fsm("animate", "t.npz", "-o", "a.new", "--frames", "3").out == "a.new\n"
     assert Path("a.new").read_text() == "3"
-    assert ".gif, .mp4, .webm or .new" in gms_fsm("animate", "--help").out
-    one_message(gms_fsm("animate", "t.npz", "-o", "a.avi"), "it must end in", ".new")
-
-
-@pytest.mark.slow
-def test_a_new_format_of_pages(gms_fsm: CommandLine, trace: Trace) -> None:
-    pytest.importorskip("uplot", reason="the page needs the extra 'replay'")
-    pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
-    register(new("page"))
-    trace.save("t.npz")
-    assert gms_fsm("replay", "t.npz", "-o", "a.new").out == "a.new\n"
-    assert Path("a.new").read_text() == "Replay"
-    assert ".new" in gms_fsm("replay", "--help").out
-    one_message(gms_fsm("replay", "t.npz", "-o", "a.txt"), "it must end in", ".html", ".new")
+    assert gms_fsm("replay", "t.npz", "-o", "a.own").out == "a.own\n"
+    assert Path("a.own").read_text() == "Replay"
+    for verb, ending in (("animate", ".new"), ("replay", ".own")):
+        assert ending in gms_fsm(verb, "--help").out
+        one_message(gms_fsm(verb, "t.npz", "-o", "a.avi"), "it must end in", ending)
 
 
 @pytest.mark.slow
@@ -148,21 +129,15 @@ def test_a_missing_extra_is_reported_and_a_graph_is_written_as_text(tmp_path: Pa
 
 
 # --------------------------------------------------------------------------- wrong rows
-def test_a_format_is_registered_once() -> None:
+def test_a_format_is_registered_once_under_a_proper_ending_with_a_known_subject() -> None:
     register(new("figure"))
     register(new("page"))
     with pytest.raises(ParameterError, match=r"the subject 'page' already has a format \.new"):
         register(new("page"))
-
-
-@pytest.mark.parametrize("ending", ["", "new", ".", ".New", ".a.b", " .a", 5])
-def test_an_ending_is_a_dot_and_small_letters(ending: Any) -> None:
-    with pytest.raises(ParameterError, match=re.escape(f"name is {ending!r}; it must be a dot")):
-        new("figure", name=ending)
-
-
-def test_subject_and_extra_are_known() -> None:
-    with pytest.raises(ParameterError, match=r"subject is 'film'; it must be 'graph', "):
+    for ending in ("", "new", ".", ".New", ".a.b", " .a", 5):
+        with pytest.raises(ParameterError, match=re.escape(f"name is {ending!r}; it must be a")):
+            new("figure", name=ending)
+    with pytest.raises(ParameterError, match=r"subject is 'film'; it must be one of 'graph', "):
         new("film")  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match=r"extra is 'fats'; it must be '', 'plots', "):
         new("figure", extra="fats")

@@ -1,7 +1,7 @@
 """The data of a replay page are the rows, values, states and log of the run, and only data.
 
 No browser is needed here; what the page computes from them is the claim of
-`test_replay_page_explains_and_compares.py`.
+`test_a_replay_page_shows_the_run.py`.
 """
 
 from __future__ import annotations
@@ -17,20 +17,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Prescribed, Trace, simulate
+from gms_fsm import Prescribed, Stribeck, Trace, simulate
 from gms_fsm.charts import GMS_ELEMENT
-from gms_fsm.charts.chart import Chart, State
-from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError
-from gms_fsm.systems.models import ChartModel, LuGre
+from gms_fsm.systems.models import LuGre
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.verification.prove import prove
 from plots.page import _rows, chart
 from plots.page.replay import replay, replay_html, write_replay
 from tests.helpers import FASTEST, FIG4_SINE, bank, pulled_mass, stick_slip
 from tests.plots.stored import column, data_of, integers, log, modes, same
-from tests.plots.systems_to_draw import BLOCKS, PULLED, STICTION
-from tests.plots.systems_to_draw import run as system_run
 
 pytestmark = [
     pytest.mark.slow,
@@ -49,9 +45,8 @@ def run_of(trace: Trace, **options: Any) -> dict[str, Any]:
     return dict(only)
 
 
-@pytest.mark.parametrize("law", ["published", "signed"])
-def test_rows_have_the_numbers_the_bits_and_the_states_of_the_trace(law: str) -> None:
-    trace = fig4(law)
+def test_rows_have_the_numbers_the_bits_and_the_states_of_the_trace() -> None:
+    trace = fig4("published")
     run = run_of(trace)
     (contact,) = run["contacts"]
     own = integers(run["between"]) == 0
@@ -113,13 +108,7 @@ def test_800_000_rows_with_30_000_transitions_fit_into_5_megabytes() -> None:
         assert v[shown].min() <= 0.99 * trace.v[inside].min()
 
 
-def test_20_elements_with_400_instants_fit_into_2_megabytes() -> None:
-    trace = simulate(bank(20), Prescribed("0.15*sin(2*pi*t/5)"), 100.0)
-    assert np.unique(trace.transitions.t).size >= 320
-    assert len(replay_html(trace).encode()) < 2_000_000
-
-
-def test_a_window_shows_that_part_of_the_run() -> None:
+def test_a_window_shows_that_part_of_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     trace = fig4("signed")
     run = run_of(trace, window=(20.0, 40.0))
     t = column(run, run["t"])
@@ -128,15 +117,10 @@ def test_a_window_shows_that_part_of_the_run() -> None:
     assert len(log(run["contacts"][0])[0]) == len(inside) > 0
     own = integers(run["between"]) == 0
     assert same(t[own], trace.t[integers(run["number"])[own]])
-
-
-def test_more_transitions_than_a_page_holds_ask_for_a_window(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
     monkeypatch.setattr(_rows, "MOST_AT_TRANSITIONS", 50)
     with pytest.raises(ParameterError, match="give a shorter window"):
-        replay_html(fig4("signed"))
-    assert replay_html(fig4("signed"), window=(0.0, 10.0))
+        replay_html(trace)
+    assert replay_html(trace, window=(0.0, 10.0))
 
 
 def test_long_runs_at_requested_times_keep_all_transitions() -> None:
@@ -151,22 +135,17 @@ def test_long_runs_at_requested_times_keep_all_transitions() -> None:
     assert same(column(run, run["t"])[own], trace.t[integers(run["number"])[own]])
 
 
-def test_requested_times_of_a_loaded_trace_are_not_duplicated(tmp_path: Path) -> None:
+def test_rows_of_a_loaded_trace_are_not_duplicated(tmp_path: Path) -> None:
     model, rig = stick_slip("signed"), Prescribed(FIG4_SINE)
     trace = simulate(model, rig, 100.0, t_eval=np.linspace(0.0, 100.0, 201))
-    fresh = data_of(replay_html(trace))
-    loaded = data_of(replay_html(Trace.load(trace.save(tmp_path / "run.npz"))))
-    for page in (fresh, loaded):
-        (run,) = page["runs"]
-        assert log(run["contacts"][0])[3].all()
-        steps = integers(run["microstep"])
-        keys = list(zip(column(run, run["t"]).tolist(), steps.tolist(), strict=True))
-        assert keys == sorted(keys)
-        assert sum(steps) == sum(fig4("signed").microstep)
-
-
-def test_a_signal_that_is_not_in_the_file_leaves_the_rows_as_they_are(tmp_path: Path) -> None:
-    trace = simulate(stick_slip("signed"), Prescribed(lambda t: 0.2), 3.0)
+    run = run_of(Trace.load(trace.save(tmp_path / "run.npz")))
+    assert log(run["contacts"][0])[3].all()
+    steps = integers(run["microstep"])
+    keys = list(zip(column(run, run["t"]).tolist(), steps.tolist(), strict=True))
+    assert keys == sorted(keys)
+    assert sum(steps) == sum(fig4("signed").microstep)
+    # A signal that is not in the file leaves the rows as they are.
+    trace = simulate(model, Prescribed(lambda t: 0.2), 3.0)
     run = run_of(Trace.load(trace.save(tmp_path / "run.npz")))
     assert run["rows"] == len(trace)
     assert not integers(run["between"]).any()
@@ -187,83 +166,54 @@ def test_counterexamples_are_pinned_where_they_have_a_place() -> None:
         replay_html(fig4("signed"), checks=report)
 
 
-def test_a_hostile_name_stays_a_text() -> None:
+def test_hostile_names_stay_texts_and_nan_and_infinities_are_stored() -> None:
     evil = "</script><script>document.title='owned'</script><!-- \u2028"
-    chart = Chart(
-        name=evil,
-        inputs=("v", "s"),
-        variables=("z",),
-        parameters=("k",),
-        states=(State("only", flow={"z": "v"}),),
-        transitions=(),
-        outputs={"F": "k * z"},
-    )
-    model = ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1, 1.5, 0.1))
-    trace = simulate(model, Prescribed("0.1"), 1.0)
-    page = replay_html(trace, title=evil)
-    assert "owned" not in re.sub(r'(?s)<script type="application/json".*?</script>', "", page)
-    assert page.count("</script>") == 3
-    assert data_of(page)["title"] == evil
-
-
-def test_nan_and_infinities_are_stored() -> None:
     trace = fig4("signed")
     stored = {name: np.array(values) for name, values in trace.seen.items()}
     stored["friction.F"][:3] = np.nan, np.inf, -np.inf
     stored["friction.v"][5] = np.nan
-    run = run_of(replace(trace, stored=stored))
+    page = replay_html(replace(trace, stored=stored), title=evil, names=[evil])
+    assert "owned" not in re.sub(r'(?s)<script type="application/json".*?</script>', "", page)
+    assert page.count("</script>") == 3
+    assert data_of(page)["title"] == evil
+    (run,) = data_of(page)["runs"]
     values = run["contacts"][0]["values"]
     assert same(column(run, values["F"]["all"])[:3], np.array([np.nan, np.inf, -np.inf]))
     assert np.isnan(column(run, values["v"]["all"])[5])
 
 
-def test_a_failed_run_has_a_page() -> None:
+def test_failed_runs_charts_without_edges_and_models_of_many_elements_have_pages() -> None:
     with pytest.raises(SimulationError) as stopped:
         simulate(stick_slip("signed"), Prescribed("0.1*sqrt(2 - t)"), 5.0)
-    run = run_of(stopped.value.trace)
-    assert run["rows"] >= len(stopped.value.trace)
-
-
-def test_a_page_in_a_missing_folder_is_one_clear_error(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="cannot write"):
-        write_replay(tmp_path / "none" / "page.html", fig4("signed"))
-
-
-def test_two_runs_of_one_model_are_distinguished_by_their_names() -> None:
-    coarse, fine = fig4("signed"), fig4("signed")
-    runs = data_of(replay_html(coarse, fine, names=["coarse", "fine"]))["runs"]
-    assert [run["title"].partition(":")[0] for run in runs] == ["coarse", "fine"]
-    assert [run["title"].partition(": ")[2] for run in runs] == [
-        run["title"] for run in data_of(replay_html(coarse, fine))["runs"]
-    ]
-
-
-def test_a_log_with_an_edge_of_another_chart_is_rejected() -> None:
-    trace = fig4("signed")
-    layout = trace.program.layout
-    other = replace(layout, edges=tuple(("warp", *ends) for _, *ends in layout.edges))
-    with pytest.raises(TraceFileError, match="'warp'"):
-        replay_html(replace(trace, firings=replace(trace.firings, layout=other)))
-
-
-def test_a_chart_without_edges_and_a_model_of_many_elements_have_pages() -> None:
+    assert run_of(stopped.value.trace)["rows"] >= len(stopped.value.trace)
     rig = Prescribed(FIG4_SINE)
     lugre = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=0.4, stribeck=Stribeck(1, 1.5, 0.05))
-    run = run_of(simulate(lugre, rig, 10.0))
-    (contact,) = run["contacts"]
+    (contact,) = run_of(simulate(lugre, rig, 10.0))["contacts"]
     assert contact["edges"] == []
     assert len(log(contact)[0]) == 0
-    chart = GMS_ELEMENT["signed"]
-    values = {"k": 1.0, "sigma": 0.0, "C": 0.02, "v_c": 1e-6}
-    bank = ChartModel(chart, values, n=9, stribeck=Stribeck(1, 1.5, 0.05))
-    page = replay_html(simulate(bank, rig, 10.0))
+    page = replay_html(simulate(bank(9), rig, 10.0))
     assert page.count('class="node state"') == 2  # one chart, which shows the chosen element
     assert data_of(page)["runs"][0]["contacts"][0]["n"] == 9
 
 
-def test_without_graphviz_the_page_has_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_written_or_drawn_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = fig4("signed")
+    with pytest.raises(OutputError, match="cannot write"):
+        write_replay(tmp_path / "none" / "page.html", trace)
+    layout = trace.program.layout
+    other = replace(layout, edges=tuple(("warp", *ends) for _, *ends in layout.edges))
+    with pytest.raises(TraceFileError, match="'warp'"):
+        replay_html(replace(trace, firings=replace(trace.firings, layout=other)))
     monkeypatch.setattr(chart, "drawn", lambda graph, form: None)
-    assert "No chart: Graphviz" in replay_html(fig4("signed"))
+    assert "No chart: Graphviz" in replay_html(trace)
+
+
+def test_two_runs_of_one_model_are_distinguished_by_their_names() -> None:
+    trace = fig4("signed")
+    runs = data_of(replay_html(trace, trace, names=["coarse", "fine"]))["runs"]
+    assert [run["title"].partition(":")[0] for run in runs] == ["coarse", "fine"]
 
 
 def test_a_notebook_shows_it_in_a_sandbox(tmp_path: Path) -> None:
@@ -276,24 +226,3 @@ def test_a_notebook_shows_it_in_a_sandbox(tmp_path: Path) -> None:
     assert html.unescape(inside[1]) == shown.html
     path = write_replay(tmp_path / "page.html", fig4("signed"))
     assert path.read_text(encoding="utf-8") == shown.html  # the same run gives the same page
-
-
-# --------------------------------------------------------------------------- contacts of systems
-@pytest.mark.parametrize("contact", ["pad1", "pad2"])
-def test_a_firing_belongs_to_its_own_contact(contact: str) -> None:
-    trace = system_run(BLOCKS).contact(contact)
-    page = run_of(trace)
-    rows, _, _, made = log(page["contacts"][0])
-    assert made.all()
-    assert column(page, page["t"])[rows].tolist() == trace.transitions.t.tolist()
-
-
-def test_a_page_shows_the_force_that_guards_read_bit_for_bit() -> None:
-    trace = system_run(PULLED)
-    page = run_of(trace)
-    (contact,) = page["contacts"]
-    own = integers(page["between"]) == 0
-    F = column(page, contact["values"]["F"]["all"])[own]
-    assert same(F, trace.F[integers(page["number"])[own]])
-    assert contact["variables"] == []  # and has no plot of elements
-    assert {edge["name"] for edge in contact["edges"]} == {e.name for e in STICTION.transitions}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from itertools import combinations, pairwise
+from itertools import chain, combinations, pairwise
 from typing import Any
 
 import pytest
@@ -17,19 +17,18 @@ import pytest
 import gms_fsm.charts.chart
 from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.language import MATLAB_LIKE, clauses, spell
 from plots.charts.labels import edge_id, part_id
-from plots.charts.notation import ChartWriter
 from plots.charts.statechart import statechart
 from tests.helpers import matrix
 from tests.plots.charts_to_draw import (
-    FIVE_STATES,
     HOSTILE,
     LONG_GUARDS,
     MANY_EDGES,
     THREE_LOOPS,
     THREE_STATES,
     any_chart,
+    label_of,
+    texts_of,
 )
 from tests.plots.pictures import Box, Picture, chart_picture, overlaps, squeezed
 
@@ -39,12 +38,10 @@ A4 = 595  # points
 AXIS = {"TB": 0, "LR": 1}
 # Chart, number of elements, options.
 OWN: dict[str, tuple[Chart, int, dict[str, Any]]] = {
-    "GMS published": (GMS_ELEMENT["published"], 1, {}),
     "GMS signed, 4 elements": (GMS_ELEMENT["signed"], 4, {}),
     "LuGre": (LUGRE, 1, {}),
     "3 states": (THREE_STATES, 1, {}),
-    "3 states, 5 elements": (THREE_STATES, 5, {}),
-    "5 states": (FIVE_STATES, 1, {}),
+    "hostile": (HOSTILE, 2, {}),
 }
 HARD: dict[str, tuple[Chart, int, dict[str, Any]]] = {
     "12 elements": (GMS_ELEMENT["published"], 12, {}),
@@ -52,7 +49,6 @@ HARD: dict[str, tuple[Chart, int, dict[str, Any]]] = {
     "40 edges, graph": (MANY_EDGES, 1, {"form": "graph"}),
     "loops": (THREE_LOOPS, 1, {"theme": "dark"}),
     "long guards": (LONG_GUARDS, 1, {"notation": "math"}),
-    "hostile": (HOSTILE, 2, {}),
     "hostile, math": (HOSTILE, 2, {"notation": "math", "theme": "dark"}),
     **{f"random {seed}": (any_chart(seed), 1, {}) for seed in range(5)},
     **{f"random {seed}": (any_chart(seed), 1, {"form": "graph"}) for seed in range(5, 9)},
@@ -63,8 +59,10 @@ ZOO: dict[str, tuple[Chart, int, dict[str, Any]]] = {
 }
 CASES = OWN | HARD | ZOO
 BOTH = [(name, direction) for name in CASES for direction in ("TB", "LR")]
-KEPT = [each for each in BOTH if each[0] in OWN]  # and the others alternately
-KEPT += [(name, ("TB", "LR")[k % 2]) for k, name in enumerate(HARD | ZOO)]
+# Each in one direction, and of the zoo and the random ones every third.
+SOME = [*OWN, *(name for name in HARD if "random" not in name)]
+SOME += [*(name for name in HARD if "random" in name), *ZOO][::3]
+KEPT = [(name, ("TB", "LR")[k % 2]) for k, name in enumerate(SOME)]
 
 
 @cache
@@ -94,8 +92,7 @@ def test_the_check_finds_an_overlap() -> None:
 
 
 # --------------------------------------------------------------------------- complete
-@pytest.mark.parametrize("direction", ["TB", "LR"])
-@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize(("name", "direction"), [each for each in KEPT if each[0] in OWN])
 def test_every_state_guard_edge_and_default_dot_is_there(name: str, direction: str) -> None:
     drawn, (chart, elements, _) = picture(name, direction), OWN[name]
     for element in (f"element{k}" for k in range(1, elements + 1)):
@@ -117,30 +114,17 @@ def test_every_state_guard_edge_and_default_dot_is_there(name: str, direction: s
 
 
 def state_lines(chart: Chart, name: str) -> list[str]:
-    lines, below = [name], len(chart.states) > 2
-    for kind, trees in (
-        ("entry", chart.assignments["entry", name]),
-        ("during", {f"d{v}": chart.flows[name, v] for v in chart.variables}),
-        ("force", {} if below else {f: chart.forces[name, f] for f in chart.force_names}),
-        ("exit", chart.assignments["exit", name]),
-    ):
-        lines += [f"{kind}:"] if trees else []
-        lines += [f"{target} = {spell(tree, MATLAB_LIKE)};" for target, tree in trees.items()]
-    return lines
+    texts = ([f"{kind}:", *each] for kind, each in texts_of(chart, name).items() if each)
+    return [name, *chain(*texts)]
 
 
 def assert_guard(chart: Chart, drawn: Picture, name: str, priority: int, edge: str) -> None:
-    shown, guard = squeezed(*drawn[name].texts), chart.guard_text(edge)
-    assigned = chart.assignments["action", edge].items()
-    actions = "".join(f"{target} = {spell(tree, MATLAB_LIKE)};" for target, tree in assigned)
-    action = f"{{{actions}}}" if actions else ""
+    shown = squeezed(*drawn[name].texts)
     number = re.fullmatch(rf"{priority}\[(g\d+)\]", shown)
     if number:  # the guard is below the picture
-        assert squeezed(f"{number[1]} = {guard}{action}") in drawn.legend()
-        return
-    assert shown == squeezed(f"{priority}[{guard}]{action}")
-    for clause in clauses(chart.guards[edge]):
-        assert spell(clause, MATLAB_LIKE) in guard
+        assert squeezed(label_of(chart, edge, f"{number[1]} = %s")) in drawn.legend()
+    else:
+        assert shown == squeezed(label_of(chart, edge, f"{priority} [%s]"))
 
 
 def assert_line(drawn: Picture, element: str, edge: Transition) -> None:
@@ -156,36 +140,8 @@ def assert_line(drawn: Picture, element: str, edge: Transition) -> None:
     assert not second.touches(guard, arrow)
 
 
-@pytest.mark.parametrize("direction", ["TB", "LR"])
-@pytest.mark.parametrize("name", ["hostile", "hostile, math"])
-def test_every_look_shows_the_whole_hostile_chart(name: str, direction: str) -> None:
-    drawn, notation = picture(name, direction), CASES[name][2].get("notation", "stateflow")
-    write = ChartWriter(HOSTILE, notation)
-
-    def plain(text: str) -> str:  # the index of a name is a text of its own, lowered
-        return squeezed(text).replace("_", "") if notation == "math" else squeezed(text)
-
-    for element in ("element1", "element2"):
-        for state in HOSTILE.states:
-            texts = squeezed(*drawn[f"{element}-state-{state.name}"].texts)
-            assert texts.startswith(state.name)
-            for variable in HOSTILE.variables:
-                assert plain(write.flow(variable, HOSTILE.flows[state.name, variable])) in texts
-        for edge in HOSTILE.transitions:
-            guard = plain(write.text(HOSTILE.guards[edge.name]))
-            texts = squeezed(*drawn[f"{element}-guard-{edge.name}"].texts)
-            assert texts == ("1[g1]" if edge.name == "länge" else f"1[{guard}]")
-            assert edge.name != "länge" or squeezed(*drawn["legend1"].texts) == f"g1={guard}"
-    assert max(len(text) for group in drawn.groups.values() for text in group.texts) <= 100
-
-
-@pytest.mark.parametrize(
-    ("notation", "direction", "theme"),
-    [("stateflow", "TB", "light"), ("math", "LR", "light"), ("math", "TB", "dark")],
-)
-def test_invalid_names_are_shown_literally(
-    notation: str, direction: str, theme: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("notation", ["stateflow", "math"])
+def test_invalid_names_are_shown_literally(notation: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)  # let them through
     bad = 'slip</B></TD></TR></TABLE>>]; "evil:n" [label=<<B>\\N" & \x01[x] \\'
     chart = Chart(
@@ -196,7 +152,7 @@ def test_invalid_names_are_shown_literally(
         transitions=(Transition('a"]; evil -> evil [x="', bad, bad, guard="v > 0"),),
         outputs={"F": "v"},
     )
-    drawn = chart_picture(chart, notation=notation, direction=direction, theme=theme)
+    drawn = chart_picture(chart, notation=notation)
     assert len(drawn.of_class("node")) == len(drawn.of_class("edge")) == 3
     (state,) = drawn.of_class("state")
     assert squeezed(drawn[state].texts[0]) == squeezed(bad.replace("\x01", ""))
@@ -227,7 +183,7 @@ def places(drawn: Picture, chart: Chart, element: str, direction: str) -> dict[s
     return found
 
 
-GRAPHS = [name for name in CASES if CASES[name][1] == 1 and name not in ("40 edges", *ZOO)]
+GRAPHS = [name for name in CASES if name not in ("40 edges", "12 elements", *ZOO)]
 GRAPHS = [name for name in GRAPHS if "random" not in name or "form" in CASES[name][2]]
 GRAPHS += [name for name in ZOO if len(CHARTS[name].transitions) > 2]
 
@@ -240,49 +196,15 @@ def test_edges_that_leave_a_state_are_in_the_order_of_priority(name: str, direct
     drawn, chart = picture(name, direction), CASES[name][0]
     if "element1-target-1" in drawn.groups:  # a matrix has its own test
         drawn = chart_picture(chart, direction=direction, form="graph")
-    for what, given in places(drawn, chart, "element1", direction).items():
-        assert all(a < b for a, b in pairwise(given)), what
-
-
-@pytest.mark.parametrize("direction", ["TB", "LR"])
-@pytest.mark.parametrize("chart", [GMS_ELEMENT["published"], FIVE_STATES], ids=["gms", "five"])
-def test_every_region_of_a_bank_is_like_the_single_chart(chart: Chart, direction: str) -> None:
-    one = chart_picture(chart, direction=direction)
-    single = places(one, chart, "element1", direction)
-    bank = chart_picture(chart, 4, direction=direction)
-    for element in (f"element{k}" for k in range(1, 5)):
-        for what, given in places(bank, chart, element, direction).items():
-            shift = given[0] - single[what][0]
-            assert given == pytest.approx([x + shift for x in single[what]], abs=0.05)
-        for edge in chart.transitions:  # the same order numbers
-            name = f"element{element[7:]}-guard-{edge.name}"
-            numbers = [
-                p[n].texts[0][0] for p, n in ((one, f"element1-guard-{edge.name}"), (bank, name))
-            ]
-            assert numbers[0] == numbers[1]
-            assert numbers[0].isdigit()
-
-
-@pytest.mark.parametrize("direction", ["TB", "LR"])
-def test_each_self_loop_has_a_level_of_its_own(direction: str) -> None:
-    """From top to bottom, or from left to right."""
-    drawn, tops, ends = picture("loops", direction), [], []
-    for _, edge in THREE_LOOPS.leaving("state_3"):
-        if edge.source == edge.target:
-            name = edge_id(THREE_LOOPS, "element1", "guard", edge)
-            boxes = [box for own, box in drawn.texts if own == name]
-            (line,) = (p for n, p in drawn.lines if n == name.replace("guard", "edge", 1) + "-1")
-            tops.append(min(b.top if direction == "TB" else b.left for b in boxes))
-            ends.append(line[0][1 - AXIS[direction]])
-    assert len(tops) >= 3
-    assert tops == sorted(tops)
-    assert ends == sorted(ends)
+    for element in drawn.of_class("region") or {"element1"}:
+        for what, given in places(drawn, chart, element, direction).items():
+            assert all(a < b for a, b in pairwise(given)), what
 
 
 # --------------------------------------------------------------------------- several elements
 @pytest.mark.parametrize(
     ("elements", "direction", "rows"),
-    [(2, "TB", 1), (2, "LR", 2), (4, "TB", 2), (4, "LR", 4), (5, "TB", 3)],
+    [(2, "LR", 2), (5, "TB", 3)],
 )
 def test_several_elements_are_a_grid_of_parallel_regions(
     elements: int, direction: str, rows: int
@@ -302,15 +224,6 @@ def test_several_elements_are_a_grid_of_parallel_regions(
     assert Box.around([p for r in regions for p in r.line]).right < 482 * 10 / 7  # 170 mm
 
 
-def test_one_element_has_no_region_alike_ones_are_drawn_once_and_lugre_has_no_edges() -> None:
-    drawn = picture("LuGre", "TB")
-    assert drawn.of_class("region") == drawn.of_class("guard") == set()
-    assert drawn.of_class("edge") == {"element1-default-edge"}
-    drawn = picture("12 elements", "TB")
-    assert drawn.of_class("region") == {"element1"}
-    assert drawn["element1"].texts[:2] == ["Elements 1 to 12", "× 12"]
-
-
 def test_elements_are_chosen_from_0_and_shown_from_1() -> None:
     signed = GMS_ELEMENT["signed"]
     drawn = chart_picture(signed, [3, 0])
@@ -325,9 +238,8 @@ def test_elements_are_chosen_from_0_and_shown_from_1() -> None:
 
 def test_sizes_of_texts_are_whole_points() -> None:
     """Graphviz cuts off the rest, and the text would be narrower than its cell."""
-    for chart in (MANY_EDGES, THREE_LOOPS, FIVE_STATES):
-        for direction in ("TB", "LR"):
-            graph = statechart(chart, direction=direction, notation="math", form="graph")
-            sizes = set(re.findall(r'POINT-SIZE="([^"]*)"', graph.source))
-            assert sizes
-            assert all(size.isdigit() for size in sizes)
+    for chart in (MANY_EDGES, THREE_LOOPS):
+        graph = statechart(chart, notation="math", form="graph")
+        sizes = set(re.findall(r'POINT-SIZE="([^"]*)"', graph.source))
+        assert sizes
+        assert all(size.isdigit() for size in sizes)

@@ -8,10 +8,10 @@ from itertools import combinations
 
 import pytest
 
-from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider
+from gms_fsm import GMS, Chart, GMSParameters, Prescribed, PulledSlider, State
 from gms_fsm.systems.system import Body, Contact, System, system_of
 from plots.systems.block_diagram import block_diagram
-from tests.plots.pictures import SVG, Box, Picture
+from tests.plots.pictures import Box
 from tests.plots.systems_to_draw import BLOCKS, DRY, SERVO, STICTION, systems
 
 MODEL = GMS(GMSParameters.paper("stick-slip"), law="signed")
@@ -79,7 +79,7 @@ def lines(system: System) -> set[tuple[str, str, str]]:
     return found
 
 
-def test_the_parts_of_a_servo() -> None:
+def test_the_parts_and_lines_of_a_servo() -> None:
     assert parts(SERVO) == {
         "signal-r": "r  signal | r = 0.5 * sin(2 * t)",
         "sampled-pid": "pid  every 1 ms | u = k_p * (r - q_m) + I"
@@ -90,9 +90,6 @@ def test_the_parts_of_a_servo() -> None:
         "contact-bearing": f"bearing  contact | {STICTION.name} | velocity: w_m",
         "contact-gear": "gear  contact | Backlash with elastic flanks | velocity: w_m - 3 * w_l",
     }
-
-
-def test_the_lines_of_a_servo() -> None:
     assert lines(SERVO) == {
         ("signal-r", "sampled-pid", "r"),
         ("body-motor", "sampled-pid", "q_m"),
@@ -102,17 +99,16 @@ def test_the_lines_of_a_servo() -> None:
         ("body-motor", "contact-gear", ""),
         ("body-load", "contact-gear", ""),
     }
-
-
-def test_a_spring_between_bodies_is_a_line_each_way() -> None:
-    assert {("body-two", "body-one", "q2"), ("body-one", "body-two", "q1")} <= lines(BLOCKS)
-    assert parts(BLOCKS)["body-belt"] == "belt  driven body | w_b = V"
-
-
-def test_what_is_read_at_ticks_is_dashed() -> None:
-    for name, found in pieces(SERVO).items():
+    for name, found in pieces(SERVO).items():  # what is read at ticks is dashed
         for _, _, look in found:
             assert ("style=dashed" in look) == name.endswith("-sampled-pid"), name
+    held = {name.split("-hold")[0] for name in nodes(SERVO) if "-hold" in name}
+    assert held == {"sampled-pid"}  # what is held has a staircase
+
+
+def test_a_force_text_between_bodies_is_a_line_each_way() -> None:
+    assert {("body-two", "body-one", "q2"), ("body-one", "body-two", "q1")} <= lines(BLOCKS)
+    assert parts(BLOCKS)["body-belt"] == "belt  driven body | w_b = V"
 
 
 def test_springs_pull_their_bodies_and_have_a_symbol() -> None:
@@ -133,14 +129,7 @@ def test_springs_pull_their_bodies_and_have_a_symbol() -> None:
     }
 
 
-def test_what_is_held_has_a_staircase() -> None:
-    held = {name.split("-hold")[0] for name in nodes(SERVO) if "-hold" in name}
-    assert held == {"sampled-pid"}
-
-
-def test_an_input_of_a_contact_comes_from_what_its_text_reads() -> None:
-    from gms_fsm.charts.chart import Chart, State
-
+def test_inputs_of_contacts_elements_shares_and_rigs() -> None:
     pressed = Chart(
         "pressed",
         inputs=("v", "N"),
@@ -149,28 +138,20 @@ def test_an_input_of_a_contact_comes_from_what_its_text_reads() -> None:
     )
     system = System(
         "brake",
-        bodies=(Body("disc", inertia=1.0),),
-        contacts=(Contact("pad", pressed, {"mu": 0.3}, inputs={"N": "A * p"}, period=0.01),),
+        bodies=(Body("disc", inertia=2.0), Body("rim", inertia="J", x="q", v="w")),
+        contacts=(
+            Contact("pad", pressed, {"mu": 0.3}, n=3, inputs={"N": "A * p"}, period=0.01),
+            Contact("dog", STICTION, DRY, v="v - A * w"),
+        ),
         signals={"p": "t"},
-        numbers={"A": 2.0},
+        numbers={"A": 2.0, "J": 1.0},
     )
     assert parts(system)["contact-pad"] == (
-        "pad  contact, every 10 ms | pressed | velocity: v | N = A * p"
+        "pad  contact, every 10 ms | pressed × 3 | velocity: v | N = A * p"
     )
     assert ("signal-p", "contact-pad", "p") in lines(system)
-    assert parts(system)["body-disc"] == "disc  body | dv/dt = -pad.F"
-
-
-def test_several_elements_are_counted() -> None:
-    from gms_fsm.charts.chart import Chart, State
-
-    spring = Chart("spring", parameters=("k",), states=(State("on", outputs={"F": "k * v"}),))
-    contact = Contact("pad", spring, {"k": 1.0}, n=3)
-    system = System("s", bodies=(Body("mass", inertia=1.0),), contacts=(contact,))
-    assert "spring × 3" in parts(system)["contact-pad"]
-
-
-def test_a_model_on_a_rig_is_the_picture_of_its_system() -> None:
+    assert parts(system)["body-disc"] == "disc  body | 2 * dv/dt = -pad.F - dog.F"
+    assert parts(system)["body-rim"] == "rim  body | J * dw/dt = A * dog.F"
     pulled = parts(system_of(MODEL, PulledSlider(1.0, 2.0, 0.1)))
     assert pulled["contact-friction"] == f"friction  contact | {MODEL.title} | velocity: v"
     driven = system_of(MODEL, Prescribed("0.1 * t"))
@@ -218,27 +199,3 @@ def test_blocks_wires_and_texts_keep_apart_on_two_pages(name: str) -> None:
         near = Box(other.left - 4, other.top, other.right + 4, other.bottom)
         if one.left == one.right and other.left == other.right:  # upright
             assert not (one.meets(near) and min(one.bottom, other.bottom) > max(one.top, other.top))
-
-
-@pytest.mark.parametrize("name", ["two-mass servo", "ball_screw_table", "a train of four"])
-def test_texts_fit_into_their_blocks(name: str) -> None:
-    """The widths of characters that blocks are made for are not less than those drawn."""
-    for group in Picture(block_diagram(systems()[name])).groups.values():
-        if not group.classes & KINDS:
-            continue
-        for text in group.element.iter(SVG + "text"):
-            start, size = float(text.get("x", "")), float(text.get("font-size", ""))
-            wide = 0.602 if "Mono" in text.get("font-family", "") else 0.5
-            assert group.box.left <= start, text.text
-            assert start + wide * size * len(text.text or "") <= group.box.right + 1, text.text
-
-
-def test_the_force_on_each_body_has_its_share() -> None:
-    geared = System(
-        "geared",
-        bodies=(Body("a", inertia=2.0, x="q1", v="w1"), Body("b", inertia="J", x="q2", v="w2")),
-        contacts=(Contact("dog", STICTION, DRY, v="w1 - N * w2"),),
-        numbers={"N": 3.0, "J": 1.0},
-    )
-    assert parts(geared)["body-a"] == "a  body | 2 * dw1/dt = -dog.F"
-    assert parts(geared)["body-b"] == "b  body | J * dw2/dt = N * dog.F"

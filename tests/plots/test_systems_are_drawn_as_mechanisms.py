@@ -16,12 +16,12 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 from gms_fsm import PulledSlider
 from gms_fsm.language import MATLAB_LIKE, spell
-from gms_fsm.systems.system import Body, Contact, System, system_of
+from gms_fsm.systems.system import System, system_of
 from plots import schematic
 from plots.systems.mechanical_layout import Item, arranged, force_of
 from tests.helpers import matrix
 from tests.plots.printed import problems
-from tests.plots.systems_to_draw import BLOCKS, DRY, GMS12, PULLED, STICTION, systems
+from tests.plots.systems_to_draw import BLOCKS, GMS12, PULLED, systems
 
 A4 = 8.27  # inches
 
@@ -31,104 +31,35 @@ def items(system: System) -> list[Item]:
     return [*layout.over, *(each for gap in layout.gaps.values() for each in gap)]
 
 
-def links(system: System) -> Counter[tuple[str, str, frozenset[str]]]:
-    return Counter(
-        (link.kind, link.constant, frozenset((each.left, each.right)))
-        for each in items(system)
-        for link in each.links
-    )
-
-
 def forces(system: System) -> dict[str, str]:
     texts = {body.name: spell(force_of(system, body), MATLAB_LIKE) for body in system.bodies}
     return {name: text for name, text in texts.items() if text != "0"}
 
 
-LINKS = {
-    "ball_screw_table": {
-        ("damper", "c_m", "screw", ""),
-        ("spring", "k_n", "screw", "table"),
-        ("damper", "d_n", "screw", "table"),
-    },
-    "belt_driven_mass": {
-        ("spring", "k_b", "motor", "carriage"),
-        ("damper", "d_b", "motor", "carriage"),
-    },
-    "brake_squeal": {
-        ("spring", "k_x", "tangential", ""),
-        ("damper", "c", "tangential", ""),
-        ("spring", "k_y", "normal", ""),
-        ("damper", "c", "normal", ""),
-    },
-    "drill_string": {
-        ("damper", "c_r", "table", ""),
-        ("damper", "c_t", "table", "bit"),
-        ("spring", "k_t", "table", "bit"),
-        ("damper", "c_b", "bit", ""),
-    },
-    "friction_damper": {("spring", "k", "structure", ""), ("damper", "c", "structure", "")},
-    "servo": {("spring", "k_s", "motor", "load"), ("damper", "d_s", "motor", "load")},
-    "two_blocks_on_a_belt": {
-        ("spring", "k", "one", ""),
-        ("spring", "k", "two", ""),
-        ("spring", "k_c", "one", "two"),
-    },
-    "pulled_mass": {("spring", "stiffness", "body", "")},
-    "pulled mass": {("spring", "K", "mass", "")},
-    "a train of four": {
-        ("spring", "k", "one", ""),
-        ("spring", "k_c", "one", "two"),
-        ("spring", "k_l", "one", "four"),
-        ("damper", "0.5 * d", "two", "three"),
-        ("spring", "k", "three", ""),
-    },
-}
-PULL = Counter({("spring", "stiffness", frozenset(("body", ""))): 1})
-FORCES = {
-    "ball_screw_table": {"screw": "M"},
-    "belt_driven_mass": {"motor": "k_p * (speed / r - w) + k_i * lag"},
-    "brake_squeal": {"tangential": "-k_xy * y", "normal": "-k_xy * x - N_0"},
-    "drill_string": {"table": "u"},
-    "friction_damper": {"structure": "F_e"},
-    "servo": {"motor": "u"},
-    "ball": {"ball": "m * g"},
-    "a train of four": {"one": "P * sin(w * t)", "four": "-k_f * x_1"},
-    "two-mass servo": {"motor": "k_t * i"},
-    "slider pushed by a force": {"body": "F_a"},
-    "paper_fig3_non_drifting": {"body": "F_a"},
-}
+@pytest.mark.slow
+def test_springs_and_dampers_are_between_their_bodies() -> None:
+    for system in (*systems().values(), BLOCKS):  # whose forces are texts, and no springs
+        wanted = Counter[Any]()
+        for spring in system.springs:
+            ends = frozenset((spring.first, spring.second or ""))
+            wanted["spring", str(spring.k), ends] += spring.k != 0.0
+            wanted["damper", str(spring.d), ends] += spring.d != 0.0
+        found = Counter(
+            (link.kind, link.constant, frozenset((each.left, each.right)))
+            for each in items(system)
+            for link in each.links
+        )
+        assert found == +wanted, system.name
 
 
-def test_springs_dampers_and_other_forces_are_those_of_the_system() -> None:
-    for name, system in systems().items():
-        wanted = Counter((kind, k, frozenset(ends)) for kind, k, *ends in LINKS.get(name, ()))
-        assert links(system) == (wanted if name in LINKS or "pulled" not in name else PULL), name
-        assert forces(system) == FORCES.get(name, {}), name
-
-
-def test_a_gear_belongs_to_its_end() -> None:
+def test_gears_drives_and_lengths_at_rest_are_written_at_their_springs() -> None:
     (nut,) = (each for each in items(systems()["ball_screw_table"]) if len(each.links) == 2)
     assert (nut.left, nut.right, nut.ratios) == ("screw", "table", (r"$\mathit{lead}$", ""))
-
-
-def test_a_point_that_moves_is_the_end_of_a_spring_and_a_damper_stays_at_the_wall() -> None:
-    (spring,) = items(PULLED)
-    assert spring.drive == r"$V\,t$"
+    # A point that moves is the end of a spring, and a damper stays at the wall.
     both = replace(PULLED, springs=(replace(PULLED.springs[0], d=1.0),))
     assert [(each.drive, len(each.links)) for each in items(both)] == [(r"$V\,t$", 1), ("", 1)]
-
-
-def test_a_length_at_rest_is_written_at_its_spring() -> None:
     labels = [link.label for each in items(systems()["a train of four"]) for link in each.links]
     assert r"$k$, rest $0.5\,r$" in labels
-
-
-def test_a_force_given_as_a_text_is_no_spring() -> None:
-    bodies = (Body("a", inertia=1.0, force="-k * x"),)
-    pad = Contact("pad", STICTION, DRY)
-    odd = System("odd", bodies=bodies, contacts=(pad,), numbers={"k": 1.0})
-    assert not links(odd)
-    assert forces(odd) == {"a": "-k * x"}
 
 
 def test_contacts_have_the_symbols_of_their_charts() -> None:
@@ -157,9 +88,12 @@ def test_contacts_have_the_symbols_of_their_charts() -> None:
 
 
 # --------------------------------------------------------------------------- the picture
-@pytest.mark.parametrize(
-    "name", matrix(sorted(systems()), {*LINKS, *FORCES, "a puck"} - {"pulled_mass", "servo"})
-)
+DRAWN = ("ball_screw_table", "belt_driven_mass", "brake_squeal", "friction_damper", "ball")
+DRAWN += ("two-mass servo", "a train of four", "a puck")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", matrix(sorted(systems()), DRAWN))
 def test_everything_is_drawn_once_and_nothing_overlaps(name: str) -> None:
     system = systems()[name]
     figure = schematic(system)
@@ -190,13 +124,10 @@ def bodies(ax: Any) -> dict[str, Any]:
     }
 
 
-def test_twelve_elements_are_one_contact() -> None:
+def test_twelve_elements_are_one_contact_and_belts_are_below_what_rubs_on_them() -> None:
     figure = schematic(system_of(GMS12, PulledSlider(1.0, 2.0, 0.1)))
     below = " ".join(text.get_text() for text in figure.axes[0].texts)
     assert below.count("× 12") == 1
-
-
-def test_belts_are_below_what_rubs_on_them() -> None:
     boxes = bodies(schematic(BLOCKS).axes[0])
     belt = boxes["body belt"]
     for name in ("one", "two"):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Prescribed
-from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
+from tests.helpers import FIG4_SINE, stick_slip
 from tests.plots.browser import Browser, browser, expect, faults
 
 pytest.importorskip("anywidget", reason="the widget needs the extra 'jupyter'")
@@ -85,6 +85,9 @@ def test_branches_are_made_compared_named_exported_and_deleted(host: Host) -> No
     assert host.widget.shown == (0, 1)
     branches = page.locator(".gms-branch")
     expect(branches).to_have_count(2)
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        assert faults(page, context=".gms-explore", options={"iframes": False}) == []
     pin = page.locator(".gms-pin")
     expect(pin).to_contain_text("in run 1 element 1 is in slip; arrest is held back: |z| < s")
     pin.click()
@@ -155,13 +158,3 @@ def test_the_page_listens_to_its_host_only_and_pictures_cannot_act(host: Host) -
     assert host.replay("document.title") != "acted"
     refused = [text for text in host.wrong if "Content Security Policy" in text]
     host.wrong = [text for text in host.wrong if text not in refused]
-
-
-def test_controls_are_for_everybody(browser: Browser) -> None:
-    widget = plots.explore(*pulled_mass(), 20.0, sliders={"F_s": (1.1, 3.0)})
-    widget.poke({"z": {0: 0.0}}, t=9.0)
-    host = Host(browser, widget)
-    for scheme in ("light", "dark"):
-        host.page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-        assert faults(host.page, context=".gms-explore", options={"iframes": False}) == []
-    host.close()

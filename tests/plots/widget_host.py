@@ -37,25 +37,11 @@ SETUP = """async ([code, style, traits]) => {
 
 
 class Host:
-    """A page with a widget in it.
+    """A page with a widget in it, which answers the requests of the page."""
 
-    Parameters
-    ----------
-    browser : Browser
-        Chromium.
-    widget : Explorer
-        The widget, which answers the requests of the page.
-    size : (int, int)
-        Of the window, in pixels.
-    **options
-        Of the browser's context, such as ``color_scheme``.
-    """
-
-    def __init__(
-        self, browser: Browser, widget: Any, size: tuple[int, int] = (1366, 1000), **options: Any
-    ) -> None:
+    def __init__(self, browser: Browser, widget: Any) -> None:
         self.widget, self.wrong, self.requests = widget, list[str](), list[dict[str, Any]]()
-        context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
+        context = browser.new_context(viewport={"width": 1366, "height": 1000})
         self.page: Page = context.new_page()
         self.page.on("console", lambda message: self.wrong.append(message.text))
         self.page.on("pageerror", lambda error: self.wrong.append(str(error)))

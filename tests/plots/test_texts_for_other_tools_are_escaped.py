@@ -1,4 +1,7 @@
-"""The Mermaid text of a chart is read back by the Mermaid parser as the same chart.
+"""Charts as Mermaid, PlantUML and TikZ have every text, and no character that is syntax there.
+
+The Mermaid text is read back by the Mermaid parser as the same chart. That the other tools draw
+theirs is checked by ``make foreign`` (`tests/foreign/check_pictures.py`).
 
 Mermaid runs in node. ``GMS_FSM_MERMAID`` names a folder where it is installed, or will be by the
 first run: 180 MB are not downloaded without being requested.
@@ -18,11 +21,15 @@ from typing import Any
 import pytest
 
 import gms_fsm.charts.chart
+import plots
+from gms_fsm.charts import CHARTS as REGISTERED
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.language import MATLAB_LIKE, spell
+from gms_fsm.errors import ParameterError
 from plots.output.mermaid import mermaid
-from tests.plots.charts_to_draw import FIVE_STATES, HOSTILE, THREE_STATES
+from plots.output.plantuml import plantuml
+from plots.output.tikz import CODES, tikz
+from tests.plots.charts_to_draw import HOSTILE, THREE_STATES, label_of, texts_of
 
 WORDS = Chart(
     name="---\nwords of Mermaid: %% {} <br/>",
@@ -39,11 +46,8 @@ WORDS = Chart(
     ),
     outputs={"F": "style"},
 )
-CHARTS = [*GMS_ELEMENT.values(), LUGRE, THREE_STATES, FIVE_STATES, HOSTILE, WORDS]
-PACKAGES = (
-    "mermaid@11",
-    "jsdom@26",
-)  # mermaid sanitizes texts with a DOM, which node does not have
+CHARTS = [*GMS_ELEMENT.values(), LUGRE, THREE_STATES, HOSTILE, WORDS]
+PACKAGES = ("mermaid@11", "jsdom@26")  # a DOM sanitizes texts, and node has none
 
 READER = """
 import { JSDOM } from 'jsdom';
@@ -68,19 +72,16 @@ console.log(JSON.stringify(found));
 
 def parsed(texts: list[str]) -> list[dict[str, Any]]:
     """Parse texts with Mermaid."""
-    folder = os.environ.get("GMS_FSM_MERMAID")
-    if not folder:
-        pytest.skip("GMS_FSM_MERMAID names no folder for Mermaid's own parser")
-    node, npm = shutil.which("node"), shutil.which("npm")
-    if node is None:
-        pytest.skip("Mermaid's own parser needs node on PATH")
+    folder, node, npm = os.environ.get("GMS_FSM_MERMAID"), shutil.which("node"), shutil.which("npm")
+    if not folder or node is None:
+        pytest.skip("Mermaid's own parser needs a folder GMS_FSM_MERMAID, and node on PATH")
     modules = Path(folder, "node_modules")
     if not (modules / "mermaid").is_dir() or not (modules / "jsdom").is_dir():
         if npm is None:
             pytest.skip(f"{folder} has no mermaid and jsdom, and there is no npm to install them")
         Path(folder).mkdir(parents=True, exist_ok=True)
         command = [npm, "install", "--no-audit", "--no-fund", "--prefix", folder, *PACKAGES]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             pytest.skip(f"npm could not install mermaid: {done.stderr.strip()[-300:]}")
     reader = Path(folder, "reader.mjs")
@@ -91,7 +92,6 @@ def parsed(texts: list[str]) -> list[dict[str, Any]]:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
         encoding="utf-8",
     )
     assert done.returncode == 0, done.stderr
@@ -109,30 +109,14 @@ def printable(text: str) -> str:
 
 
 def expected(chart: Chart) -> tuple[list[list[str]], list[tuple[int, int, str]]]:
-    states = []
+    states, edges = [], []
     for state in chart.states:
-        lines = [state.name]
-        flow = {f"d{v}": chart.flows[state.name, v] for v in chart.variables}
-        own = any(each.outputs or each.locked for each in chart.states)
-        names = chart.force_names if own or len(chart.states) < 3 else ()
-        forces = {name: chart.forces[state.name, name] for name in names}
-        for kind, trees in (
-            ("entry", chart.assignments["entry", state.name]),
-            ("during", flow),
-            ("force", {name: tree for name, tree in forces.items() if tree is not None}),
-            ("exit", chart.assignments["exit", state.name]),
-        ):
-            lines += [f"{kind}: {n} = {spell(tree, MATLAB_LIKE)};" for n, tree in trees.items()]
+        texts = texts_of(chart, state.name).items()
+        lines = [state.name, *(f"{kind}: {text}" for kind, each in texts for text in each)]
         states.append([printable(line) for line in lines])
-    edges = []
-    for state in chart.states:
         for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-            trees = chart.assignments["action", edge.name]
-            action = " ".join(f"{n} = {spell(tree, MATLAB_LIKE)};" for n, tree in trees.items())
-            label = f"{priority} [{chart.guard_text(edge.name)}]"
-            label += f" {{{action}}}" if action else ""
             ends = (chart.state_index(edge.source), chart.state_index(edge.target))
-            edges.append((*ends, printable(label)))
+            edges.append((*ends, printable(label_of(chart, edge.name, f"{priority} [%s]"))))
     return states, edges
 
 
@@ -170,22 +154,53 @@ def test_mermaid_itself_reads_the_same_chart(hostile: Chart) -> None:
         assert [(ids.index(a), ids.index(b), shown(text)) for a, b, text in rest] == edges
 
 
-@pytest.mark.parametrize("chart", CHARTS, ids=lambda chart: chart.states[0].name)
-def test_characters_that_mermaid_could_misread_are_escaped(chart: Chart) -> None:
-    head, body = mermaid(chart).split("stateDiagram-v2\n")
-    assert head.startswith('---\ntitle: "')
-    assert head.count("\n") == 3
-    for line in body.splitlines():
-        text = line.partition(" : ")[2]
-        assert not re.search(r'[:;#<>&%{}"\\]', re.sub(r"#\d+;", "", text))
-        assert line.isprintable()
-    texts = html.unescape(re.sub(r"#(\d+);", r"&#\1;", body))
-    states, edges = expected(chart)
-    for text in [line for state in states for line in state] + [e[2] for e in edges]:
-        assert text in texts
-
-
-def test_invalid_names(hostile: Chart) -> None:
+def test_characters_that_mermaid_could_misread_are_escaped(hostile: Chart) -> None:
+    for chart in CHARTS:
+        head, body = mermaid(chart).split("stateDiagram-v2\n")
+        assert head.startswith('---\ntitle: "')
+        assert head.count("\n") == 3
+        for line in body.splitlines():
+            text = line.partition(" : ")[2]
+            assert not re.search(r'[:;#<>&%{}"\\]', re.sub(r"#\d+;", "", text))
+            assert line.isprintable()
+        texts = html.unescape(re.sub(r"#(\d+);", r"&#\1;", body))
+        states, edges = expected(chart)
+        for text in [line for state in states for line in state] + [e[2] for e in edges]:
+            assert text in texts
     lines = mermaid(hostile).splitlines()
     assert len(lines) == 9
     assert not [line for line in lines[4:] if "evil:" in line or "%%" in line]
+
+
+# --------------------------------------------------------------------------- PlantUML and TikZ
+def test_plantuml_and_tikz_texts_are_there_and_escaped(tmp_path: Path) -> None:
+    for chart in (*CHARTS, *REGISTERED.values()):
+        lines = plantuml(chart).splitlines()
+        assert (lines[0], lines[-1]) == ("@startuml", "@enduml")
+        texts = [line.partition(" : ")[2] for line in lines if " : " in line]
+        for text in texts:
+            assert not re.search(r"[^\w .,=+()]|_", re.sub(r"&#\d+;|<U\+\w{4}>", "", text))
+        codes = [re.sub(r"<U\+([0-9A-F]{4})>", r"&#x\1;", text) for text in texts]
+        texts = [html.unescape(text) for text in codes]
+        text = plain = tikz(chart)
+        assert text.count("{") - text.count(r"\{") == text.count("}") - text.count(r"\}")
+        for character, code in sorted(CODES.items(), key=lambda item: -len(item[1])):
+            plain = plain.replace(code, character)
+        for state in chart.states:
+            for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
+                label = f"{priority} [{chart.guard_text(edge.name)}]"
+                assert any(text.startswith(label) for text in texts)
+                assert f"[{chart.guard_text(edge.name)}]" in plain
+        assert text.count(r"\node[state]") == len(chart.states)
+    for ending in ("puml", "tikz"):
+        path = plots.render(plots.statechart(LUGRE), tmp_path / f"chart.{ending}")
+        assert "bristle" in path.read_text(encoding="utf-8")
+    for write in (plantuml, tikz):
+        with pytest.raises(ParameterError, match="chart is 3"):
+            write(3)  # type: ignore[arg-type]
+
+
+def test_titles_cannot_end_the_text() -> None:
+    chart = Chart("a\n@enduml\n\\end{tikzpicture}", states=(State("a"),), outputs={"F": "v"})
+    assert plantuml(chart).count("@enduml") == 1
+    assert tikz(chart).splitlines()[0] == r"% a @enduml \end{tikzpicture}"
