@@ -17,12 +17,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.integrate
 
 from gms_fsm import ElementMachines, Prescribed, Trace, simulate
 from gms_fsm.app.report import run_scenario
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.errors import CheckpointError, OutputError, ParameterError
+from gms_fsm.errors import CheckpointError, ParameterError
 from gms_fsm.run._checkpoint import Checkpointer
 from tests.corpus import belt
 from tests.helpers import ROOT, open_loop, pulled_mass, same_bits, stick_slip
@@ -141,22 +140,6 @@ def test_a_damaged_checkpoint_is_refused(damage: str, tmp_path: Path) -> None:
         path.write_bytes(data)
     with pytest.raises(CheckpointError, match="damaged"):
         simulate(stick_slip("signed"), open_loop(), 25.0, checkpoint=path)
-
-
-def test_a_scipy_solver_cannot_be_checkpointed(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="history"):
-        simulate(
-            stick_slip("signed"),
-            open_loop(),
-            5.0,
-            method=scipy.integrate.Radau,
-            checkpoint=tmp_path / "run.checkpoint",
-        )
-
-
-def test_a_missing_folder_is_reported_before_the_run(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="cannot write"):
-        simulate(stick_slip("signed"), open_loop(), 5.0, checkpoint=tmp_path / "no" / "file")
 
 
 def test_checkpoints_are_written_at_the_requested_interval(

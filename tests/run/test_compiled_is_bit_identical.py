@@ -13,9 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Trace, simulate
-from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.program import lower
-from tests.helpers import CURVE, open_loop, other_parts, pulled_mass, stick_slip
+from tests.helpers import CURVE, other_parts, pulled_mass, stick_slip
 
 pytest.importorskip("llvmlite", reason="needs the extra fast")
 
@@ -97,13 +96,3 @@ def test_every_function_at_many_places(text: str) -> None:
     one, other = wanted[:, 1], found[:, 1]
     np.testing.assert_array_equal(np.isnan(one), np.isnan(other))  # whatever its payload
     assert one[~np.isnan(one)].tobytes() == other[~np.isnan(one)].tobytes()
-
-
-def test_scipy_solvers_are_not_compiled() -> None:
-    scipy_integrate = pytest.importorskip("scipy.integrate")
-    with pytest.raises(
-        ParameterError, match=r"'compiled' runs the built-in methods.*RK45.*'machines'"
-    ):
-        simulate(
-            stick_slip("signed"), open_loop(), 1.0, engine="compiled", method=scipy_integrate.RK45
-        )
