@@ -306,6 +306,7 @@ class Columns:
         fresh = slice(int(b.memory.taken), int(b.out.row))
         modes = [*b.now.mode.tolist(), *b.sliding.flags.tolist()]
         log.rows_microstep[fresh], log.rows_mode[fresh] = 0, modes
+        b.memory.taken = b.out.row
 
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
