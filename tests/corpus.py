@@ -171,6 +171,7 @@ METHODS: dict[str, dict[str, Any]] = {
     "dp45 by step": {"events": "step", "max_step": 1e-2},
     "bs23 by step": {"method": "bs23", "events": "step", "max_step": 1e-2},
     "t_eval": {"t_eval": np.linspace(0, 12, 777)},
+    "held": {"events": "held", "step": 0.01},
 }
 _BASES = ("open loop", "fig. 4, published", "fig. 3, slipping", "pulled mass")
 _SUBJECTS: dict[str, Callable[[], tuple[Any, Any]]] = {

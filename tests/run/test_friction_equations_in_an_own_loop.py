@@ -22,8 +22,6 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.charts import CHARTS
-from gms_fsm.charts.registry import entry
 from gms_fsm.errors import ChartError
 from tests.helpers import FASTEST, pulled_mass, stick_slip
 
@@ -112,13 +110,6 @@ def test_wrong_numbers_change_nothing() -> None:
     assert friction.states == ("stick",) * 4
 
 
-def test_nothing_is_answered_before_the_first_settle() -> None:
-    model, _ = pulled_mass()
-    friction = FrictionEquations(model)
-    with pytest.raises(ParameterError, match=r"call y = friction\.settle"):
-        friction.force(0.0, friction.initial, 0.0)
-
-
 def test_edges_without_end_are_an_error() -> None:
     chart = Chart(
         "flutters",
@@ -137,41 +128,7 @@ def test_edges_without_end_are_an_error() -> None:
 
 
 FREE = {"F": "v"}
-READS_A = Chart(
-    "feels",
-    states=(State("a"), State("b")),
-    transitions=(Transition("go", "a", "b", guard="a > 1"),),
-    outputs=FREE,
-)
 READS_N = Chart("pressed", inputs=("v", "N"), states=(State("on"),), outputs={"F": "N*v"})
-
-
-@pytest.mark.parametrize(
-    ("friction", "why"),
-    [
-        (
-            Contact("pad", CHARTS["stiction"], entry("stiction").demonstration.values),
-            "the force of a lock depends on the masses",
-        ),
-        (
-            Contact(
-                "pad",
-                CHARTS["planar-coulomb"],
-                entry("planar-coulomb").demonstration.values,
-                v=("v", "w"),
-                inputs=entry("planar-coulomb").demonstration.inputs,
-            ),
-            "it has the velocities v, w",
-        ),
-        (Contact("pad", pulled_mass()[0], period=1e-3), "it has a period of 0.001 s"),
-        (ChartModel(READS_A, {}), "it reads a, the acceleration"),
-        (Contact("pad", READS_N), "its texts name 'N', which nobody gives here"),
-        (3, "it must be a model or a contact"),
-    ],
-)
-def test_what_a_velocity_does_not_determine_is_refused(friction: Any, why: str) -> None:
-    with pytest.raises(ParameterError, match=why):
-        FrictionEquations(friction)
 
 
 def test_a_contact_with_formulas_of_time() -> None:

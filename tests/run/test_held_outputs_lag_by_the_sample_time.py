@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import ParameterError, Settings, Trace, simulate
+from gms_fsm import Trace, simulate
 from tests.helpers import non_drifting, open_loop, stick_slip
 
 T = np.linspace(0.0, 8.0, 1601)
@@ -55,23 +55,3 @@ def test_machines_fire_at_ticks_only_and_once_each() -> None:
     assert (log.t % 0.25 == 0.0).all()
     pairs = list(zip(log.t.tolist(), log.element.tolist(), strict=True))
     assert len(set(pairs)) == len(pairs)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["machines", "compiled"])
-def test_engines_agree_bit_for_bit(engine: str) -> None:
-    if engine == "compiled":
-        pytest.importorskip("llvmlite")
-    arguments = {"events": "held", "step": 0.01}
-    one, other = (
-        simulate(stick_slip("published"), open_loop(), 30.0, engine=each, **arguments)  # type: ignore[arg-type]
-        for each in ("ifelse", engine)
-    )
-    np.testing.assert_array_equal(one.rows.y, other.rows.y)
-    np.testing.assert_array_equal(one.F, other.F)
-    assert one.transitions.tolist() == other.transitions.tolist()
-
-
-def test_it_needs_the_distance_of_its_ticks() -> None:
-    with pytest.raises(ParameterError, match=r"events='held'.*step=\.\.\."):
-        Settings(events="held")

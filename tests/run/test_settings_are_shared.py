@@ -11,7 +11,6 @@ import pytest
 from gms_fsm import (
     GMS,
     GMSParameters,
-    ParameterError,
     Prescribed,
     Session,
     Settings,
@@ -59,23 +58,3 @@ def test_a_saved_session_has_its_settings(tmp_path: Any) -> None:
     session = Session(MODEL, RIG, 6.0, settings=FIXED, t_start=0.5)
     again = Session.load(session.save(tmp_path / "session.json"))
     assert (again.settings, again.t_start) == (FIXED, 0.5)
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: simulate(MODEL, RIG, 1.0, settings={"rtol": 1e-3}), "settings is {'rtol': 0.001}"),
-        (lambda: simulate(MODEL, RIG, 1.0, rtoll=1e-3), "simulate takes no argument 'rtoll'"),
-        (lambda: Session(MODEL, RIG, 1.0, steps=3), "a session takes no argument 'steps'"),
-        (lambda: sweep(MODEL, RIG, 1.0, {"k": [1.0]}, enginee="x"), "did you mean 'engine'?"),
-        (lambda: Settings(rtol=-1.0), "rtol is -1.0"),
-        (lambda: Settings(step="long"), "step is 'long'"),
-        (lambda: Settings(atol="fine"), "atol is 'fine'"),
-        (lambda: Settings(t_eval=[2.0, 1.0]), "times must increase"),
-        (lambda: Settings(events=None), "events is None"),
-    ],
-)
-def test_a_mistake_is_named(call: Any, words: str) -> None:
-    with pytest.raises(ParameterError) as caught:
-        call()
-    assert words in str(caught.value)

@@ -16,7 +16,7 @@ from gms_fsm.errors import GMSError
 from tests.helpers import FASTEST
 from tests.run.stepping_cases import friction, jumping, record
 
-CASES = 40  # make soak takes 1,000
+CASES = 28  # make soak takes 1,000
 BOTH = sorted({"ifelse", FASTEST})
 COMPILED = ("LuGre bristle", "Elasto", "Reset")  # of the charts; each takes seconds
 
@@ -88,7 +88,7 @@ def test_random_records(jumps: bool) -> None:
     found = {k: differences(1, k, jumps=jumps) for k in range(int(jumps), CASES, 2)}
     wrong = {k: text for k, (text, _) in found.items() if text}
     assert not wrong, f"python -m tests.run.test_stepping_equals_simulate 1 {CASES}: {wrong}"
-    assert sum(count for _, count in found.values()) > 150
+    assert sum(count for _, count in found.values()) > 100
 
 
 def main() -> None:

@@ -1,63 +1,63 @@
-"""`record`, run by Python over the compiled engine's arrays, gives the same rows.
+"""What only machine code can get wrong: its functions, columns that are full, random tables.
 
-So the loop that fills the columns is correct as source, whatever a compiler makes of it; that the
-compiled code does the same is the claim of test_compiled_is_bit_identical.py.
+And `record`, run by Python over the compiled engine's arrays, gives the same rows: so the loop that
+fills the columns is correct as source, whatever a compiler makes of it. That machine code runs the
+corpus to the bit is in tests/laws/test_engines_agree.py.
 """
 
+from __future__ import annotations
+
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 pytest.importorskip("llvmlite", reason="needs the extra fast")
 
 import integrators.runners.compiled
-from gms_fsm import Slider, simulate
+from gms_fsm import Chart, ChartModel, Prescribed, State, Trace, simulate
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.observing import on_surfaces
+from gms_fsm.lowering.program import lower
 from gms_fsm.run.recording import compiled_run
 from gms_fsm.traces import observed
-from gms_fsm.traces.failures import LivelockError
 from integrators.loop import Machines
 from integrators.machine_code.layout import BlockLayout
 from integrators.runners import columns
 from integrators.runners.observing import observe_rows as rows_observed
 from integrators.sliding import Functions
-from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
-from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
-
-TIMES = np.linspace(0.0, 20.0, 41)
+from tests.corpus import outcome, run, trace
+from tests.helpers import CURVE, other_parts, pulled_mass, stick_slip
 
 
+# --------------------------------------------------------------------------- as source
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Make engine="compiled" run the Python source over its own arrays; return what it returned."""
     returned = []
+    machine = integrators.runners.compiled
 
-    def engine(program, run):
-        inside = (
-            integrators.runners.compiled._longest(run)
-            <= integrators.runners.compiled.LONGEST_INSIDE
-        )
-        return SimpleNamespace(
-            layout=BlockLayout(run, integrators.runners.compiled.is_known, inside=inside)
-        )
+    def engine(program: Any, run: Any) -> Any:
+        inside = machine._longest(run) <= machine.LONGEST_INSIDE
+        return SimpleNamespace(layout=BlockLayout(run, machine.is_known, inside=inside))
 
-    def run(self, most_steps, *, pause):
+    def run(self: Any, most_steps: int, *, pause: bool) -> int:
         code = self.start.program.ieee
         flow = code["flow" if self.start.options.located else "flow_live"]
         names = ("arm", "margins", "normal", "follow")
         functions = Functions(flow, *(code[name] for name in names), self.p)
         machines = Machines(*(code[name] for name in ("switch", "act", "tick", "jolts", "observe")))
-        recorded = self.run_of.recorded
         with np.errstate(all="ignore"):
             event = columns.record(
-                functions, machines, self.buffers, self.log, recorded, most_steps, pause
+                functions, machines, self.buffers, self.log, self.run_of.recorded, most_steps, pause
             )
         returned.append(event)
         return event
 
-    def observe_rows(program, t, y, mode, kept):
+    def observe_rows(program: Any, t: Any, y: Any, mode: Any, kept: range) -> Any:
         table, seen = np.empty((t.size, len(kept))), np.empty(program.layout.observed.size)
         on = on_surfaces(program, program.ieee, compiled.packed(program.p))
         observe, rows = program.ieee["observe"], (t, y, mode)
@@ -75,51 +75,100 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "options",
-    [
-        {},
-        {"output": "end"},
-        {"t_eval": TIMES},
-        {"method": "rk4", "step": 9.03e-3},
-        {"events": "step", "method": "heun", "step": 0.01},
-        {"max_step": 0.01},
-    ],
-    ids=["all", "end", "t_eval", "rk4", "step", "many rows"],
+    "name",
+    ["open loop", "pulled mass, rk4", "open loop, rk4 by step", "open loop, t_eval", "sliding"],
 )
-@pytest.mark.parametrize("case", ["open loop", "pulled mass"])
-def test_the_same_rows_and_the_same_log(case, options, read):
-    model, rig = (stick_slip("signed"), open_loop()) if case == "open loop" else pulled_mass()
-    ours = simulate(model, rig, 20.0, engine="compiled", **options)
-    theirs = simulate(model, rig, 20.0, engine="ifelse", **options)
-    assert len(theirs.transitions) > 2
+def test_the_source_of_the_loop_gives_the_same_run(name: str, read: list[int]) -> None:
+    assert other_parts(run(name)(engine="compiled"), trace(name, "ifelse")) == []
     assert read, "the source was run"
-    for name in ("t", "microstep", "y", "mode"):
-        np.testing.assert_array_equal(getattr(ours.rows, name), getattr(theirs.rows, name))
-        np.testing.assert_array_equal(getattr(ours.stops, name), getattr(theirs.stops, name))
-    np.testing.assert_array_equal(ours.transitions, theirs.transitions)
-    for name in ("v", "F", "s", "F_elements", "dz"):
-        np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
 
 
-def test_sliding_gives_the_same_rows(read):
-    model = one_element("published", F_c=1.0, F_s=1.5, v_s=0.05, C=0.1, sigma=5.0, k=1.0)
-    start = {"z": [-2.5], "states": ["slip"], "v": 0.05}
-    runs = [
-        simulate(model, Slider(1.0, "-2.4 - 2*t"), 5.0, initial=start, engine=engine)
-        for engine in ("compiled", "ifelse")
-    ]
-    assert len(runs[0].sliding) == 1
-    for name in ("t", "microstep", "y", "mode"):
-        np.testing.assert_array_equal(*(getattr(run.rows, name) for run in runs))
+def test_the_source_of_the_loop_records_the_end(read: list[int]) -> None:
+    end = run("open loop")(engine="compiled", output="end")
+    assert other_parts(end, run("open loop")(engine="ifelse", output="end")) == []
+    assert read
 
 
-def test_failures_end_the_run_at_the_same_point(read):
-    model, rig = memoryless([0.5, 0.4]), SLOWING
-    scenes = []
-    for engine in ("compiled", "ifelse"):
-        with pytest.raises(LivelockError) as caught:
-            simulate(model, rig, 10.0, engine=engine)
-        scenes.append((str(caught.value), caught.value.trace))
-    (text, ours), (same, theirs) = scenes
-    assert text == same
-    np.testing.assert_array_equal(ours.rows.y, theirs.rows.y)
+def test_failures_end_the_source_of_the_loop_at_the_same_point(read: list[int]) -> None:
+    (ours, said), (theirs, too) = run("livelock").outcome(engine="compiled"), outcome("livelock")
+    assert said == too
+    assert other_parts(ours, theirs) == []
+    assert read
+
+
+# --------------------------------------------------------------------------- as machine code
+def agreed(model: Any, rig: Any, t_end: float, **options: Any) -> Trace:
+    """Run both engines to the end and compare; return one trace."""
+    one, other = (
+        simulate(model, rig, t_end, engine=engine, **options) for engine in ("ifelse", "compiled")
+    )
+    assert other_parts(one, other) == []
+    return one
+
+
+@pytest.mark.slow
+def test_a_run_that_fills_its_columns_many_times_over() -> None:
+    """More rows, firings and stops than there is room for at first, in several calls."""
+    (model, _), rig = pulled_mass(), Prescribed("0.3*sin(20*t)")
+    trace = agreed(model, rig, 20.0, method="rk4", step=7.003e-3)
+    assert len(trace) > 3000
+    assert len(trace.transitions) > 512
+    few = agreed(model, rig, 20.0, t_eval=[0.0, 20.0])
+    assert len(few.stops) > 1024
+    agreed(model, rig, 2.1, method="euler", step=1e-4)  # 21,000 steps
+
+
+@pytest.mark.slow
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(
+    st.lists(st.floats(0, 1.5, allow_subnormal=False) | st.just(0.0), min_size=2, max_size=12),
+    st.lists(st.floats(-0.5, 0.5), min_size=12, max_size=12),
+    st.booleans(),
+)
+def test_random_corners_and_jumps(gaps: list[float], values: list[float], held: bool) -> None:
+    times = np.concatenate([[0.0], np.cumsum(gaps), [np.sum(gaps) + 1.0]])
+    level = np.resize(values, times.size)
+    given = list(zip(times, level, strict=True)) if held else (times, level)
+    rig = Prescribed(given)
+    if times[1] > 0.0 or held:  # a record must cover the start
+        agreed(stick_slip("signed"), rig, float(times[-1]), rtol=1e-5)
+
+
+def _function(text: str) -> ChartModel:
+    """Return a chart whose force is a function of z."""
+    chart = Chart("f", ("v",), ("z",), (), (State("on", {"z": "0"}),), (), {"F": text})
+    return ChartModel(chart, {}, n=1, stribeck=CURVE)
+
+
+def _argument_values() -> list[float]:
+    rng = np.random.default_rng(11)
+    whole = [float(u) for u in range(-12, 13)]
+    near = rng.normal(0, 2, 1500).tolist() + rng.uniform(-800, 800, 500).tolist()
+    wide = (rng.choice([-1, 1], 500) * 10 ** rng.uniform(-300, 300, 500)).tolist()
+    return [0.0, -0.0, *whole, *near, *wide]
+
+
+FUNCTIONS = [
+    "8**z", "2**z", "0.5**z", "10**z", "z**0.5", "z**(-0.5)", "abs(z)**0.25", "z**(-1.0)", "z**9",
+    "exp(z)**0.5", "pi**z", "z**z", "z**5", "exp(z)", "exp(-z)*exp(z)", "sin(z)*cos(z)",
+    "tanh(z)", "sqrt(z)", "1/z", "z/3*3", "0*z", "-z", "sgn(sqrt(z))", "min(z, sqrt(z))",
+    "max(sqrt(z), z)", "min(0*z, -0*z)", "max(z, 1, sqrt(z))", "abs(-abs(z))", "1e300*z*z",
+    "(z - z)/(z - z)",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", FUNCTIONS)
+def test_every_function_at_many_places(text: str) -> None:
+    """Compilers turn 8**z into exp2 and z**0.5 into sqrt, which differ in the last bits."""
+    values = _argument_values()
+    program = lower(_function(text), Prescribed("0"))
+    y = np.column_stack([np.zeros(len(values)), values])
+    mode = np.zeros((len(values), program.layout.modes), dtype=np.int64)
+    found = compiled.observe_rows(program, np.zeros(len(values)), y, mode, range(5))
+    wanted, out = np.empty_like(found), [0.0] * 5
+    for row, place in enumerate(y.tolist()):
+        program.ieee["observe"](0.0, place, [0], program.live, program.p, out)
+        wanted[row] = out
+    one, other = wanted[:, 1], found[:, 1]
+    np.testing.assert_array_equal(np.isnan(one), np.isnan(other))  # whatever its payload
+    assert one[~np.isnan(one)].tobytes() == other[~np.isnan(one)].tobytes()

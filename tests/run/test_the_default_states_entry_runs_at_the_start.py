@@ -11,9 +11,7 @@ import pytest
 from gms_fsm import (
     Chart,
     ChartModel,
-    ParameterError,
     Prescribed,
-    Slider,
     State,
     Transition,
     simulate,
@@ -65,9 +63,3 @@ def test_a_compiled_sweep_enters_with_the_numbers_of_each_run() -> None:
     k = np.linspace(1.0, 2.0, 130)  # two runs per task, which share their buffers
     found = sweep(MODEL, RIG, 0.1, {"k": k}, engine="compiled", progress=False)
     np.testing.assert_allclose(found.z[:, 0] - found.z[0, 0], 0.5 * (k - 1.0), rtol=1e-9)
-
-
-def test_an_entry_that_sets_the_velocity_is_refused() -> None:
-    chart = Chart("kick", states=(State("on", entry={"v": "1"}, outputs={"F": "0"}),))
-    with pytest.raises(ParameterError, match="the entry of the default state 'on' sets 'v'"):
-        simulate(ChartModel(chart, {}), Slider(1.0, "1"), 1.0)

@@ -292,13 +292,19 @@ class Columns:
 
         The rows are complete except for their modes; only the previous time and state are certain.
         """
+        self._complete()
+        now: Any = self.buffers.now  # arrays
+        t, y, mode = before
+        now.t, now.y[:], now.mode[:] = t, y, mode[: len(now.mode)]
+
+    def _complete(self) -> None:
+        """Write the modes of the last rows, which the loop would write with the next event."""
         b: Any = self.buffers
         log: Any = self.log
         fresh = slice(int(b.memory.taken), int(b.out.row))
-        t, y, mode = before
         modes = [*b.now.mode.tolist(), *b.sliding.flags.tolist()]
         log.rows_microstep[fresh], log.rows_mode[fresh] = 0, modes
-        b.now.t, b.now.y[:], b.now.mode[:] = t, y, mode[: len(b.now.mode)]
+        b.memory.taken = b.out.row
 
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
@@ -352,6 +358,7 @@ class Columns:
             t, y, mode = self.latest
             rows = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
         else:
+            self._complete()
             columns: Any = out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode
             self.handed_out = count == len(out.rows_t)
             rows = Rows(*columns) if self.handed_out else _rows(count, *columns)

@@ -1,0 +1,93 @@
+"""A sweep is many runs: each row is, to the last bit, what `simulate` gives with its numbers.
+
+Whatever the engine, whatever is recorded; from a file it comes back as it was saved.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gms_fsm import Sweep, Trace, simulate, sweep
+from gms_fsm.systems.mounted import mounted
+from gms_fsm.systems.numbers import known_in, value_in, varied
+from tests.corpus import FAILING, FEW, each, in_turn, outcome, run
+
+FACTORS = (1.0, 1.01, 0.99)  # of every number at once
+LEFT_OUT = {"numbers.V"}  # the velocity that a run begins with
+
+
+def swept(name: str) -> tuple[Sweep, list[Trace]]:
+    """Sweep over all numbers of a run, each by its name; return it, and the runs one by one."""
+    what, one = mounted(*run(name).subject), run(name)
+    times = np.linspace(one.how.get("t_start", 0.0), one.t_end, 5)
+    how = {**one.how, "t_eval": times, "engine": in_turn(name)}
+    values = {
+        each: np.asarray(value_in(what, each)) for each in known_in(what) if each not in LEFT_OUT
+    }
+    numbers = {each: np.stack([by * u for by in FACTORS]) for each, u in values.items()}
+    alone = []
+    for k in range(len(FACTORS)):
+        other = varied(what, {each: u[k] for each, u in numbers.items()})
+        subject: Any = (other.system,) if other.named else (other.model, other.rig)
+        alone.append(simulate(*subject, one.t_end, **how))
+    return sweep(*one.subject, one.t_end, numbers, **how), alone
+
+
+def same(found: Sweep, other: Sweep) -> None:
+    """Assert that two sweeps are equal in all that they have."""
+    mine, its = found.columns(), other.columns()
+    assert [*mine] == [*its]
+    pairs = [(mine[name], its[name]) for name in mine]
+    pairs += [(found.rows[name], other.rows[name]) for name in found.rows]
+    fields = found.transitions.dtype.names or ()
+    pairs += [(found.transitions[name], other.transitions[name]) for name in fields]
+    assert found.times.tolist() == other.times.tolist()
+    for a, b in pairs:
+        assert a.dtype == b.dtype
+        np.testing.assert_array_equal(a, b)
+    assert [*found.rows] == [*other.rows]
+    assert (found.edges, found.contacts) == (other.edges, other.contacts)
+
+
+@each(FEW)
+def test_each_row_is_a_run(name: str, tmp_path: Path) -> None:
+    found, alone = swept(name)
+    assert found.outcome.tolist() == ["ok"] * len(FACTORS)
+    for k, one in enumerate(alone):
+        for contact in found.contacts or ("",):
+            ours, theirs = (each.contact(contact) if contact else each for each in (found, one))
+            for column in ("x", "v", "F", "z", "states"):
+                mine, its = getattr(ours, column)[k], getattr(theirs, column)
+                np.testing.assert_array_equal(mine, its[-1], err_msg=column)
+                if column in ours.rows:
+                    np.testing.assert_array_equal(ours.rows[column][k], its, err_msg=column)
+            log = theirs.transitions
+            fired = zip(log.element.tolist(), log.edge.tolist(), strict=True)
+            assert ours.sequence(k) == list(fired)
+        for part, ends in found.ends.items():
+            body, _, axis = part.partition(".")
+            its = getattr(one.body(body), axis) if axis else one.value(part)
+            np.testing.assert_array_equal(ends[k], its[-1], err_msg=part)
+        assert found.transition_count[k] == len(one.transitions)
+        log = found.transitions[found.transitions["run"] == k]
+        for column in ("t", "z", "v", "s", "F_before", "F_after"):
+            np.testing.assert_array_equal(log[column], one.transitions[column], err_msg=column)
+    same(Sweep.load(found.save(tmp_path / "runs.npz")), found)
+
+
+@each(FAILING)
+def test_a_failure_is_the_outcome_of_its_run(name: str) -> None:
+    what, one = mounted(*run(name).subject), run(name)
+    number = next(iter(known_in(what)))
+    values = np.stack([np.asarray(value_in(what, number))] * 2)
+    how = {**one.how, "engine": in_turn(name)}
+    found = sweep(*one.subject, one.t_end, {number: values}, **how)
+    part, said = outcome(name)
+    assert part is not None
+    for k in range(2):
+        assert said.startswith(f"{found.outcome[k]}: {found.message[k]}")
+        assert found.t[k] == (part.t[-1] if len(part) else one.how.get("t_start", 0.0))
+        assert found.transition_count[k] == len(part.transitions)
