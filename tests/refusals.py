@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
+import scipy.integrate
 
 from gms_fsm import (
     GMS,
@@ -34,6 +35,7 @@ from gms_fsm import (
     Prescribed,
     PulledSlider,
     Record,
+    Session,
     Slider,
     State,
     Stribeck,
@@ -43,6 +45,7 @@ from gms_fsm import (
     excite,
     fit,
     initial_bank,
+    prove,
     simulate,
 )
 from gms_fsm.app.cli import CliOptions, app
@@ -55,12 +58,14 @@ from gms_fsm.errors import (
     ParameterError,
     RecordError,
     ScenarioError,
+    SessionError,
     TraceFileError,
     UnitError,
 )
 from gms_fsm.traces.monitors import Chattering, Passivity
 from tests import older_files, own_files
-from tests.helpers import ROOT, stick_slip
+from tests.helpers import FIG4_SINE, ROOT, stick_slip
+from tests.inspection.sessions import a_system, fig4, locked
 from tests.scenario_files import MEASURED, OPEN_LOOP, changed, sine_table, table
 
 APPROVED = ROOT / "tests" / "refusals.approved.txt"
@@ -68,6 +73,7 @@ APPROVED = ROOT / "tests" / "refusals.approved.txt"
 VARYING = (
     r"(?<=not valid TOML: )[^;]*",
     r"(?<=\()(Validation|Key|Value|Overflow|UnicodeDecode|EOF|Attribute)?Error: .*?(?=\); write)",
+    r"(?<=not a session file, or damaged \()(Validation|Key|Value|Type|JSONDecode)Error: .*",
     r"(?<=\()BadZipFile: .*?(?=\); write)",
     r"\[Errno .*",
     r"embedded null[^)]*",
@@ -1326,6 +1332,225 @@ rows = {
     "equality": ("invariant, column 6", ..., lambda: "z == s"),
 }
 group("monitors", ExpressionError, monitored, rows)
+
+
+# --------------------------------------------------------------------------- sessions
+FIG4 = stick_slip("published"), Prescribed(FIG4_SINE)
+
+
+def unmoved(move: Callable[[Session], object], made: Callable[[], Session] = fig4) -> None:
+    """Ask a session for a move; it stays where it is, with its branches and breakpoints."""
+    session = made()
+    try:
+        move(session)
+    finally:
+        assert (session.here.row, len(session.branches), session.breakpoints) == (0, 1, [])
+
+
+rows = {
+    "break on an unknown kind": (lambda s: s.break_on("fired", "arrest"),),
+    "break on an unknown edge": (lambda s: s.break_on("fires", "arest"),),
+    "break on an edge that is no state": (lambda s: s.break_on("enter", "arrest"),),
+    "break on an element too many": (lambda s: s.break_on("fires", "arrest", 4),),
+    "break on an element below zero": (lambda s: s.break_on("fires", "arrest", -1),),
+    "break after no hit": (lambda s: s.break_on("fires", "arrest", None, "", 0),),
+    "poke of nothing": (lambda s: s.poke(),),
+    "poke of no element": (lambda s: s.poke({"z": {}}, state={}),),
+    "poke of an element too many": (lambda s: s.poke({"z": {4: 0.1}}),),
+    "poke of an unknown variable": (lambda s: s.poke({"w": {0: 0.1}}),),
+    "poke of a number as a name": (lambda s: s.poke({0: 0.1}),),
+    "poke of the state of an element below zero": (lambda s: s.poke(state={-1: "slip"}),),
+    "poke of a parameter": (lambda s: s.poke({"F_s": {0: 2.0}}),),
+    "branch below zero": (lambda s: s.switch(-1),),
+    "branch that is missing": (lambda s: s.switch(1),),
+    "comparison without a parent": (lambda s: s.compare(b=0),),
+    "why of an element too many": (lambda s: s.why(4),),
+    "why of an unknown edge": (lambda s: s.why(0, "arest"),),
+    "why of an edge that leaves another state": (lambda s: s.why(0, "arrest"),),
+    "time before the start": (lambda s: s.goto(-1.0),),
+    "time that is none": (lambda s: s.goto(NAN),),
+    "watch that divides by zero": (lambda s: s.watch("1 / x"),),
+    "watch of the root of a negative number": (lambda s: s.watch("sqrt(-1 - x)"),),
+    "tree without the original run": (lambda s: s.tree.delete(0),),
+    "tree of a missing branch": (lambda s: s.tree.trace(7),),
+    "tree poked before the start": (lambda s: s.tree.poke({"z": {0: 0.0}}, t=-1.0),),
+    "tree poked at the end": (lambda s: s.tree.poke({"z": {0: 0.0}}, t=100.0),),
+}
+group("session", SessionError, unmoved, rows, "")
+rows = {
+    "poke of all elements at once": ("z", 0.1, lambda s: s.poke({"z": 0.1})),
+    "poke of a text": ("variables", "z", lambda s: s.poke("z")),
+    "poke of a state as a text": ("state", "slip", lambda s: s.poke(state="slip")),
+    "steps below zero": ("count", -1, lambda s: s.step(-1)),
+    "steps back below zero": ("count", -5, lambda s: s.back(-5)),
+    "tree of no name": ("name", " ", lambda s: s.tree.rename(0, " ")),
+    "poke of all elements of a contact": (
+        "bank.z",
+        1.0,
+        lambda s: s.poke({"bank.z": 1.0}),
+        a_system,
+    ),
+}
+group("session", SessionError, unmoved, rows)
+rows = {
+    "poke of a prescribed velocity": (lambda s: s.poke(v=0.1),),
+    "negative value of a fork": (lambda s: s.tree.set({"F_s": -1.0}),),
+    "unknown value of a fork": (lambda s: s.tree.set({"q": 1.0}),),
+    "value of several elements of a fork": (lambda s: s.tree.set({"sigma": 1.0}),),
+    "rows of a session": (lambda s: Session(s.model, s.rig, 1.0, t_eval=[0.0, 1.0]),),
+    "progress of a session": (lambda s: Session(s.model, s.rig, 1.0, progress=print),),
+    "no engine of a session": (lambda s: Session(s.model, s.rig, 1.0, engine=None),),
+}
+group("session", ParameterError, unmoved, rows, "")
+rows = {
+    "poke of NaN": ("initial['z'][0] (element 1)", NAN, lambda s: s.poke({"z": {0: NAN}})),
+    "poke of infinity": ("initial['z'][0] (element 1)", INF, lambda s: s.poke({"z": {0: INF}})),
+    "unknown law of a fork": ("law", "signd", lambda s: s.tree.fork(law="signd")),
+    "law of a system without one": ("law", "signed", lambda s: s.tree.fork(law="signed"), locked),
+    "rig of a system": ("rig", None, lambda s: Session(s.system, None, 2.0), a_system),
+    "model without a rig": ("t_end", None, lambda s: Session(s.model, 2.0)),
+    "locked velocity": ("initial", ..., lambda s: s.poke({"w1": 0.1}), a_system),
+}
+group("session", ParameterError, unmoved, rows)
+rows = {"unknown state": (lambda s: s.poke(state={0: "slipp"}),)}
+group("session", ChartError, unmoved, rows, "")
+COLUMNS = {"z9 > 0": 1, "z1": 1, "state(1) == slide": 13, "z1 == 0.1": 7, "": 1, "exec(t)": 1}
+rows = {
+    f"condition {text!r}": (f"column {column}", ..., lambda s, text=text: s.until(text))
+    for text, column in COLUMNS.items()
+}
+group("session", ExpressionError, unmoved, rows)
+rows = {
+    "element too many": (lambda s: s.until("state(9) == slip"),),
+    "condition of a breakpoint": (lambda s: s.break_on("fires", "arrest", None, "z9 > 0"),),
+    "name without its contact": (lambda s: s.parse("F > 1"), a_system),
+    "variable without its element": (lambda s: s.parse("bank.z > 1"), a_system),
+    "state without its contact": (lambda s: s.parse("state(1) == stuck"), a_system),
+    "state without its element": (lambda s: s.parse("bank.state == slip"), a_system),
+}
+group("session", ExpressionError, unmoved, rows, "column 1")
+rows = {
+    "poke of a number": (lambda s: s.poke({"m": 2.0}), a_system),
+    "poke of a signal": (lambda s: s.poke({"r": 2.0}), a_system),
+    "poke of a parameter of a contact": (lambda s: s.poke({"pad.F_c": 2.0}), a_system),
+    "poke of a missing body": (lambda s: s.poke({"load.x": 2.0}), a_system),
+    "poke of an element too many of a contact": (
+        lambda s: s.poke({"bank.z": {4: 1.0}}),
+        a_system,
+    ),
+    "poke of the velocity of no body": (lambda s: s.poke(v=1.0), a_system),
+    "state of no contact": (lambda s: s.poke(state={0: "stuck"}), a_system),
+    "state of a contact with several elements": (
+        lambda s: s.poke(state={"bank": "slip"}),
+        a_system,
+    ),
+    "force without its contact": (lambda s: s.here.F, a_system),
+    "missing contact": (lambda s: s.here.contact("gear"), a_system),
+    "break on an edge of another contact": (
+        lambda s: s.break_on("fires", "arrest", "pad"),
+        a_system,
+    ),
+    "break on a missing contact": (lambda s: s.break_on("fires", "arrest", "gear 1"), a_system),
+}
+group("session", SessionError, unmoved, rows, "")
+
+
+def damaged(**changes: Any) -> None:
+    """Load a session file with some parts changed, or left out (...)."""
+    path = fig4(5.0).save("s.json")
+    data = json.loads(path.read_text()) | changes
+    path.write_text(json.dumps({name: part for name, part in data.items() if part is not ...}))
+    Session.load(path)
+
+
+FORK = {"fork": -1, "edits": {}, "cursor": 0, "from": None, "between": None}
+ORIGINAL = {"parent": None, **FORK}
+rows = {
+    "unknown law": {"branches": [ORIGINAL, {"parent": 0, **FORK, "law": "another"}]},
+    "value that is a text": {"branches": [ORIGINAL, {"parent": 0, **FORK, "values": {"k": "x"}}]},
+    "parent of itself": {"branches": [ORIGINAL, {"parent": 1, **FORK}]},
+    "half a branch": {"branches": [{"cursor": -3, "between": None}]},
+    "null for branches": {"branches": None},
+    "current that is missing": {"current": 7},
+    "current that is a word": {"current": "one"},
+    "end before the start": {"t_end": -1.0},
+    "null for the end": {"t_end": None},
+    "empty header": {"header": {}},
+    "unknown method": {"options": {"method": "rk5"}},
+    "unknown option": {"options": {"nonsense": 1}},
+    "breakpoint of an unknown kind": {"breakpoints": [{"kind": "fired", "name": "arrest"}]},
+    "breakpoint of an unknown edge": {"breakpoints": [{"kind": "fires", "name": "arest"}]},
+    "breakpoint of an element too many": {
+        "breakpoints": [{"kind": "fires", "name": "arrest", "element": 9}]
+    },
+    "breakpoint of half a condition": {
+        "breakpoints": [{"kind": "fires", "name": "arrest", "condition": "z9 >"}]
+    },
+    "number for watches": {"watches": 5},
+    **{f"no {key}": {key: ...} for key in ("header", "t_end", "options", "branches", "current")},
+}
+group(
+    "session file",
+    TraceFileError,
+    lambda given: damaged(**given),
+    {name: (given,) for name, given in rows.items()},
+    "s.json",
+)
+
+
+def session_file(text: str) -> None:
+    """Load this text as a session."""
+    Path("odd.json").write_text(text)
+    Session.load("odd.json")
+
+
+rows = {
+    f"text {text!r}": (text,)
+    for text in ("", "{", "[]", "null", "{}", '{"format": "other"}', "\0", "title = 'a scenario'")
+} | {"format alone": ('{"format": "gms-fsm session 1"}',)}
+group("session file", TraceFileError, session_file, rows, "odd.json")
+rows = {"missing file": ("nothing.json", ..., "nothing.json"), "folder": (".", ..., ".")}
+group("session file", TraceFileError, Session.load, rows)
+
+
+def drawn_by_hand() -> Session:
+    return Session(stick_slip("signed"), Prescribed(lambda t: 0.1 * t), 3.0)
+
+
+rows = {
+    "function": (drawn_by_hand,),
+    "method of SciPy": (lambda: Session(*FIG4, 1.0, method=scipy.integrate.Radau),),
+}
+group("saved session", SessionError, lambda made: made().save("s.json"), rows, "")
+
+
+def exported(session: Session, name: str = "branch.toml", **poked: Any) -> None:
+    """Write the current branch as a scenario, poked before if anything is given."""
+    if poked:
+        session.tree.poke(**poked)
+    session.tree.save_scenario(name)
+
+
+rows = {
+    "session in a missing folder": ("", ..., lambda: fig4().save("no/folder/s.json")),
+    "scenario with another ending": ("one.json", ..., lambda: exported(fig4(), "one.json")),
+}
+group("saved", OutputError, lambda call: call(), rows)
+rows = {
+    "ticks": (lambda: exported(a_system(), variables={"one.x": 0.1}, t=1.0),),
+    "poke that a failed run does not reach": (
+        lambda: exported(Session(*FIG4, 40.0, max_steps=60), variables={"z": {0: 0.1}}, t=39.0),
+    ),
+}
+group("exported session", SessionError, lambda call: call(), rows, "")
+
+
+# --------------------------------------------------------------------------- proofs
+rows = {
+    "quotient in its domain": ("", ..., lambda: prove(gms_element("signed"), ["z / s > 1"])),
+    "model": ("chart", FIG4[0], lambda: prove(FIG4[0])),
+}
+group("prove", ParameterError, lambda call: call(), rows)
 
 
 # --------------------------------------------------------------------------- trace files

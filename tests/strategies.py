@@ -21,7 +21,17 @@ from gms_fsm import (
     Transition,
 )
 
-__all__ = ["banks", "chart_models", "charts", "options", "ramps", "rigs", "rounded", "signals"]
+__all__ = [
+    "banks",
+    "chart_models",
+    "charts",
+    "moves",
+    "options",
+    "ramps",
+    "rigs",
+    "rounded",
+    "signals",
+]
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 VALUES = ("0", "k * z", "-k", "exp(-v**2) + σ_0", "F_c * sgn(v)", "1e-300 * w")
@@ -257,3 +267,17 @@ def options(draw: st.DrawFn) -> dict[str, Any]:
     if kind == 5:
         found["events"] = "step"
     return found
+
+
+def moves(t_end: float) -> st.SearchStrategy[tuple[str, Any]]:
+    """A move of a session of a bank, and what it takes."""
+    return st.one_of(
+        st.tuples(st.sampled_from(["step", "back"]), st.integers(1, 30)),
+        st.tuples(st.sampled_from(["next", "prev"]), st.none()),
+        st.tuples(st.just("goto"), st.floats(0.0, t_end)),
+        st.tuples(st.just("until"), st.sampled_from(["z1 > 0.1", "z1 < -0.05", "v > 0.2"])),
+        st.tuples(st.just("switch"), st.integers(0, 5)),
+        st.tuples(
+            st.just("poke"), st.tuples(st.floats(-0.3, 0.3), st.sampled_from([None, "slip"]))
+        ),
+    )

@@ -9,7 +9,7 @@ import pytest
 
 from gms_fsm.debugger import COMMANDS, Debugger, help_of, view
 from gms_fsm.session.session import Session
-from tests.inspection.test_session_of_a_system import pushed
+from tests.inspection.sessions import pushed
 from tests.systems_cases import CASES
 
 

@@ -20,7 +20,7 @@ from gms_fsm.session.session import Session
 from tests.app.test_debugger_on_a_model_of_ones_own import own, session_on
 from tests.app.test_debugger_shows_systems import made, pulled
 from tests.helpers import FIG4_SINE, ROOT, stick_slip
-from tests.inspection.test_session_failures_are_outcomes import both_ways
+from tests.inspection.sessions import both_ways
 
 APPROVED = Path(__file__).with_name("debugger.approved.txt")
 SCENARIOS = ROOT / "scenarios"
