@@ -103,27 +103,19 @@ def test_a_system_is_fitted(gms_fsm: CommandLine, scenario: Path, tmp_path: Path
     one_message(gms_fsm("run", "system.toml"), "add a table [fit]")
 
 
-def test_a_run_ignores_the_table(gms_fsm: CommandLine, scenario: Path) -> None:
-    done = gms_fsm("run", scenario, "-o", "out", "--set", "output.figures=[]")
-    assert (done.code, done.err) == (0, "")
-
-
 def test_what_a_fit_does_not_use_is_said(scenario: Path) -> None:
     loaded = load_fit(scenario, ["run.t_end=5.0", "initial.z=[0.0, 0.0]"])
     assert loaded.notes == ("a fit ignores [run] and [initial]",)
     assert load_fit(scenario).notes == ()
 
 
-def test_a_file_without_the_table(gms_fsm: CommandLine, scenario: Path) -> None:
-    scenario.write_text(SCENARIO.partition("[fit]")[0])
-    one_message(gms_fsm("fit", scenario), "there is no table [fit]", "free = ")
-
-
-def test_a_file_without_a_record(gms_fsm: CommandLine, scenario: Path) -> None:
+def test_a_file_without_the_table_or_a_record(gms_fsm: CommandLine, scenario: Path) -> None:
     text = changed(SCENARIO, 'kind = "record"', 'kind = "prescribed"\nvelocity = "0.1"')
     head, _, rest = text.partition("[record]")
     scenario.write_text(head + "[run]\nt_end = 1.0\n[fit]" + rest.partition("[fit]")[2])
     one_message(gms_fsm("fit", scenario), "there is no table [record]", "measured force")
+    scenario.write_text(SCENARIO.partition("[fit]")[0])
+    one_message(gms_fsm("fit", scenario), "there is no table [fit]", "free = ")
 
 
 def test_a_folder_of_the_users_is_refused_before_the_search(
@@ -147,15 +139,11 @@ def test_ctrl_c_keeps_the_best_so_far(
     assert "start with out/rig-fit/report.md" in done.out
     assert said in (tmp_path / "out" / "rig-fit" / "report.md").read_text(encoding="utf-8")
 
-
-def test_ctrl_c_before_anything_was_found(
-    gms_fsm: CommandLine, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(fit, "fitted", interrupted)
-    done = gms_fsm("fit", scenario, "-o", "out")
+    done = gms_fsm("fit", scenario, "-o", "nothing")
     assert done.code == 130
     assert "nothing was written" in done.err
     assert "Traceback" not in done.err
