@@ -15,14 +15,7 @@ import pytest
 from gms_fsm import Trace, simulate
 from gms_fsm.app import paper
 from gms_fsm.app.paper.experiments import experiments, run
-from gms_fsm.app.paper.held import (
-    OSCILLATION,
-    PAPERS_FORCE,
-    PAPERS_PLACE,
-    RAMP,
-    figure_3_lags,
-    lag_of,
-)
+from gms_fsm.app.paper.held import lag_of
 from gms_fsm.app.paper.writing import claims_text, write
 from gms_fsm.errors import OutputError
 from gms_fsm.traces.failures import SimulationError
@@ -161,26 +154,6 @@ def test_traces_and_logs_are_there_and_agree(folder: Path) -> None:
         Trace.load(folder / "traces" / f"fig4_{name}.npz") for name in ("chart", "ifelse")
     )
     np.testing.assert_array_equal(chart.F, ifelse.F)
-
-
-def test_held_outputs_explain_the_residual_of_figure_3(folder: Path) -> None:
-    """Within a factor of 10, in proportion to the sample time; x is ahead by one step."""
-    runs = {
-        name: Trace.load(folder / "traces" / f"{name}.npz")
-        for name in ["fig3_step", *(e.name for e in experiments() if "fig3_held_chart" in e.name)]
-    }
-    lags = figure_3_lags(runs)
-    assert [lag.period for lag in lags] == [2e-3, 1e-3, 5e-4]
-    for phase in (RAMP, OSCILLATION):
-        sizes = np.array([lag.during(phase).largest for lag in lags])
-        np.testing.assert_allclose(sizes[:-1] / sizes[1:], 2.0, rtol=0.03)
-        assert (sizes[1] / (PAPERS_FORCE, PAPERS_PLACE) < 10).all()
-        assert (sizes[1] / (PAPERS_FORCE, PAPERS_PLACE) > 0.1).all()
-    middle = lags[1].during((1.0, 2.0))
-    inside, held = (runs[name].sample(middle.t) for name in ("fig3_step", "fig3_held_chart_1000us"))
-    step = 1e-3 * inside.v
-    assert np.median(middle.place / step) == pytest.approx(1.0, abs=0.02)
-    assert np.median((held.z - inside.z)[:, 0] / step) == pytest.approx(0.5, abs=0.02)
 
 
 def test_an_unwritable_folder_is_reported_before_anything_runs(tmp_path: Path) -> None:
