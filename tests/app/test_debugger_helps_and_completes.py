@@ -106,17 +106,6 @@ def test_an_empty_line_repeats_a_move_only_when_typed() -> None:
     assert made.reply("").startswith("row 6")
 
 
-def test_it_greets_without_a_scenario() -> None:
-    made = debugger(warming(), "next\nquit\n", "My contact")
-    assert made.run() == 0
-    assert made.stdout.getvalue().splitlines()[:4] == [  # type: ignore[attr-defined]
-        "My contact",
-        "warming contact; prescribed velocity, to t = 8 s",
-        "help lists the commands, where shows everything, quit exits.",
-        "(t=0.0000 s) next",
-    ]
-
-
 def test_the_view_of_a_system_is_plain_data() -> None:
     made = debugger(a_system())
     made.reply("goto 1.02")

@@ -129,15 +129,6 @@ def test_a_terminal_gets_lines_of_its_width(columns: int, monkeypatch: pytest.Mo
     assert (sentence in lines) == (columns >= len(sentence))
 
 
-def test_a_long_answer_is_one_line_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    out = Terminal()
-    monkeypatch.setenv("COLUMNS", "150")
-    made = Debugger(_bank(4), "", io.StringIO("goto 1\nwhy 1\nquit\n"), out)
-    made.run()
-    (line,) = (each for each in out.getvalue().splitlines() if "break_away_backward does" in each)
-    assert len(re.sub(r"\x1b\[[0-9;]*m", "", line)) > 80
-
-
 @pytest.mark.parametrize("environment", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
 def test_no_colour_where_it_is_not_wanted(
     environment: dict[str, str], monkeypatch: pytest.MonkeyPatch

@@ -128,21 +128,6 @@ def test_why_element_1_does_not_arrest_is_known_within_five_commands() -> None:
     assert "element 1 is in stick" in signed
 
 
-def test_where_shows_every_element_and_the_states_over_time() -> None:
-    said = answers(FIG_4, "goto 100", "goto 25", "where")[2].splitlines()
-    assert said[0] == "t = 24.9999735 s, row 73, micro-step 3, branch 0"
-    assert " ".join(said[3].split()) == "> 1 slip -2.276 1.5 1.517 [########> -1.669 1:yn"
-    assert said[6].split()[-1] == "1:yy*"
-    ribbons = {line.split()[0]: line[6:] for line in said if line.startswith(" E")}
-    assert len(ribbons) == 4
-    for ribbon in ribbons.values():
-        assert len(ribbon) == 74
-        assert set(ribbon) == {"-", "#"}
-    # Element 1 slips through 25 s, element 2 does not.
-    assert (ribbons["E1"][17:19], ribbons["E2"][17:19]) == ("##", "#-")
-    assert said[-2].index("^") == 6 + 18
-
-
 def test_every_transition_of_the_log_is_shown() -> None:
     loaded = load_scenario(SCENARIOS / f"{FIG_4}.toml")
     log = simulate(loaded.model, loaded.rig, **loaded.arguments).transitions

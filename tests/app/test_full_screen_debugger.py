@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("textual", reason="needs the extra tui")
 
 from gms_fsm import Prescribed
-from gms_fsm.debugger import COMMANDS, Debugger
+from gms_fsm.debugger import COMMANDS
 from gms_fsm.debugger.tui import run_tui
 from gms_fsm.debugger.tui._app import FullScreen
 from gms_fsm.debugger.tui._keys import KEYS
@@ -179,26 +179,11 @@ def test_commands_are_completed_remembered_and_repeated() -> None:
     assert drive(action, light=True).return_value == 0
 
 
-def test_mistakes_are_answered_as_at_the_prompt(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines = [
-        *["stpe", "goto yesterday", "why 9", "poke z1=nan", "until (((", "compare", "branch 7"],
-        *["load nothing.json", "print 1 / x", "[bold]x[/]", "save no/folder/here.json"],
-    ]
-
-    made = Debugger(session())
-    wanted = {line: " ".join(made.reply(line).split()) for line in lines}
-
+def test_a_panel_that_fails_does_not_end_it(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("division by zero")
 
     async def action(app: FullScreen, pilot: Any) -> None:
-        for line, expected in wanted.items():
-            app.give(line)
-            await settle(pilot)
-            assert expected.startswith("error: ")
-            begin = max(i for i, text in enumerate(app.said) if text.startswith("(t="))
-            assert " ".join(" ".join(app.said[begin + 1 :]).split()) == expected
-            assert expected in " ".join(app.panels["answers"].shown.split())
         monkeypatch.setattr("gms_fsm.debugger.tui._app.chart_states", broken)
         await press(pilot, "s")
         assert app.panels["chart"].shown == "cannot be shown here: division by zero"

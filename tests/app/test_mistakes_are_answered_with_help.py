@@ -9,8 +9,8 @@ import graphviz
 import numpy as np
 import pytest
 
-from gms_fsm import Prescribed, Session, simulate
-from gms_fsm.charts import LUGRE, gms_element
+from gms_fsm import Prescribed, simulate
+from gms_fsm.charts import gms_element
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.run.simulate import Moment
 from plots import block_diagram, mermaid, render, statechart
@@ -66,19 +66,6 @@ def test_no_bar_before_an_error(arguments: tuple[str, ...], gms_fsm: CommandLine
 )
 def test_numbers_are_shown_as_plain_numbers(value: object, text: str) -> None:
     assert shown(value) == text
-
-
-def test_messages_of_calls_show_plain_numbers() -> None:
-    trace, late = simulate(stick_slip("signed"), Prescribed("0.2"), 3.0), np.float64(20.0)
-    session = Session(trace.model, trace.rig, 3.0)
-    for said, call in {
-        r"^time 20\.0 s is outside the run, 0\.0 to 3\.0 s$": lambda: trace.sample([late]),
-        "t = -20.0 s is before": lambda: session.goto(-late),
-        "name is 20.0": lambda: trace.variable(late),
-        "elements is 20.0": lambda: statechart(LUGRE, late),
-    }.items():
-        with pytest.raises(ValueError, match=said):
-            call()
 
 
 def test_a_moment_knows_where_the_slider_is() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.charts.registry import registered
 from gms_fsm.systems.signals import Corners, Formula
-from tests.helpers import ROOT
 from tests.scenario_files import (
     MEASURED,
     OPEN_LOOP,
@@ -146,30 +144,6 @@ def test_a_chart_s_keys_are_its_parameters_with_units_and_rules(
             assert f", {each.unit}" in said
             assert (each.rule in said) == (each.rule != "finite")
             assert ("array" in str(keys[each.name])) == each.per_element
-
-
-# Tables whose keys are names that the user chooses.
-USERS_NAMES = {"flow", "initial", "inputs", "let", "numbers", "outputs", "signals", "updates"}
-USERS_NAMES |= {"values"}
-
-
-def test_every_shipped_scenario_uses_keys_of_the_schema(schema: dict[str, Any]) -> None:
-    def check(table: dict[str, Any], known: set[str]) -> None:
-        for key, value in table.items():
-            assert key in known, key
-            if key in USERS_NAMES:
-                continue
-            for each in value if isinstance(value, list) else [value]:
-                if isinstance(each, dict):
-                    check(each, named)
-
-    named = {key for table in schema["$defs"].values() for key in table["properties"]}
-    files = sorted((ROOT / "scenarios").glob("*.toml"))
-    assert files
-    for file in files:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-        kind = "SystemScenario" if "body" in data else "Scenario"
-        check(data, set(schema["$defs"][kind]["properties"]))
 
 
 # --------------------------------------------------------------------------- nothing is executed
