@@ -61,6 +61,7 @@ def test_a_poke_changes_what_it_names() -> None:
     assert session.back() == before
 
 
+@pytest.mark.slow
 def test_branches_of_branches_have_the_pasts_of_all() -> None:
     session = fig4()
     for t, element in ((30.0, 0), (60.0, 1), (20.0, 2)):  # the last in the past of all
@@ -171,6 +172,7 @@ def test_a_comparison_names_bodies_and_contacts() -> None:
     assert list(session.compare().differences) == ["x", "pad.F"]  # it has no variables
 
 
+@pytest.mark.slow
 def test_ticks_stay_where_they_are() -> None:
     sampled = (Sampled("ramp", period=0.3, updates={"u": "u + 0.3"}),)
     session = Session(pushed(signals={}, sampled=sampled), 4.0)
@@ -197,6 +199,7 @@ def test_numbers_and_pokes_of_a_system() -> None:
 
 
 # --------------------------------------------------------------------------- forks
+@pytest.mark.slow
 def test_numbers_of_model_rig_and_element_and_the_law() -> None:
     model, rig = pulled_mass()
     tree = tree_of(model, rig, 20.0)

@@ -36,7 +36,7 @@ def test_a_motion_that_fits_has_none():
         (
             bank(),
             "0.5*cos(t)",
-            "the stroke of 1 m is 2e+05 times the largest threshold.*unit of the motion",
+            "the stroke of 1 m is 2e\\+05 times the largest threshold.*unit of the motion",
         ),
         (
             bank(v_c=1e-2),
@@ -73,6 +73,7 @@ def test_a_run_that_resolves_them_has_no_such_note():
     assert notes(bank(), ramp) == ()
 
 
+@pytest.mark.slow
 def test_the_command_line_prints_them_and_the_summary_shows_them(gms_fsm):
     path = ROOT / "scenarios" / "pulled_mass.toml"
     sets = ("model.v_c=10.0", "run.t_end=2.0", "output.figures=[]")

@@ -48,6 +48,7 @@ def test_the_charts_that_ship_are_proved(name: str) -> None:
     assert report.of("release")
 
 
+@pytest.mark.slow
 def test_the_assumptions_are_the_rules_and_the_inertia() -> None:
     assert prove(CHARTS["lugre"]).of("release") == ()  # it has no locks
     assert default_domain(STICTION) == ("F_c > 0", "F_s >= F_c", "b >= 0")
@@ -55,6 +56,7 @@ def test_the_assumptions_are_the_rules_and_the_inertia() -> None:
     assert "a = (H - F) W while the contact moves" in str(prove(STICTION))
 
 
+@pytest.mark.slow
 def test_the_force_of_a_locked_state_is_the_load() -> None:
     """F > F_s holds in the locked state only where the load H is larger than F_s."""
     double = replace(
@@ -79,6 +81,7 @@ def acceleration(chart: Chart, state: str, point: Mapping[str, float]) -> float:
     return (point["H"] - sign * point["F_c"]) * point["W"]
 
 
+@pytest.mark.slow
 def test_a_stiction_below_coulomb_friction_is_pushed_back_at_once() -> None:
     domain = ("F_c > 0", "F_s > 0", "b >= 0")
     found = only(STICTION, "release", domain)
@@ -93,6 +96,7 @@ def test_a_stiction_below_coulomb_friction_is_pushed_back_at_once() -> None:
         assert point["v"] == 0
 
 
+@pytest.mark.slow
 def test_a_run_at_the_counterexample_switches_without_end() -> None:
     rule = Parameter("F_s", "N", "> 0", per_element=False)
     loose = replace(
@@ -154,6 +158,7 @@ def test_an_impact_without_loss_of_direction_livelocks() -> None:
     assert point["v"] > point["v_r"]
 
 
+@pytest.mark.slow
 def test_closed_guards_on_the_lock_livelock_at_rest() -> None:
     """With v <= 0 a contact that has just let go, at v = 0, is locked again: at one point."""
     closed = replace(
@@ -191,6 +196,7 @@ def test_a_flank_that_pulls_chatters() -> None:
     assert (point["H"] - point["F_a"]) * point["W"] < 0 < (point["H"] + point["F_b"]) * point["W"]
 
 
+@pytest.mark.slow
 def test_named_expressions_are_expanded() -> None:
     named = replace(
         STICTION,

@@ -36,6 +36,7 @@ def fired() -> list[tuple[int, Any]]:
 
 
 # --------------------------------------------------------------------------- breakpoints
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name", "element"),
     [
@@ -131,6 +132,7 @@ def stuck(**options: float) -> Session:
     return Session(one_element("signed"), Prescribed("0.1*sin(t)"), 6.0, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "level"), [("z1", 0.003), ("z1", 0.1999), ("x", 0.05)])
 def test_a_crossing_of_a_closed_form(name: str, level: float) -> None:
     session = stuck(max_step=0.01)
@@ -170,6 +172,7 @@ def test_true_already_must_first_become_false() -> None:
     assert session.until("sqrt(x - 0.05) > 0").x > 0.05  # what cannot be computed is not true
 
 
+@pytest.mark.slow
 def test_a_state_becomes_true_on_the_row_of_its_firing() -> None:
     session = pulled()
     here = session.until("state(3) == slip")
