@@ -67,6 +67,7 @@ def test_what_was_held_out_is_scored() -> None:
     assert one.by_record == {"rig": one.rmse}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "worst"), [("static curve", 0.7), ("Maxwell-slip, NNLS, 15", 0.05), ("GMS 1", 0.01)]
 )
@@ -104,6 +105,7 @@ def test_interrupted_it_keeps_what_is_complete(tmp_path: Path) -> None:
     assert written["sections"][0]["rows"][1]["rmse"] == card.sections[0].rows[1].rmse
 
 
+@pytest.mark.slow
 def test_a_fit_that_was_interrupted_is_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(task: Any, **_: Any) -> Any:
         local = replace(task, options=replace(task.options, search="local"))
@@ -170,6 +172,7 @@ def score(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> None:
     SCORE["main"]()
 
 
+@pytest.mark.slow
 def test_the_tribometer_is_scored_from_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -62,6 +62,7 @@ def test_help_lists_every_verb_and_imports_nothing_heavy() -> None:
     assert {*names} & HEAVY == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["signed", "published"])
 def test_code_prints_the_generated_program(law: str, gms_fsm: CommandLine) -> None:
     done = said(gms_fsm("code", "--law", law))
@@ -87,6 +88,7 @@ def broken(gms_fsm: CommandLine) -> CommandLine:
     return gms_fsm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "error", "cause"),
     [
@@ -188,6 +190,7 @@ def test_plot_animate_and_replay(gms_fsm: CommandLine) -> None:
 
 
 # --------------------------------------------------------------------------- exports
+@pytest.mark.slow
 def test_an_export_begins_where_its_scenario_begins(gms_fsm: CommandLine) -> None:
     t = np.round(0.5 + 0.01 * np.arange(60), 2)
     Path("own.csv").write_text(table(["t", "x", "F"], t, 3 + np.sin(6 * t), np.cos(6 * t)))
@@ -200,6 +203,7 @@ def test_an_export_begins_where_its_scenario_begins(gms_fsm: CommandLine) -> Non
     assert 1e-3 < float(x[1]) < 5e-3  # m; the record says mm
 
 
+@pytest.mark.slow
 def test_an_exported_contact_has_the_tolerance_of_its_scenario(gms_fsm: CommandLine) -> None:
     Path("servo.toml").write_text(SERVO.read_text().replace("[run]", "[run]\nrtol = 1e-3"))
     bearing = ("export", "servo.toml", "--contact", "bearing")

@@ -56,6 +56,7 @@ def scenario(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_scenario_is_fitted_and_reported(
     gms_fsm: CommandLine, scenario: Path, tmp_path: Path
 ) -> None:
@@ -90,6 +91,7 @@ def test_its_keys_and_defaults_are_those_of_the_function() -> None:
         assert getattr(defaults, name) == empty, name
 
 
+@pytest.mark.slow
 def test_a_system_is_fitted(gms_fsm: CommandLine, scenario: Path, tmp_path: Path) -> None:
     system = small().save(tmp_path / "first.toml").read_text(encoding="utf-8")
     record = "[record]" + SCENARIO.partition("[record]")[2].partition("[fit]")[0]
@@ -128,6 +130,7 @@ def test_a_folder_of_the_users_is_refused_before_the_search(
     assert (tmp_path / "out" / "report.md").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_the_best_so_far(
     gms_fsm: CommandLine, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -179,6 +179,7 @@ def test_a_mistake_is_one_message(options: list[str], said: str, gms_fsm: Comman
 
 
 # --------------------------------------------------------------------------- cheap
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tick", "takes"),
     [(0.0, 0.0), (1e-2, 0.0), (1.0, 0.0), (0.02, 5.0)],  # a slow terminal slows no run

@@ -19,6 +19,7 @@ from tests.helpers import pulled_mass, stick_slip
 from tests.scenario_files import CommandLine
 
 
+@pytest.mark.slow
 def test_the_formats_are_named_from_one_table(tmp_path: Path, gms_fsm: CommandLine) -> None:
     done = gms_fsm("chart", "lugre", "-o", "x.tex")
     assert done.code == 2

@@ -133,6 +133,7 @@ def test_no_command_overwrites_a_users_file(
         place.unlink()
 
 
+@pytest.mark.slow
 def test_its_own_files_are_rewritten_but_changed_ones_are_not(
     refused: Callable[..., str], scenario: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

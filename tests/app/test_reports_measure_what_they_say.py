@@ -171,6 +171,7 @@ def test_r2_and_rmse_are_those_of_numpy(record: Record) -> None:
     np.testing.assert_array_equal(shown, force)
 
 
+@pytest.mark.slow
 def test_the_rows_of_the_trace_do_not_matter_and_a_part_counts_as_that_part() -> None:
     record, force = measured(), measured().columns["force"]
     trace = simulate(MODEL, RIG, 10.0, rtol=1e-9, atol=1e-12)  # all accepted steps
@@ -238,6 +239,7 @@ def damped(sigma: float) -> GMS:
     return GMS(replace(MODEL.parameters, sigma=np.full(3, sigma)), law="signed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "record", "said", "not_said"),
     [
@@ -257,6 +259,7 @@ def test_what_a_record_cannot_tell(
     assert [words for words in not_said if words in doubts] == []
 
 
+@pytest.mark.slow
 def test_a_v_c_below_the_noise_is_reported_and_one_above_is_not() -> None:
     rng = np.random.default_rng(2)
     noisy = motion(ONE_SPEED.velocity + 5e-6 * rng.standard_normal(ONE_SPEED.velocity.size))

@@ -70,6 +70,7 @@ def test_what_cannot_be_told_is_named(tmp_path: Path) -> None:
     assert ("never slipped: element" in doubts) == bool(small().never_slipped)
 
 
+@pytest.mark.slow
 def test_profiles_are_there_exactly_when_something_is_open(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")
     names = {"profiles.png", "profiles.svg"}

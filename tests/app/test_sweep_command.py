@@ -27,6 +27,7 @@ def path(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_every_combination_is_run_as_python_runs_it_and_shown(
     gms_fsm: CommandLine, path: Path, tmp_path: Path
 ) -> None:

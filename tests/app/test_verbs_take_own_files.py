@@ -35,6 +35,7 @@ def test_chart_draws_the_chart_of_a_contact(verb: CommandLine) -> None:
     assert verb("chart", "pulled.toml", "-o", "only.dot").code == 0
 
 
+@pytest.mark.slow
 def test_check_proves_the_chart_of_every_contact_once(verb: CommandLine) -> None:
     pytest.importorskip("z3", reason="needs z3 (extra: check)")
     alone, both = verb("check", "own.toml"), verb("check", "pair.toml")
@@ -114,6 +115,7 @@ def test_a_bare_system_file_runs_when_it_is_told_how_long(verb: CommandLine) -> 
     assert System.load("bare.toml").name == "pulled mass"
 
 
+@pytest.mark.slow
 def test_sweep_varies_numbers_and_contacts(verb: CommandLine) -> None:
     axes = ("--over", "numbers.K=2:4:2", "--over", "pad2.F_s=0.3:0.4:2", "--engine", "ifelse")
     assert verb("sweep", "pair.toml", *axes, "-o", "out").code == 0
