@@ -9,16 +9,16 @@ import pytest
 
 from gms_fsm import Trace
 from gms_fsm.app.report import monitor_lines, run_scenario
-from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.scenario import load_scenario, session_of
 from gms_fsm.traces.failures import LivelockError
 from gms_fsm.traces.monitors import Invariant
+from tests.corpus import run
 from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
     changed,
     one_message,
 )
-from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
 
 MONITORS = ["abs(z) <= 0.01*s", "passivity", "coverage", "chattering"]
 
@@ -53,6 +53,7 @@ def test_the_arguments_of_simulate_include_them(path: Path) -> None:
     assert given[0] == Invariant("abs(z) <= 0.01*s")
     assert len(given) == 4
     assert "monitors" not in load_scenario(path, ["run.monitors=[]"]).arguments
+    assert session_of(load_scenario(path)).step().row == 1  # the debugger has none
     assert len(load_scenario(path, ["run.monitors=['all']"]).arguments["monitors"]) == 3
 
 
@@ -67,8 +68,9 @@ def test_a_run_that_fails_reports_them_too(
 def test_a_livelock_is_reported_once(path: Path, tmp_path: Path) -> None:
     """The models of scenario files have none, so a custom chart replaces them."""
     loaded = load_scenario(path, ["run.monitors=['all']"])
-    loaded = replace(loaded, model=memoryless([0.5]), rig=SLOWING)
-    loaded.arguments["t_end"] = 10.0
+    model, rig = run("chattering").subject
+    loaded = replace(loaded, model=model, rig=rig)
+    loaded.arguments["t_end"] = run("chattering").t_end
     with pytest.raises(LivelockError) as caught:
         run_scenario(loaded, tmp_path / "out")
     assert str(caught.value).count("chattering") == 1
