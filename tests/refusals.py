@@ -1467,22 +1467,14 @@ FORK = {"fork": -1, "edits": {}, "cursor": 0, "from": None, "between": None}
 ORIGINAL = {"parent": None, **FORK}
 rows = {
     "unknown law": {"branches": [ORIGINAL, {"parent": 0, **FORK, "law": "another"}]},
-    "value that is a text": {"branches": [ORIGINAL, {"parent": 0, **FORK, "values": {"k": "x"}}]},
     "parent of itself": {"branches": [ORIGINAL, {"parent": 1, **FORK}]},
-    "half a branch": {"branches": [{"cursor": -3, "between": None}]},
     "null for branches": {"branches": None},
     "current that is missing": {"current": 7},
     "current that is a word": {"current": "one"},
     "end before the start": {"t_end": -1.0},
-    "null for the end": {"t_end": None},
     "empty header": {"header": {}},
     "unknown method": {"options": {"method": "rk5"}},
-    "unknown option": {"options": {"nonsense": 1}},
     "breakpoint of an unknown kind": {"breakpoints": [{"kind": "fired", "name": "arrest"}]},
-    "breakpoint of an unknown edge": {"breakpoints": [{"kind": "fires", "name": "arest"}]},
-    "breakpoint of an element too many": {
-        "breakpoints": [{"kind": "fires", "name": "arrest", "element": 9}]
-    },
     "breakpoint of half a condition": {
         "breakpoints": [{"kind": "fires", "name": "arrest", "condition": "z9 >"}]
     },

@@ -134,7 +134,7 @@ from pathlib import Path
 from gms_fsm import GMS, GMSParameters, Prescribed
 from gms_fsm.session.session import Session
 session = Session(GMS(GMSParameters.paper("stick-slip"), law="signed"),
-                  Prescribed("0.15*sin(2*pi*t/25)"), 100.0, method="rk4", step=1e-3,
+                  Prescribed("0.15*sin(2*pi*t/25)"), 100.0, method="euler", step=1e-3,
                   engine="ifelse")
 session.goto(100.0)
 session.goto(50.0)
