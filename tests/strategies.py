@@ -21,7 +21,19 @@ from gms_fsm import (
     Transition,
 )
 
-__all__ = ["banks", "chart_models", "charts", "options", "ramps", "rigs", "rounded", "signals"]
+__all__ = [
+    "banks",
+    "chart_models",
+    "charts",
+    "moves",
+    "options",
+    "pairs_on_a_surface",
+    "provable_charts",
+    "ramps",
+    "rigs",
+    "rounded",
+    "signals",
+]
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 VALUES = ("0", "k * z", "-k", "exp(-v**2) + σ_0", "F_c * sgn(v)", "1e-300 * w")
@@ -257,3 +269,67 @@ def options(draw: st.DrawFn) -> dict[str, Any]:
     if kind == 5:
         found["events"] = "step"
     return found
+
+
+def moves(t_end: float) -> st.SearchStrategy[tuple[str, Any]]:
+    """A move of a session of a bank, and what it takes."""
+    return st.one_of(
+        st.tuples(st.sampled_from(["step", "back"]), st.integers(1, 30)),
+        st.tuples(st.sampled_from(["next", "prev"]), st.none()),
+        st.tuples(st.just("goto"), st.floats(0.0, t_end)),
+        st.tuples(st.just("until"), st.sampled_from(["z1 > 0.1", "z1 < -0.05", "v > 0.2"])),
+        st.tuples(st.just("switch"), st.integers(0, 5)),
+        st.tuples(
+            st.just("poke"), st.tuples(st.floats(-0.3, 0.3), st.sampled_from([None, "slip"]))
+        ),
+    )
+
+
+# --------------------------------------------------------------------------- what is proved
+LEFT = ["z", "abs(z)", "v", "abs(v)", "z * v", "z + v", "max(z, v)", "sgn(v) * z", "z ** 2"]
+RIGHT = ["s", "-s", "v_c", "-v_c", "0", "1", "0.5 * s", "s + v_c", "-0.5"]
+PROVABLE_FLOWS = st.sampled_from(["v", "0", "1 - z / s", "sgn(v) - z / s", "-v", "abs(v)", "z * v"])
+COMPARISONS = st.builds(
+    "{} {} {}".format,
+    st.sampled_from(LEFT),
+    st.sampled_from(["<", "<=", ">", ">="]),
+    st.sampled_from(RIGHT),
+)
+PROVABLE_CLAUSES = st.one_of(
+    COMPARISONS,
+    COMPARISONS.map("not {}".format),
+    st.builds("({} or {})".format, COMPARISONS, COMPARISONS),
+)
+
+
+@st.composite
+def provable_charts(draw: st.DrawFn) -> Chart:
+    """Two or three states, with edges of which some can hold at once, and cycles."""
+    names = ["first", "second", "third"][: draw(st.integers(2, 3))]
+    ends = st.sampled_from(names)
+    guards = st.lists(PROVABLE_CLAUSES, min_size=1, max_size=3).map(" and ".join)
+    actions = st.sampled_from([{}, {}, {}, {"z": "0"}, {"z": "-z"}, {"z": "s"}])
+    edges = tuple(
+        Transition(f"edge{i}", draw(ends), draw(ends), draw(guards), draw(actions))
+        for i in range(draw(st.integers(2, 4)))
+    )
+    states = tuple(State(name, {"z": draw(PROVABLE_FLOWS)}) for name in names)
+    return Chart("random", ("v", "s"), ("z",), ("v_c",), states, edges, {"F": "z"})
+
+
+SURFACES = ["s", "-s", "0.5 * s", "v", "1", "1 / s", "0.5 + abs(v)", "max(v, s)", "min(v, s)"]
+RESTS = ["v > v_c", "v <= v_c", "z > 0", "abs(v) <= v_c", "v < 0", "z * v >= 0"]
+
+
+@st.composite
+def pairs_on_a_surface(draw: st.DrawFn) -> Chart:
+    """Two states whose guards share a surface, which is the name of the chart."""
+    surface = draw(st.sampled_from(SURFACES))
+    rests = st.lists(st.sampled_from(RESTS), max_size=2)
+    go, back = (
+        " and ".join([f"z {op} {surface}", *draw(rests)])
+        for op in draw(st.sampled_from([(">=", "<"), ("<=", ">"), (">", "<="), (">", "<")]))
+    )
+    states = tuple(State(name, {"z": draw(PROVABLE_FLOWS)}) for name in ("first", "second"))
+    edges = (Transition("go", "first", "second", go), Transition("back", "second", "first", back))
+    return Chart(surface, ("v", "s"), ("z",), ("v_c",), states, edges, {"F": "z"})

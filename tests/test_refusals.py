@@ -9,6 +9,7 @@ from tests.refusals import REFUSALS, approved, place_of, refused, told
 
 INPUTS = {"a.toml", "own.csv", "in/a.toml", "in/own.csv", "own.toml", "pulled.toml", "pair.toml"}
 TRACES = {"run.npz", ".npz", "run.txt", "run.csv", "run.transitions.csv"}
+SESSIONS = {"s.json", "odd.json"}
 
 
 @pytest.mark.parametrize("name", REFUSALS)
@@ -20,7 +21,7 @@ def test_it_is_refused_at_its_place(name: str) -> None:
     assert type(error) is row.error
     assert place_of(error).endswith(row.place)
     assert shown(error.value) == shown(row.value)
-    assert files <= INPUTS | TRACES
+    assert files <= INPUTS | TRACES | SESSIONS
     assert len(str(error)) < 2000
     assert "np." not in str(error)
     assert told(error) == approved()[name], "python -m tests.refusals approves what is new"

@@ -22,7 +22,7 @@ from gms_fsm.app.benchmark.methods import METHODS, Method, Predictor
 from gms_fsm.identification.bank import stop_operators
 from gms_fsm.identification.fit import fitted
 from tests.helpers import ROOT
-from tests.scenario_files import CommandLine, data_folder
+from tests.scenario_files import data_folder
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
 
@@ -67,6 +67,7 @@ def test_what_was_held_out_is_scored() -> None:
     assert one.by_record == {"rig": one.rmse}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "worst"), [("static curve", 0.7), ("Maxwell-slip, NNLS, 15", 0.05), ("GMS 1", 0.01)]
 )
@@ -82,8 +83,12 @@ def test_a_method_that_fails_is_a_row_with_the_reason() -> None:
     def fails(*_: Any) -> Predictor:
         raise GMSError("no spring")
 
-    row = make(Path(), data=[SMALL], methods=[Method("bad", fails, ("rig",))]).sections[0].rows[-1]
+    card = make(Path(), data=[SMALL], methods=[constant(0.0), Method("bad", fails, ("rig",))])
+    row = card.sections[0].rows[-1]
     assert (row.model, row.rmse, row.note) == ("bad", None, "no spring")
+    text = page(card)
+    for words in ("A rig", "Held out: from 8 s on. free.", "| constant 0 | 1 |", "Submit yours"):
+        assert words in text
 
 
 def test_interrupted_it_keeps_what_is_complete(tmp_path: Path) -> None:
@@ -100,6 +105,7 @@ def test_interrupted_it_keeps_what_is_complete(tmp_path: Path) -> None:
     assert written["sections"][0]["rows"][1]["rmse"] == card.sections[0].rows[1].rmse
 
 
+@pytest.mark.slow
 def test_a_fit_that_was_interrupted_is_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(task: Any, **_: Any) -> Any:
         local = replace(task, options=replace(task.options, search="local"))
@@ -109,12 +115,6 @@ def test_a_fit_that_was_interrupted_is_no_row(monkeypatch: pytest.MonkeyPatch) -
     card = make(Path(), data=[SMALL], methods=[constant(0.0), of_card("GMS 1")])
     assert not card.complete
     assert [row.model for row in card.sections[0].rows] == ["other", "constant 0"]
-
-
-def test_the_page_says_what_was_held_out_and_how_to_submit() -> None:
-    text = page(make(Path(), data=[SMALL], methods=[constant(0.0)]))
-    for words in ("A rig", "Held out: from 8 s on. free.", "| constant 0 | 1 |", "Submit yours"):
-        assert words in text
 
 
 # --------------------------------------------------------------------------- submissions
@@ -147,37 +147,24 @@ GOOD: dict[str, Any] = {"name": "mine", "dataset": "rig", "F": [0.0] * int((T >=
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ("{", ["mine.json", "not JSON"]),
-        ("[]", ["no name, dataset, F"]),
-        ({"name": "mine"}, ["no dataset, F"]),
-        (GOOD | {"name": 3}, ["name is 3"]),
-        (GOOD | {"dataset": "rigg"}, ["'rigg'", "there are rig"]),
-        (GOOD | {"F": [1.0]}, ["1 forces for 201 rows"]),
-        (GOOD | {"F": 3}, ["a list for each record"]),
-        (GOOD | {"F": {"test99": []}}, ["no record 'test99'", "rig"]),
-        (GOOD | {"F": {}}, ["no forces for rig"]),
-        (GOOD | {"F": ["a"] * 201}, ["list of numbers"]),
-        (GOOD | {"F": [float("nan")] * 201}, ["entry 0", "not finite"]),
-        (GOOD | {"rows": [2], "F": [1.0]}, ["entry 0", "no held-out row", "from 400 to 600"]),
-        (GOOD | {"rows": [500, 450], "F": [1.0, 1.0]}, ["must increase"]),
+        ("{", "mine.json.*not JSON"),
+        ("[]", "no name, dataset, F"),
+        ({"name": "mine"}, "no dataset, F"),
+        (GOOD | {"name": 3}, "name is 3"),
+        (GOOD | {"dataset": "rigg"}, "'rigg'.*there are rig"),
+        (GOOD | {"F": [1.0]}, "1 forces for 201 rows"),
+        (GOOD | {"F": 3}, "a list for each record"),
+        (GOOD | {"F": {"test99": []}}, "no record 'test99'.*rig"),
+        (GOOD | {"F": {}}, "no forces for rig"),
+        (GOOD | {"F": ["a"] * 201}, "list of numbers"),
+        (GOOD | {"F": [float("nan")] * 201}, "entry 0.*not finite"),
+        (GOOD | {"rows": [2], "F": [1.0]}, "entry 0.*no held-out row.*from 400 to 600"),
+        (GOOD | {"rows": [500, 450], "F": [1.0, 1.0]}, "must increase"),
     ],
 )
-def test_a_file_that_cannot_be_scored(submit: Any, given: Any, words: list[str]) -> None:
-    with pytest.raises((RecordError, ParameterError)) as caught:
+def test_a_file_that_cannot_be_scored(submit: Any, given: Any, words: str) -> None:
+    with pytest.raises((RecordError, ParameterError), match=words):
         submit(given)
-    assert [word for word in words if word not in str(caught.value)] == []
-
-
-def test_missing_data_are_said_first(gms_fsm: CommandLine) -> None:
-    done = gms_fsm("benchmark", "--data", "nowhere", "-o", "out")
-    assert done.code == 2
-    assert "nowhere: there is no such folder" in done.err
-    assert gms_fsm("benchmark", "--only", "skates", "-o", "out").code == 2
-
-
-@pytest.fixture
-def tribometer_folder() -> Path:
-    return data_folder()
 
 
 def score(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> None:
@@ -185,25 +172,20 @@ def score(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> None:
     SCORE["main"]()
 
 
-def test_a_missing_file_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(SystemExit, match=r"^score: none\.json: it cannot be read"):
-        score(monkeypatch, "none.json")
-
-
+@pytest.mark.slow
 def test_the_tribometer_is_scored_from_the_command_line(
-    tribometer_folder: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (split,) = data_set("tribometer").splits(tribometer_folder)
+    with pytest.raises(SystemExit, match=r"^score: none\.json: it cannot be read"):
+        score(monkeypatch, "none.json")
+    (split,) = data_set("tribometer").splits(data_folder())
     (held,) = split.held
     forces = held.columns["force"][held.chosen] + 0.1
     Path("mine.json").write_text(
         json.dumps({"name": "mine", "dataset": "tribometer", "F": forces.tolist()})
     )
-    score(monkeypatch, "mine.json", "--data", str(tribometer_folder))
+    score(monkeypatch, "mine.json", "--data", str(data_folder()))
     assert "| mine | – | – | 0.1 |" in capsys.readouterr().out
     assert split.training[0].columns["time"][split.training[0].chosen].max() < 100.0
     assert held.columns["time"][held.chosen].min() >= 100.0

@@ -15,7 +15,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.files import LIST
 from tests.scenario_files import CommandLine, one_message
 
-EXPECTED = {
+CAUGHT = {
     "overlap": "livelock",
     "literal": "livelock",
     "memoryless": "chattering",
@@ -23,72 +23,65 @@ EXPECTED = {
 }
 
 
-def z3() -> None:
+@pytest.fixture
+def check(gms_fsm: CommandLine) -> CommandLine:
     pytest.importorskip("z3", reason="needs z3 (extra: check)")
+    return lambda *arguments: gms_fsm("check", *arguments)
 
 
 def graphviz() -> None:
-    z3()
     if shutil.which("dot") is None:
         pytest.importorskip("pygraphviz", reason="drawing needs Graphviz, program or package")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "code", "last"),
     [
-        (("gms", "--law", "signed"), 0, "19 proved, 0 settled by order, 0 refuted, 0 undecided"),
-        (("gms", "--law", "published"), 1, "18 proved, 0 settled by order, 1 refuted, 0 undecided"),
-        (("lugre",), 0, "7 proved, 0 settled by order, 0 refuted, 0 undecided"),
+        ("gms --law signed", 0, "19 proved, 0 settled by order, 0 refuted, 0 undecided"),
+        ("gms --law published", 1, "18 proved, 0 settled by order, 1 refuted, 0 undecided"),
         # undecided is not a refutation
         (
-            ("gms", "--law", "signed", "--domain", "s >= 0", "--domain", "v_c > 0"),
+            "gms --law signed --domain s>=0 --domain v_c>0",
             0,
             "16 proved, 0 settled by order, 0 refuted, 3 undecided",
         ),
     ],
 )
 def test_the_exit_code_is_1_if_something_is_refuted(
-    gms_fsm: CommandLine, arguments: tuple[str, ...], code: int, last: str
+    check: CommandLine, arguments: str, code: int, last: str
 ) -> None:
-    z3()
-    answer = gms_fsm("check", *arguments)
+    answer = check(*arguments.split(), "-o", "o")
     assert (answer.code, answer.err) == (code, "")
-    assert answer.out.splitlines()[-1] == last
+    assert last in answer.out.splitlines()
     assert "over the reals, not floats" in answer.out
+    if not code:  # with nothing refuted there is a report and no chart
+        assert {path.name for path in Path("o").iterdir()} == {"report.txt", LIST}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BROKEN)
-def test_every_broken_reading_is_caught(gms_fsm: CommandLine, name: str) -> None:
-    z3()
-    answer = gms_fsm("check", f"broken:{name}")
+def test_every_broken_reading_is_caught_and_listed(check: CommandLine, name: str) -> None:
+    answer = check(f"broken:{name}")
     word, code = ("settled by order", 0) if name == "arms" else ("refuted", 1)
     assert answer.code == code
-    heading = ""
-    caught = set()
+    heading, caught = "", set()
     for line in answer.out.splitlines():
         heading = heading if line.startswith(" ") else line
         if line.startswith(("  refuted", "  settled by order")):
             assert line.startswith(f"  {word}  ")
             caught.add(heading)
-    assert caught == {EXPECTED[name]}
+    assert caught == {CAUGHT[name]}
+    said = " ".join(check("--list").out.split())
+    assert f"broken:{name} {BROKEN[name].wrong}" in said
+    assert "gms --law signed" in said
 
 
-def test_a_domain_replaces_the_default(gms_fsm: CommandLine) -> None:
-    z3()
-    answer = gms_fsm("check", "broken:arms", "--domain", "s > 0", "--domain", "C > 0")
+def test_a_domain_replaces_the_default(check: CommandLine) -> None:
+    answer = check("broken:arms", "--domain", "s > 0", "--domain", "C > 0")
     assert "assumed: s > 0, C > 0\n" in answer.out
     arms = "stick, break_away_forward, break_away_backward"
     assert f"proved     {arms}: never enabled at the same time" in answer.out
-
-
-def test_the_list_names_all_charts_and_describes_the_faults(gms_fsm: CommandLine) -> None:
-    answer = gms_fsm("check", "--list")
-    assert (answer.code, answer.err) == (0, "")
-    said = " ".join(answer.out.split())
-    for name, broken in BROKEN.items():
-        assert f"broken:{name} {broken.wrong}" in said
-    assert "gms --law signed" in said
-    assert "lugre" in said
 
 
 def test_without_z3_the_message_names_the_extra(
@@ -99,17 +92,10 @@ def test_without_z3_the_message_names_the_extra(
 
 
 # --------------------------------------------------------------------------- marked charts
-def classes(path: Path) -> dict[str, set[str]]:
-    """Return the classes of each named part of an SVG."""
-    return {
-        node.get("id", ""): set(node.get("class", "").split())
-        for node in ElementTree.parse(path).iter()
-        if node.get("class")
-    }
-
-
 def marked(path: Path) -> set[str]:
-    return {name for name, found in classes(path).items() if "marked" in found}
+    """Return the names of the marked parts of an SVG."""
+    nodes = ElementTree.parse(path).iter()
+    return {node.get("id", "") for node in nodes if "marked" in node.get("class", "").split()}
 
 
 def texts(path: Path) -> str:
@@ -117,17 +103,17 @@ def texts(path: Path) -> str:
     return " ".join(node.text or "" for node in nodes).replace("\u00a0", " ")
 
 
-def test_charts_are_drawn_with_the_edges_marked(gms_fsm: CommandLine, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_charts_are_drawn_with_the_faults_marked(check: CommandLine, tmp_path: Path) -> None:
     graphviz()
     folder = tmp_path / "new" / "folder"
-    answer = gms_fsm("check", "broken:arms", "-o", folder)
+    answer = check("broken:arms", "-o", folder)
     assert answer.code == 0  # the order of the edges settles it
     names = {"report.txt", "1-determinism.svg", "1-determinism.png"}
     assert {path.name for path in folder.iterdir()} == names | {LIST}
     for name in names:
         assert str(folder / name) in answer.out
     assert answer.out.startswith((folder / "report.txt").read_text())
-    assert (folder / "1-determinism.png").read_bytes().startswith(b"\x89PNG")
     assert marked(folder / "1-determinism.svg") == {
         f"element1-{part}"
         for arm in ("break_away_forward", "break_away_backward")
@@ -136,11 +122,7 @@ def test_charts_are_drawn_with_the_edges_marked(gms_fsm: CommandLine, tmp_path: 
     said = texts(folder / "1-determinism.svg")
     assert "determinism, settled by order: both are" in said
     assert "s = 0, z = 0" in said
-
-
-def test_a_faulty_state_is_marked(gms_fsm: CommandLine, tmp_path: Path) -> None:
-    graphviz()
-    gms_fsm("check", "gms", "--law", "published", "-o", tmp_path)
+    check("gms", "--law", "published", "-o", tmp_path)
     assert marked(tmp_path / "1-stability.svg") == {"element1-state-slip"}
     said = texts(tmp_path / "1-stability.svg")
     assert "stability, z for v < 0: unstable" in said
@@ -148,19 +130,6 @@ def test_a_faulty_state_is_marked(gms_fsm: CommandLine, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_with_nothing_refuted_there_is_a_report_and_no_chart(
-    gms_fsm: CommandLine, tmp_path: Path
-) -> None:
-    z3()
-    assert gms_fsm("check", "gms", "--law", "signed", "-o", tmp_path).code == 0
-    assert {path.name for path in tmp_path.iterdir()} == {"report.txt", LIST}
-
-
-def test_a_folder_that_cannot_be_made_is_one_message(gms_fsm: CommandLine, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    one_message(gms_fsm("check", "lugre", "-o", tmp_path / "file" / "out"), "another folder")
-
-
 def test_a_mark_changes_no_text_and_has_to_exist(tmp_path: Path) -> None:
     graphviz()
     chart = BROKEN["arms"].chart

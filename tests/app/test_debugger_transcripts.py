@@ -15,12 +15,9 @@ import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition, simulate
 from gms_fsm.app.scenario import load_scenario, run_debugger, session_of
-from gms_fsm.debugger import Debugger
 from gms_fsm.session.session import Session
-from tests.app.test_debugger_on_a_model_of_ones_own import own, session_on
-from tests.app.test_debugger_shows_systems import made, pulled
-from tests.helpers import FIG4_SINE, ROOT, stick_slip
-from tests.inspection.test_session_failures_are_outcomes import both_ways
+from tests.helpers import ROOT
+from tests.inspection.sessions import a_system, both_ways, debugger, fig4, locked, warming
 
 APPROVED = Path(__file__).with_name("debugger.approved.txt")
 SCENARIOS = ROOT / "scenarios"
@@ -56,27 +53,27 @@ def _element(*edges: Transition, states: tuple[str, ...]) -> Chart:
     return Chart("element", ("v",), ("z",), ("k",), parts, edges, {"F": "k * z"})
 
 
-def _of(chart: Chart, n: int = 1, rig: str = "0.1", t_start: float = 0.0) -> Debugger:
+def _of(chart: Chart, n: int = 1, rig: str = "0.1", t_start: float = 0.0) -> Session:
     model = ChartModel(chart, {"k": 1.0}, n=n, stribeck=Stribeck(1.0, 1.0, 1.0))
-    return session_on(Session(model, Prescribed(rig), 2.0, t_start=t_start))
+    return Session(model, Prescribed(rig), 2.0, t_start=t_start)
 
 
 CASES = (Transition("go", "on", "ON", guard="z > 1"), Transition("Go", "ON", "on", guard="z < 0"))
 BAD = Transition("go", "on", "off", guard="0 / (z - z) > 0")
-SESSIONS: dict[str, Callable[[], Debugger]] = {
-    "fig 4": lambda: session_on(Session(stick_slip("published"), Prescribed(FIG4_SINE), 100.0)),
-    "pulled mass": lambda: session_on(
-        session_of(load_scenario(SCENARIOS / "pulled_mass.toml", ["run.t_end=20.0"]))
+SESSIONS: dict[str, Callable[[], Session]] = {
+    "fig 4": fig4,
+    "pulled mass": lambda: session_of(
+        load_scenario(SCENARIOS / "pulled_mass.toml", ["run.t_end=20.0"])
     ),
-    "a chart of one's own": own,
-    "two elements of it": lambda: own(2),
+    "a chart of one's own": warming,
+    "two elements of it": lambda: warming(2),
     "a spring": lambda: _of(_element(states=("on",)), 2, t_start=1.0),
     "many edges": lambda: _of(_wide(), 2),
     "cases": lambda: _of(_element(*CASES, states=("on", "ON"))),
-    "a livelock": lambda: session_on(Session(both_ways(), Prescribed("0.15"), 20.0)),
+    "a livelock": lambda: Session(both_ways(), Prescribed("0.15"), 20.0),
     "a guard without a value": lambda: _of(_element(BAD, states=("on", "off")), rig="1"),
-    "a system": made,
-    "a lock": pulled,
+    "a system": a_system,
+    "a lock": locked,
 }
 
 
@@ -88,12 +85,12 @@ def sections() -> dict[str, str]:
 
 def played(title: str, said: str) -> str:
     """Return the transcript of the commands of a transcript, given anew."""
-    debugger = SESSIONS[title.partition(":")[0]]()
+    made = debugger(SESSIONS[title.partition(":")[0]]())
     lines = []
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
         for line in said.splitlines():
             if line.startswith(PROMPT):
-                lines += [line, *debugger.reply(line.removeprefix(PROMPT)).splitlines()]
+                lines += [line, *made.reply(line.removeprefix(PROMPT)).splitlines()]
     return "\n".join(lines) + "\n"
 
 
@@ -121,35 +118,26 @@ breakpoint 1: fires break_away_backward, element 2
     assert said.endswith("for the edges that leave slip: step, then why 2\n(t=20.1407 s) quit\n")
 
 
-@pytest.mark.parametrize(
-    "commands", [("goto 25", "why 1"), ("g", "goto 25", "where", "why"), ("u t >= 25", "why")]
-)
-def test_why_element_1_does_not_arrest_is_known_within_five_commands(
-    commands: tuple[str, ...],
-) -> None:
-    said = talk(FIG_4, *commands, "quit")
-    assert "element 1 is in slip" in said
-    assert "arrest does not fire: |z| < s is false by 0.776 m." in said
-    first = answers(FIG_4, "help")[0].splitlines()[0]
-    assert "goto 25" in first
-    assert "why 1" in first
-
-
-def test_under_the_signed_law_it_does_arrest() -> None:
-    said = talk(FIG_4, "goto 25", "why 1", overrides=("model.law=signed",))
-    assert "element 1 is in stick" in said
+def test_why_element_1_does_not_arrest_is_known_within_five_commands() -> None:
+    for commands in (("goto 25", "why 1"), ("u t >= 25", "why")):
+        said = talk(FIG_4, *commands)
+        assert "element 1 is in slip" in said
+        assert "arrest does not fire: |z| < s is false by 0.776 m." in said
+        assert said.endswith("(t=25.0000 s) \n")  # the end of input is a quiet quit
+    signed = talk(FIG_4, "goto 25", "why 1", overrides=("model.law=signed",))
+    assert "element 1 is in stick" in signed
 
 
 def test_every_transition_of_the_log_is_shown() -> None:
     loaded = load_scenario(SCENARIOS / f"{FIG_4}.toml")
     log = simulate(loaded.model, loaded.rig, **loaded.arguments).transitions
-    said = answers(FIG_4, *["next"] * (len(log) + 1), "log 1000")
-    for record, text in zip(log, said, strict=False):
+    *said, end, shown = answers(FIG_4, *["next"] * (len(log) + 1), "log 1000")
+    for record, text in zip(log, said, strict=True):
         assert f"t = {record.t:.9g} s, micro-step " in text
         by = f"{record.source} -> {record.target} by {record.edge}"
         assert f"element {record.element + 1}: {by}" in text
-    assert "end of the run" in said[-2]
-    assert len(said[-1].splitlines()) == len(log)
+    assert "end of the run" in end
+    assert len(shown.splitlines()) == len(log)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import itertools
+import sys
 from typing import Any
 
 import pytest
@@ -11,11 +13,13 @@ import pytest
 pytest.importorskip("textual", reason="needs the extra tui")
 
 from gms_fsm import Prescribed
-from gms_fsm.debugger import COMMANDS, Debugger
+from gms_fsm.debugger import COMMANDS
+from gms_fsm.debugger.tui import run_tui
 from gms_fsm.debugger.tui._app import FullScreen
 from gms_fsm.debugger.tui._keys import KEYS
 from gms_fsm.debugger.tui._spans import DARK, LIGHT
 from gms_fsm.debugger.tui._widgets import Help
+from gms_fsm.errors import SessionError
 from gms_fsm.session.session import Session
 from tests.app.full_screen import (
     FIG_4,
@@ -29,7 +33,8 @@ from tests.app.full_screen import (
     typed,
 )
 from tests.app.test_debugger_transcripts import answers
-from tests.helpers import FIG4_SINE, stick_slip
+from tests.helpers import FIG4_SINE, ROOT, stick_slip
+from tests.scenario_files import CommandLine, one_message
 
 pytestmark = pytest.mark.slow
 ANSWER = "arrest does not fire: |z| < s is false by 0.776 m."
@@ -174,26 +179,11 @@ def test_commands_are_completed_remembered_and_repeated() -> None:
     assert drive(action, light=True).return_value == 0
 
 
-def test_mistakes_are_answered_as_at_the_prompt(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines = [
-        *["stpe", "goto yesterday", "why 9", "poke z1=nan", "until (((", "compare", "branch 7"],
-        *["load nothing.json", "print 1 / x", "[bold]x[/]", "save no/folder/here.json"],
-    ]
-
-    made = Debugger(session())
-    wanted = {line: " ".join(made.reply(line).split()) for line in lines}
-
+def test_a_panel_that_fails_does_not_end_it(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("division by zero")
 
     async def action(app: FullScreen, pilot: Any) -> None:
-        for line, expected in wanted.items():
-            app.give(line)
-            await settle(pilot)
-            assert expected.startswith("error: ")
-            begin = max(i for i, text in enumerate(app.said) if text.startswith("(t="))
-            assert " ".join(" ".join(app.said[begin + 1 :]).split()) == expected
-            assert expected in " ".join(app.panels["answers"].shown.split())
         monkeypatch.setattr("gms_fsm.debugger.tui._app.chart_states", broken)
         await press(pilot, "s")
         assert app.panels["chart"].shown == "cannot be shown here: division by zero"
@@ -271,3 +261,33 @@ def test_every_colour_can_be_read_on_its_ground(palette: Any, grounds: tuple[str
         front, _, own = style.partition(" on ")
         pair = sorted(_luminance(c[-7:]) for c in (front, own or ground))
         assert (pair[1] + 0.05) / (pair[0] + 0.05) >= 4.5, (style, ground)
+
+
+def test_it_says_what_it_needs(gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Textual, a terminal that can place text, a valid scenario; --light is an option of it."""
+    path = ROOT / "scenarios" / f"{FIG_4}.toml"
+    one_message(
+        gms_fsm("debug", "--tui", path), "needs a terminal", "without --tui it reads commands"
+    )
+    one_message(gms_fsm("debug", "--tui", path, "--set", "model.law=none"), "law")
+    done = gms_fsm("debug", "--light", path)
+    assert (done.code, "it is an option of --tui" in done.err) == (2, True)
+    for name in ("stdin", "stdout"):
+        file = io.StringIO()
+        monkeypatch.setattr(file, "isatty", lambda: True)
+        monkeypatch.setattr(sys, name, file)
+    monkeypatch.setenv("TERM", "dumb")
+    with pytest.raises(SessionError, match="needs a terminal"):
+        run_tui(session())
+
+
+def test_without_textual_the_extra_is_named(
+    gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "textual", None)
+    one_message(
+        gms_fsm("debug", "--tui", ROOT / "scenarios" / f"{FIG_4}.toml"),
+        "the full-screen debugger needs textual, which is not installed",
+        'pip install "gms-fsm[tui]"',
+        "without --tui answers at a prompt",
+    )

@@ -8,12 +8,13 @@ import pytest
 
 pytest.importorskip("textual", reason="needs the extra tui")
 
-from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck
+from gms_fsm import Prescribed
 from gms_fsm.debugger.tui._app import PAGES, FullScreen
 from gms_fsm.debugger.tui._widgets import Panel
 from gms_fsm.foundation.quantities import quantity
 from gms_fsm.session.session import Session
 from tests.app.full_screen import LARGE, SMALL, drive, press, screen_text, session, settle
+from tests.helpers import FIG4_SINE, bank
 
 pytestmark = pytest.mark.slow
 
@@ -48,14 +49,6 @@ def _check(app: FullScreen, size: tuple[int, int]) -> set[str]:
     return seen
 
 
-def _twelve() -> Session:
-    k = [1.0 + 0.1 * i for i in range(12)]
-    parameters = GMSParameters(
-        k, [0.1] * 12, [0.1] * 12, sigma_2=0.1, stribeck=Stribeck(1.0, 1.5, 1e-3), v_c=1e-6
-    )
-    return Session(GMS(parameters, law="published"), Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
-
-
 @pytest.mark.parametrize(
     ("scenario", "sizes"),
     [
@@ -84,7 +77,13 @@ def test_every_panel_is_on_the_screen_and_its_lines_fit(
             assert app.screen.region.contains_region(app.screen.query_one(Panel).region)
             await press(pilot, "escape")
 
-    drive(action, sizes[0], _twelve() if scenario == "twelve" else session(scenario))
+    drive(
+        action,
+        sizes[0],
+        Session(bank(12), Prescribed(FIG4_SINE), 100.0)
+        if scenario == "twelve"
+        else session(scenario),
+    )
 
 
 def test_the_chart_of_an_element_is_whole_at_every_size() -> None:

@@ -9,16 +9,16 @@ import pytest
 
 from gms_fsm import Trace
 from gms_fsm.app.report import monitor_lines, run_scenario
-from gms_fsm.app.scenario import load_scenario, run_debugger
+from gms_fsm.app.scenario import load_scenario, session_of
 from gms_fsm.traces.failures import LivelockError
 from gms_fsm.traces.monitors import Invariant
+from tests.corpus import run
 from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
     changed,
     one_message,
 )
-from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
 
 MONITORS = ["abs(z) <= 0.01*s", "passivity", "coverage", "chattering"]
 
@@ -31,10 +31,10 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_verdicts_are_printed_and_written(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
-    done = gms_fsm("run", path, "-o", tmp_path / "out")
+    done = gms_fsm("run", path, "-o", tmp_path / "out", "--set", "output.every=0.5")
     assert done.code == 0
     trace = Trace.load(tmp_path / "out" / "trace.npz")
-    assert list(trace.monitors) == MONITORS
+    assert (len(trace), list(trace.monitors)) == (3, MONITORS)  # few rows are no obstacle
     lines = monitor_lines(trace)
     assert lines[0].startswith("monitor abs(z) <= 0.01*s (not ok): first broken at t = ")
     assert lines[1].startswith("monitor passivity (ok): ")
@@ -44,15 +44,8 @@ def test_verdicts_are_printed_and_written(gms_fsm: CommandLine, path: Path, tmp_
     for line in lines:
         assert f"{line}\n" in done.out
         assert f"- {line}\n" in summary
-
-
-def test_without_monitors_nothing_is_printed(
-    gms_fsm: CommandLine, path: Path, tmp_path: Path
-) -> None:
     done = gms_fsm("run", path, "-o", tmp_path / "out", "--set", "run.monitors=[]")
-    assert done.code == 0
-    assert "monitor " not in done.out
-    assert "onitor" not in (tmp_path / "out" / "summary.md").read_text()
+    assert "onitor" not in done.out + (tmp_path / "out" / "summary.md").read_text()
 
 
 def test_the_arguments_of_simulate_include_them(path: Path) -> None:
@@ -60,6 +53,7 @@ def test_the_arguments_of_simulate_include_them(path: Path) -> None:
     assert given[0] == Invariant("abs(z) <= 0.01*s")
     assert len(given) == 4
     assert "monitors" not in load_scenario(path, ["run.monitors=[]"]).arguments
+    assert session_of(load_scenario(path)).step().row == 1  # the debugger has none
     assert len(load_scenario(path, ["run.monitors=['all']"]).arguments["monitors"]) == 3
 
 
@@ -74,25 +68,12 @@ def test_a_run_that_fails_reports_them_too(
 def test_a_livelock_is_reported_once(path: Path, tmp_path: Path) -> None:
     """The models of scenario files have none, so a custom chart replaces them."""
     loaded = load_scenario(path, ["run.monitors=['all']"])
-    loaded = replace(loaded, model=memoryless([0.5]), rig=SLOWING)
-    loaded.arguments["t_end"] = 10.0
+    model, rig = run("chattering").subject
+    loaded = replace(loaded, model=model, rig=rig)
+    loaded.arguments["t_end"] = run("chattering").t_end
     with pytest.raises(LivelockError) as caught:
         run_scenario(loaded, tmp_path / "out")
     assert str(caught.value).count("chattering") == 1
     assert any("monitor coverage" in note for note in caught.value.__notes__)
     kept = Trace.load(tmp_path / "out" / "partial.npz").monitors["chattering"]
     assert not kept.ok
-
-
-def test_rows_far_apart_are_no_obstacle(path: Path, tmp_path: Path) -> None:
-    trace, _ = run_scenario(load_scenario(path, ["output.every=0.5"]), tmp_path / "out")
-    assert len(trace) == 3
-    assert list(trace.monitors) == MONITORS
-
-
-def test_the_debugger_opens_such_a_scenario(path: Path, tmp_path: Path) -> None:
-    commands, said = tmp_path / "commands", tmp_path / "said"
-    commands.write_text("run\nquit\n")
-    with commands.open() as stdin, said.open("w") as stdout:
-        run_debugger(load_scenario(path), stdin, stdout)
-    assert "at its end" in said.read_text()

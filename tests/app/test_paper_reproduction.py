@@ -12,20 +12,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from gms_fsm import Trace
+from gms_fsm import Trace, simulate
 from gms_fsm.app import paper
 from gms_fsm.app.paper.experiments import experiments, run
-from gms_fsm.app.paper.held import (
-    OSCILLATION,
-    PAPERS_FORCE,
-    PAPERS_PLACE,
-    RAMP,
-    figure_3_lags,
-)
+from gms_fsm.app.paper.held import lag_of
 from gms_fsm.app.paper.writing import claims_text, write
 from gms_fsm.errors import OutputError
 from gms_fsm.traces.failures import SimulationError
-from tests.helpers import ROOT
+from tests.helpers import ROOT, non_drifting
 from tests.page_blocks import Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow
@@ -66,60 +60,54 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def cells(folder: Path, claim: str) -> list[str]:
-    rows = [line for line in (folder / "claims.md").read_text().splitlines() if claim in line]
-    assert len(rows) == 1, claim
-    return [cell.strip() for cell in re.split(r"(?<!\\)\|", rows[0])[1:-1]]
+CLAIMS = [
+    ("linearly elastic", r"line of 111\.\d N/m", "holds"),
+    ("hysteresis when the force falls", r"\d+\.\d to \d+\.\d mN above", "holds only as"),
+    ("GMS is bounded", r"between 1\.769 and 2\.732 mm", "holds only as"),
+    ("where elements slip", r"between 15\.48 and 16\.44 mm", "holds"),
+    ("LuGre drifts steadily", r"0\.60 mm at 2 s, 5\.63 mm at 30 s", "holds"),
+    ("no GMS transition fires", r"^0 transitions", "holds"),
+    ("break-away near t = 5 s", r"t = 4\.9128 s", "holds"),
+    ("one break-away peak first", r"^1 peak", "holds"),
+    (
+        "several break-away peaks later",
+        r"2 at 32\.64–35\.04",
+        "holds only with s\\(v\\) unsigned",
+    ),
+    (
+        "the force is not symmetric",
+        r"-3\.08, -2\.00, -0\.68, -0\.40",
+        "holds only with s\\(v\\)",
+    ),
+    ("LuGre is uniform", r"0\.42\d+ to 0\.42\d+", "holds"),
+    ("a residual of about 1e-3 N", r"fig4: 0 of \d+", "differs: the implementations are ident"),
+    (
+        "spikes at the transitions",
+        r"42 of 50 transitions lost",
+        "holds only with guards evaluated",
+    ),
+    (
+        "residual of about 1e-4 N",
+        r"up to 1\.7e-04 N and 2\.3e-06 m on the ramp .* up to 7\.0e-04 N and 4\.8e-06 m while"
+        r".* at any time is 1\.2e-03 N, just before a tick, 12 times",
+        r"holds only with outputs held .* is explained by them within a factor of 7 at",
+    ),
+    ("proportional to the sample time", r"divides them by 1\.9\d to 2\.0\d", "holds"),
+    (
+        "… with outputs held between ticks",
+        r"1\.3e-04 N before .*, 2\.0e-04 N .*, 3\.0e-04 N .* 0\.25 N .* 0\.08 N .* 15 of 15",
+        r"holds only with outputs held .* is explained by them within a factor of 8",
+    ),
+]
 
 
-@pytest.mark.parametrize(
-    ("claim", "measured", "verdict"),
-    [
-        ("linearly elastic", r"line of 111\.\d N/m", "holds"),
-        ("hysteresis when the force falls", r"\d+\.\d to \d+\.\d mN above", "holds only as"),
-        ("GMS is bounded", r"between 1\.769 and 2\.732 mm", "holds only as"),
-        ("where elements slip", r"between 15\.48 and 16\.44 mm", "holds"),
-        ("LuGre drifts steadily", r"0\.60 mm at 2 s, 5\.63 mm at 30 s", "holds"),
-        ("no GMS transition fires", r"^0 transitions", "holds"),
-        ("break-away near t = 5 s", r"t = 4\.9128 s", "holds"),
-        ("one break-away peak first", r"^1 peak", "holds"),
-        (
-            "several break-away peaks later",
-            r"2 at 32\.64–35\.04",
-            "holds only with s\\(v\\) unsigned",
-        ),
-        (
-            "the force is not symmetric",
-            r"-3\.08, -2\.00, -0\.68, -0\.40",
-            "holds only with s\\(v\\)",
-        ),
-        ("LuGre is uniform", r"0\.42\d+ to 0\.42\d+", "holds"),
-        ("a residual of about 1e-3 N", r"fig4: 0 of \d+", "differs: the implementations are ident"),
-        (
-            "spikes at the transitions",
-            r"42 of 50 transitions lost",
-            "holds only with guards evaluated",
-        ),
-        (
-            "residual of about 1e-4 N",
-            r"up to 1\.7e-04 N and 2\.3e-06 m on the ramp .* up to 7\.0e-04 N and 4\.8e-06 m while"
-            r".* at any time is 1\.2e-03 N, just before a tick, 12 times",
-            r"holds only with outputs held .* is explained by them within a factor of 7 at",
-        ),
-        ("proportional to the sample time", r"divides them by 1\.9\d to 2\.0\d", "holds"),
-        (
-            "… with outputs held between ticks",
-            r"1\.3e-04 N before .*, 2\.0e-04 N .*, 3\.0e-04 N .* 0\.25 N .* 0\.08 N .* 15 of 15",
-            r"holds only with outputs held .* is explained by them within a factor of 8",
-        ),
-    ],
-)
-def test_every_claim_has_a_measured_figure_and_a_verdict(
-    folder: Path, claim: str, measured: str, verdict: str
-) -> None:
-    _, _, found, judged = cells(folder, claim)
-    assert re.search(measured, found), found
-    assert re.fullmatch(rf"\*\*{verdict}.*\*\*", judged), judged
+def test_every_claim_has_a_measured_figure_and_a_verdict(folder: Path) -> None:
+    lines = (folder / "claims.md").read_text().splitlines()
+    for claim, measured, verdict in CLAIMS:
+        (row,) = [line for line in lines if claim in line]
+        _, _, found, judged = [cell.strip() for cell in re.split(r"(?<!\\)\|", row)[1:-1]]
+        assert re.search(measured, found), found
+        assert re.fullmatch(rf"\*\*{verdict}.*\*\*", judged), judged
 
 
 def test_claims_state_our_choices_and_how_far_the_engines_agree(folder: Path) -> None:
@@ -138,7 +126,7 @@ def test_claims_state_our_choices_and_how_far_the_engines_agree(folder: Path) ->
     assert (holds, condition) == (text.count("| **holds** |"), text.count("| **holds only"))
 
 
-def test_figures_are_complete_and_small(folder: Path) -> None:
+def test_figures_are_complete_and_small_and_have_the_panels_of_the_paper(folder: Path) -> None:
     charts = ["chart_element", "chart_bank", "block_diagram", "chart_lugre"]
     names = ["fig3", "fig3_slipping", "fig4", "fig4_laws", "residual", "residual_held", *charts]
     for name in names:
@@ -148,12 +136,8 @@ def test_figures_are_complete_and_small(folder: Path) -> None:
         svg = folder / f"{name}.svg"
         assert svg.stat().st_size < 1_000_000
         assert ElementTree.parse(svg).getroot().tag.endswith("svg")
-
-
-def test_figure_4_has_the_panels_of_the_paper(folder: Path) -> None:
-    # Matplotlib draws text as paths, with the text itself in a comment.
     for name, letters in (("fig3", "abcd"), ("fig4", "abcdef")):
-        text = (folder / f"{name}.svg").read_text()
+        text = (folder / f"{name}.svg").read_text()  # text as paths, with itself in a comment
         for letter in letters:
             assert f"<!-- {letter} -->" in text, (name, letter)
 
@@ -172,26 +156,6 @@ def test_traces_and_logs_are_there_and_agree(folder: Path) -> None:
     np.testing.assert_array_equal(chart.F, ifelse.F)
 
 
-def test_held_outputs_explain_the_residual_of_figure_3(folder: Path) -> None:
-    """Within a factor of 10, in proportion to the sample time; x is ahead by one step."""
-    runs = {
-        name: Trace.load(folder / "traces" / f"{name}.npz")
-        for name in ["fig3_step", *(e.name for e in experiments() if "fig3_held_chart" in e.name)]
-    }
-    lags = figure_3_lags(runs)
-    assert [lag.period for lag in lags] == [2e-3, 1e-3, 5e-4]
-    for phase in (RAMP, OSCILLATION):
-        sizes = np.array([lag.during(phase).largest for lag in lags])
-        np.testing.assert_allclose(sizes[:-1] / sizes[1:], 2.0, rtol=0.03)
-        assert (sizes[1] / (PAPERS_FORCE, PAPERS_PLACE) < 10).all()
-        assert (sizes[1] / (PAPERS_FORCE, PAPERS_PLACE) > 0.1).all()
-    middle = lags[1].during((1.0, 2.0))
-    inside, held = (runs[name].sample(middle.t) for name in ("fig3_step", "fig3_held_chart_1000us"))
-    step = 1e-3 * inside.v
-    assert np.median(middle.place / step) == pytest.approx(1.0, abs=0.02)
-    assert np.median((held.z - inside.z)[:, 0] / step) == pytest.approx(0.5, abs=0.02)
-
-
 def test_an_unwritable_folder_is_reported_before_anything_runs(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     begun: list[str] = []
@@ -200,15 +164,10 @@ def test_an_unwritable_folder_is_reported_before_anything_runs(tmp_path: Path) -
     assert not begun
 
 
-def test_a_run_that_fails_leaves_its_part(tmp_path: Path) -> None:
-    with pytest.raises(SimulationError, match=r"kept in .*partial\.npz"):
-        write(tmp_path, force="0.1*sqrt(3 - t)")
-    assert 2.999 < Trace.load(tmp_path / "partial.npz").t[-1] <= 3.0
-
-
-def test_a_run_that_fails_leaves_the_runs_before_it(tmp_path: Path) -> None:
-    with pytest.raises(SimulationError, match="fig4_chart"):
+def test_a_run_that_fails_leaves_its_part_and_the_runs_before_it(tmp_path: Path) -> None:
+    with pytest.raises(SimulationError, match=r"fig4_chart.*kept in .*partial\.npz"):
         write(tmp_path, velocity="0.1*sqrt(3 - t)")
+    assert 2.999 < Trace.load(tmp_path / "partial.npz").t[-1] <= 3.0
     assert Trace.load(tmp_path / "traces" / "fig3_chart.npz").t[-1] == paper.FIG3_END
 
 
@@ -220,3 +179,21 @@ def test_custom_signals_are_used_and_not_assessed(monkeypatch: pytest.MonkeyPatc
     assert "F_a = 0.1*t" in text
     assert "Not assessed" in text
     assert "| claim |" not in text
+
+
+def test_before_a_tick_the_force_is_that_of_the_tick_before() -> None:
+    model, rig = non_drifting("published")
+    h, end = 0.02, 0.4
+    ticks = h * np.arange(20)
+    held = simulate(model, rig, end, events="held", step=h, t_eval=np.append(ticks, end))
+    inside = simulate(model, rig, end, rtol=1e-9)
+    lag = lag_of(held, inside)
+    np.testing.assert_array_equal(lag.t, ticks)
+    exact = inside.sample([*ticks, end])
+    np.testing.assert_array_equal(lag.force, held.F[:-1] - exact.F[:-1])
+    np.testing.assert_array_equal(lag.before, held.F[:-1] - exact.F[1:])
+    np.testing.assert_array_equal(lag.place, held.x[:-1] - exact.x[:-1])
+    assert lag.during((0.1, 0.2)).t == pytest.approx([0.1, 0.12, 0.14, 0.16, 0.18])
+    assert lag.largest_before > lag.median[0]
+    with pytest.raises(TypeError, match="must have a sample time"):
+        lag_of(inside, inside)

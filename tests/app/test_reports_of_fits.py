@@ -13,7 +13,7 @@ from gms_fsm import Fit, Record
 from gms_fsm.app import fit_report
 from gms_fsm.app.fit_report import report_files, write_report
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.errors import OutputError, ParameterError
+from gms_fsm.errors import OutputError
 from gms_fsm.foundation.extras import missing
 from gms_fsm.identification.result import Choice, ChoiceRow
 from tests.identification.fits_made import small, two_records, with_profiles, with_table
@@ -42,18 +42,14 @@ def table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_the_files_are_there(folder: Path) -> None:
+def test_the_page_names_its_files_every_parameter_and_score(folder: Path) -> None:
     written = {path.name for path in folder.iterdir()}
     wanted = set(report_files()) - {"fitted.csv"}  # for a long motion
     assert wanted | FILES | {"fit.png"} <= written
-    page = (folder / "report.md").read_text(encoding="utf-8")
+    page, fit = (folder / "report.md").read_text(encoding="utf-8"), small()
     for name in wanted - {"report.md"}:
         assert f"({name})" in page
     assert (folder / "fit.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_the_page_has_every_parameter_and_score(folder: Path) -> None:
-    page, fit = (folder / "report.md").read_text(encoding="utf-8"), small()
     for each in fit.table:
         value, interval = each.shown
         assert f"| {each.name} | {value} | {interval} | {each.unit} |" in page
@@ -74,6 +70,7 @@ def test_what_cannot_be_told_is_named(tmp_path: Path) -> None:
     assert ("never slipped: element" in doubts) == bool(small().never_slipped)
 
 
+@pytest.mark.slow
 def test_profiles_are_there_exactly_when_something_is_open(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")
     names = {"profiles.png", "profiles.svg"}
@@ -113,11 +110,7 @@ def test_tables_have_all_digits(folder: Path) -> None:
     assert [float(row["modelled_N"]) for row in found] == part.modelled.tolist()
     assert [row["use"] == "held out" for row in found] == part.held.tolist()
     assert [row["use"] == "training" for row in found] == part.rows.tolist()
-
-
-def test_residuals_are_read_back_as_a_record(folder: Path) -> None:
     again = Record.from_csv(folder / "residuals.csv", position="x_m", force="residual_N")
-    (part,) = small().residuals()
     assert np.array_equal(again.columns["force"], part.measured - part.modelled)
 
 
@@ -130,42 +123,32 @@ def test_the_scenario_runs_and_gives_the_fitted_force(folder: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_several_records_have_a_table(tmp_path: Path) -> None:
-    page = write_report(two_records(), tmp_path).read_text(encoding="utf-8")
+def test_several_records_have_a_table_and_say_licences_and_notes_once(tmp_path: Path) -> None:
+    task = two_records().task
+    records = tuple(replace(each, licence="MIT; somebody") for each in task.records)
+    notes = ("long: velocity: as measured", "short: velocity: as measured", "long: 2 gaps", "other")
+    fit = replace(two_records(), task=replace(task, records=records), notes=notes)
+    page = write_report(fit, tmp_path).read_text(encoding="utf-8")
     assert "| record | training [N] | held out [N] |" in page
     for part in two_records().residuals():
         rmse = np.sqrt(np.mean((part.measured - part.modelled)[part.rows] ** 2))
         assert f"| {part.record.name} | {rmse:.4g} | – |" in page
     assert "no rows were held out" in page
     assert "repeatability is not known" in page
+    said = ("licence of all records: MIT; somebody", "all records: velocity: as measured")
+    for each in (*said, "long: 2 gaps", "other"):
+        assert page.count(f"- {each}\n") == 1
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_licences_and_notes_are_said_once(tmp_path: Path) -> None:
-    task = two_records().task
-    records = tuple(replace(each, licence="MIT; somebody") for each in task.records)
-    notes = ("long: velocity: as measured", "short: velocity: as measured", "long: 2 gaps", "other")
-    fit = replace(two_records(), task=replace(task, records=records), notes=notes)
-    page = write_report(fit, tmp_path).read_text(encoding="utf-8")
-    assert page.count("- licence of all records: MIT; somebody\n") == 1
-    for said in ("all records: velocity: as measured", "long: 2 gaps", "other"):
-        assert page.count(f"- {said}\n") == 1
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_candidates_are_listed_with_the_chosen_one(tmp_path: Path) -> None:
+def test_candidates_and_an_interruption_are_said(tmp_path: Path) -> None:
     rows = tuple(ChoiceRow(name, "simple", 3, 0.1, 0.99, -5.0, 1.0) for name in ("one", "two"))
-    chosen = replace(small(), choice=Choice(rows, "two"))
+    stopped = "The search was interrupted: this is the best so far."
+    chosen = replace(small(), choice=Choice(rows, "two"), stopped=stopped)
     page = write_report(chosen, tmp_path).read_text(encoding="utf-8")
     assert "| one | simple | 3 | 0.1 | 0.9900 | -5 | 1 |  |" in page
     assert "| **two** | simple | 3 | 0.1 | 0.9900 | -5 | 1 |  |" in page
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_an_interrupted_search_is_said_first(tmp_path: Path) -> None:
-    stopped = replace(small(), stopped="The search was interrupted: this is the best so far.")
-    page = write_report(stopped, tmp_path).read_text(encoding="utf-8")
-    assert page.splitlines()[2] == "**The search was interrupted: this is the best so far.**"
+    assert page.splitlines()[2] == f"**{stopped}**"
 
 
 def test_without_matplotlib_the_texts_are_written(
@@ -194,8 +177,3 @@ def test_a_motion_too_long_for_a_scenario_is_said(
         page = write_report(small(), tmp_path).read_text(encoding="utf-8")
     assert "- no scenario was written: fitted.toml: it would have 1316456 bytes" in page
     assert "gms-fsm run" not in page
-
-
-def test_something_else_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"it must be a Fit, from gms_fsm\.fit"):
-        write_report("fit", tmp_path)  # type: ignore[arg-type]

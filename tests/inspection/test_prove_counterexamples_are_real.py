@@ -17,10 +17,10 @@ import pytest
 pytest.importorskip("z3", reason="needs z3 (extra: check)")
 
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from gms_fsm import Chart, Finding, Report, State, Transition, prove
+from gms_fsm import Chart, Finding, Report, Transition, prove
 from gms_fsm.language import Value, evaluate, parse_value
+from tests.strategies import pairs_on_a_surface, provable_charts
 
 pytestmark = pytest.mark.slow
 
@@ -43,35 +43,6 @@ GRID += [
     }
     for _ in range(500)
 ]
-
-# --------------------------------------------------------------------------- random charts
-left_sides = st.sampled_from(
-    ["z", "abs(z)", "v", "abs(v)", "z * v", "z + v", "max(z, v)", "sgn(v) * z", "z ** 2", "z - v"]
-)
-right_sides = st.sampled_from(["s", "-s", "v_c", "-v_c", "0", "1", "0.5 * s", "s + v_c", "-0.5"])
-comparisons = st.builds(
-    "{} {} {}".format, left_sides, st.sampled_from(["<", "<=", ">", ">="]), right_sides
-)
-clauses = st.one_of(
-    comparisons,
-    comparisons.map("not {}".format),
-    st.builds("({} or {})".format, comparisons, comparisons),
-)
-guards = st.lists(clauses, min_size=1, max_size=3).map(" and ".join)
-flows = st.sampled_from(["v", "0", "1 - z / s", "sgn(v) - z / s", "-v", "abs(v)", "z * v"])
-actions = st.one_of(st.just({}), st.sampled_from([{"z": "0"}, {"z": "-z"}, {"z": "s"}]))
-
-
-@st.composite
-def charts(draw: st.DrawFn) -> Chart:
-    names = ["first", "second", "third"][: draw(st.integers(2, 3))]
-    ends = st.sampled_from(names)
-    edges = tuple(
-        Transition(f"edge{i}", draw(ends), draw(ends), draw(guards), draw(actions))
-        for i in range(draw(st.integers(2, 4)))
-    )
-    states = tuple(State(name, {"z": draw(flows)}) for name in names)
-    return Chart("random", ("v", "s"), ("z",), ("v_c",), states, edges, {"F": "z"})
 
 
 # --------------------------------------------------------------------------- what a point shows
@@ -141,7 +112,7 @@ def test_refutations_are_confirmed_and_proofs_are_not_contradicted(number: int) 
     seen: Counter[tuple[str, str]] = Counter()
 
     @settings(max_examples=number, deadline=None, derandomize=True)
-    @given(charts())
+    @given(provable_charts())
     def attack(chart: Chart) -> None:
         found = prove(chart, ["s > 0", "v_c > 0"])
         count_of(found, seen)
@@ -169,28 +140,6 @@ def test_refutations_are_confirmed_and_proofs_are_not_contradicted(number: int) 
 
 
 # --------------------------------------------------------------------------- on a surface
-surfaces = st.sampled_from(
-    ["s", "-s", "0.5 * s", "v", "1", "1 / s", "0.5 + abs(v)", "max(v, s)", "min(v, s)"]
-)
-rests = st.lists(
-    st.sampled_from(["v > v_c", "v <= v_c", "z > 0", "abs(v) <= v_c", "v < 0", "z * v >= 0"]),
-    max_size=2,
-)
-
-
-@st.composite
-def pairs(draw: st.DrawFn) -> Chart:
-    """Two states whose guards share a surface."""
-    surface = draw(surfaces)
-    go, back = (
-        " and ".join([f"z {op} {surface}", *draw(rests)])
-        for op in draw(st.sampled_from([(">=", "<"), ("<=", ">"), (">", "<="), (">", "<")]))
-    )
-    states = tuple(State(name, {"z": draw(flows)}) for name in ("first", "second"))
-    edges = (Transition("go", "first", "second", go), Transition("back", "second", "first", back))
-    return Chart(surface, ("v", "s"), ("z",), ("v_c",), states, edges, {"F": "z"})
-
-
 RATES = list(product((-1.0, -0.25, 0.0, 0.75), (-1.0, 0.0, 0.25)))
 
 
@@ -220,7 +169,7 @@ def test_chattering_is_confirmed_by_a_short_step_of_each_flow(number: int) -> No
     seen: Counter[tuple[str, str]] = Counter()
 
     @settings(max_examples=number, deadline=None, derandomize=True)
-    @given(pairs())
+    @given(pairs_on_a_surface())
     def attack(chart: Chart) -> None:
         found = prove(chart, ["s > 0", "v_c > 0"])
         count_of(found, seen)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from random import Random
 
+import numpy as np
+
 from gms_fsm import Session, Trace
 from tests.corpus import FAILING, FEW, each, outcome, run
 from tests.helpers import other_parts
@@ -42,16 +44,27 @@ def test_wherever_it_goes_it_shows_the_rows_of_the_run(name: str) -> None:
     """Steps, backward too, to transitions and to times, at random; repeat with the same name."""
     session, dice, whole = session_of(name, engine="ifelse"), Random(name), whole_of(name)
     assert whole is not None
-    start, t_end = whole.t[0], run(name).t_end
-    moves = {
-        "step": lambda: session.step(dice.randint(1, 40)),
-        "back": lambda: session.back(dice.randint(1, 40)),
-        "next": session.next_transition,
-        "previous": session.prev_transition,
-        "goto": lambda: session.goto(dice.uniform(start, t_end)),
-    }
-    for move in dice.choices([*moves], k=25):
-        moves[move]()
+    start, t_end, last = whole.t[0], run(name).t_end, len(whole) - 1
+    fired, row = [0, *np.flatnonzero(whole.microstep), last], 0
+    for move in dice.choices(["step", "back", "next", "previous", "goto"], k=25):
+        far, t = dice.randint(1, 40), dice.uniform(start, t_end)
+        match move:
+            case "step":
+                session.step(far)
+                row = min(row + far, last)
+            case "back":
+                session.back(far)
+                row = max(row - far, 0)
+            case "next":
+                session.next_transition()
+                row = next((each for each in fired if each > row), last)
+            case "previous":
+                session.prev_transition()
+                row = max((each for each in fired[:-1] if each < row), default=0)
+            case "goto":
+                session.goto(t)
+                row = int(np.searchsorted(whole.t, t, side="right")) - 1
         here = session.branch
-        row = here.raw(here.cursor)
-        assert [row[0], list(row[2])] == [whole.t[here.cursor], whole.rows.y[here.cursor].tolist()]
+        assert here.cursor == row, move
+        found = here.raw(row)
+        assert [found[0], list(found[2])] == [whole.t[row], whole.rows.y[row].tolist()]

@@ -20,9 +20,9 @@ from gms_fsm.app.lessons import LESSONS, Result
 from gms_fsm.app.lessons.engine.lesson import Lesson, grid
 from gms_fsm.app.lessons.engine.notebooks import composed
 from gms_fsm.app.lessons.engine.predict import reveal, vary
-from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
+from gms_fsm.errors import MissingExtraError, ParameterError
 from tests.helpers import ROOT, matrix
-from tests.scenario_files import CommandLine
+from tests.scenario_files import CommandLine, one_message
 
 FOLDER = ROOT / "docs" / "lessons"
 COUNTED = ("", "elements n", "switches found once per step", "elements in slip")  # without a unit
@@ -62,6 +62,21 @@ def test_the_five_lines_say_what_was_measured(ran: Ran, number: int) -> None:
         assert line.startswith("Measured")
 
 
+@each_lesson
+def test_readers_predict_before_the_run_and_compare_after_it(ran: Ran, number: int) -> None:
+    cells = composed(number)
+    (run,) = (i for i, (_, text) in enumerate(cells) if "this.run()" in text)
+    asked = "\n".join(text for kind, text in cells[:run] if kind == "code")
+    (answers,) = (text for kind, text in cells[run:] if kind == "code" and "reveal(" in text)
+    assert any("<details>" in text for kind, text in cells[run:] if kind == "markdown")
+    names: dict[str, Any] = {"result": ran(number)}
+    exec(asked, names)
+    predictions = [name for name, value in names.items() if value is None]
+    assert len(predictions) >= 2
+    assert re.findall(r"^reveal\((\w+), ", answers, re.MULTILINE) == predictions
+    exec(answers, names)  # every answer can be read from the run
+
+
 @pytest.mark.slow
 @each_lesson
 def test_its_figure_has_units_and_nothing_overlaps(ran: Ran, number: int) -> None:
@@ -92,21 +107,6 @@ def test_its_figure_has_units_and_nothing_overlaps(ran: Ran, number: int) -> Non
         wide = min(a.x1, b.x1) - max(a.x0, b.x0)
         high = min(a.y1, b.y1) - max(a.y0, b.y0)
         assert wide <= 1 or high <= 1, (one, other)
-
-
-@each_lesson
-def test_readers_predict_before_the_run_and_compare_after_it(ran: Ran, number: int) -> None:
-    cells = composed(number)
-    (run,) = (i for i, (_, text) in enumerate(cells) if "this.run()" in text)
-    asked = "\n".join(text for kind, text in cells[:run] if kind == "code")
-    (answers,) = (text for kind, text in cells[run:] if kind == "code" and "reveal(" in text)
-    assert any("<details>" in text for kind, text in cells[run:] if kind == "markdown")
-    names: dict[str, Any] = {"result": ran(number)}
-    exec(asked, names)
-    predictions = [name for name, value in names.items() if value is None]
-    assert len(predictions) >= 2
-    assert re.findall(r"^reveal\((\w+), ", answers, re.MULTILINE) == predictions
-    exec(answers, names)  # every answer can be read from the run
 
 
 def test_a_page_without_its_parts_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -205,27 +205,16 @@ def test_the_command_line_writes_text_figure_and_page(gms_fsm: CommandLine) -> N
         assert f"lesson_7.{name}" in done.out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["99"], "no lesson '99'"),
-        (["0"], "no lesson '0'"),
-        (["one"], "no lesson 'one'"),
-        (["7", "-o", "file/out"], "choose another folder"),
-    ],
-)
 def test_a_mistake_is_one_message_before_anything_runs(
-    arguments: list[str], said: str, gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
+    gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Lesson, "run", lambda _: pytest.fail("it was run"))
     Path("file").write_text("in the way")
-    done = gms_fsm("lesson", *arguments)
-    assert done.code == 2
-    assert said in done.err
-    assert "Traceback" not in done.err + done.out
+    one_message(gms_fsm("lesson", "0"), "no lesson '0'")
+    one_message(gms_fsm("lesson", "7", "-o", "file/out"), "choose another folder")
     assert list(Path().iterdir()) == [Path("file")]
-    with pytest.raises(ParameterError if len(arguments) == 1 else OutputError):
-        lessons.teach(99 if len(arguments) == 1 else 7, "file/out")
+    with pytest.raises(ParameterError):
+        lessons.teach(99, "out")
 
 
 def test_without_the_extras_there_is_the_text_and_a_note(
@@ -252,7 +241,6 @@ def test_without_the_extras_there_is_the_text_and_a_note(
         (3.0, 6.0, "50 % too low"),
         (9.0, 6.0, "50 % too high"),
         (-1.0, 6.0, "far off"),
-        (1e9, 6.0, "far off"),
         (0.0, 0.0, "You predicted 0 N. Measured: 0 N."),
         ("lower", "higher", "You predicted lower. Measured: higher."),
         (None, 6.0, "You predicted nothing. Measured: 6 N."),
