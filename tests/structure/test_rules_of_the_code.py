@@ -77,6 +77,13 @@ def hiding(source: Source) -> Iterator[int]:
                 yield node.lineno
 
 
+def named_errors(source: Source) -> Iterator[int]:
+    """Errors are defined in one place, and those that keep a trace in another."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.ClassDef) and node.name.endswith(("Error", "Exception")):
+            yield node.lineno
+
+
 def reading(source: Source) -> Iterator[int]:
     """Messages are for people; programs use the fields."""
     for node in ast.walk(source.tree):
@@ -190,6 +197,12 @@ RULES = {
         ("gms_fsm/", "plots/"),
         ('raise ChartError("none; give one")', 'raise ChartError(f"{a} is none; give {b}")'),
         ('raise ChartError("none", advice="give one; or two")',),
+    ),
+    "errors have their homes": Rule(
+        named_errors,
+        ("gms_fsm/", "plots/"),
+        ("class OwnError(ValueError): ...",),
+        known=("gms_fsm/errors.py", "gms_fsm/traces/failures.py"),
     ),
     "no code reads a message": Rule(
         reading,
