@@ -30,8 +30,9 @@ def subject_of(name: str) -> Model | System:
 
 
 def there(folder: Path) -> dict[str, bytes]:
-    """Return what is in a folder."""
-    return {each.relative_to(folder).as_posix(): each.read_bytes() for each in folder.rglob("*.*")}
+    """Return what is in a folder, beside the list of what is ours."""
+    files = [each for each in folder.rglob("*.*") if each.name != ".gms-fsm-files.json"]
+    return {each.relative_to(folder).as_posix(): each.read_bytes() for each in files}
 
 
 @pytest.mark.parametrize("name", RUNS)

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -140,176 +140,187 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "LiveChart": lambda: plots.LiveChart(_trace()),
 }
 
+
 # --------------------------------------------------------------------------- right arguments
-# A dataclass is made of the fields of an example.
-EXAMPLES = [make() for name, make in OBJECTS.items() if name not in RECORDS]
-EXAMPLES += [BODY, CONTACT, STATE, EDGE, Bench(), Spring("shaft", "a", k=1.0)]
-EXAMPLES += [Sampled("pid", period=1e-3, updates={"u": "t"}, initial={"u": 1.0})]
-# By name; "Entry.name" goes before. What has a default and is not here is given its default.
-RIGHT: dict[str, Any] = {
-    f"{type(example).__name__}.{each.name}": getattr(example, each.name)
-    for example in EXAMPLES
-    if is_dataclass(example)
-    for each in fields(example)
-    if each.init
-}
-RIGHT |= {
-    **dict.fromkeys(("branch", "element", "number", "row"), 0),
-    **dict.fromkeys(("condition", "expression", "text"), "z > 1"),
-    **dict.fromkeys(("system", "model", "model_or_contact"), MODEL),
-    "alpha": [1.0],
-    "chart": CHART,
-    "column": "stick-slip",
-    "dt": 0.1,
-    "edge": "break_away_forward",
-    "elements": 1,
-    "graph": plots.block_diagram(1),
-    "k": [2.0],
-    "kind": "guard",
-    "law": "signed",
-    "models": [MODEL],
-    "monitors": {},
-    "name": "z",
-    "path": Path("file.npz"),
-    "points": 5,
-    "records": _rubbed(),
-    "rig": RIG,
-    "settings": None,
-    "speeds": [1e-3, 2e-3],
-    "state": "stick",
-    "stribeck": PARAMETERS.stribeck,
-    "stroke": 1e-3,
-    "t": 0.5,
-    "t_end": 1.0,
-    "times": [0.5],
-    "trace": _trace(),
-    "v": np.array(0.5),
-    "v_c": 1.0,
-    "values": {"z": {0: 0.1}},
-    "weights": [1.0],
-    "whose": "simulate",
-    "y": FrictionEquations(MODEL).initial,
-    "C": 0.1,
-}
-SEVERAL: dict[str, dict[str, Any]] = {
-    "Chart.guard_text": {"edge": "go"},
-    "Chart.state_index": {"name": "on"},
-    "Fit.bootstrap": {"draws": 2},
-    "Fit.compare": {"others": _fit()},
-    "Fit.predict": {"record": _rubbed()},
-    "Fit.profile": {"name": "k1"},
-    "Fit.score": {"record": _rubbed()},
-    "FrictionBank": {"t": 0.0},
-    "FrictionBank.from_array": {"array": FrictionBank([MODEL]).to_array()},
-    "FrictionBank.restore": {"snapshot": FrictionBank([MODEL]).snapshot()},
-    "FrictionEquations": {"t": 0.0},
-    "FrictionState": {"t": 0.0},
-    "FrictionState.from_array": {"array": FrictionState(MODEL).to_array()},
-    "FrictionState.restore": {"snapshot": FrictionState(MODEL).snapshot()},
-    **{
-        f"{kind}.{name}": {"v0": v, "v1": v}
-        for kind, v in (("FrictionState", 0.1), ("FrictionBank", [0.1]))
-        for name in ("advance", "advance_to", "peek")
-    },
-    "Record.from_arrays": {"position": TIMES, "time": TIMES},
-    "Session": {"t_end": 1.0},
-    "Session.break_on": {"kind": "tested"},
-    "Session.watch": {"expression": "z1", "text": "z1"},
-    "System.body": {"name": "mass"},
-    "System.contact": {"name": "pad"},
-    "animate": {"path": Path("a.gif"), "frames": 2},
-    "choose": {"candidates": {"bank": (MODEL, ["k"])}, "fold": "cycles", "cycles": 5.0},
-    "explore": {"initial": None, "settings": None, "t_start": 0.0, "t_end": 1.0}
-    | {"sliders": {"v_c": (1e-9, 2.0)}},
-    "export": {"folder": Path("c99"), "format": "c99", "name": "friction"},
-    "fit": {"fixed": {"v_c": 1e-3}, "free": ["k"], "search": "local"},
-    "handout": {"path": Path("a.pdf"), "velocity": "0.1", "t_end": 1.0},
-    "initial_bank": {"n": 2, "v_c": None},
-    "live_statechart": {"row": 0},
-    "measure_phenomena": {"models": ["stiction"], "phenomena": ["stick-slip"]},
-    "preset": {"chosen": "ieee1"},
-    "render": {"path": Path("a.dot")},
-    "schematic": {"system": SYSTEM},
-    "simulate": {"t_end": 1.0},
-    "sweep": {"parameters": {"v_c": [1.0]}},
-    "unfold": {"trace": _switching(), "t0": 1.0, "t1": 3.0},
-    "write_replay": {"path": Path("a.html")},
-}
-RIGHT |= {f"{name}.{key}": given[key] for name, given in SEVERAL.items() for key in given}
+@functools.cache
+def right() -> dict[str, Any]:
+    """Return valid arguments by name; "Entry.name" goes before.
+
+    A dataclass is made of the fields of an example. What has a default and is not here is given its
+    default.
+    """
+    examples = [make() for name, make in OBJECTS.items() if name not in RECORDS]
+    examples += [BODY, CONTACT, STATE, EDGE, Bench(), Spring("shaft", "a", k=1.0)]
+    examples += [Sampled("pid", period=1e-3, updates={"u": "t"}, initial={"u": 1.0})]
+    found = {
+        f"{type(example).__name__}.{each.name}": getattr(example, each.name)
+        for example in examples
+        if is_dataclass(example)
+        for each in fields(example)
+        if each.init
+    }
+    found |= _by_name()
+    return found | {
+        f"{name}.{key}": given[key] for name, given in _by_entry().items() for key in given
+    }
 
 
-class Entry(NamedTuple):
-    """A public entry with valid arguments."""
+def _by_name() -> dict[str, Any]:
+    return {
+        **dict.fromkeys(("branch", "element", "number", "row"), 0),
+        **dict.fromkeys(("condition", "expression", "text"), "z > 1"),
+        **dict.fromkeys(("system", "model", "model_or_contact"), MODEL),
+        "alpha": [1.0],
+        "chart": CHART,
+        "column": "stick-slip",
+        "dt": 0.1,
+        "edge": "break_away_forward",
+        "elements": 1,
+        "graph": plots.block_diagram(1),
+        "k": [2.0],
+        "kind": "guard",
+        "law": "signed",
+        "models": [MODEL],
+        "monitors": {},
+        "name": "z",
+        "path": Path("file.npz"),
+        "points": 5,
+        "records": _rubbed(),
+        "rig": RIG,
+        "settings": None,
+        "speeds": [1e-3, 2e-3],
+        "state": "stick",
+        "stribeck": PARAMETERS.stribeck,
+        "stroke": 1e-3,
+        "t": 0.5,
+        "t_end": 1.0,
+        "times": [0.5],
+        "trace": _trace(),
+        "v": np.array(0.5),
+        "v_c": 1.0,
+        "values": {"z": {0: 0.1}},
+        "weights": [1.0],
+        "whose": "simulate",
+        "y": FrictionEquations(MODEL).initial,
+        "C": 0.1,
+    }
 
-    make: Callable[[], Callable[..., Any]]
-    right: dict[str, Any]
+
+def _by_entry() -> dict[str, dict[str, Any]]:
+    return {
+        "Chart.guard_text": {"edge": "go"},
+        "Chart.state_index": {"name": "on"},
+        "Fit.bootstrap": {"draws": 2},
+        "Fit.compare": {"others": _fit()},
+        "Fit.predict": {"record": _rubbed()},
+        "Fit.profile": {"name": "k1"},
+        "Fit.score": {"record": _rubbed()},
+        "FrictionBank": {"t": 0.0},
+        "FrictionBank.from_array": {"array": FrictionBank([MODEL]).to_array()},
+        "FrictionBank.restore": {"snapshot": FrictionBank([MODEL]).snapshot()},
+        "FrictionEquations": {"t": 0.0},
+        "FrictionState": {"t": 0.0},
+        "FrictionState.from_array": {"array": FrictionState(MODEL).to_array()},
+        "FrictionState.restore": {"snapshot": FrictionState(MODEL).snapshot()},
+        **{
+            f"{kind}.{name}": {"v0": v, "v1": v}
+            for kind, v in (("FrictionState", 0.1), ("FrictionBank", [0.1]))
+            for name in ("advance", "advance_to", "peek")
+        },
+        "Record.from_arrays": {"position": TIMES, "time": TIMES},
+        "Session": {"t_end": 1.0},
+        "Session.break_on": {"kind": "tested"},
+        "Session.watch": {"expression": "z1", "text": "z1"},
+        "System.body": {"name": "mass"},
+        "System.contact": {"name": "pad"},
+        "animate": {"path": Path("a.gif"), "frames": 2},
+        "choose": {"candidates": {"bank": (MODEL, ["k"])}, "fold": "cycles", "cycles": 5.0},
+        "explore": {"initial": None, "settings": None, "t_start": 0.0, "t_end": 1.0}
+        | {"sliders": {"v_c": (1e-9, 2.0)}},
+        "export": {"folder": Path("c99"), "format": "c99", "name": "friction"},
+        "fit": {"fixed": {"v_c": 1e-3}, "free": ["k"], "search": "local"},
+        "handout": {"path": Path("a.pdf"), "velocity": "0.1", "t_end": 1.0},
+        "initial_bank": {"n": 2, "v_c": None},
+        "live_statechart": {"row": 0},
+        "measure_phenomena": {"models": ["stiction"], "phenomena": ["stick-slip"]},
+        "preset": {"chosen": "ieee1"},
+        "render": {"path": Path("a.dot")},
+        "schematic": {"system": SYSTEM},
+        "simulate": {"t_end": 1.0},
+        "sweep": {"parameters": {"v_c": [1.0]}},
+        "unfold": {"trace": _switching(), "t0": 1.0, "t1": 3.0},
+        "write_replay": {"path": Path("a.html")},
+    }
 
 
-def _right(name: str, call: Callable[..., Any], skipped: int = 0) -> dict[str, Any]:
+def _right(name: str, call: Callable[..., Any], skipped: int) -> dict[str, Any]:
     """Return valid arguments, by the signature."""
     found = {}
     for each in list(inspect.signature(call).parameters.values())[skipped:]:
         if each.kind is each.VAR_KEYWORD:
             if name in ("simulate", "sweep", "Session", "explore"):
                 found |= {one.name: one.default for one in fields(Settings)}
-            mine = [key for key in RIGHT if key.rpartition(".")[0] == name]
-            found |= {key.rpartition(".")[2]: RIGHT[key] for key in mine}
-        elif f"{name}.{each.name}" in RIGHT:
-            found[each.name] = RIGHT[f"{name}.{each.name}"]
+            mine = [key for key in right() if key.rpartition(".")[0] == name]
+            found |= {key.rpartition(".")[2]: right()[key] for key in mine}
+        elif f"{name}.{each.name}" in right():
+            found[each.name] = right()[f"{name}.{each.name}"]
         elif each.default is not each.empty:
             found[each.name] = each.default
         elif each.kind is not each.VAR_POSITIONAL:
-            found[each.name] = RIGHT.get(each.name)
+            found[each.name] = right().get(each.name)
     return found
 
 
-def _entries() -> Iterator[tuple[str, Entry]]:
-    """Yield every public entry; files are in the current folder."""
+def _names() -> Iterator[str]:
+    """Yield every public entry."""
     for home in (gms_fsm, plots):
         for name in home.__all__:
             call = getattr(home, name)
             if name not in RECORDS and not (isinstance(call, type) and issubclass(call, Exception)):
-                yield name, Entry(functools.partial(getattr, home, name), _right(name, call))
-    for kind, make in OBJECTS.items():
-        for name, member in inspect.getmembers(type(make()), callable):
+                yield name
+    for kind in OBJECTS:
+        for name, member in inspect.getmembers(_class(kind), callable):
             if not name.startswith("_") and not inspect.isclass(member):
-                bound = inspect.ismethod(member)  # a class method
-                yield (
-                    f"{kind}.{name}",
-                    Entry(
-                        lambda make=make, name=name: getattr(make(), name),
-                        _right(f"{kind}.{name}", member, 0 if bound else 1),
-                    ),
-                )
+                yield f"{kind}.{name}"
+
+
+def _class(name: str) -> Any:
+    return getattr(gms_fsm, name) if name in gms_fsm.__all__ else getattr(plots, name)
+
+
+def entry(name: str) -> tuple[Callable[[], Callable[..., Any]], dict[str, Any]]:
+    """Return an entry, made when it is called, and valid arguments."""
+    kind, _, method = name.partition(".")
+    if not method:
+        return lambda: _class(name), _right(name, _class(name), 0)
+    member = getattr(_class(kind), method)  # a class method is bound
+    arguments = _right(name, member, 0 if inspect.ismethod(member) else 1)
+    return lambda: getattr(OBJECTS[kind](), method), arguments
 
 
 def _faults(name: str) -> Iterator[str]:
-    make, right = ENTRIES[name]
-    for place in right:
+    make, arguments = entry(name)
+    for place in arguments:
         for wrong in FEWER.get(place, WRONG):
             call = make()
             parameter = inspect.signature(call).parameters.get(place)
             if wrong is None and parameter is not None and parameter.default is None:
                 continue
             try:
-                call(**{**right, place: wrong})
+                call(**{**arguments, place: wrong})
             except GMSError:
                 pass
             except Exception as error:
                 yield f"{name}({place}={wrong!r}): {type(error).__name__}: {str(error)[:150]}"
 
 
-ENTRIES = dict(_entries())
-
-
-@pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-@pytest.mark.parametrize("name", ENTRIES)
+@pytest.mark.parametrize("name", list(_names()))
 @pytest.mark.filterwarnings("ignore")
-def test_wrong_types_raise_our_errors(name: str) -> None:
+def test_wrong_types_raise_our_errors(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     if "." not in name:  # otherwise the wrong ones would be rejected for another reason
-        ENTRIES[name].make()(**ENTRIES[name].right)
+        make, arguments = entry(name)
+        make()(**arguments)
     assert list(_faults(name)) == []
