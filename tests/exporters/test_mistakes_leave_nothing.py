@@ -178,8 +178,8 @@ def test_a_text_of_a_chart_is_one_file(tmp_path: Path) -> None:
 
 # --------------------------------------------------------------------------- names and folders
 NAMES = ["../x", "/x", "a/b", "a b", "1x", "x.y", "é", "x" * 64]
-WORDS = [("st", "step"), ("st", "Z"), ("matlab", "k" * 52), ("transitions", "math"),
-         ("modelica", "z"), ("fmu2", "double")]  # fmt: skip
+WORDS = [("st", "Z"), ("matlab", "k" * 52), ("transitions", "math"), ("modelica", "z")]
+WORDS += [(form, min(formats()[form].words)) for form in PROGRAMS if formats()[form].words]
 
 
 @pytest.mark.parametrize(

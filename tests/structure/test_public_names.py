@@ -24,7 +24,11 @@ from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, PulledSlider, Slider,
 model = GMS(GMSParameters.paper("stick-slip"), law="signed")
 """
 LOADED = {  # code, what it loads and what it does not
-    "the façade": ("import gms_fsm; dir(gms_fsm)", "gms_fsm", "numpy transitions integrators"),
+    "the façade": (
+        "import gms_fsm; dir(gms_fsm)",
+        "gms_fsm",
+        f"{LARGE} llvmlite numpy transitions typer integrators",
+    ),
     "integrators": ("import integrators", "integrators", f"{LARGE} llvmlite gms_fsm transitions"),
     "simulating": (
         HEAD + 'assert len(simulate(model, Prescribed("0.2*sin(2*pi*t/20)"), 21.0).transitions)\n'
