@@ -20,7 +20,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.filterwarnings("ignore:the FMU has no binary"),
 ]
-RUNS = ("open loop", "lugre", "system servo")
+RUNS = ("open loop", "system servo")
 NOT_OF_SYSTEMS = {"scxml", "transitions", "matlab", "modelica", "st"}
 
 
