@@ -48,6 +48,7 @@ def test_it_moves_as_simulate_says() -> None:
     assert len(switches) == 4
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_episode() -> None:
     def episode(env: FrictionPositioning, seed: int) -> list[Any]:
         rows = [env.reset(seed=seed)[0].tolist()]

@@ -80,6 +80,7 @@ MAKERS: dict[str, Any] = {"control": friction_system, "pathsim": friction_block}
 hosts = pytest.mark.parametrize("host", MAKERS)
 
 
+@pytest.mark.slow
 @hosts
 def test_on_the_same_samples_it_is_simulate_to_the_bit(host: str) -> None:
     expected = simulate(MODEL, Prescribed((T, V)), 10.0, t_eval=T)
@@ -152,6 +153,7 @@ def test_a_response_begins_at_any_time_and_speed() -> None:
         assert response(system, t, np.full(100, 0.1)).outputs == pytest.approx(F, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_two_joints_are_two_systems() -> None:
     both = control.interconnect(
         [friction_system(MODEL, DT, name=name) for name in ("hip", "knee")],
@@ -166,6 +168,7 @@ def test_two_joints_are_two_systems() -> None:
     assert found[1].tolist() != found[0].tolist()
 
 
+@pytest.mark.slow
 def test_a_state_that_was_not_returned_is_refused_and_does_no_harm() -> None:
     system = friction_system(MODEL, DT)
     whole = response(system).outputs.tolist()
@@ -189,6 +192,7 @@ def test_the_servo_in_pathsim_is_reset_continued_and_stops_where_it_should() -> 
     assert len(friction.switches) == 24
 
 
+@pytest.mark.slow
 def test_blocks_with_their_own_periods_do_not_disturb_each_other() -> None:
     fine, coarse, alone = (friction_block(MODEL, period) for period in (DT, 4 * DT, 4 * DT))
     source = Source(speed)
@@ -210,6 +214,7 @@ def test_between_samples_and_late_samples_are_right() -> None:
     assert blocks[0].friction.t == 0.0
 
 
+@pytest.mark.slow
 def test_a_checkpoint_holds_the_friction(tmp_path: Path) -> None:
     there, here = friction_block(MODEL, DT), friction_block(MODEL, DT)
     before, after = driven(there, speed), driven(here, speed)

@@ -138,6 +138,7 @@ def test_several_frictions() -> None:
         assert found.t.tolist() == how.get("t_eval", found.t.tolist())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [1, lambda y: y[1]])
 def test_motion_along_a_jump_of_the_force(velocity: Any) -> None:
     """Coulomb friction by sgn(v): where it holds the mass, the motion slides along v = 0."""

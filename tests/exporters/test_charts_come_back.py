@@ -35,6 +35,7 @@ def back(chart: Chart, form: str, folder: Path) -> Chart:
     return rebuilt(file, file.machine_of([]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["scxml", "transitions"])
 def test_every_included_chart(form: str, tmp_path: Path) -> None:
     for name in MODELS:

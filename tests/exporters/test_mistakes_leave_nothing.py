@@ -163,6 +163,7 @@ def test_what_a_format_cannot_express(
     assert word in error.reason
 
 
+@pytest.mark.slow
 def test_an_engine_without_a_plain_form_says_why(tmp_path: Path) -> None:
     files = export(ChartModel(READS_F, {}), "c99", tmp_path, name="it")
     assert not [each for each in files if "plain" in each.name]
@@ -200,6 +201,7 @@ def test_a_chart_named_like_a_path(form: str, name: str, tmp_path: Path) -> None
     assert "another name" in said
 
 
+@pytest.mark.slow
 def test_what_is_not_ours_stays(tmp_path: Path) -> None:
     for name in [path.name for path in export(PAPER, "transitions", tmp_path / "a", name="it")]:
         folder = tmp_path / name.partition(".")[0]
@@ -231,6 +233,7 @@ def test_an_unknown_format(form: Any, tmp_path: Path) -> None:
     assert all(each in said for each in formats())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

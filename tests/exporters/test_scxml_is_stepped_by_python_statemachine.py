@@ -15,6 +15,7 @@ from tests.helpers import stick_slip
 VELOCITY = "0.15 * sin(2 * pi * t / 25)"
 
 
+@pytest.mark.slow
 def test_the_gms_element(tmp_path: Path) -> None:
     pytest.importorskip("statemachine", reason="needs python-statemachine")
     gms = stick_slip("signed")

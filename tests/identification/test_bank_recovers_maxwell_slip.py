@@ -56,6 +56,7 @@ def test_thresholds_on_the_grid_are_exact(places: list[int], seed: int | None) -
     np.testing.assert_allclose(of(model)[1], r, rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_other_thresholds_are_nearly_exact(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -101,6 +102,7 @@ RECORDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RECORDS)
 def test_other_records_of_it_give_the_same_bank(name: str) -> None:
     k, r = of(initial_bank(RECORDS[name](), 2, smoothing=0.0))
@@ -108,6 +110,7 @@ def test_other_records_of_it_give_the_same_bank(name: str) -> None:
     np.testing.assert_allclose(r, R[::2], rtol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("length", "load"), [(2.0**-40, 2.0**60), (2.0**30, 2.0**-40)])
 def test_other_units_give_the_same_bank(length: float, load: float) -> None:
     record = made(K, R, 0.1, seed=2)

@@ -102,6 +102,7 @@ def test_the_page_of_loops_has_the_tables_measured() -> None:
     assert [int(right) == 72 for _, _, right in rows] == [False, False, *[True] * 7]
 
 
+@pytest.mark.slow
 def test_the_regressions_are_those_of_all_cases() -> None:
     code = "import regressions.runs as r; print(len(r.Runs.params[0]))"
     done = subprocess.run(

@@ -86,6 +86,7 @@ for place, name in enumerate(gms_fsm.__all__):
 """)
 
 
+@pytest.mark.slow
 def test_public_names_are_those_that_type_checkers_see_and_no_rooms() -> None:
     branch = next(node for node in sources()["gms_fsm"].tree.body if isinstance(node, ast.If))
     told = {
