@@ -117,7 +117,7 @@ def test_co_simulation_on_random_records(name: str, form: str, tmp_path: Path, r
 @pytest.mark.parametrize("name", WHOLE)
 def test_whole_systems(name: str, form: str, tmp_path: Path, ran: Ran) -> None:
     system, end, seen = WHOLE[name]
-    t = np.linspace(0.0, end, 201)
+    t, unit = np.linspace(0.0, end, 201), "N" if seen.endswith("F") else "m"
     path = written(system, form, tmp_path, name="it")
     assert validate_fmu(str(path)) == []
     output = {"output": [seen, "switches"], "record_events": False, "output_interval": end / 200}
@@ -132,7 +132,7 @@ def test_whole_systems(name: str, form: str, tmp_path: Path, ran: Ran) -> None:
         exact = trace.value(seen)
         apart = np.abs(np.interp(t, result["time"], result[seen]) - exact).max()
         assert apart < 1e-6 * np.abs(exact).max() + 1e-7
-        ran(form, FMPY, f"{name}, {kind}", f"all switches, {seen} within {apart:.0e}")
+        ran(form, FMPY, f"{name}, {kind}", f"all switches, {seen} within {apart:.0e} {unit}")
 
 
 # What the engine refuses with such a force, or what is not a friction of one velocity.

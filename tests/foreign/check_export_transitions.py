@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gms_fsm import Prescribed, export, simulate
-from tests.exporters.charts_to_export import MODELS, SLOW, model
+from tests.exporters.charts_to_export import MODELS, SLOW, imported, model, rebuilt
 
 ASK = f"""
 import json, math, sys
@@ -30,7 +30,7 @@ def test_in_a_process_of_their_own(ran: Callable[..., None], tmp_path: Path) -> 
     how: Any = {"method": "euler", "step": 1e-3, "events": "step", "engine": "ifelse"}
     for name in MODELS:
         folder = tmp_path / name
-        export(model(name), "transitions", folder, name="own")
+        path, *_ = export(model(name), "transitions", folder, name="own")
         command = [sys.executable, "-c", ASK]
         done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
         assert done.returncode == 0, done.stderr
@@ -39,10 +39,12 @@ def test_in_a_process_of_their_own(ran: Callable[..., None], tmp_path: Path) -> 
         trace = simulate(model(name), Prescribed(SLOW), 7.5, **how)
         its = [[float(e.t).hex(), int(e.element), str(e.edge)] for e in trace.transitions]
         assert json.loads(log) == its
+        file = imported(path)
+        assert rebuilt(file, file.machine_of([])) == model(name).chart
         count += len(its)
     ran(
         "transitions",
         f"transitions {version('transitions')}",
-        f"{len(MODELS)} included charts run by themselves",
-        f"{count} switches equal to the bit",
+        f"{len(MODELS)} included charts run by themselves, and imported",
+        f"{count} switches equal to the bit; the charts imported are equal",
     )
