@@ -28,7 +28,6 @@ collect_ignore += [
         "blark": ["tests/foreign/check_export_st.py"],
         "fmpy": [
             "tests/exporters/fmus.py",
-            "tests/exporters/test_fmus_run_in_fmpy.py",
             "tests/foreign/check_export_fmu.py",
         ],
     }.items()

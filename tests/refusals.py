@@ -1312,6 +1312,32 @@ group(
     rows,
 )
 
+NESTED: Any = {"states": (STICK,)}
+rows = {
+    "equation that is a table": (
+        "state 'slip', flow of 'z', column 1",
+        ...,
+        lambda: chart(state(flow={"z": {"v": 1}})),
+    ),
+}
+group("wrong kind", ExpressionError, lambda call: call(), rows)
+rows = {
+    "states in a state": ("state 'outer'", ..., lambda: State(name="outer", flow={}, **NESTED)),
+}
+group("wrong kind", ChartError, lambda call: call(), rows)
+PUSHED, SWEPT = Prescribed(0.2), {"v_s": [1e-3, 2e-3]}
+rows = {
+    "rig before model": ("model", PUSHED, (PUSHED, stick_slip("signed"), 3.0, SWEPT)),
+    "values before rig": ("rig", SWEPT, (stick_slip("signed"), SWEPT, PUSHED, 3.0)),
+    "values for the end": ("t_end", SWEPT, (stick_slip("signed"), PUSHED, SWEPT, 3.0)),
+    "values without a name": (
+        "parameters",
+        [1.0],
+        (stick_slip("signed"), PUSHED, 3.0, [1.0]),
+    ),
+}
+group("sweep", ParameterError, lambda given: sweep(*given, engine="machines"), rows)
+
 
 # --------------------------------------------------------------------------- monitors
 def monitored(monitors: Callable[[], Any]) -> None:

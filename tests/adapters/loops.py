@@ -9,7 +9,6 @@ import numpy as np
 from gms_fsm import (
     Chart,
     Contact,
-    FrictionState,
     Parameter,
     PulledSlider,
     State,
@@ -43,34 +42,6 @@ class PID:
         self.I += k_i * PERIOD * e
         self.e_before = e
         return u
-
-
-def servo_by_runge_kutta(dt: float, engine: str | None = None) -> tuple[float, list[Any]]:
-    """Return where the load is at the end, and the switches: RK4, the stages peek."""
-    friction, pid = FrictionState(servo_friction(), engine=engine), PID()
-    y, u, switches = np.zeros(4), 0.0, []  # x_m, v_m, x_l, v_l
-
-    def slope(y: Any, F: float) -> Any:
-        x_m, v_m, x_l, v_l = y
-        shaft = k_s * (x_m - x_l) + d_s * (v_m - v_l)
-        return np.array([v_m, (u - shaft) / m_m, v_l, (shaft - F) / m_l])
-
-    F = friction.peek(0.0, 0.0, 0.0)
-    for step in range(round(T_END / dt)):
-        if step % round(PERIOD / dt) == 0:
-            u = pid(y[0])
-        v = y[3]
-        k1 = slope(y, F)
-        y2 = y + dt / 2 * k1
-        k2 = slope(y2, friction.peek(v, y2[3], dt / 2))
-        y3 = y + dt / 2 * k2
-        k3 = slope(y3, friction.peek(v, y3[3], dt / 2))
-        y4 = y + dt * k3
-        k4 = slope(y4, friction.peek(v, y4[3], dt))
-        y = y + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        F = friction.advance(v, y[3], dt)
-        switches += friction.switches
-    return float(y[2]), switches
 
 
 def servo_in_pathsim(period: float, **options: Any) -> tuple[Any, Any, Any]:

@@ -5,8 +5,6 @@ The clock of these tests goes on only when it is asked, by the sleep, or by the 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -14,6 +12,7 @@ from gms_fsm import FrictionState, Prescribed, simulate
 from gms_fsm.adapters import sampled
 from gms_fsm.adapters.sampled import run_sampled
 from gms_fsm.errors import ParameterError
+from tests.adapters.loops import PULLED_END, exact_pulled_mass, sequence
 from tests.helpers import pulled_mass
 
 TICK = 2.0**-10  # s
@@ -77,8 +76,7 @@ def test_the_last_tick_always_runs(clock: Clock) -> None:
         clock.now += 10 * TICK if k == 3 else 0.0
 
     run = run_sampled(step, TICK, 5)
-    assert run.ticks.tolist() == [1, 2, 3, 5]
-    assert run.missed == 1
+    assert (run.ticks.tolist(), run.missed) == ([1, 2, 3, 5], 1)
 
 
 def test_friction_at_the_times_measured_is_that_of_simulate() -> None:
@@ -96,17 +94,28 @@ def test_friction_at_the_times_measured_is_that_of_simulate() -> None:
     assert len(run.ticks) + run.missed == 200
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
+@pytest.mark.slow
+def test_the_pulled_mass_takes_all_its_edges_at_1_khz() -> None:
+    """Even by the simplest scheme: the last force gives the next velocity."""
+    dt, x, v, F, switches = 1e-3, 0.0, 0.0, 0.0, []
+    friction = FrictionState(pulled_mass()[0])
+    for step in range(round(PULLED_END / dt)):
+        v_next = v + dt * (2.0 * (0.1 * step * dt - x) - F)
+        F = friction.advance(v, v_next, dt)
+        x += dt * (v + v_next) / 2
+        v = v_next
+        switches += friction.switches
+    assert len(switches) == 72
+    assert sequence(switches) == sequence(exact_pulled_mass().transitions)
+
+
+def test_wrong_arguments_are_named() -> None:
+    for given, words in (
         ((None, 1e-3, 5), "step is None; it must be a function"),
         ((print, 0.0, 5), "period is 0.0; it must be > 0"),
         ((print, np.nan, 5), "period"),
         ((print, 1e-3, 0), "ticks is 0; it must be an integer, at least 1"),
-    ],
-)
-def test_wrong_arguments_are_named(arguments: tuple[Any, ...], words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
-        run_sampled(*arguments)
-    with pytest.raises(ParameterError, match=r"spin is -1\.0"):
-        run_sampled(print, 1e-3, 5, spin=-1.0)
+        ((print, 1e-3, 5, -1.0), r"spin is -1\.0"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            run_sampled(*given[:3], **dict(zip(["spin"], given[3:], strict=False)))

@@ -12,50 +12,44 @@ import pytest
 
 from gms_fsm import GMSError
 from gms_fsm.adapters.scipy import solve_ivp
-from gms_fsm.app.scenario import load_scenario
-from tests.helpers import ROOT, pulled_mass
-
-PERIOD = 1e-3  # s
+from tests.adapters.loops import PERIOD, PID, d_s, k_s, m_l, m_m, servo_friction
+from tests.helpers import pulled_mass
 
 
 def _servo(**options: Any) -> tuple[float, int]:
     """Return where the load is after 0.2 s, in mm, and the number of switches."""
-    friction: Any = load_scenario(ROOT / "scenarios" / "servo.toml").model
-    y, integral, before, switches = np.zeros(4), 0.0, 0.0, 0
+    friction, pid, y, switches = servo_friction(), PID(), np.zeros(4), 0
     for tick in range(200):
-        e = 2e-3 - y[0]
-        u = 400.0 * e + integral + 40.0 * (e - before) / PERIOD
-        integral, before = integral + 500.0 * PERIOD * e, e
+        u = pid(y[0])
 
         def rates(t: float, y: Any, F: float, u: float = u) -> list[float]:
             x_m, v_m, x_l, v_l = y
-            shaft = 2e4 * (x_m - x_l) + 5.0 * (v_m - v_l)
-            return [v_m, (u - shaft) / 0.5, v_l, shaft - F]
+            shaft = k_s * (x_m - x_l) + d_s * (v_m - v_l)
+            return [v_m, (u - shaft) / m_m, v_l, (shaft - F) / m_l]
 
         span = tick * PERIOD, (tick + 1) * PERIOD
         found = solve_ivp(rates, span, y, friction, 3, **options)
         assert found.success, found.message
         y, friction = found.y[:, -1], found.friction
         switches += len(found.switches)
-    assert friction.states == {"bearing": ("stick",) * 4}
-    return 1e3 * float(y[2]), switches
+    assert set(friction.states.values()) == {("stick",) * 4}
+    return float(y[2]), switches
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["RK45", "Radau", "LSODA"])
-def test_the_servo(method: str) -> None:
-    where, switches = _servo(method=method)
-    assert where == pytest.approx(1.32993, abs=5e-5)
+@pytest.mark.parametrize(
+    ("how", "error"),
+    [
+        ({"method": "RK45"}, 4e-5),
+        ({"method": "Radau"}, 4e-5),
+        ({"sample": PERIOD}, 5e-3),
+        ({"sample": PERIOD / 10}, 4e-5),
+    ],
+)
+def test_the_servo(how: dict[str, Any], error: float) -> None:
+    where, switches = _servo(**how)
+    assert where == pytest.approx(1.32993e-3, rel=error)
     assert switches == 24
-
-
-@pytest.mark.slow
-def test_the_servo_by_samples() -> None:
-    where, switches = _servo(sample=PERIOD)
-    assert where == pytest.approx(1.3299, rel=5e-3)
-    assert switches == 24
-    where, _ = _servo(sample=PERIOD / 10)
-    assert where == pytest.approx(1.32993, abs=5e-5)
 
 
 def _mass(t: float, y: Any, F: float) -> list[float]:

@@ -28,9 +28,10 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.adapters.scipy import Solution, solve_ivp
-from tests.helpers import FASTEST, pulled_mass
+from tests.helpers import FASTEST, matrix, pulled_mass
 
-K = np.array([40.0, 30.0, 20.0, 10.0])
+MODEL, _ = pulled_mass()
+END = 20.0  # s
 
 
 def _pulled(mass: float, stiffness: float, speed: float) -> Callable[..., list[float]]:
@@ -53,60 +54,49 @@ def _late(solution: Solution, trace: Trace) -> float:
 
 @pytest.fixture(scope="module")
 def reference() -> Trace:
-    trace = simulate(*pulled_mass(), 60.0, engine=FASTEST, rtol=1e-9)
-    assert len(trace.transitions) == 72
+    trace = simulate(*pulled_mass(), END, engine=FASTEST, rtol=1e-9)
+    assert len(trace.transitions) == 16
     return trace
 
 
+# A method or a sample in s, and the largest error of a switch time.
+WAYS: dict[Any, float] = {"RK45": 5e-5, "Radau": 1e-6, "LSODA": 5e-4, "dp45": 5e-6, 1e-2: 1e-2}
+WAYS |= {scipy.integrate.DOP853: 5e-6, 2e-3: 4e-4}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("method", "error"),
-    [
-        ("RK45", 5e-5),
-        ("Radau", 1e-6),
-        ("LSODA", 5e-4),
-        (scipy.integrate.DOP853, 5e-6),
-        ("dp45", 5e-6),
-    ],
-)
-def test_located(reference: Trace, method: Any, error: float) -> None:
-    model, _ = pulled_mass()
-    found = solve_ivp(_pulled(1.0, 2.0, 0.1), (0.0, 60.0), [0.0, 0.0], model, 1, method=method)
-    assert _late(found, reference) < error
+@pytest.mark.parametrize("way", matrix([*WAYS], ["RK45", "Radau", "LSODA", "dp45", 1e-2]))
+def test_located_or_on_straight_lines_between_samples(reference: Trace, way: Any) -> None:
+    how = {"sample": way} if isinstance(way, float) else {"method": way}
+    found = solve_ivp(_pulled(1.0, 2.0, 0.1), (0.0, END), [0.0, 0.0], MODEL, 1, **how)
+    assert _late(found, reference) < WAYS[way]
+    if isinstance(way, float):
+        assert len(found.t) == round(END / way) + 1
+        return
     assert found.y[0, -1] == pytest.approx(reference.x[-1], abs=2e-5)
     assert found.F[-1] == pytest.approx(reference.F[-1], abs=2e-5)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("sample", "error"), [(1e-2, 1e-2), (2e-3, 4e-4)])
-def test_straight_lines_between_samples(reference: Trace, sample: float, error: float) -> None:
-    model, _ = pulled_mass()
-    found = solve_ivp(_pulled(1.0, 2.0, 0.1), (0.0, 60.0), [0.0, 0.0], model, 1, sample=sample)
-    assert _late(found, reference) < error
-    assert len(found.t) == round(60.0 / sample) + 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("length", [1e-6, 1e3])
-def test_other_scales(length: float) -> None:
-    model = GMS(
-        GMSParameters(
-            K / length,
-            np.array([0.4, 0.3, 0.2, 0.1]) / length,
-            [0.02 * length] * 4,
-            sigma_2=0.4 / length,
-            stribeck=Stribeck(F_c=1.0, F_s=1.5, v_s=0.05 * length),
-            v_c=1e-6 * length,
-            weights=length / (4 * K),
-        ),
-        law="signed",
+@pytest.mark.parametrize(
+    ("length", "method", "error"), [(1e-6, "RK45", 5e-5), (1e3, "Radau", 1e-6)]
+)
+def test_other_scales(length: float, method: str, error: float) -> None:
+    p = MODEL.parameters
+    numbers = p.replaced(
+        k=p.k / length,
+        sigma=p.sigma / length,
+        C=p.C * length,
+        sigma_2=0.4 / length,
+        stribeck=Stribeck(F_c=1.0, F_s=1.5, v_s=0.05 * length),
+        v_c=1e-6 * length,
+        weights=p.weights * length,
     )
-    rig = 1.0 / length, 2.0 / length, 0.1 * length
-    trace = simulate(model, PulledSlider(*rig), 60.0, engine=FASTEST, rtol=1e-9)
-    assert len(trace.transitions) == 72
-    for method, error in (("RK45", 5e-5), ("Radau", 1e-6)):
-        found = solve_ivp(_pulled(*rig), (0.0, 60.0), [0.0, 0.0], model, 1, method=method)
-        assert _late(found, trace) < error
+    model, rig = GMS(numbers, law="signed"), (1.0 / length, 2.0 / length, 0.1 * length)
+    trace = simulate(model, PulledSlider(*rig), END, engine=FASTEST, rtol=1e-9)
+    assert len(trace.transitions) == 16
+    found = solve_ivp(_pulled(*rig), (0.0, END), [0.0, 0.0], model, 1, method=method)
+    assert _late(found, trace) < error
 
 
 def test_other_parameters() -> None:
@@ -125,31 +115,30 @@ def _coupled(t: float, y: Any, F: Any) -> list[float]:
 
 @pytest.mark.slow
 def test_several_frictions() -> None:
-    model, _ = pulled_mass()
     system = System(
         "two masses",
         bodies=(
             Body("a", inertia=1.0, force="2*(0.1*t - x_a) - 3*(x_a - x_b)", x="x_a", v="v_a"),
             Body("b", inertia=1.0, force="3*(x_a - x_b)", x="x_b", v="v_b"),
         ),
-        contacts=(Contact("front", model, v="v_a"), Contact("back", model, v="v_b")),
+        contacts=(Contact("front", MODEL, v="v_a"), Contact("back", MODEL, v="v_b")),
     )
-    trace = simulate(system, 30.0, rtol=1e-9, engine=FASTEST)
+    trace = simulate(system, 12.0, rtol=1e-9, engine=FASTEST)
     log = [(str(r.contact), int(r.element), str(r.edge)) for r in trace.transitions]
-    by_place = solve_ivp(_coupled, (0.0, 30.0), [0.0] * 4, system.contacts, [1, 3])
-    by_function = solve_ivp(
-        _coupled, (0.0, 30.0), [0.0] * 4, system.contacts, lambda y: y[[1, 3]], t_eval=[10.0, 30.0]
-    )
-    stepped = solve_ivp(
-        _coupled, (0.0, 30.0), [0.0] * 4, system.contacts, np.array([1, 3]), sample=5e-3
-    )
-    for found in (by_place, by_function, stepped):
+    ways: list[tuple[Any, dict[str, Any]]] = [
+        ([1, 3], {}),
+        (lambda y: y[[1, 3]], {"t_eval": [5.0, 12.0]}),
+        (np.array([1, 3]), {"sample": 5e-3}),
+    ]
+    for velocity, how in ways:
+        found = solve_ivp(_coupled, (0.0, 12.0), [0.0] * 4, system.contacts, velocity, **how)
         assert [(s.contact, s.element, s.edge) for s in found.switches] == log
         assert found.y[2, -1] == pytest.approx(trace.body("b").x[-1], abs=2e-5)
         assert found.F.shape == (2, len(found.t))
-    assert by_function.t.tolist() == [10.0, 30.0]
+        assert found.t.tolist() == how.get("t_eval", found.t.tolist())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [1, lambda y: y[1]])
 def test_motion_along_a_jump_of_the_force(velocity: Any) -> None:
     """Coulomb friction by sgn(v): where it holds the mass, the motion slides along v = 0."""

@@ -18,17 +18,7 @@ PATIENCE = 900  # s, for a site that another worker builds
 
 @dataclass(frozen=True)
 class Built:
-    """The site, and what Sphinx said.
-
-    Parameters
-    ----------
-    site : Path
-        Its folder.
-    code : int
-        Exit code of Sphinx; warnings are errors.
-    said : str
-        Its output.
-    """
+    """The site, the exit code of Sphinx, which is 1 after warnings, and what it said."""
 
     site: Path
     code: int

@@ -18,31 +18,14 @@ from tests.helpers import ROOT
 
 pytestmark = pytest.mark.slow
 
-for module in (
-    "furo",
-    "ipykernel",
-    "latex2mathml",
-    "myst_parser",
-    "nbclient",
-    "sphinx",
-):
+NEEDED = ("furo", "ipykernel", "ipywidgets", "latex2mathml", "myst_parser", "nbclient", "sphinx")
+for module in NEEDED:
     pytest.importorskip(module, reason="building the site needs the extra 'docs'")
-pytest.importorskip("ipywidgets", reason="building the site needs the extra 'docs'")
 
-LOADS = {  # what a browser fetches by itself
-    ("script", "src"),
-    ("img", "src"),
-    ("img", "srcset"),
-    ("iframe", "src"),
-    ("source", "src"),
-    ("video", "src"),
-    ("audio", "src"),
-    ("embed", "src"),
-    ("object", "data"),
-    ("link", "href"),
-    ("image", "href"),
-    ("use", "href"),
-}
+
+def fetched(tag: str, name: str) -> bool:
+    """Return whether a browser fetches an attribute by itself."""
+    return name in ("src", "srcset", "data") or (name == "href" and tag in ("link", "image", "use"))
 
 
 class Links(HTMLParser):
@@ -57,7 +40,7 @@ class Links(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: Any) -> None:
         for name, value in attrs:
-            if (tag, name.removeprefix("xlink:")) in LOADS:
+            if fetched(tag, name.removeprefix("xlink:")):
                 self.loads.append(value)
             elif tag == "a" and name == "href":
                 self.links.append(value)

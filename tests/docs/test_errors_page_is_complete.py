@@ -10,7 +10,6 @@ from __future__ import annotations
 import builtins
 import inspect
 import re
-from pathlib import Path
 
 import pytest
 
@@ -25,35 +24,22 @@ PAGE = (ROOT / "docs" / "errors.md").read_text(encoding="utf-8")
 SECTIONS = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL))
 
 
-def _all(kind: type[GMSError]) -> list[type[GMSError]]:
-    return [found for each in kind.__subclasses__() for found in (each, *_all(each))]
-
-
 HOMES = (errors.__name__, failures.__name__)
-KINDS = [kind for kind in _all(GMSError) if kind.__module__ in HOMES]
+KINDS = [
+    kind
+    for home in (errors, failures)
+    for _, kind in inspect.getmembers(home, inspect.isclass)
+    if kind.__module__ in HOMES and issubclass(kind, BaseException) and kind is not GMSError
+]
 
 
-def test_every_error_has_one_root() -> None:
-    """Every class in the module, and every exception elsewhere in the package."""
-    own = [
-        kind for home in (errors, failures) for _, kind in inspect.getmembers(home, inspect.isclass)
-    ]
-    own = [kind for kind in own if kind.__module__ in HOMES and issubclass(kind, BaseException)]
-    assert len(own) > 10
-    assert all(issubclass(kind, GMSError) for kind in own)
-    root = Path(errors.__file__).parent
-    for path in sorted(root.rglob("*.py")):
-        named = re.findall(r"^class (\w+(?:Error|Exception))\(", path.read_text(), re.MULTILINE)
-        assert path.name in ("errors.py", "failures.py") or named == [], path
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-def test_an_error_is_also_a_fitting_builtin_exception(kind: type[GMSError]) -> None:
-    usual = [base for base in kind.__mro__ if base.__module__ == builtins.__name__]
-    assert usual[0] is not Exception
-
-
-def test_the_page_has_every_error_and_no_other() -> None:
+def test_every_error_has_one_root_a_builtin_relative_and_a_section() -> None:
+    assert len(KINDS) > 10
+    for kind in KINDS:
+        assert issubclass(kind, GMSError)
+        usual = [base for base in kind.__mro__ if base.__module__ == builtins.__name__]
+        assert usual[0] is not Exception
+        assert (kind.__doc__ or "").partition("\n")[0].endswith(".")
     named = [name for name in SECTIONS if name.endswith("Error")]
     assert sorted(named) == sorted(kind.__name__ for kind in KINDS)
 
@@ -72,9 +58,3 @@ def test_a_section_has_cause_example_and_advice(kind: type[GMSError]) -> None:
         "^error: " if last.kind == "console" else f"^{name}: ", last.body, re.MULTILINE
     )
     assert "\n*Do:* " in section
-
-
-def test_every_docstring_says_what_went_wrong() -> None:
-    for kind in KINDS:
-        assert kind.__doc__
-        assert kind.__doc__.partition("\n")[0].endswith(".")

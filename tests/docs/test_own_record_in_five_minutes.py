@@ -16,26 +16,6 @@ pytest.importorskip("matplotlib", reason="the picture needs the extra 'plots'")
 
 PAGE = ROOT / "docs" / "howto" / "measured-record.md"
 
-SCENARIO = """\
-[model]
-kind = "GMS"
-law = "signed"
-k = [10e3, 15e3, 10e3, 5e3]          # N/m
-shares = [0.25, 0.35, 0.25, 0.15]    # of the friction, sum 1
-C = 20.0                             # N/s
-v_c = 5e-6                           # m/s
-stribeck = { F_c = 2.3, F_s = 2.4, v_s = 2e-5 }
-
-[rig]
-kind = "record"
-
-[record]
-file = "rig.csv"
-time = { column = "time [s]", unit = "s" }
-position = { column = "position [mm]", unit = "mm" }
-force = { column = "friction [N]", unit = "N" }
-"""
-
 
 def own_table() -> str:
     """Return 12 s of a stage that moves back and forth by 0.5 mm, with its friction force.
@@ -55,19 +35,21 @@ def own_table() -> str:
     return table(columns, t, 1e3 * position + 2e-5 * noise[0], force + 0.05 * noise[1])
 
 
-def test_the_scenario_here_is_the_one_of_the_page() -> None:
+@pytest.fixture
+def command(gms_fsm: CommandLine, tmp_path: Path) -> CommandLine:
+    """The command line beside the table and the scenario of the page."""
     blocks = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert SCENARIO in blocks
+    (scenario,) = (each for each in blocks if 'file = "rig.csv"' in each and "[model]" in each)
+    (tmp_path / "rig.csv").write_text(own_table())
+    (tmp_path / "rig.toml").write_text(scenario)
+    return gms_fsm
 
 
 @pytest.mark.slow
 def test_table_and_scenario_become_picture_and_summary(
-    gms_fsm: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: CommandLine, tmp_path: Path
 ) -> None:
-    (tmp_path / "rig.csv").write_text(own_table())
-    (tmp_path / "rig.toml").write_text(SCENARIO)
-    monkeypatch.chdir(tmp_path)
-    done = gms_fsm("run", "rig.toml", "-o", "out")
+    done = command("run", "rig.toml", "-o", "out")
     assert done.code == 0, done.err
     assert "out/summary.md" in done.out
     assert (tmp_path / "out" / "overview.png").read_bytes().startswith(b"\x89PNG")
@@ -75,8 +57,7 @@ def test_table_and_scenario_become_picture_and_summary(
     assert summary.startswith("# rig\n")
     for said in ("signed law", "weights", "R²", "RMSE", "time constant 0.02 s", "rig.csv"):
         assert said in summary, said
-    r2 = float(summary.partition("R² = ")[2].split(",")[0])
-    assert 0.99 < r2 < 1.0
+    assert 0.99 < float(summary.partition("R² = ")[2].split(",")[0]) < 1.0
     trace = Trace.load(tmp_path / "out" / "trace.npz")
     assert len(trace) == 2400
     assert len(trace.transitions) > 20
@@ -85,23 +66,10 @@ def test_table_and_scenario_become_picture_and_summary(
     assert len(log) == len(trace.transitions) + 1
 
 
-def test_the_readmes_overrides_work(
-    gms_fsm: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "rig.csv").write_text(own_table())
-    (tmp_path / "rig.toml").write_text(SCENARIO)
-    monkeypatch.chdir(tmp_path)
-    done = gms_fsm(
-        "run",
-        "rig.toml",
-        "--live",
-        "--set",
-        "model.law=published",
-        "--set",
-        "record.smoothing=0.05",
-        "--set",
-        "output.figures=[]",
-    )
+@pytest.mark.slow
+def test_the_readmes_overrides_work(command: CommandLine, tmp_path: Path) -> None:
+    changes = ("model.law=published", "record.smoothing=0.05", "output.figures=[]")
+    done = command("run", "rig.toml", "--live", *(p for each in changes for p in ("--set", each)))
     assert done.code == 0, done.err
     assert "|z|/s" in done.err
     summary = (tmp_path / "out" / "rig" / "summary.md").read_text(encoding="utf-8")

@@ -20,6 +20,7 @@ TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_blocks_run_in_their_order_and_print_what_is_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -50,24 +51,10 @@ def test_the_transcript_is_true() -> None:
     assert out.getvalue() == transcript
 
 
-def test_the_first_example_is_short() -> None:
-    assert len(BLOCKS[0].strip().splitlines()) <= 15
-
-
 def test_make_targets_of_the_readme_exist() -> None:
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     named = set(re.findall(r"make ([a-z-]+)", TEXT))
     assert {"paper", "test"} <= named <= targets
-
-
-@pytest.mark.parametrize("page", ["README.md", "docs/gallery.md"])
-def test_pictures_and_links_exist(page: str) -> None:
-    place = ROOT / page
-    links = re.findall(r"\]\(([^)#]+)", place.read_text(encoding="utf-8"))
-    assert links
-    for link in links:
-        least = 1000 if link.endswith((".png", ".svg", ".gif")) else 1
-        assert (place.parent / link).stat().st_size >= least, link
 
 
 def test_every_picture_that_is_kept_is_shown() -> None:
@@ -75,7 +62,9 @@ def test_every_picture_that_is_kept_is_shown() -> None:
     shown = {
         name for page in pages for name in re.findall(r"images/([\w.]+)", page.read_text("utf-8"))
     }
-    assert shown == {path.name for path in (ROOT / "docs/images").iterdir()}
+    kept = list((ROOT / "docs/images").iterdir())
+    assert shown == {path.name for path in kept}
+    assert [path.name for path in kept if path.is_file() and path.stat().st_size < 1000] == []
 
 
 # --------------------------------------------------------------------------- terminals

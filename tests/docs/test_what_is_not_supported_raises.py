@@ -17,7 +17,6 @@ from gms_fsm import (
     Contact,
     FrictionState,
     GMSError,
-    Prescribed,
     Settings,
     System,
     export,
@@ -31,20 +30,13 @@ FOUND = re.findall(r"^- ((?:.|\n  )+)$", PAGE.partition("## Not supported")[2], 
 STATEMENTS = [" ".join(each.split()) for each in FOUND]
 
 
-def system(force: Any = "0") -> System:
+def system(force: str = "0", **signals: Any) -> System:
     return System(
         "a mass",
         bodies=(Body("mass", inertia=1.0, force=force),),
         contacts=(Contact("pad", stick_slip("signed")),),
+        signals=signals,
     )
-
-
-def document(inside: str) -> Chart:
-    head = '<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0">'
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "chart.scxml"
-        path.write_text(f"{head}{inside}</scxml>", encoding="utf-8")
-        return Chart.from_scxml(path, name="it", outputs={"F": "0"})
 
 
 def exported(what: Any, name: str, **more: Any) -> None:
@@ -52,16 +44,17 @@ def exported(what: Any, name: str, **more: Any) -> None:
         export(what, name, folder, **more)
 
 
-def stepped(name: str, **values: float) -> FrictionState:
-    return FrictionState(Contact("pad", CHARTS[name], values))
+def nested() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "chart.scxml"
+        inside = '<state id="a"><state id="b"/></state>'
+        path.write_text(f'<scxml xmlns="http://www.w3.org/2005/07/scxml">{inside}</scxml>')
+        Chart.from_scxml(path, name="it", outputs={"F": "0"})
 
 
+# Each call stands for its statement; tests/exporters tries all formats and all parts of charts.
 REFUSED: dict[str, list[Callable[[], object]]] = {
-    "Nested": [
-        lambda: document('<state id="a"><state id="b"/></state>'),
-        lambda: document('<parallel id="a"><state id="b"/></parallel>'),
-        lambda: document('<state id="a"/><history id="b"/>'),
-    ],
+    "Nested": [nested],
     "`floor`": [
         lambda: system("floor(x)"),
         lambda: system("x % 2"),
@@ -69,27 +62,15 @@ REFUSED: dict[str, list[Callable[[], object]]] = {
         lambda: system("1 if x > 0 else 0"),
     ],
     "Stepping": [
-        lambda: stepped("stiction", F_c=1.0, F_s=2.0, b=0.0),
-        lambda: stepped("planar-coulomb", F_c=1.0, F_s=2.0, v_c=1e-3),
-    ],
-    "Whole systems": [
-        lambda: exported(system(), "matlab"),
-        lambda: exported(system(), "modelica"),
-        lambda: exported(system(), "st"),
-        lambda: exported(system(), "scxml"),
-    ],
-    "Python functions": [
-        lambda: exported(
-            System("pushed", bodies=(Body("mass", inertia=1.0, force="f"),),
-                   contacts=(Contact("pad", stick_slip("signed")),),
-                   signals={"f": lambda t: t}),  # type: ignore[dict-item]
-            "c99",
+        lambda: FrictionState(Contact("a", CHARTS["stiction"], {"F_c": 1.0, "F_s": 2.0, "b": 0.0})),
+        lambda: FrictionState(
+            Contact("a", CHARTS["planar-coulomb"], {"F_c": 1.0, "F_s": 2.0, "v_c": 1e-3})
         ),
     ],
-    "SciPy": [
-        lambda: exported(stick_slip("signed"), "c99", settings=Settings(method=Radau)),
-    ],
-}  # fmt: skip
+    "Whole systems": [lambda: exported(system(), "matlab")],
+    "Python functions": [lambda: exported(system("f", f=lambda t: t), "c99")],
+    "SciPy": [lambda: exported(stick_slip("signed"), "c99", settings=Settings(method=Radau))],
+}
 
 
 def test_each_statement_has_something_that_raises() -> None:
@@ -120,8 +101,9 @@ def test_no_page_says_so_elsewhere() -> None:
     assert said == []
 
 
+@pytest.mark.slow
 def test_the_opposite_runs() -> None:
     """The same calls without what is not supported."""
     exported(stick_slip("signed"), "c99", settings=Settings())
+    exported(system("f", f="t"), "c99")
     assert len(simulate(system("2 * x"), 0.1)) > 1
-    assert len(simulate(stick_slip("signed"), Prescribed("0.1 * t"), 0.1)) > 1

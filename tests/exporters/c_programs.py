@@ -1,4 +1,4 @@
-"""Exported C programs: compiled, run on records, and compared with the engine."""
+"""Exported C: compiled, run on records or called from Python, and compared with the engine."""
 
 from __future__ import annotations
 
@@ -7,21 +7,25 @@ import io
 import re
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from gms_fsm import GMSError, Model, Prescribed, Settings, System, Trace, export, simulate
 from gms_fsm.exporters import Subject
 from gms_fsm.exporters._c import CEngine, engine_of
+from gms_fsm.exporters.plain.c import plain_c
 from gms_fsm.run.problem import Problem
 from gms_fsm.systems.signals import Corners
+from tests.exporters.frictions import case
 
 FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 COMPILERS = [each for each in ("gcc", "clang") if shutil.which(each)]
+needs_c = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
 
 
 @dataclass(frozen=True)
@@ -33,13 +37,17 @@ class Output:
     message: str
 
 
-def built(folder: Path, name: str, compiler: str = "cc", *flags: str) -> Path:
-    """Compile an exported program; every warning is an error."""
-    made = folder / f"{name}-{compiler}{''.join(flags)}"
-    command = [compiler, *FLAGS, *flags, f"{name}.c", f"{name}_main.c", "-o", made.name, "-lm"]
+def compiled(folder: Path, compiler: str, made: str, *arguments: str) -> Path:
+    """Compile files of a folder; every warning is an error."""
+    command = [compiler or COMPILERS[0], *FLAGS, *arguments, "-o", made, "-lm"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return made
+    return folder / made
+
+
+def built(folder: Path, name: str, compiler: str = "cc") -> Path:
+    """Compile an exported program."""
+    return compiled(folder, compiler, f"{name}-{compiler}", f"{name}.c", f"{name}_main.c")
 
 
 def run(program: Path, t: np.ndarray, **inputs: np.ndarray) -> Output:
@@ -136,10 +144,7 @@ class Library:
 
     def __init__(self, folder: Path, made: CEngine, compiler: str = "cc") -> None:
         self.made, name = made, made.name
-        path = folder / f"{name}-{compiler}.so"
-        command = [compiler, *FLAGS, "-fPIC", "-shared", f"{name}.c", "-o", path.name, "-lm"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
+        path = compiled(folder, compiler, f"{name}-{compiler}.so", "-fPIC", "-shared", f"{name}.c")
         found = ctypes.CDLL(str(path))
         kinds = {True: ctypes.c_int64, False: ctypes.c_double}
         fields: list[tuple[str, Any]] = [("t", ctypes.c_double)]
@@ -174,3 +179,33 @@ class Library:
         found = re.search(rf"_parameter_{name} = (\d+)", self.made.header)
         assert found
         return int(found[1])
+
+
+# --------------------------------------------------------------------------- the plain form
+STEP = 1e-3
+
+
+def plain_step(folder: Path, subject: Subject, compiler: str = "") -> Callable[..., float]:
+    """Return the step of a friction that has begun, as a function of its inputs and dt."""
+    files = plain_c(subject)
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    made, source = f"{subject.name}.so", f"{subject.name}_plain.c"
+    library = compiled(folder, compiler, made, "-shared", "-fPIC", source)
+    loaded = ctypes.CDLL(str(library))
+    step, memory = loaded[f"{subject.name}_plain_step"], ctypes.create_string_buffer(65536)
+    step.restype = ctypes.c_double
+    loaded[f"{subject.name}_plain_start"](memory)
+    return lambda *inputs: float(step(memory, *map(ctypes.c_double, inputs)))
+
+
+def plain_compared(name: str, seed: int, compiler: str, folder: Path) -> tuple[int, int]:
+    """Compare the bits with those of the engine; return the switches and the steps."""
+    given = case(name, seed)
+    trace = given.simulated(method="euler", step=STEP, events="step")
+    last = np.append(np.diff(trace.t) > 0.0, True)  # of the rows at one time: after switching
+    t, v, F = trace.t[last], trace.v[last], trace.F[last]
+    step = plain_step(folder, Subject.of(given.model, "c99", name=f"f{seed}{compiler}"), compiler)
+    found = [step(v[k], t[k + 1] - t[k]) for k in range(len(t) - 1)]
+    assert found == F[:-1].tolist(), f"repeat with case({name!r}, {seed})"
+    return len(trace.transitions), len(found)

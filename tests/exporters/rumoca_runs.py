@@ -10,7 +10,7 @@ import rumoca
 from gms_fsm import Prescribed, simulate
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.targets.modelica import modelica
-from tests.exporters.text_cases import case
+from tests.exporters.frictions import case
 
 T_END = 3.0
 TEST = """

@@ -15,21 +15,9 @@ from gms_fsm.systems.models import Model
 __all__ = ["PythonStateMachine", "Tool", "moved_by", "run", "switches_of"]
 
 Switch = tuple[float, str, str]  # when, from which state, to which
-MATH = SimpleNamespace(
-    abs=abs,
-    min=min,
-    max=max,
-    exp=math.exp,
-    log=math.log,
-    sqrt=math.sqrt,
-    sin=math.sin,
-    cos=math.cos,
-    tanh=math.tanh,
-    atan=math.atan,
-    asinh=math.asinh,
-    pow=math.pow,
-    sign=lambda u: float((u > 0) - (u < 0)),
-)
+NAMES = ("exp", "log", "sqrt", "sin", "cos", "tanh", "atan", "asinh", "pow")
+MATH = SimpleNamespace(**{name: getattr(math, name) for name in NAMES}, abs=abs, min=min, max=max)
+MATH.sign = lambda u: float((u > 0) - (u < 0))
 
 
 class Tool(Protocol):
@@ -53,6 +41,9 @@ class PythonStateMachine:
         self.machine.send("step")
         (state,) = self.machine.configuration
         return state.id, vars(self.machine.model)
+
+    def close(self) -> None:
+        """It has no process of its own."""
 
 
 def moved_by(text: str) -> Callable[[float], float]:

@@ -7,45 +7,34 @@ the classical Runge-Kutta method, and bisection in time where an indicator chang
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gms_fsm import GMS, Body, Contact, GMSParameters, System, simulate
-from gms_fsm.app.scenario import load_system
-from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
+from gms_fsm import Body, Contact, System, simulate
 from gms_fsm.exporters import Subject
 from gms_fsm.exporters.fmi.model import FmuArguments, both_of
-from gms_fsm.systems.models import ChartModel
 from integrators.runners import exchange, stepping
+from tests.exporters.frictions import KARNOPP_MODEL, servo
+from tests.helpers import stick_slip
 
-PAPER = GMS(GMSParameters.paper("stick-slip"), law="signed")
-KARNOPP_VALUES = {"F_c": 1.0, "F_s": 1.5, "sigma_2": 0.4, "D": 1e-4}
+PAPER = stick_slip("signed")
 OPEN_LOOP = System(
     "open loop",
-    bodies=(Body("body", velocity="v"),),
+    bodies=(Body("body", velocity="0.2 * sin(2 * pi * t / 20)"),),
     contacts=(Contact("friction", PAPER, v="v"),),
-    signals={"v": "0.2 * sin(2 * pi * t / 20)"},
 )
-MASS = System(
-    "mass",
-    bodies=(Body("mass", inertia="1.0", force="3 * sin(1.5 * t)", x="x", v="v"),),
-    contacts=(Contact("pad", ChartModel(KARNOPP, KARNOPP_VALUES), v="v"),),
-)
+
+
+def mass(friction: Any, more: str = "") -> System:
+    """Return a mass under a force."""
+    body = Body("mass", inertia="1.0", force=f"3 * sin(1.5 * t){more}", x="x", v="v")
+    return System("mass", bodies=(body,), contacts=(Contact("pad", friction, v="v"),))
+
+
 # The mass rests where sgn(v) pushes back from both sides: it slides along v = 0.
-SLIDING = System(
-    "mass",
-    bodies=(Body("mass", inertia="1.0", force="3 * sin(1.5 * t) - sgn(v)", x="x", v="v"),),
-    contacts=(Contact("friction", PAPER, v="v"),),
-)
-
-
-def servo() -> System:
-    """Return the servo of the scenarios, whose controller is sampled."""
-    return load_system(Path(__file__).parents[2] / "scenarios" / "servo.toml")
+SLIDING = mass(PAPER, " - sgn(v)")
 
 
 class Importer:
@@ -118,18 +107,18 @@ class Importer:
             t = stop
 
 
-CASES: dict[str, tuple[Callable[[], System], float, float]] = {
-    "open loop": (lambda: OPEN_LOOP, 20.0, 0.02),
-    "Karnopp": (lambda: MASS, 6.0, 5e-3),
-    "sliding": (lambda: SLIDING, 4.0, 5e-3),
-    "servo": (servo, 0.0495, 2e-5),
+CASES: dict[str, tuple[System, float, float]] = {
+    "open loop": (OPEN_LOOP, 20.0, 0.02),
+    "Karnopp": (mass(KARNOPP_MODEL), 6.0, 5e-3),
+    "sliding": (SLIDING, 4.0, 5e-3),
+    "servo": (servo(), 0.0495, 2e-5),
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_all_switches_are_seen(name: str) -> None:
-    make, end, h = CASES[name]
-    system = make()
+    system, end, h = CASES[name]
     importer = Importer(both_of(Subject.of(system, "fmu2")))
     importer.run(end, h)
     trace = simulate(system, end, engine="ifelse", rtol=1e-9)
@@ -140,23 +129,19 @@ def test_all_switches_are_seen(name: str) -> None:
     np.testing.assert_allclose(importer.b.now.y, y, rtol=1e-4, atol=1e-5 * np.abs(y).max())
 
 
+@pytest.mark.slow
 def test_looking_changes_no_frozen_sign() -> None:
     importer = Importer(both_of(Subject.of(SLIDING, "fmu2")))
     importer.run(2.0, 5e-3)
     held, y = list(importer.b.now.held), list(importer.b.now.y)
-    v = importer.b.now.y
     for sign in (1.0, -1.0):  # an importer tries states far beyond a crossing
         importer.go_to(2.0, [sign * (abs(u) + 1.0) for u in y])
-        arguments: Any = importer.functions, importer.machines, importer.b, importer.x
-        exchange.observe(*arguments)
+        exchange.observe(importer.functions, importer.machines, importer.b, importer.x)
         assert list(importer.b.now.held) == held
-    importer.go_to(2.0, y)
-    assert v is importer.b.now.y
 
 
 def test_another_start_moves_the_ticks() -> None:
-    both = both_of(Subject.of(servo(), "fmu2"))
-    importer = Importer(both)
+    importer = Importer(both_of(Subject.of(servo(), "fmu2")))
     importer.go_to(3.0, list(importer.b.now.y))
     stepping.restart(importer.b, importer.clocks)
     importer.settle()

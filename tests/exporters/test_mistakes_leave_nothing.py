@@ -1,58 +1,40 @@
 """Whatever is wrong with an export, the answer is one error of ours, and nothing is written.
 
-The claims hold for every format, also for one that is registered here.
+What a format cannot express is refused by the place where it stands.
 """
 
 from __future__ import annotations
 
 import itertools
-import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gms_fsm import (
-    GMS,
+    Body,
     Chart,
     ChartModel,
+    Contact,
     GMSError,
-    GMSParameters,
     OutputError,
     ParameterError,
     State,
+    System,
+    Transition,
     export,
 )
-from gms_fsm.exporters import FORMATS, Format, Subject, formats, register
+from gms_fsm.charts import CHARTS
+from gms_fsm.exporters import formats
+from gms_fsm.run.settings import Settings
 from plots.output.mermaid import mermaid
-from tests.exporters.test_what_cannot_be_written_is_named import system as driven
+from tests.exporters.frictions import KARNOPP_MODEL
+from tests.helpers import stick_slip
 from tests.scenario_files import CommandLine, one_message
 
-CHART = """\
-name = "spring"
-variables = ["z"]
-parameters = ["k"]
-
-[outputs]
-F = "k * z"
-
-[[state]]
-name = "on"
-flow.z = "v"
-"""
 PROGRAMS = [name for name, each in formats().items() if each.subject == "friction"]
-KINDS = [*PROGRAMS, "states"]
-GMS_MODEL = GMS(GMSParameters.paper("stick-slip"), law="signed")
-
-
-def states(subject: Subject) -> dict[str, str]:
-    names = "\n".join(each.name for each in subject.contact.chart.states)
-    assert subject.start.system.contacts  # with its initial values, which are then checked
-    return {f"{subject.name}.txt": names, "README-it-states.md": "One name per line.\n"}
-
-
+PAPER = stick_slip("signed")
 pytestmark = pytest.mark.filterwarnings("ignore:the FMU has no binary")
 
 
@@ -60,16 +42,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:the FMU has no binary")
 def _no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     """No compiler: archives are made faster, and no mistake is one of the compiler's."""
     monkeypatch.setattr(shutil, "which", lambda name: None)
-
-
-@pytest.fixture(autouse=True)
-def _one_more_format() -> Iterator[None]:
-    takes = ("initial", "t_start")
-    own = Format("states", "friction", "a list of states", "a test", states, takes=takes,
-                 words=["double", "while"])  # fmt: skip
-    register(own)
-    yield
-    FORMATS.remove(own)
 
 
 def there(folder: Path) -> dict[str, bytes | None]:
@@ -82,70 +54,165 @@ def there(folder: Path) -> dict[str, bytes | None]:
 
 def refused(
     inside: Path, *arguments: Any, kind: type[GMSError] = ParameterError, **more: Any
-) -> str:
-    """Return the message of an export that leaves the folder as it was."""
+) -> GMSError:
+    """Return the error of an export that leaves the folder as it was."""
     before = there(inside)
-    with pytest.raises(kind) as error:
+    with pytest.raises(kind) as caught:
         export(*arguments, **more)
     assert there(inside) == before
-    said = str(error.value)
-    assert "\n" not in said
-    assert error.value.reason
-    return said
+    assert "\n" not in str(caught.value)
+    assert caught.value.reason
+    return caught.value
 
 
-def friction(name: str = "one", parameter: str = "k") -> ChartModel:
-    """A spring as a chart of one state."""
-    state = State("on", {"z": "v"})
-    chart = Chart(name, ("v",), ("z",), (parameter,), (state,), (), {"F": f"{parameter} * z"})
-    return ChartModel(chart, {parameter: 2.0})
+# --------------------------------------------------------------------------- what cannot be said
+def chart(guard: str = "v > 0", actions: Any = None, flow: str = "v", **parts: Any) -> Chart:
+    """Return a chart of two states."""
+    given: dict[str, Any] = {
+        "variables": ("z",),
+        "states": (State("a", flow={"z": flow}), State("b")),
+        "transitions": (Transition("go", "a", "b", guard, actions or {}),),
+        "outputs": {"F": "z"},
+    }
+    return Chart(**{"name": "own", **given, **parts})
 
 
-def words_for_charts(form: str) -> list[str]:
-    """Return words of a format's language that are parameters of charts, at most three."""
-    found = []
-    for word in sorted(formats()[form].words, key=lambda each: (len(each) < 4, each)):
-        try:
-            friction(parameter=word)
-        except GMSError:
-            continue
-        found.append(word)
-    return found[:3]
+def model(**parts: Any) -> ChartModel:
+    """Return the same with numbers."""
+    made = chart(**parts)
+    return ChartModel(made, dict.fromkeys(made.parameter_names, 1.0))
 
 
-@pytest.mark.parametrize("form", KINDS)
-def test_without_a_mistake_the_readme_is_among_the_files(form: str, tmp_path: Path) -> None:
-    files = export(GMS_MODEL, form, tmp_path / "out", name="it")
-    assert tmp_path / "out" / f"README-it-{form}.md" in files
-    assert all(path.parent == tmp_path / "out" and path.stat().st_size for path in files)
+def system(signal: Any = "0") -> System:
+    """Return a mass under a force."""
+    body, pad = Body("mass", inertia=1.0, force="f"), Contact("pad", PAPER)
+    return System("driven", bodies=(body,), contacts=(pad,), signals={"f": signal})
+
+
+def push(t: float) -> float:
+    return 0.1 * t
+
+
+PUSH = f"{Path(__file__).name}:{push.__code__.co_firstlineno}, push)"
+READS_F, READS_A = chart("F > 1"), chart("a > 1")
+ENTERED = chart(let={"twice": "2 * v"}, states=(State("a", entry={"z": "twice"}),), transitions=())
+EDGES = Chart(
+    "own", variables=("edges",), states=(State("a", flow={"edges": "v"}),), outputs={"F": "edges"}
+)
+CASES = chart(states=(State("a"), State("A")), transitions=())
+ROWS: list[tuple[str, Any, str, str]] = [  # formats, what is given, place, word of the reason
+    # locks, forces and accelerations in guards
+    ("scxml transitions", CHARTS["karnopp"], "state 'stuck'", "locks"),
+    ("fmu2 fmu3 matlab modelica st", KARNOPP_MODEL, 'chart "Karnopp\'s model"', "locks"),
+    ("scxml", CHARTS["backlash"], "edge 'leave_right': guard", "'F'"),
+    ("scxml transitions", READS_A, "edge 'go': guard", "acceleration"),
+    ("matlab modelica st", ChartModel(READS_F, {}), "edge 'go'", "'F'"),
+    ("matlab modelica st", ChartModel(READS_A, {}), "edge 'go'", "'a'"),
+    ("scxml transitions", chart(actions={"v": "0"}), "edge 'go': action 'v'", "velocity"),
+    ("transitions", chart(actions={"z": "F"}), "edge 'go': action 'z'", "'F'"),
+    ("transitions", chart(velocities=("v", "w"), outputs={"F": "v", "F_w": "w"}), "own", "v, w"),
+    # names, words and functions of languages
+    ("scxml", chart(parameters=("delete",)), "name 'delete'", "word"),
+    ("scxml", chart(variables=("z", "Math")), "name 'Math'", "word"),
+    ("scxml", chart(parameters=("σ",)), "name 'σ'", "ASCII"),
+    ("scxml", chart(name="a\x00b"), "name", "'\\x00'"),
+    ("scxml", chart(reference="\ufffe"), "reference", "U+FFFE"),
+    ("c99 fmu2", model(parameters=("double",)), "'double'", "word"),
+    ("matlab", model(parameters=("function",)), "parameter 'function'", "word"),
+    ("modelica", model(parameters=("when",)), "parameter 'when'", "word"),
+    ("st", model(parameters=("LReal",)), "parameter 'LReal'", "word"),
+    ("st", model(parameters=("Z",)), "'z'", "one name"),
+    ("st", ChartModel(CASES, {}), "state 'A'", "one name"),
+    ("st", model(parameters=("k__1",), outputs={"F": "k__1 * z"}), "name 'k__1'", "underscores"),
+    ("st", model(flow="v - tanh(z)"), "chart 'own'", "'tanh'"),
+    ("st modelica", model(flow="v - asinh(z)"), "chart 'own'", "'asinh'"),
+    ("matlab", ChartModel(EDGES, {}), "variable 'edges'", "field"),
+    # numbers, first values, signals
+    ("c99 fmu3 js matlab", chart(), "chart 'own'", "numbers"),
+    ("c99 fmu2", ChartModel(ENTERED, {}), "contact 'friction'", "v is known"),
+    ("fmu2 fmu3", system(push), "signal 'f'", "Python function"),
+    ("js", system(push), "signal 'f'", PUSH),
+    ("scxml transitions matlab .mmd", system(), "system 'driven'", "system of bodies"),
+    # what is not used, or missing
+    ("js", system(), "t_end", "needs its end"),
+    ("js", system(), "settings", "rows"),
+    ("c99", PAPER, "t_end", "does not use"),
+    ("st", PAPER, "settings", "does not use"),
+    ("c99", PAPER, "settings", "locate"),
+]
+OPTIONS = {  # by format and place
+    ("js", "signal 'f'"): {"t_end": 1.0},
+    ("js", "settings"): {"settings": Settings(output="end"), "t_end": 1.0},
+    ("c99", "t_end"): {"t_end": 1.0},
+    ("st", "settings"): {"settings": Settings()},
+    ("c99", "settings"): {"settings": Settings(step=1e-3, events="held")},
+}
+
+
+@pytest.mark.parametrize(
+    ("form", "given", "place", "word"),
+    [(form, *row) for forms, *row in ROWS for form in forms.split()],
+    ids=lambda each: each if isinstance(each, str) else "",
+)
+def test_what_a_format_cannot_express(
+    form: str, given: Any, place: str, word: str, tmp_path: Path
+) -> None:
+    more: Any = OPTIONS.get((form, place), {})
+    error = refused(tmp_path, given, form, tmp_path / "out", name="it", **more)
+    assert place in error.place
+    assert word in error.reason
+
+
+@pytest.mark.slow
+def test_an_engine_without_a_plain_form_says_why(tmp_path: Path) -> None:
+    files = export(ChartModel(READS_F, {}), "c99", tmp_path, name="it")
+    assert not [each for each in files if "plain" in each.name]
+    text = (tmp_path / "README-it-c99.md").read_text(encoding="utf-8")
+    assert "There is no plain form: chart 'own', edge 'go': it reads 'F'" in text
 
 
 def test_a_text_of_a_chart_is_one_file(tmp_path: Path) -> None:
-    (path,) = export(GMS_MODEL, ".mmd", tmp_path, name="it")
+    (path,) = export(PAPER, ".mmd", tmp_path, name="it")
     assert path.name == "it.mmd"
-    assert path.read_text(encoding="utf-8") == mermaid(GMS_MODEL.chart)
-    assert "a system of bodies" in refused(tmp_path, driven(), ".mmd", tmp_path)
+    assert path.read_text(encoding="utf-8") == mermaid(PAPER.chart)
 
 
-def test_what_we_wrote_is_replaced(tmp_path: Path) -> None:
-    files = export(GMS_MODEL, "st", tmp_path, name="it")
-    before = there(tmp_path)
-    assert export(GMS_MODEL, "st", tmp_path, name="it") == files
-    assert there(tmp_path) == before
+# --------------------------------------------------------------------------- names and folders
+NAMES = ["../x", "/x", "a/b", "a b", "1x", "x.y", "é", "x" * 64]
+WORDS = [("st", "Z"), ("matlab", "k" * 52), ("transitions", "math"), ("modelica", "z")]
+WORDS += [(form, min(formats()[form].words)) for form in PROGRAMS if formats()[form].words]
 
 
+@pytest.mark.parametrize(
+    ("form", "name"), [*zip(itertools.cycle(PROGRAMS), NAMES, strict=False), *WORDS]
+)
+def test_a_name_of_files_that_cannot_be(form: str, name: str, tmp_path: Path) -> None:
+    error = refused(tmp_path, model(), form, tmp_path / "out", name=name)
+    assert repr(name) in str(error)
+
+
+TITLES = ["../x", "..", "/etc/x", "x\\y", "...", "+", "3", "while"]
+
+
+@pytest.mark.parametrize(("form", "name"), [*zip(itertools.cycle(PROGRAMS), TITLES, strict=False)])
+def test_a_chart_named_like_a_path(form: str, name: str, tmp_path: Path) -> None:
+    said = str(refused(tmp_path, model(name=name), form, tmp_path / "out"))
+    assert repr(name) in said
+    assert "another name" in said
+
+
+@pytest.mark.slow
 def test_what_is_not_ours_stays(tmp_path: Path) -> None:
-    names = [path.name for path in export(GMS_MODEL, "transitions", tmp_path / "first", name="it")]
-    for name in names:
+    for name in [path.name for path in export(PAPER, "transitions", tmp_path / "a", name="it")]:
         folder = tmp_path / name.partition(".")[0]
         folder.mkdir()
         (folder / name).write_text("mine")
-        said = refused(folder, GMS_MODEL, "transitions", folder, name="it", kind=OutputError)
+        said = str(refused(folder, PAPER, "transitions", folder, name="it", kind=OutputError))
         assert name in said
         assert "was not written by gms-fsm" in said
 
 
-def test_folders_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_folders_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine")
     (tmp_path / "README-it-st.md").mkdir()
     for folder, said in (
@@ -155,83 +222,36 @@ def test_folders_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.Monk
         ("a\0b", "a null byte"),
         *([("/proc/friction", "/proc/friction")] if Path("/proc/self").exists() else []),
     ):
-        given = refused(tmp_path, GMS_MODEL, "st", folder, name="it", kind=OutputError)
-        assert said in given
-    monkeypatch.chdir(tmp_path)
-    assert 'write "."' in refused(tmp_path, GMS_MODEL, "st", "")
+        assert said in str(refused(tmp_path, PAPER, "st", folder, name="it", kind=OutputError))
+    assert 'write "."' in str(refused(tmp_path, PAPER, "st", ""))
 
 
 @pytest.mark.parametrize("form", ["", "c", "C99", "../c99", 3, None, ["c99"]])
 def test_an_unknown_format(form: Any, tmp_path: Path) -> None:
-    said = refused(tmp_path, GMS_MODEL, form, tmp_path / "out")
-    assert "there is no format" in said
+    said = str(refused(tmp_path, PAPER, form, tmp_path / "out"))
+    assert "there is no such format" in said
     assert all(each in said for each in formats())
 
 
-@pytest.mark.parametrize("form", PROGRAMS)
-def test_a_word_of_the_language_as_name_chart_or_parameter(form: str, tmp_path: Path) -> None:
-    for word in sorted(formats()[form].words)[:1]:
-        assert repr(word) in refused(tmp_path, GMS_MODEL, form, tmp_path / "out", name=word)
-    words = words_for_charts(form)
-    for word in words:
-        if word.islower():  # names are made in lower case
-            assert repr(word) in refused(tmp_path, friction(word), form, tmp_path / "out")
-        if form == "transitions":  # its words are modules, which files may not be called after
-            continue
-        given = friction(parameter=word)
-        assert word in refused(tmp_path, given, form, tmp_path / "out", name="it")
-    assert words or not re.search(r"c99|fmu|matlab|modelica|st$", form)
-
-
-# The door is the same for all formats: each wrong value is given to one of them.
-NAMES = ["../x", "/x", "a/b", "a b", "1x", "x.y", "é", "x" * 64]
-TITLES = ["../x", "..", "/etc/x", "x\\y", "...", "+", "3"]
-WRONG: list[tuple[str, Any]] = [
-    *(("system", each) for each in (None, 3, "gms", object(), [GMS_MODEL])),
-    *(("folder", each) for each in (None, 3, object(), ["out"])),
-    *(("name", each) for each in (None, 3, ["it"])),
-    *(("initial", each) for each in (3, "z", {"y": 1.0}, {"z": "x"})),
-    *(("t_start", each) for each in ("x", None, float("nan"))),
-    *(("settings", each) for each in (3, {"rtol": 1e-3})),
-]
-
-
-@pytest.mark.parametrize(("form", "name"), [*zip(itertools.cycle(KINDS), NAMES, strict=False)])
-def test_a_name_that_is_no_identifier(form: str, name: str, tmp_path: Path) -> None:
-    assert repr(name) in refused(tmp_path, GMS_MODEL, form, tmp_path / "out", name=name)
-
-
-@pytest.mark.parametrize(("form", "name"), [*zip(itertools.cycle(KINDS), TITLES, strict=False)])
-def test_a_chart_named_like_a_path(form: str, name: str, tmp_path: Path) -> None:
-    said = refused(tmp_path, friction(name), form, tmp_path / "out")
-    assert repr(name) in said
-    assert "give another name" in said
-
-
-@pytest.mark.parametrize(("form", "wrong"), [*zip(itertools.cycle(KINDS), WRONG, strict=False)])
-def test_wrong_types(form: str, wrong: tuple[str, Any], tmp_path: Path) -> None:
-    given = {"system": GMS_MODEL, "folder": tmp_path / "out", "name": "it", wrong[0]: wrong[1]}
-    refused(tmp_path, kind=GMSError, format=form, **given)
-
-
-@pytest.mark.parametrize("kind", ["model", "format", "folder", "word", "path", "chart", "signal"])
-def test_the_command_line_says_it_in_one_message(kind: str, gms_fsm: CommandLine) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ("gms --law signed --to c99 -o file", "another folder"),
+        ("gms --law signed --to c99 --name ../x", "'../x'"),
+        ("bare.toml --to c99", "needs numbers"),
+    ],
+)
+def test_the_command_line_says_it_in_one_message(
+    arguments: str, said: str, gms_fsm: CommandLine
+) -> None:
     here = Path.cwd()
     (here / "file").write_text("mine")
-    (here / "double.toml").write_text(CHART.replace("spring", "double"))
-    (here / "named.toml").write_text(CHART.replace("spring", "../x"))
-    (here / "bare.toml").write_text(CHART)
-    (here / "driven.toml").write_text("x = [")
+    (here / "bare.toml").write_text(
+        'name = "spring"\nvariables = ["z"]\nparameters = ["k"]\noutputs.F = "k * z"\n'
+        '[[state]]\nname = "on"\nflow.z = "v"\n'
+    )
     before = there(here)
-    arguments, said = {
-        "model": (["nobody", "--to", "c99"], "nobody"),
-        "format": (["gms", "--law", "signed", "--to", "c98"], "there is no format 'c98'"),
-        "folder": (["gms", "--law", "signed", "--to", "c99", "-o", "file"], "another folder"),
-        "word": (["gms", "--law", "signed", "--to", "c99", "--name", "double"], "'double'"),
-        "path": (["gms", "--law", "signed", "--to", "c99", "--name", "../x"], "'../x'"),
-        "chart": (["bare.toml", "--to", "c99"], "needs numbers"),
-        "signal": (["driven.toml", "--to", "c99"], "driven.toml"),
-    }[kind]
-    one_message(gms_fsm("export", *arguments), said)
+    one_message(gms_fsm("export", *arguments.split()), said)
     assert there(here) == before
     assert not (here.parent / "x").exists()

@@ -15,17 +15,19 @@ from gms_fsm import Chart, ChartModel, Contact, GMSParameters, State, Transition
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import plain_c
-from tests.exporters.plain_c_runs import COMPILERS, compared, compiled, needs_c
-from tests.exporters.text_cases import case
+from tests.exporters.c_programs import COMPILERS, needs_c, plain_compared, plain_step
+from tests.exporters.frictions import case
 
 
 @needs_c
+@pytest.mark.slow
 def test_the_bits_of_the_engine(tmp_path: Path) -> None:
-    switches, _ = compared("gms-4-signed", 1, COMPILERS[0], tmp_path)
+    switches, _ = plain_compared("gms-4-signed", 1, COMPILERS[0], tmp_path)
     assert switches
 
 
 @needs_c
+@pytest.mark.slow
 def test_further_inputs_position_and_time(tmp_path: Path) -> None:
     """What a chart reads besides v becomes an argument; x is the integral of v."""
     chart = Chart(
@@ -43,7 +45,7 @@ def test_further_inputs_position_and_time(tmp_path: Path) -> None:
         outputs={"F": "N * z + min(x, t)**2.5"},
     )
     contact = Contact("c", chart, {"mu": 0.3}, inputs={"N": "load + 1"})
-    step = compiled(tmp_path, Subject.of(contact, "c99", name="loaded"))
+    step = plain_step(tmp_path, Subject.of(contact, "c99", name="loaded"))
     x, z, age, state, dt = 0.0, 0.0, 0.0, "a", 2.0**-6
     for k in range(400):
         t, v, N = k * dt, float(np.cos(3 * k * dt)), 1.5
@@ -82,9 +84,9 @@ def test_names_of_the_printer_give_way() -> None:
 
 
 @needs_c
-@pytest.mark.parametrize("compiler", [*COMPILERS, *filter(shutil.which, ["g++"])])
-def test_states_of_any_name_compile(compiler: str, tmp_path: Path) -> None:
-    """States h and H, stick and Stick; a parameter named as the header's guard would be."""
+@pytest.mark.slow
+def test_states_of_any_name_compile(tmp_path: Path) -> None:
+    """h and H, stick and Stick, a parameter named as the guard of the header; also in C++."""
     states = ("h", "H", "stick", "Stick", "H_2")
     chart = Chart(
         "names",
@@ -98,18 +100,15 @@ def test_states_of_any_name_compile(compiler: str, tmp_path: Path) -> None:
         outputs={"F": "IT_PLAIN_H * z"},
     )
     subject = Subject.of(ChartModel(chart, {"IT_PLAIN_H": 2.0}), "c99", name="it")
-    for name, text in plain_c(subject).items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    if compiler == "g++":  # the header only, twice: it names functions of C
-        main = '#include "it_plain.h"\n#include "it_plain.h"\n'
+    for compiler in COMPILERS:
+        step = plain_step(tmp_path, subject, compiler)
+        assert [step(1.0, 1.0) for _ in range(4)] == [0.0, 2.0, 4.0, 6.0]
+    if shutil.which("g++"):  # the header only, twice: it names functions of C
+        main = '#include "it_plain.h"\n' * 2
         main += "int main() { it_plain f; it_plain_start(&f); return it_plain_step(&f, 1, 1) > 0; }"
         (tmp_path / "main.cc").write_text(main)
-        source = ["gcc", "-std=c99", "-c", "it_plain.c", "-o", "it_plain.o"]
-        for command in (source, ["g++", "-Wall", "-Werror", "main.cc", "it_plain.o"]):
-            subprocess.run(command, cwd=tmp_path, check=True)
-    else:
-        step = compiled(tmp_path, subject, compiler)
-        assert [step(1.0, 1.0) for _ in range(4)] == [0.0, 2.0, 4.0, 6.0]
+        command = ["g++", "-Wall", "-Werror", "-c", "main.cc"]
+        subprocess.run(command, cwd=tmp_path, check=True)
 
 
 def test_names_of_the_text_itself_are_refused() -> None:
@@ -127,6 +126,7 @@ def test_names_of_the_text_itself_are_refused() -> None:
 
 
 @needs_c
+@pytest.mark.slow
 def test_one_state_needs_no_field(tmp_path: Path) -> None:
     """An edge of a chart of one state takes its actions, and nothing else."""
     chart = Chart(
@@ -137,6 +137,6 @@ def test_one_state_needs_no_field(tmp_path: Path) -> None:
         outputs={"F": "z"},
     )
     subject = Subject.of(ChartModel(chart, {}), "c99", name="reset")
-    step = compiled(tmp_path, subject)
+    step = plain_step(tmp_path, subject)
     assert [step(1.0, 1.0) for _ in range(5)] == [0.0, 1.0, 0.0, 1.0, 0.0]
     assert "state" not in plain_c(subject)["reset_plain.h"]

@@ -15,6 +15,7 @@ from tests.helpers import stick_slip
 VELOCITY = "0.15 * sin(2 * pi * t / 25)"
 
 
+@pytest.mark.slow
 def test_the_gms_element(tmp_path: Path) -> None:
     pytest.importorskip("statemachine", reason="needs python-statemachine")
     gms = stick_slip("signed")
@@ -42,12 +43,8 @@ def test_the_readme_is_a_program(tmp_path: Path) -> None:
 
 
 def test_names_that_a_tool_keeps_for_itself_are_in_the_readme(tmp_path: Path) -> None:
-    export(
-        Chart("own", parameters=("model",), states=(State("a"),), outputs={"F": "v"}),
-        "scxml",
-        tmp_path,
-        name="own",
-    )
+    chart = Chart("own", parameters=("model",), states=(State("a"),), outputs={"F": "v"})
+    export(chart, "scxml", tmp_path, name="own")
     text = (tmp_path / "README-own-scxml.md").read_text(encoding="utf-8")
     assert "python-statemachine keeps the names model for itself" in text
     assert "set every <data> without expr" in text

@@ -12,30 +12,38 @@ from gms_fsm import Chart, ChartModel, FrictionState, State, export
 from gms_fsm.charts.registry import entry
 from gms_fsm.exporters import Subject, formats
 from gms_fsm.systems.models import demonstration
-from tests.exporters.text_cases import case, loaded
+from tests.exporters.frictions import case, loaded
 
 
+@pytest.mark.slow
 def test_blark_parses_structured_text() -> None:
     blark = pytest.importorskip("blark")
     subject = Subject.of(case("gms-4-signed", 0).model, "st", name="friction")
     blark.parse_source_code(formats()["st"].write(subject)["friction.st"])
 
 
-def test_octave_takes_a_switch(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_octave_takes_a_switch_and_holds_its_tolerance_on_a_stiff_flow(tmp_path: Path) -> None:
+    """By default, in calls many relaxation times long, through the narrow Stribeck curve."""
     octave = pytest.importorskip("tests.exporters.octave")
     if octave.OCTAVE is None:
         pytest.skip("octave-cli is not installed")
     given = case("gms-4-signed", 1, corners=3)
     lines = octave.lines_of(given.t[:2], given.v[:2], 0.05)
-    forces, log = octave.ran_in_octave(tmp_path, given.model, lines, 1e-2)
-    trace = given.simulated(rtol=1e-8)
-    expected = trace.transitions
-    first = expected.t < given.t[1]
-    assert [i - 1 for _, i, _ in log] == expected.element[first].tolist()
+    forces, log = octave.ran_in_octave(tmp_path / "switch", given.model, lines, 1e-2)
+    expected = given.simulated(rtol=1e-8).transitions
+    assert [i - 1 for _, i, _ in log] == expected.element[expected.t < given.t[1]].tolist()
     assert log
     assert len(forces) == len(lines)
+    model = demonstration(entry("lugre"))
+    lines = np.array([[0.0, 0.1, 0.01], [0.1, -0.1, 0.05], [-0.1, 0.0, 0.05]])
+    forces, _ = octave.ran_in_octave(tmp_path / "stiff", model, lines, np.inf)
+    friction = FrictionState(model, rtol=1e-12)
+    exact = [friction.advance(*line) for line in lines.tolist()]
+    assert forces.tolist() == pytest.approx(exact, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_rumoca_takes_the_switches() -> None:
     pytest.importorskip("rumoca")
     from tests.exporters.rumoca_runs import compared
@@ -79,16 +87,3 @@ def test_matlab_keeps_names_below_its_limit(tmp_path: Path) -> None:
     (path, *_) = export(given, "matlab", tmp_path / "out", name="k" * longest)
     names = re.findall(r"^function .*?(k{9}\w*)", path.read_text(encoding="utf-8"), re.MULTILINE)
     assert max(map(len, names)) == 63
-
-
-def test_octave_holds_its_tolerance_on_a_stiff_flow(tmp_path: Path) -> None:
-    """By default, in calls many relaxation times long, through the narrow Stribeck curve."""
-    octave = pytest.importorskip("tests.exporters.octave")
-    if octave.OCTAVE is None:
-        pytest.skip("octave-cli is not installed")
-    model = demonstration(entry("lugre"))
-    lines = np.array([[0.0, 0.1, 0.01], [0.1, -0.1, 0.05], [-0.1, 0.0, 0.05]])
-    forces, _ = octave.ran_in_octave(tmp_path, model, lines, np.inf)
-    friction = FrictionState(model, rtol=1e-12)
-    exact = [friction.advance(*line) for line in lines.tolist()]
-    assert forces.tolist() == pytest.approx(exact, rel=1e-6)

@@ -27,7 +27,7 @@ from gms_fsm import (
 from gms_fsm.charts import CHARTS, GMS_ELEMENT
 from gms_fsm.language import evaluate, parse_value
 from tests.exporters.charts_to_export import MODELS, SLOW, imported, model
-from tests.helpers import stick_slip
+from tests.helpers import matrix, stick_slip
 
 SINE = "0.15 * sin(2 * pi * t / 25)"
 FORCE = Chart(
@@ -54,7 +54,6 @@ LOADED = Contact("pad", FORCE, {"k": 1.0, "mu": 0.3}, inputs={"N": "2 * load"})
 PRESSED = Contact("pad", stick_slip("signed"), inputs={"N": "1 + 0.5 * sin(t)"})
 LOAD = {"load": "0.5 + 0.2 * cos(t)"}
 Case = tuple[Any, dict[str, str], float, float, int]  # friction, record, end, step, switches
-FEW = ("gms-signed", "seven-parameter", "backlash")
 CASES: dict[str, Case] = {
     "forces in guards, inputs, several elements": (SEVERAL, {"v": "sin(2 * t)"}, 20.0, 1e-2, 20),
     "a load from outside": (LOADED, {"v": "sin(2 * t)", **LOAD}, 20.0, 1e-2, 10),
@@ -67,18 +66,12 @@ def case(name: str) -> Case:
     if name in CASES:
         return CASES[name]
     switches = -1 if not CHARTS[name].transitions or name == "backlash" else 2
-    if name.startswith("gms"):
-        return model(name), {"v": SINE}, 25.0, 5e-3, switches
-    return model(name), {"v": SLOW}, 7.5, 1e-3, switches
+    record = ({"v": SINE}, 25.0, 5e-3) if name.startswith("gms") else ({"v": SLOW}, 7.5, 1e-3)
+    return model(name), *record, switches
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *CASES,
-        *(pytest.param(e, marks=[pytest.mark.matrix] * (e not in FEW)) for e in MODELS),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*CASES, *matrix([*MODELS], ["gms-signed", "seven-parameter"])])
 def test_every_switch_and_the_force_are_equal(name: str, tmp_path: Path) -> None:
     given, record, t_end, step, least = case(name)
     path, *_ = export(given, "transitions", tmp_path, name="file")
@@ -118,16 +111,11 @@ print(sorted({name.partition(".")[0] for name in sys.modules} & {"numpy", "gms_f
 
 def alone(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run an exported file in a process that has not imported this package."""
-    return subprocess.run(
-        [sys.executable, "-c", ISOLATED, *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-        timeout=60,
-    )
+    command = [sys.executable, "-c", ISOLATED, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
 
 
+@pytest.mark.slow
 def test_it_runs_by_itself_and_prints_its_switches(tmp_path: Path) -> None:
     export(stick_slip("signed"), "transitions", tmp_path, name="file")
     done = alone(tmp_path, "25", "0.01")
@@ -137,6 +125,9 @@ def test_it_runs_by_itself_and_prints_its_switches(tmp_path: Path) -> None:
     assert lines[0].endswith("element 1: break_away_forward -> slip")
     assert last.startswith(f"{len(lines)} switches; F = ")
     assert len(lines) == 16
+    text = (tmp_path / "README-file-transitions.md").read_text(encoding="utf-8")
+    for wanted in ("python file.py", "States: stick, slip", "not located", "k, sigma, C, v_c"):
+        assert wanted in text
 
 
 def test_a_chart_without_numbers_asks_for_them(tmp_path: Path) -> None:
@@ -144,14 +135,6 @@ def test_a_chart_without_numbers_asks_for_them(tmp_path: Path) -> None:
     done = alone(tmp_path)
     assert done.returncode == 1
     assert "no numbers: fill in VALUES, one mapping for each element" in done.stderr
-    file = imported(path)
     values = [{"k": 1.0, "sigma": 0.0, "C": 0.1, "v_c": 1e-6}]
-    rows = list(file.run(lambda t: {"v": 1.0, "s": 0.5}, 1.0, 0.01, values=values))
+    rows = list(imported(path).run(lambda t: {"v": 1.0, "s": 0.5}, 1.0, 0.01, values=values))
     assert rows[-1][3] == ["slip"]
-
-
-def test_the_readme_says_how_to_run_it(tmp_path: Path) -> None:
-    export(stick_slip("signed"), "transitions", tmp_path, name="own")
-    text = (tmp_path / "README-own-transitions.md").read_text(encoding="utf-8")
-    for wanted in ("python own.py", "States: stick, slip", "not located", "k, sigma, C, v_c"):
-        assert wanted in text

@@ -85,10 +85,15 @@ def main() -> int:
 
 # --------------------------------------------------------------------------- what a user does
 def drive(name: str, page: Page, pictures: Path | None) -> None:
-    """Slider, poke and compare, law, export; print what was seen."""
+    """Move a slider, poke and compare, export; print what was seen.
+
+    What the widget does is tried in tests/plots; here each message crosses a host's own way.
+    """
 
     def say(text: str) -> None:
         print(f"{name}: {text}", flush=True)
+        if pictures is not None:
+            page.screenshot(path=pictures / f"{name}-{text.partition(':')[0]}.png")
 
     widget = page.locator(".gms-explore").first
     widget.wait_for(timeout=PATIENCE)
@@ -96,21 +101,14 @@ def drive(name: str, page: Page, pictures: Path | None) -> None:
     expect(widget.locator(".gms-now")).to_have_count(1, timeout=PATIENCE)  # the page has answered
     frame = replay_of(page)
     before, drawn = frame.evaluate(FORCE), frame.evaluate(PLOT)
-    slider = widget.locator("input[type=range]").first
-    slider.focus()
-    begin = time.perf_counter()
+    widget.locator("input[type=range]").first.focus()
     for _ in range(40):
         page.keyboard.press("ArrowRight")
     value = widget.locator("input[type=number]").first.input_value()
     until(lambda: frame.evaluate(PLOT) != drawn and settled(widget))
-    took = time.perf_counter() - begin
-    after = at_rest(frame)
     assert float(value) == 1.6, value
-    assert before != after
-    say(f"slider: F_s = {value} N, 40 keys and the last picture in {1e3 * took:.0f} ms")
-    spent = widget.locator(".gms-took").inner_text()
-    say(f"slider: the last run took {spent}; F changed in data and plot")
-    keep(page, pictures, f"{name}-slider")
+    assert before != at_rest(frame)
+    say(f"slider: F_s = {value} N; F changed in data and plot")
 
     frame.evaluate("go(events[14])")
     poke = widget.get_by_role("button", name="poke at 24.99997 s")
@@ -121,28 +119,12 @@ def drive(name: str, page: Page, pictures: Path | None) -> None:
     until(lambda: settled(widget) and frame.evaluate("runs.length") == 2)
     told = widget.locator(".gms-pin").inner_text()
     assert "first difference" in told, told
-    say(f"poke: {widget.locator('.gms-current title').text_content()}".split(". Click")[0])
     say(f"compare: {told}")
-    assert frame.evaluate("pinned") is not None
-    widget.get_by_label("Compare the current branch with").select_option("")
-    until(lambda: settled(widget) and frame.evaluate("runs.length") == 1)
-    widget.get_by_label("Compare the current branch with").select_option("0")
-    until(lambda: settled(widget) and frame.evaluate("runs.length") == 2)
-    keep(page, pictures, f"{name}-compare")
 
-    widget.locator(".gms-branch").first.click()
-    until(lambda: settled(widget) and frame.evaluate("runs.length") == 1)
-    widget.get_by_label("Slip law").select_option("signed")
-    expect(widget.locator(".gms-branch")).to_have_count(3)
-    until(lambda: settled(widget) and frame.evaluate("runs.length") == 2)
-    differ = frame.locator(".differs").count()
-    say(f"law: published against signed; {differ} marks of different states at this row")
-    keep(page, pictures, f"{name}-law")
     with page.expect_download() as download:
         widget.get_by_role("button", name="export").click()
-    text = Path(download.value.path()).read_text(encoding="utf-8")
-    assert 'law = "signed"' in text
-    say(f"export: {download.value.suggested_filename}, {len(text)} characters")
+    assert 'law = "published"' in Path(download.value.path()).read_text(encoding="utf-8")
+    say(f"export: {download.value.suggested_filename}")
 
 
 def replay_of(page: Page) -> Frame:
@@ -174,26 +156,12 @@ def until(condition: Callable[[], bool], patience: float = 30.0) -> None:
         time.sleep(0.02)
 
 
-def keep(page: Page, pictures: Path | None, name: str) -> None:
-    if pictures is not None:
-        page.screenshot(path=pictures / f"{name}.png")
-
-
 # --------------------------------------------------------------------------- the notebooks
 @contextlib.contextmanager
 def jupyterlab(browser: Browser, folder: Path) -> Iterator[Page]:
     """Open a notebook in JupyterLab and run all its cells."""
-    cells = [
-        {
-            "cell_type": "code",
-            "execution_count": None,
-            "id": f"cell{i}",
-            "metadata": {},
-            "outputs": [],
-            "source": source,
-        }
-        for i, source in enumerate((SETUP, "w"))
-    ]
+    empty = {"cell_type": "code", "execution_count": None, "metadata": {}, "outputs": []}
+    cells = [{**empty, "id": f"cell{i}", "source": each} for i, each in enumerate((SETUP, "w"))]
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
     notebook = {"cells": cells, "metadata": kernel, "nbformat": 4, "nbformat_minor": 5}
     (folder / "explore.ipynb").write_text(json.dumps(notebook), encoding="utf-8")

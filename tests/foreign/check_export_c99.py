@@ -14,11 +14,12 @@ from gms_fsm.charts.registry import registered
 from gms_fsm.systems.models import demonstration
 from gms_fsm.systems.signals import Corners
 from gms_fsm.systems.system import system_of
-from tests.exporters.c_cases import CASES, SCENARIOS, case, times, walk
 from tests.exporters.c_programs import COMPILERS, same_bits
+from tests.exporters.frictions import DENSE, dense, times, walk
+from tests.helpers import ROOT
 
 SEEDS = range(2, 8)
-FLAGS = "-std=c99 -O2 -ffp-contract=off -Wall -Wextra -Wpedantic -Werror"
+SCENARIOS = ROOT / "scenarios"
 
 
 def version(compiler: str) -> str:
@@ -27,16 +28,12 @@ def version(compiler: str) -> str:
     return f"{compiler} {text.stdout.strip()}"
 
 
-def test_there_are_two_compilers() -> None:
-    assert COMPILERS == ["gcc", "clang"]
-
-
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", DENSE)
 def test_random_records(name: str, compiler: str, tmp_path: Path, ran: Callable[..., None]) -> None:
     switches = 0
     for seed in SEEDS:
-        given, t, inputs = case(name, seed)
+        given, t, inputs = dense(name, seed)
         switches += same_bits(given, tmp_path, t, [compiler], **inputs)
     what = f"{name}, {len(SEEDS)} random records"
     ran("c99", version(compiler), what, f"{switches} switches, all bits equal, no warning")

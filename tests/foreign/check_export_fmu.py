@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,7 @@ from fmpy.validation import validate_fmu
 
 from gms_fsm import Body, Contact, FrictionState, Prescribed, Settings, System, simulate
 from gms_fsm.charts.registry import registered
-from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
-from gms_fsm.systems.models import ChartModel, demonstration
-from tests.exporters.c_cases import CASES, case
+from gms_fsm.systems.models import demonstration
 from tests.exporters.c_programs import known_floors
 from tests.exporters.fmus import (
     END,
@@ -36,42 +35,33 @@ from tests.exporters.fmus import (
     taken,
     written,
 )
+from tests.exporters.frictions import DENSE, KARNOPP_MODEL, dense, servo
 
 Ran = Callable[..., None]
 FMPY = f"FMPy {fmpy.__version__}"
 STATES = [f"state[{k + 1}]" for k in range(4)]
-BODY = {"bodies": (Body("mass", inertia="m", force="f", x="x", v="v"),), "numbers": {"m": 1.0}}
-KARNOPP_ON_A_MASS = System(
-    "mass",
-    contacts=(
-        Contact(
-            "pad", ChartModel(KARNOPP, {"F_c": 1.0, "F_s": 1.5, "sigma_2": 0.4, "D": 1e-4}), v="v"
-        ),
-    ),
-    signals={"f": "3 * sin(1.5 * t) * min(t, 1)"},
-    **BODY,  # type: ignore[arg-type]
+PUSH = "3 * sin(1.5 * t) * min(t, 1)"
+forms = pytest.mark.parametrize("form", FORMATS)
+
+
+def on_a_mass(friction: Any, force: str = PUSH) -> System:
+    """Return a mass under a force."""
+    body = Body("mass", inertia="1.0", force=force, x="x", v="v")
+    return System("mass", bodies=(body,), contacts=(Contact("it", friction, v="v"),))
+
+
+OPEN_LOOP = System(
+    "open loop",
+    bodies=(Body("body", velocity="0.2 * sin(2 * pi * t / 20)"),),
+    contacts=(Contact("friction", PAPER, v="v"),),
 )
 # Dry friction by sgn(v), besides a bristle: the motion slides along v = 0 when it rests.
-SGN_ON_A_MASS = System(
-    "mass",
-    bodies=(
-        Body("mass", inertia="1.0", force="3 * sin(1.5 * t) * min(t, 1) - sgn(v)", x="x", v="v"),
-    ),
-    contacts=(Contact("friction", PAPER, v="v"),),
-)
-GMS_ON_A_FORMULA = System(
-    "open loop",
-    bodies=(Body("body", velocity="v"),),
-    contacts=(Contact("friction", PAPER, v="v"),),
-    signals={"v": "0.2 * sin(2 * pi * t / 20)"},
-)
-
-
-def servo() -> System:
-    """Return the servo of the scenarios."""
-    from gms_fsm.app.scenario import load_system
-
-    return load_system(Path(__file__).parents[2] / "scenarios" / "servo.toml")
+WHOLE: dict[str, tuple[System, float, str]] = {
+    "open loop as a formula": (OPEN_LOOP, END, "friction.F"),
+    "servo": (servo(), 0.2, "x_l"),
+    "Karnopp on a mass": (on_a_mass(KARNOPP_MODEL), 10.0, "x"),
+    "sgn(v) on a mass": (on_a_mass(PAPER, f"{PUSH} - sgn(v)"), 10.0, "x"),
+}
 
 
 def simulated(path: Path, kind: str, end: float, **options: Any) -> np.ndarray:
@@ -81,15 +71,7 @@ def simulated(path: Path, kind: str, end: float, **options: Any) -> np.ndarray:
     return result
 
 
-# --------------------------------------------------------------------------- the paper's open loop
-@pytest.mark.parametrize("form", FORMATS)
-def test_the_model_description_is_valid(form: str, tmp_path: Path, ran: Ran) -> None:
-    for what in (PAPER, servo(), KARNOPP_ON_A_MASS):
-        assert validate_fmu(str(written(what, form, tmp_path, name="it"))) == []
-    ran(form, FMPY, "validation of three FMUs", "no findings")
-
-
-@pytest.mark.parametrize("form", FORMATS)
+@forms
 @pytest.mark.parametrize("solver", ["CVode", "Euler"])
 def test_model_exchange_takes_all_edges(form: str, solver: str, tmp_path: Path, ran: Ran) -> None:
     t, v = paper_record()
@@ -111,59 +93,10 @@ def test_model_exchange_takes_all_edges(form: str, solver: str, tmp_path: Path, 
     ran(form, FMPY, f"open loop, Model Exchange, {solver}", f"48 of 48 switches, {order}")
 
 
-@pytest.mark.parametrize("form", FORMATS)
-def test_model_exchange_is_accurate(form: str, tmp_path: Path, ran: Ran) -> None:
-    trace = simulate(GMS_ON_A_FORMULA, END, rtol=1e-9)
-    names = [f"friction.{each}" for each in STATES]
-    result = simulated(
-        written(GMS_ON_A_FORMULA, form, tmp_path, name="gms"), "ModelExchange", END,
-        relative_tolerance=1e-8, output_interval=0.01, output=names,
-    )  # fmt: skip
-    found = switched(result, names, ("stick", "slip"))
-    assert [each[1:] for each in found] == taken(trace)
-    late = np.abs([each[0] for each in found] - trace.transitions.t).max()
-    assert late < 1e-5
-    ran(
-        form, FMPY, "open loop as a formula, Model Exchange, CVode", f"switches within {late:.0e} s"
-    )
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_co_simulation_gives_the_engine_s_bits(form: str, tmp_path: Path, ran: Ran) -> None:
-    path = written(PAPER, form, tmp_path, name="gms")
-    t, v = paper_record()
-    state, slave, forces = FrictionState(PAPER), Slave(path), []
-    for j in range(1, t.size):
-        h = float(t[j] - t[j - 1])
-        # The last bit of the end of a line that is given by its derivative is that of v + dv * h.
-        last = v[j] if form == "fmu3" else v[j - 1] + (v[j] - v[j - 1]) / h * h
-        forces.append(state.advance(float(v[j - 1]), float(last), h))
-    found = slave.run(t, ["F"], v=v)[:, 0]
-    np.testing.assert_array_equal(found, forces)
-    assert slave.count("switches") == 48
-    how = "input derivatives" if form == "fmu2" else "intermediate update"
-    ran(form, FMPY, f"open loop, Co-Simulation, {how}", "48 of 48 switches, all bits of F")
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_co_simulation_with_held_inputs(form: str, tmp_path: Path, ran: Ran) -> None:
-    t, v = paper_record()
-    record = np.array(list(zip(t, v, strict=True)), dtype=[("time", "f8"), ("v", "f8")])
-    result = simulated(
-        written(PAPER, form, tmp_path, name="gms"), "CoSimulation", END,
-        input=record, output_interval=0.01, output=["switches"],
-    )  # fmt: skip
-    assert result["switches"][-1] == 48
-    ran(form, FMPY, "open loop, Co-Simulation by its own loop", "48 of 48 switches")
-
-
-# --------------------------------------------------------------------------- whole systems
-@pytest.mark.parametrize("form", FORMATS)
-@pytest.mark.parametrize("name", CASES)
+@forms
+@pytest.mark.parametrize("name", DENSE)
 def test_co_simulation_on_random_records(name: str, form: str, tmp_path: Path, ran: Ran) -> None:
-    from dataclasses import replace
-
-    given, t, inputs = case(name, 3)
+    given, t, inputs = dense(name, 3)
     t = np.arange(t.size) * 2.0 ** np.round(np.log2(t[-1] / (t.size - 1)))  # exact lines
     inputs = {key: np.round(each * 2**30) / 2**30 for key, each in inputs.items()}
     known: dict[str, Settings] = {}
@@ -180,33 +113,26 @@ def test_co_simulation_on_random_records(name: str, form: str, tmp_path: Path, r
     ran(form, FMPY, f"{name} on a random record, Co-Simulation", "all bits of F")
 
 
-WHOLE: dict[str, tuple[Callable[[], System], float, str]] = {
-    "servo": (servo, 0.2, "x_l"),
-    "Karnopp on a mass": (lambda: KARNOPP_ON_A_MASS, 10.0, "x"),
-    "sgn(v) on a mass": (lambda: SGN_ON_A_MASS, 10.0, "x"),
-}
-
-
-@pytest.mark.parametrize("form", FORMATS)
+@forms
 @pytest.mark.parametrize("name", WHOLE)
 def test_whole_systems(name: str, form: str, tmp_path: Path, ran: Ran) -> None:
-    make, end, seen = WHOLE[name]
-    system = make()
-    t = np.linspace(0.0, end, 201)
-    trace = simulate(system, end, t_eval=t, rtol=1e-9)
+    system, end, seen = WHOLE[name]
+    t, unit = np.linspace(0.0, end, 201), "N" if seen.endswith("F") else "m"
     path = written(system, form, tmp_path, name="it")
+    assert validate_fmu(str(path)) == []
     output = {"output": [seen, "switches"], "record_events": False, "output_interval": end / 200}
-    result = simulated(path, "ModelExchange", end, relative_tolerance=1e-9, **output)
-    assert result["switches"][-1] == len(trace.transitions) > 10
-    apart = np.abs(np.interp(t, result["time"], result[seen]) - trace.value(seen)).max()
-    assert apart < 1e-6 * np.abs(trace.value(seen)).max() + 1e-7
-    ran(form, FMPY, f"{name}, Model Exchange, CVode", f"all switches, {seen} within {apart:.0e} m")
-    result = simulated(path, "CoSimulation", end, **output)
-    exact = simulate(system, end, t_eval=t)
-    assert result["switches"][-1] == len(exact.transitions)
-    apart = np.abs(np.interp(t, result["time"], result[seen]) - exact.value(seen)).max()
-    assert apart < 1e-6 * np.abs(trace.value(seen)).max()
-    ran(form, FMPY, f"{name}, Co-Simulation", f"all switches, {seen} within {apart:.0e} m")
+    for kind, options, rtol in (
+        ("Model Exchange, CVode", {"relative_tolerance": 1e-9}, 1e-9),
+        ("Co-Simulation", {}, 1e-6),
+    ):
+        trace = simulate(system, end, t_eval=t, rtol=rtol)
+        result = simulated(path, kind.split(",")[0].replace(" ", "").replace("-", ""), end,
+                           **options, **output)  # fmt: skip
+        assert result["switches"][-1] == len(trace.transitions) > 10
+        exact = trace.value(seen.rpartition(".")[2])
+        apart = np.abs(np.interp(t, result["time"], result[seen]) - exact).max()
+        assert apart < 2e-6 * np.abs(exact).max() + 1e-7
+        ran(form, FMPY, f"{name}, {kind}", f"all switches, {seen} within {apart:.0e} {unit}")
 
 
 # What the engine refuses with such a force, or what is not a friction of one velocity.
@@ -217,11 +143,7 @@ CHARTS = [name for name in registered() if name not in NOT_HERE and not name.sta
 @pytest.mark.parametrize("name", CHARTS)
 def test_every_built_in_chart_on_a_mass(name: str, tmp_path: Path, ran: Ran) -> None:
     entry = registered()[name]
-    system = System(
-        "mass",
-        bodies=(Body("mass", inertia="1.0", force="3 * sin(1.5 * t) * min(t, 1)", x="x", v="v"),),
-        contacts=(Contact("it", demonstration(entry, next(iter(entry.laws), "")), v="v"),),
-    )
+    system = on_a_mass(demonstration(entry, next(iter(entry.laws), "")))
     t = np.linspace(0.0, 10.0, 641)
     trace = simulate(system, 10.0, t_eval=t, rtol=1e-9)
     result = simulated(
@@ -237,34 +159,41 @@ def test_every_built_in_chart_on_a_mass(name: str, tmp_path: Path, ran: Ran) -> 
 
 
 # --------------------------------------------------------------------------- instances, sources
-@pytest.mark.parametrize("form", FORMATS)
-def test_all_functions_are_there_and_nothing_is_global(form: str, tmp_path: Path, ran: Ran) -> None:
+@forms
+def test_all_functions_are_there_without_globals_or_warnings(
+    form: str, tmp_path: Path, ran: Ran
+) -> None:
     header = Path(fmpy.__file__).parent / "c-code" / f"fmi{form[-1]}Functions.h"
     wanted = {*re.findall(rf"FullName\((fmi{form[-1]}\w+)\)", header.read_text())} - {"name"}
     folder = Path(fmpy.extract(str(written(PAPER, form, tmp_path, name="gms"))))
     (library,) = (folder / "binaries").rglob("gms.so")
-    lines = subprocess.run(
-        ["nm", "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True
-    ).stdout.splitlines()
+    lines = said("nm", "-D", "--defined-only", str(library)).splitlines()
     assert {line.split()[-1] for line in lines} == wanted
     for source in (folder / "sources").glob("*.c"):
-        subprocess.run(
-            ["cc", "-std=c99", "-fPIC", "-c", source.name], cwd=source.parent, check=True
-        )
-        command = ["nm", source.with_suffix(".o").name]
-        table = subprocess.run(
-            command, cwd=source.parent, capture_output=True, text=True, check=True
-        )
-        assert not re.search(r" [bBcCdD] ", table.stdout.replace(" d .", "")), table.stdout
-    ran(
-        form,
-        f"nm {_version_of_nm()}",
-        "functions of the standard, globals",
-        f"{len(wanted)} functions, no globals",
-    )
+        said("cc", "-std=c99", "-fPIC", "-c", source.name, folder=source.parent)
+        table = said("nm", source.with_suffix(".o").name, folder=source.parent)
+        assert not re.search(r" [bBcCdD] ", table.replace(" d .", "")), table
+    tool = f"nm {said('nm', '--version').splitlines()[0].split()[-1]}"
+    what = f"{len(wanted)} functions, no globals"
+    ran(form, tool, "functions of the standard, globals", what)
+    flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
+    for compiler in filter(shutil.which, ("gcc", "clang")):
+        for given in (PAPER, servo(), on_a_mass(KARNOPP_MODEL), dense("LuGre", 1)[0]):
+            folder = Path(fmpy.extract(str(written(given, form, tmp_path, name="it")))) / "sources"
+            files = [each.name for each in folder.glob("*.c")]
+            said(compiler, *flags, *files, "-o", "it.so", "-lm", folder=folder)
+        tool = f"{compiler} {said(compiler, '--version').splitlines()[0].split()[-1]}"
+        ran(form, tool, "-std=c99 -Wall -Wextra -Wpedantic", "no warning")
 
 
-@pytest.mark.parametrize("form", FORMATS)
+def said(*command: str, folder: Path | None = None) -> str:
+    """Return what a program prints."""
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@forms
 def test_instances_are_independent_and_their_states_can_be_kept(
     form: str, tmp_path: Path, ran: Ran
 ) -> None:
@@ -295,7 +224,7 @@ def test_instances_are_independent_and_their_states_can_be_kept(
     ran(form, FMPY, "three instances; a state kept, serialized and restored", "equal bits")
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@forms
 def test_another_start_and_other_numbers(form: str, tmp_path: Path, ran: Ran) -> None:
     system = servo()
     path = written(system, form, tmp_path, name="it")
@@ -306,8 +235,6 @@ def test_another_start_and_other_numbers(form: str, tmp_path: Path, ran: Ran) ->
     )
     path = written(PAPER, form, tmp_path, name="gms")
     other, v = Slave(path, **{"k[2]": 3.0, "v_s": 2e-3, "z[1]": 0.1}), paper_record(2.0**-6)[1]
-    from dataclasses import replace
-
     numbers = PAPER.parameters  # type: ignore[attr-defined]
     k = [*numbers.k]
     k[1] = 3.0
@@ -322,7 +249,7 @@ def test_another_start_and_other_numbers(form: str, tmp_path: Path, ran: Ran) ->
     ran(form, FMPY, "parameters and initial values set", "all bits of F")
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@forms
 def test_wrong_calls_are_errors_with_a_message(
     form: str, tmp_path: Path, ran: Ran, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -348,7 +275,7 @@ def test_wrong_calls_are_errors_with_a_message(
     ran(form, FMPY, "wrong calls", "errors with a message, nothing changed")
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@forms
 def test_the_sources_can_be_compiled_again(form: str, tmp_path: Path, ran: Ran) -> None:
     folder = Path(fmpy.extract(str(written(PAPER, form, tmp_path, name="gms"))))
     (folder / "binaries").rename(folder / "before")
@@ -362,25 +289,3 @@ def test_the_sources_can_be_compiled_again(form: str, tmp_path: Path, ran: Ran) 
     slave.run(t, ["F"], v=v)
     assert slave.count("switches") == 48
     ran(form, f"{FMPY} and CMake", "the sources, compiled again", "48 of 48 switches")
-
-
-@pytest.mark.parametrize("form", FORMATS)
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_the_sources_give_no_warning(form: str, compiler: str, tmp_path: Path, ran: Ran) -> None:
-    if not shutil.which(compiler):
-        pytest.skip(f"{compiler} is not here")
-    for what in (PAPER, servo(), KARNOPP_ON_A_MASS, CASES["LuGre"](np.random.default_rng(1))[0]):
-        folder = Path(fmpy.extract(str(written(what, form, tmp_path, name="it")))) / "sources"
-        flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
-        files = [each.name for each in folder.glob("*.c")]
-        command = [compiler, *flags, *files, "-o", "it.so", "-lm"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-    head = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True)
-    version = head.stdout.splitlines()[0].split()[-1]
-    ran(form, f"{compiler} {version}", "-std=c99 -Wall -Wextra -Wpedantic", "no warning")
-
-
-def _version_of_nm() -> str:
-    told = subprocess.run(["nm", "--version"], capture_output=True, text=True, check=True).stdout
-    return told.splitlines()[0].split()[-1]

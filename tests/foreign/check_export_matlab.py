@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gms_fsm import FrictionState
+from tests.exporters.frictions import NAMES, Case, case, loaded
 from tests.exporters.octave import OCTAVE, lines_of, ran_in_octave
-from tests.exporters.text_cases import NAMES, Case, case, loaded
 
 RTOL = 1e-10
 CALL = 0.01  # s, the longest call; the steps in it are those of the default tolerance

@@ -12,8 +12,8 @@ from pymoca import parser
 from gms_fsm import Body, System, simulate
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.targets.modelica import modelica
+from tests.exporters.frictions import NAMES, case, loaded
 from tests.exporters.rumoca_runs import T_END, compared, ran_in_rumoca
-from tests.exporters.text_cases import NAMES, case, loaded
 
 NEAR = 1e-6  # of the largest force; Rumoca locates events by the tolerance of its solver
 

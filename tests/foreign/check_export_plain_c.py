@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.exporters.plain_c_runs import compared
-from tests.exporters.text_cases import NAMES
+from tests.exporters.c_programs import plain_compared
+from tests.exporters.frictions import NAMES
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
@@ -19,7 +19,7 @@ def test_the_bits_of_the_engine(compiler: str, ran: Callable[..., None], tmp_pat
         for seed in range(3):
             folder = tmp_path / f"{name}{seed}"
             folder.mkdir()
-            counts = compared(name, seed, compiler, folder)
+            counts = plain_compared(name, seed, compiler, folder)
             switches, steps = switches + counts[0], steps + counts[1]
     assert switches
     told = subprocess.run([compiler, "-dumpversion"], capture_output=True, text=True, check=True)

@@ -95,23 +95,22 @@ class Scion:
         self.process.communicate(timeout=20)
 
 
-def check(name: str, path: Path, start: Callable[[], PythonStateMachine | Scion]) -> int:
-    """Step a document with a tool, and compare with `simulate`; return the switches."""
+def stepped(name: str, folder: Path, start: Callable[[Path], PythonStateMachine | Scion]) -> int:
+    """Step the documents of a chart with a tool, and compare with `simulate`."""
     velocity, t_end, step = motion(name)
-    trace = simulate(
-        model(name),
-        Prescribed(velocity),
-        t_end,
-        method="euler",
-        step=step,
-        events="step",
-        engine="ifelse",
-    )
-    element = int(path.stem.removeprefix("own").removeprefix("_") or 1) - 1
-    mine = run(start(), model(name), element, moved_by(velocity), t_end, step)
-    assert mine == switches_of(trace, element)
-    assert len(mine) > 2 or name not in SWITCHING
-    return len(mine)
+    how: Any = {"method": "euler", "step": step, "events": "step", "engine": "ifelse"}
+    trace = simulate(model(name), Prescribed(velocity), t_end, **how)
+    count = 0
+    for element, path in enumerate(export(model(name), "scxml", folder, name="own")[:-1]):
+        tool = start(path)
+        try:
+            mine = run(tool, model(name), element, moved_by(velocity), t_end, step)
+        finally:
+            tool.close()
+        assert mine == switches_of(trace, element)
+        assert len(mine) > 2 or name not in SWITCHING
+        count += len(mine)
+    return count
 
 
 @pytest.fixture(scope="module")
@@ -129,33 +128,19 @@ def scion(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def kept(tool: str, ran: Ran, folder: Path, start: Callable[[Path], Any]) -> None:
+    """Step all charts with a tool, and keep its row."""
+    count = sum(stepped(name, folder / name, start) for name in NAMES)
+    what = f"{len(NAMES)} included charts stepped, all elements"
+    ran("scxml", tool, what, f"{count} switches, all as in simulate with Euler's method")
+
+
 def test_python_statemachine(ran: Ran, tmp_path: Path) -> None:
-    count = 0
-    for name in NAMES:
-        paths = export(model(name), "scxml", tmp_path / name, name="own")[:-1]
-        for path in paths:
-            count += check(name, path, lambda path=path: PythonStateMachine(path))  # type: ignore[misc]
-    ran(
-        "scxml",
-        f"python-statemachine {version('python-statemachine')}",
-        f"{len(NAMES)} included charts stepped, all elements",
-        f"{count} switches, all as in simulate with Euler's method",
-    )
+    tool = f"python-statemachine {version('python-statemachine')}"
+    kept(tool, ran, tmp_path, PythonStateMachine)
 
 
 def test_scion(ran: Ran, scion: Path, tmp_path: Path) -> None:
-    count = 0
-    for name in NAMES:
-        for path in export(model(name), "scxml", tmp_path / name, name="own")[:-1]:
-            tool = Scion(path, scion)
-            try:
-                count += check(name, path, lambda tool=tool: tool)  # type: ignore[misc]
-            finally:
-                tool.close()
     package = json.loads((scion / "node_modules/@scion-scxml/scxml/package.json").read_text())
-    ran(
-        "scxml",
-        f"SCION {package['version']} (node)",
-        f"{len(NAMES)} included charts stepped, all elements",
-        f"{count} switches, all as in simulate with Euler's method",
-    )
+    tool = f"SCION {package['version']} (node)"
+    kept(tool, ran, tmp_path, lambda path: Scion(path, scion))

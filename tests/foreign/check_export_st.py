@@ -19,7 +19,7 @@ import pytest
 
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.targets.st import structured_text
-from tests.exporters.text_cases import NAMES, case
+from tests.exporters.frictions import NAMES, case
 
 STEP = 1e-3
 SOURCE = "https://github.com/beremiz/matiec"

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from gms_fsm import Prescribed, export, simulate
 from tests.exporters.charts_to_export import MODELS, SLOW, imported, model, rebuilt
@@ -26,29 +27,16 @@ print(sorted({{name.partition(".")[0] for name in sys.modules}} & {{"numpy", "gm
 
 def test_in_a_process_of_their_own(ran: Callable[..., None], tmp_path: Path) -> None:
     count = 0
+    how: Any = {"method": "euler", "step": 1e-3, "events": "step", "engine": "ifelse"}
     for name in MODELS:
         folder = tmp_path / name
         path, *_ = export(model(name), "transitions", folder, name="own")
-        done = subprocess.run(
-            [sys.executable, "-c", ASK],
-            capture_output=True,
-            text=True,
-            check=False,
-            cwd=folder,
-            timeout=300,
-        )
+        command = [sys.executable, "-c", ASK]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
         assert done.returncode == 0, done.stderr
         log, modules = done.stdout.splitlines()
         assert modules == "[]"
-        trace = simulate(
-            model(name),
-            Prescribed(SLOW),
-            7.5,
-            method="euler",
-            step=1e-3,
-            events="step",
-            engine="ifelse",
-        )
+        trace = simulate(model(name), Prescribed(SLOW), 7.5, **how)
         its = [[float(e.t).hex(), int(e.element), str(e.edge)] for e in trace.transitions]
         assert json.loads(log) == its
         file = imported(path)

@@ -1,13 +1,14 @@
-"""Synthetic records whose truth is known."""
+"""Synthetic records whose truth is known, and one fit of them that answers many questions."""
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
 from scipy.signal import lfilter
 
-from gms_fsm import GMS, GMSParameters, Prescribed, Record, Stribeck, simulate
+from gms_fsm import GMS, Fit, GMSParameters, Prescribed, Record, Stribeck, fit, simulate
 from gms_fsm.systems.models import Model
 from tests.helpers import FASTEST
 
@@ -31,13 +32,13 @@ def bank(k: Any, weights: Any, **given: Any) -> GMS:
     )
 
 
-def measured(model: Model, motion: Record, sd: float, seed: int, ar: float = 0.0) -> Record:
+def measured(model: Model, motion: Record, sd: float = 0.01, seed: int = 0) -> Record:
     """Return the record of a model moved like another record, with noise in its force."""
     t, v = motion.columns["time"], motion.motion().velocity
     options = {"t_start": float(t[0]), "t_eval": t, "rtol": 1e-9, "engine": FASTEST}
     run = simulate(model, Prescribed((t, v)), float(t[-1]), **options)
     return Record.from_arrays(
-        time=t, velocity=v, force=run.F + sd * noise(seed, t.size, ar), name="synthetic"
+        time=t, velocity=v, force=run.F + sd * noise(seed, t.size), name="synthetic"
     )
 
 
@@ -50,4 +51,23 @@ def sine(amplitude: float, period: float, cycles: float, rate: float = 200.0) ->
     return Record.from_arrays(time=t, position=x, velocity=np.gradient(x, t), name="sine")
 
 
-__all__ = ["bank", "measured", "noise", "sine"]
+TRUTH, START = bank([2e4, 5e3], [5e-5, 1e-4]), bank([1e4, 1e4], [4e-5, 9e-5])
+FREE: Any = ("k", "weights")
+NOISE = 0.01  # N
+
+
+@functools.cache
+def rubbed(cycles: float = 6.0) -> Record:
+    """Return a record of two elements; both slip."""
+    return measured(TRUTH, sine(3e-4, 2.0, cycles), NOISE)
+
+
+def fitted(record: Any, model: Any = START, free: Any = FREE, **more: Any) -> Fit:
+    """Fit from a start that is near."""
+    return fit(record, model, free=free, **{"search": "local"} | more)
+
+
+@functools.cache
+def plain() -> Fit:
+    """Return the fit of four cycles of the record; two are held out."""
+    return fitted(rubbed(), train=(0, 8), test=(8, 12))

@@ -12,10 +12,12 @@ import pytest
 
 from gms_fsm import Body, Chart, ChartModel, Contact, Prescribed, State, System, simulate
 from gms_fsm.charts.registry import registered
+from gms_fsm.identification.candidates import BEHIND_BACKLASH, STIFFER_ONE_WAY
 from gms_fsm.identification.problem.linear import linear_names
 from gms_fsm.systems.models import demonstration, with_values
 from gms_fsm.systems.mounted import mounted_alone
 from gms_fsm.systems.numbers import value_in
+from tests.helpers import matrix
 
 RIG = Prescribed("0.1 * sin(3 * t) * exp(0.1 * t)")
 CASES = [
@@ -25,10 +27,11 @@ CASES = [
     and len(entry.chart(entry.laws[0] if entry.laws else "").velocities) == 1
     for law in (entry.laws or ("",))
 ]
+KEPT = [("gms", "signed"), ("maxwell-slip", ""), ("elasto-plastic", ""), ("dahl", "")]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "law"), CASES)
+@pytest.mark.parametrize(("name", "law"), matrix(CASES, KEPT))
 @pytest.mark.filterwarnings("ignore:published law")
 def test_force_is_affine_in_them(name: str, law: str) -> None:
     model = demonstration(registered()[name], law)
@@ -49,24 +52,23 @@ def test_force_is_affine_in_them(name: str, law: str) -> None:
 
 
 def test_what_the_elements_feel_is_searched() -> None:
-    expected = {"gms": {"k", "sigma", "sigma_2"}, "maxwell-slip": {"sigma_2"}, "backlash": set()}
-    for name, linear in expected.items():
-        entry = registered()[name]
-        model = demonstration(entry, entry.laws[-1] if entry.laws else "")
-        assert {*linear_names(mounted_alone(model))} - {"sigma_2"} == linear - {"sigma_2"}, name
+    expected = {"gms": {"k", "sigma"}, "maxwell-slip": set(), "backlash": set()}
+    models = {name: demonstration(registered()[name], _law(name)) for name in expected}
+    backlash = {"k": 3.0, "b": 1.0, "g": 0.2, "r": 0.3, "ratio": 1.5, "rho": 0.0, "v_s": 1.0}
+    models |= {"behind": ChartModel(BEHIND_BACKLASH, backlash)}
+    models |= {"stiffer": ChartModel(STIFFER_ONE_WAY, {"k": 3.0, "b": -1.0, "z_c": 0.4})}
+    for name, model in models.items():
+        linear = {*linear_names(mounted_alone(model))} - {"sigma_2"}
+        assert linear == expected.get(name, {"k", "b"}), name
+
+
+def _law(name: str) -> str:
+    return "signed" if name == "gms" else ""
 
 
 def _own(force: str, flow: str = "v", let: dict[str, str] | None = None) -> ChartModel:
-    chart = Chart(
-        "own",
-        ("v",),
-        ("z",),
-        ("k", "b", "c"),
-        (State("stick", flow={"z": flow}),),
-        (),
-        {"F": force},
-        let=let or {},
-    )
+    state, outputs = State("stick", flow={"z": flow}), {"F": force}
+    chart = Chart("own", ("v",), ("z",), ("k", "b", "c"), (state,), (), outputs, let=let or {})
     return ChartModel(chart, {"k": 1.0, "b": 1.0, "c": 1.0})
 
 

@@ -7,7 +7,7 @@ import pytest
 from gms_fsm import Chart, Contact, State, measure_phenomena
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import GMSError
-from gms_fsm.phenomena.measure import Bench, chosen_phenomena
+from gms_fsm.phenomena.measure import Bench
 from gms_fsm.phenomena.specimens import specimens_of
 from tests.phenomena.cases import BENCH, DRY
 
@@ -43,23 +43,10 @@ def test_a_contact_of_ones_own_needs_constant_inputs() -> None:
         specimens_of({"mine": Contact("pad", LOADED, {"mu": 0.1}, inputs={"N": "N_0 + x"})}, BENCH)
 
 
-@pytest.mark.parametrize(
-    ("models", "message"),
-    [
-        (["lugree"], "there is no model 'lugree'; did you mean 'lugre'"),
-        ({"mine": 3}, r"models\['mine'\] is 3; it must be a model"),
-    ],
-)
-def test_what_is_no_model_is_refused(models: object, message: str) -> None:
-    with pytest.raises(GMSError, match=message):
-        measure_phenomena(models)  # type: ignore[arg-type]
-
-
-def test_unknown_phenomena_and_numbers_are_refused() -> None:
-    with pytest.raises(GMSError, match="there is no phenomenon 'lagg'; did you mean 'lag'"):
-        chosen_phenomena(["lagg"])
-    with pytest.raises(GMSError, match="bench: there is no number 'F_x'; did you mean 'F_s'"):
-        Bench.of({"F_x": 1.0})
+def test_what_is_no_model_and_no_bench_is_refused() -> None:
+    """Unknown names are in tests/refusals.py."""
+    with pytest.raises(GMSError, match=r"models\['mine'\] is 3; it must be a model"):
+        measure_phenomena({"mine": 3})  # type: ignore[dict-item]
     with pytest.raises(GMSError, match="bench: F_s is -1"):
         Bench(F_s=-1.0)
 

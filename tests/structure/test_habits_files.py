@@ -66,16 +66,12 @@ def test_there_are_three_workflows() -> None:
 
 
 @pytest.mark.parametrize("job", JOBS.values(), ids=JOBS)
-def test_make_targets_and_extras_exist(job: dict[str, Any]) -> None:
+def test_make_targets_extras_and_pythons_exist(job: dict[str, Any]) -> None:
     for command in commands(job):
         assert "${{" not in command, "the test must see what is run"
         assert set(re.findall(r"\bmake (\w+)", command)) <= TARGETS, command
         for names in re.findall(r"\[([\w,]+)\]\"", command):
             assert set(names.split(",")) <= set(PROJECT["optional-dependencies"]), command
-
-
-@pytest.mark.parametrize("job", JOBS.values(), ids=JOBS)
-def test_pythons_are_those_of_the_classifiers(job: dict[str, Any]) -> None:
     assert set(versions(job)) <= set(SUPPORTED)
     assert PROJECT["requires-python"] == f">={SUPPORTED[0]}"
     if "pytest" in str(commands(job)):
@@ -100,14 +96,9 @@ def test_files_that_forms_and_policies_name_exist() -> None:
             assert (ROOT / name).is_file(), (path.name, name)
             named += 1
     assert named >= 3
-
-
-@pytest.mark.parametrize("name", ["bug", "new_chart", "question"])
-def test_each_field_of_a_form_has_a_unique_name(name: str) -> None:
-    form = read(GITHUB / "ISSUE_TEMPLATE" / f"{name}.yml")
-    assert form["name"]
-    assert form["description"]
-    fields = [field for field in form["body"] if field["type"] != "markdown"]
-    for key in ("id", "label"):
-        names = [field[key] if key == "id" else field["attributes"][key] for field in fields]
-        assert len(set(names)) == len(names) > 2
+    for form in forms:
+        if form.stem != "config":
+            fields = [each for each in read(form)["body"] if each["type"] != "markdown"]
+            for names in ([each["id"] for each in fields],
+                          [each["attributes"]["label"] for each in fields]):  # fmt: skip
+                assert len(set(names)) == len(names) > 2, form

@@ -5,7 +5,7 @@ One function writes these texts, `gms_fsm.foundation.extras.missing`, from one t
 
 from __future__ import annotations
 
-import re
+import importlib
 import subprocess
 import sys
 import tomllib
@@ -14,10 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm import Prescribed, Sweep, prove, simulate, sweep
+from gms_fsm import Prescribed, Sweep, Trace, prove, simulate, sweep
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.foundation.extras import EXTRAS, missing, require
 from tests.helpers import ROOT, stick_slip
+from tests.structure.source import sources
 
 FOR_DEVELOPERS = {"all", "bench", "cluster", "dev", "docs", "foreign", "hosts", "mutation", "test"}
 
@@ -36,13 +37,12 @@ def test_a_message_names_the_command_and_what_works_without(extra: str) -> None:
     assert said.endswith(f"(without it: {without})")
 
 
+@pytest.mark.slow
 def test_the_text_is_in_one_place() -> None:
-    sources = [p for room in ("gms_fsm", "integrators", "plots") for p in (ROOT / room).rglob("*")]
-    texts = {p: p.read_text(encoding="utf-8") for p in sources if p.suffix == ".py"}
-    homes = {p.relative_to(ROOT).as_posix() for p, text in texts.items() if "gms-fsm[" in text}
-    raised = {p.name for p, text in texts.items() if "MissingExtraError(" in text}
+    homes = {each.path for each in sources().values() if "gms-fsm[" in each.text}
+    raised = {each.path for each in sources().values() if "MissingExtraError(" in each.text}
     assert homes == {"gms_fsm/foundation/extras.py"}
-    assert raised == {"extras.py", "errors.py"}
+    assert raised == {"gms_fsm/foundation/extras.py", "gms_fsm/errors.py"}
 
 
 def made() -> Sweep:
@@ -52,24 +52,40 @@ def made() -> Sweep:
 def replayed() -> str:
     from plots.page.replay import replay_html
 
-    return replay_html(simulate(stick_slip("signed"), Prescribed("0.2"), 0.1))
+    return replay_html(trace())
 
 
-@pytest.mark.parametrize(
-    ("module", "extra", "call"),
-    [
-        (
-            "pandas",
-            "pandas",
-            lambda _: simulate(stick_slip("signed"), Prescribed("0.2"), 0.1).to_pandas(),
-        ),
-        ("pandas", "pandas", lambda _: made().to_dataframe()),
-        ("xarray", "sweep", lambda _: made().to_xarray()),
-        ("pandas", "sweep", lambda folder: made().save(folder / "a.parquet")),
-        ("z3", "check", lambda _: prove(stick_slip("signed").chart)),
-        ("uplot", "replay", lambda _: replayed()),
-    ],
-)
+def trace() -> Trace:
+    return simulate(stick_slip("signed"), Prescribed("0.2"), 0.1)
+
+
+def hosted(name: str) -> None:
+    """Make the friction of an adapter."""
+    adapter = importlib.import_module(f"gms_fsm.adapters.{name}")
+    if name == "pathsim":
+        adapter._block_class.cache_clear()
+        adapter.friction_block(stick_slip("signed"), 1e-3)
+    if name == "control":
+        adapter.friction_system(stick_slip("signed"), 1e-3)
+    if name == "mujoco":
+        adapter.JointFriction(None, None, {"hinge": stick_slip("signed")})
+
+
+CALLS: list[tuple[str, str, Callable[[Path], object]]] = [
+    ("pandas", "pandas", lambda _: trace().to_pandas()),
+    ("pandas", "pandas", lambda _: made().to_dataframe()),
+    ("xarray", "sweep", lambda _: made().to_xarray()),
+    ("pandas", "sweep", lambda folder: made().save(folder / "a.parquet")),
+    ("z3", "check", lambda _: prove(stick_slip("signed").chart)),
+    ("uplot", "replay", lambda _: replayed()),
+    *(
+        (name, name, lambda _, name=name: hosted(name))
+        for name in ("pathsim", "control", "mujoco", "gymnasium")
+    ),
+]
+
+
+@pytest.mark.parametrize(("module", "extra", "call"), CALLS)
 def test_a_function_names_the_module_and_the_extra(
     module: str,
     extra: str,
@@ -77,38 +93,35 @@ def test_a_function_names_the_module_and_the_extra(
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
 ) -> None:
+    for name in [each for each in sys.modules if each.startswith(f"{module}.")]:
+        monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, module, None)
-    words = rf"need\w* (?i:{module}), which is not installed: pip install \"gms-fsm\[{extra}\]\""
+    monkeypatch.delitem(sys.modules, "gms_fsm.adapters.gymnasium", raising=False)
+    words = rf"need\w* (?i:{module})\S*, which is not .*pip install \"gms-fsm\[{extra}\]\""
     with pytest.raises(MissingExtraError, match=words):
         call(tmp_path)
 
 
 @pytest.mark.slow
-def test_a_module_names_the_module_and_the_extra() -> None:
+@pytest.mark.parametrize("absent", ["matplotlib", "PIL"])
+def test_a_module_names_the_module_and_the_extra(absent: str) -> None:
     """PIL is needed by matplotlib only."""
     pytest.importorskip("matplotlib", reason="needs the extra plots")
-    code = """
+    code = f"""
 import importlib, sys
-for absent in ("matplotlib", "PIL"):
-    sys.modules[absent] = None
-    from gms_fsm.errors import MissingExtraError
-    for module in ("figures", "panels", "systems.elements", "film.animation"):
-        try:
-            importlib.import_module("plots." + module)
-        except MissingExtraError as error:
-            print(error)
-    for name in [each for each in sys.modules if each.startswith(("plots", "gms_fsm", absent))]:
-        del sys.modules[name]
+sys.modules[{absent!r}] = None
+from gms_fsm.errors import MissingExtraError
+for module in ("figures", "panels", "systems.elements", "film.animation"):
+    try:
+        importlib.import_module("plots." + module)
+    except MissingExtraError as error:
+        print(error)
 """
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    said = 'need {}, which is not installed: pip install "gms-fsm[plots]"'
-    lines = done.stdout.splitlines()
-    assert [
-        said.format(absent) in line
-        for absent, line in zip(["matplotlib"] * 4 + ["PIL"] * 4, lines, strict=True)
-    ] == [True] * 8
+    said = f'need {absent}, which is not installed: pip install "gms-fsm[plots]"'
+    assert [said in line for line in done.stdout.splitlines()] == [True] * 4
 
 
 def test_a_broken_module_is_not_reported_as_missing(
@@ -121,8 +134,4 @@ def test_a_broken_module_is_not_reported_as_missing(
         require("halfdone", "plots")
     with pytest.raises(MissingExtraError, match="need no_such_module, which is not installed"):
         require("needy", "plots")
-
-
-def test_an_installed_module_is_returned() -> None:
     assert require("xml.etree", "plots") is sys.modules["xml.etree"]
-    assert re.__name__ == require("re", "plots").__name__

@@ -1,0 +1,355 @@
+"""A chart written as SCXML, or for transitions, and read again is equal to the chart.
+
+Documents and machines of other people are read with the texts given beside them; what has no
+counterpart in a chart is refused by name.
+"""
+
+from __future__ import annotations
+
+import enum
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from transitions import Machine
+from transitions import State as MachineState
+from transitions.extensions import HierarchicalMachine
+from transitions.extensions.asyncio import AsyncMachine
+from transitions.extensions.states import Timeout, add_state_features
+
+from gms_fsm import Chart, State, Transition, export
+from gms_fsm.charts import CHARTS
+from gms_fsm.errors import ChartError, ExpressionError, ParameterError
+from tests.exporters.charts_to_export import MODELS, imported, model, rebuilt
+from tests.strategies import charts
+
+
+def back(chart: Chart, form: str, folder: Path) -> Chart:
+    """Return what is read from a file."""
+    path, *_ = export(chart, form, folder, name="file")
+    if form == "scxml":
+        return Chart.from_scxml(path)
+    file = imported(path)
+    return rebuilt(file, file.machine_of([]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["scxml", "transitions"])
+def test_every_included_chart(form: str, tmp_path: Path) -> None:
+    for name in MODELS:
+        if form == "transitions" or name != "backlash":  # its guards read F
+            again = back(CHARTS[name], form, tmp_path / name)
+            assert again == CHARTS[name], name
+            assert again.guards == CHARTS[name].guards, name
+
+
+@pytest.mark.slow
+@given(chart=charts(locks=False, forces=(), plain=True))
+@settings(max_examples=25, deadline=None)
+def test_any_chart_from_scxml(chart: Chart, tmp_path_factory: pytest.TempPathFactory) -> None:
+    assert back(chart, "scxml", tmp_path_factory.mktemp("chart")) == chart
+
+
+@pytest.mark.slow
+@given(chart=charts(locks=False))
+@settings(max_examples=25, deadline=None)
+def test_any_chart_from_transitions(chart: Chart, tmp_path_factory: pytest.TempPathFactory) -> None:
+    assert back(chart, "transitions", tmp_path_factory.mktemp("chart")) == chart
+
+
+@pytest.mark.slow
+@given(chart=charts())
+@settings(max_examples=25, deadline=None)
+def test_any_machine_also_with_locks(chart: Chart) -> None:
+    """A machine with the states and edges of any chart, without conditions."""
+    edges = {edge.name: [edge.name, [*edge.sources], edge.target] for edge in chart.transitions}
+    machine = Machine(
+        states=[state.name for state in chart.states],
+        transitions=[*edges.values()],
+        initial=chart.default_state.name,
+    )
+    names = ("name", "reference", "inputs", "velocities", "parameters", "let", "outputs")
+    again = Chart.from_transitions(
+        machine,
+        **{name: getattr(chart, name) for name in (*names, "contact_outputs")},
+        variables=[name for name in chart.variables if name != "age"],
+        flows={state.name: state.flow for state in chart.states},
+        entry={state.name: state.entry for state in chart.states},
+        exit={state.name: state.exit for state in chart.states},
+        state_outputs={state.name: state.outputs for state in chart.states},
+        locked=[state.name for state in chart.states if state.locked],
+        impulses=[edge.name for edge in chart.transitions if edge.impulse],
+        guards={edge.name: edge.guard for edge in chart.transitions},
+        actions={edge.name: edge.actions for edge in chart.transitions},
+    )
+    assert again == chart
+
+
+def test_the_documents_of_a_models_elements(tmp_path: Path) -> None:
+    paths = export(model("gms-signed"), "scxml", tmp_path, name="gms")
+    assert [path.name for path in paths[:4]] == [f"gms_{i}.scxml" for i in (1, 2, 3, 4)]
+    assert all(Chart.from_scxml(path) == CHARTS["gms-signed"] for path in paths[:4])
+    assert '<data id="sigma" expr="0.6" />' in paths[3].read_text(encoding="utf-8")
+
+
+# --------------------------------------------------------------------------- SCXML of others
+FOREIGN = """\
+<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" name="own" initial="stick">
+  <datamodel><data id="z" expr="0"/></datamodel>
+  <state id="slip">
+    <onentry><assign location="z" expr="Math.min(z, 1)"/></onentry>
+    <transition event="sticks" target="stick" cond="!(v &gt;= 1 || z &gt; 9)"/>
+  </state>
+  <state id="stick">
+    <transition event="slips" target="slip" cond="z &gt; 1 &amp;&amp; Math.sign(v) &gt; 0">
+      <assign location="z" expr="-Math.abs(z)"/>
+    </transition>
+    <transition target="slip" cond="z &lt; -1"/>
+    <transition target="slip"/>
+  </state>
+</scxml>
+"""
+
+
+def read(folder: Path, old: str = "", new: str = "", **texts: Any) -> Chart:
+    """Return the chart of the document, changed."""
+    assert old in FOREIGN
+    path = folder / "own.scxml"
+    path.write_text(FOREIGN.replace(old, new) if old else FOREIGN, encoding="utf-8")
+    beside: Any = {"variables": ("z",), "flows": {"stick": {"z": "v"}}, "outputs": {"F": "z"}}
+    return Chart.from_scxml(path, **{**beside, **texts})
+
+
+def test_a_document_of_another_tool(tmp_path: Path) -> None:
+    assert read(tmp_path) == Chart(
+        "own",
+        variables=("z",),
+        states=(State("stick", flow={"z": "v"}), State("slip", entry={"z": "min(z, 1)"})),
+        transitions=(
+            Transition("slips", "stick", "slip", "z > 1 and sgn(v) > 0", {"z": "-abs(z)"}),
+            Transition("stick_slip", "stick", "slip", "z < -1"),
+            Transition("stick_slip_2", "stick", "slip", "True"),
+            Transition("sticks", "slip", "stick", "not (v >= 1 or z > 9)"),
+        ),
+        outputs={"F": "z"},
+    )
+
+
+def test_texts_beside_go_before_those_of_the_document(tmp_path: Path) -> None:
+    texts: Any = {"guards": {"slips": "z > 3"}, "actions": {"slips": {}}}
+    chart = read(tmp_path, name="mine", entry={"slip": {"z": "2"}}, **texts)
+    assert chart.name == "mine"
+    assert chart.guard_text("slips") == "z > 3"
+    assert chart.guard_text("sticks") == "!(v >= 1 || z > 9)"
+    assert not chart.transitions[0].actions
+    assert chart.states[1].entry == {"z": "2"}
+
+
+def test_one_event_for_one_edge_that_leaves_several_states(tmp_path: Path) -> None:
+    edge = '<transition event="slips" cond="v &lt; 9" target="stick"/>'
+    text = re.sub(r'<transition event="slips".*?</transition>', edge, FOREIGN, flags=re.DOTALL)
+    (tmp_path / "a.scxml").write_text(text.replace("</onentry>", f"</onentry>{edge}"))
+    chart = Chart.from_scxml(tmp_path / "a.scxml", variables=("z",), outputs={"F": "z"})
+    assert {edge.name: edge.sources for edge in chart.transitions}["slips"] == ("stick", "slip")
+
+
+STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/>'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (FOREIGN, "<scxml", "it is not XML"),
+        (FOREIGN, "<html/>", "its root is <html>, not <scxml"),
+        ("<scxml ", '<!DOCTYPE x [<!ENTITY a "b">]><scxml ', "a document type definition"),
+        (STATE, f"<parallel></parallel>{STATE}", "<parallel> has no counterpart in a chart"),
+        (STATE, f"<script></script>{STATE}", "<script> has no counterpart in a chart"),
+        *(
+            (STATE, f"{STATE}<{each}/>", f"state 'stick': <{each}> has no counterpart")
+            for each in ("state", "history", "invoke", "initial")
+        ),
+        (STATE, "<state/>" + STATE, "a <state> has no id"),
+        ('initial="stick"', 'initial="stuck"', "its initial state is 'stuck'"),
+        ('<data id="z" expr="0"/>', '<data id="z" src="z.json"/>', "<data src=...> has no"),
+        ('target="slip"/>', "/>", "transition 3: a transition without target, or internal"),
+        ('target="slip"/>', 'target="slip" type="internal"/>', "without target, or internal"),
+        ('target="slip"/>', 'target="slip stick"/>', "its targets are 'slip stick'"),
+        ('target="slip"/>', 'target="nowhere"/>', "target 'nowhere' is not a state"),
+        ('event="slips"', 'event="*"', "its event is '*'"),
+        ('event="slips"', 'event="error.x"', "its event is 'error.x'"),
+        ('cond="!(v &gt;= 1 || z &gt; 9)"', "", "transition sticks: no guard is given for it"),
+        (ASSIGN, '<send event="x"/>', "<send> has no"),
+        (ASSIGN, "<if cond='1'/>", "<if> has no"),
+        ('expr="-Math.abs(z)"', "", "<assign location='z'> has no expr"),
+        ("</transition>", '<assign location="z" expr="0"/></transition>', "'z'> is there twice"),
+        ('location="z" expr="-', 'location="q" expr="-', "'q' is not a variable"),
+        *(
+            ("z &lt; -1", cond, "edge 'stick_slip', guard")
+            for cond in ("In('slip')", "z == 1", "z != 1", "Math.cbrt(z) &gt; 1", "_event.data.z")
+        ),
+    ],
+)
+def test_what_a_document_has_beyond_a_chart_is_named(
+    old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    with pytest.raises((ChartError, ExpressionError), match=re.escape(said)):
+        read(tmp_path, old, new)
+
+
+def changed(folder: Path, old: str, new: str) -> Path:
+    """Return an exported document that somebody has changed."""
+    path, *_ = export(CHARTS["seven-parameter"], "scxml", folder, name="file")
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('cond="v &lt; 0.0"', 'cond="v &lt; 1.0"', "arrest_forward: cond is 'v < 1.0', but"),
+        ('cond="v &lt; 0.0" ', "", "cond is None, but gms:guard beside it means 'v < 0.0'"),
+        ('expr="-(F_c', 'expr="(F_c', "transition arrest_backward: expr of 'z' is"),
+        ('expr="f / (1', 'expr="f / (2', "state 'stick', onentry: expr of 'f' is"),
+        ('gms:order="1"', 'gms:order="0"', "'break_away_backward' stands after"),
+    ],
+)
+def test_a_change_that_contradicts_the_texts_is_seen(
+    old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ChartError, match=re.escape(said)):
+        Chart.from_scxml(changed(tmp_path, old, new))
+
+
+def test_a_change_on_purpose(tmp_path: Path) -> None:
+    path = changed(tmp_path, 'cond="v &lt; 0.0"', 'cond="v &lt; -1.0"')
+    text = path.read_text(encoding="utf-8")
+    path.write_text(re.sub(r' gms:guard="v &lt; 0"', "", text), encoding="utf-8")
+    assert Chart.from_scxml(path).guard_text("arrest_forward") == "v < -1"
+    again = Chart.from_scxml(path, guards={"arrest_forward": "v < -2"})
+    assert again.guard_text("arrest_forward") == "v < -2"
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(ChartError, match=r"none\.scxml: it cannot be read"):
+        Chart.from_scxml(tmp_path / "none.scxml")
+    with pytest.raises(ParameterError, match="path is 5"):
+        Chart.from_scxml(5)  # type: ignore[arg-type]
+    with pytest.raises(ChartError, match="there is no argument 'flow'"):
+        Chart.from_scxml(tmp_path / "none.scxml", flow={})  # type: ignore[call-arg]
+
+
+# --------------------------------------------------------------------------- machines of others
+def small(**more: Any) -> Machine:
+    states, edges = ["stick", "slip"], [["slips", "stick", "slip"], ["sticks", "slip", "stick"]]
+    return Machine(**{"states": states, "initial": "stick", "transitions": edges, **more})
+
+
+TEXTS: dict[str, Any] = {"outputs": {"F": "v"}, "guards": {"slips": "v > 1", "sticks": "v < 1"}}
+
+
+def test_the_initial_state_comes_first_and_names_are_found() -> None:
+    chart = Chart.from_transitions(small(initial="slip", name="own"), **TEXTS)
+    assert [state.name for state in chart.states] == ["slip", "stick"]
+    assert chart.name == "imported chart"
+    assert [edge.name for edge in chart.transitions] == ["slips", "sticks"]
+
+
+def test_states_of_an_enumeration_and_wildcards() -> None:
+    Own = enum.Enum("Own", ["stick", "slip"])
+    edges = [["slips", "*", Own.slip], ["sticks", Own.slip, Own.stick]]
+    chart = Chart.from_transitions(
+        Machine(states=Own, initial=Own.stick, transitions=edges), **TEXTS
+    )
+    assert chart.transitions[0].sources == ("stick", "slip")
+
+
+def row(**more: Any) -> Any:
+    return small(transitions=[{"trigger": "slips", "source": "stick", "dest": "slip", **more}])
+
+
+def state(**more: Any) -> Any:
+    return small(states=["stick", MachineState("slip", **more)])
+
+
+def test_a_text_stands_for_a_condition() -> None:
+    machine = row(conditions="is_fast")
+    chart = Chart.from_transitions(machine, outputs={"F": "v"}, guards={"slips": "v > 1"})
+    assert chart.guard_text("slips") == "v > 1"
+    with pytest.raises(ChartError, match=r"trigger 'slips': no guard is given for it; give one"):
+        Chart.from_transitions(machine, outputs={"F": "v"})
+
+
+@add_state_features(Timeout)
+class Timed(Machine):  # type: ignore[misc]
+    """A machine whose states can end by themselves."""
+
+
+class Watching:
+    """A model whose method transitions calls by its name."""
+
+    def on_enter_slip(self) -> None:
+        """Do nothing."""
+
+
+TIMEOUT = {"name": "b", "timeout": 2, "on_timeout": "x"}
+OF_MACHINES = "before_state_change after_state_change prepare_event finalize_event on_exception"
+BEYOND: list[tuple[Any, str]] = [
+    ("a machine", "machine is 'a machine'; it must be a transitions.Machine"),
+    (HierarchicalMachine(states=["a"], initial="a"), "a HierarchicalMachine has no counterpart"),
+    (AsyncMachine(states=["a"], initial="a"), "an? AsyncMachine has no counterpart"),
+    (small(queued=True), "queued=True has no counterpart"),
+    *((small(**{each: "look"}), f"its callback {each} 'look'")
+      for each in (*OF_MACHINES.split(), "on_final")),
+    (small(initial=None, model=None), "it has no initial state"),
+    *((state(**{f"on_{each}": "look"}), f"state 'slip': its callback on_{each} 'look'")
+      for each in ("enter", "exit")),
+    (small(model=Watching()), "state 'slip': its callback on_enter 'on_enter_slip'"),
+    (state(final=True), "state 'slip': a final state"),
+    (Timed(states=["a", TIMEOUT], initial="a"),
+     r"state 'b': its timeout of 2 s has no counterpart.*after\(T\)"),
+    (row(unless="is_slow"), "trigger 'slips': unless has no counterpart"),
+    *((row(**{each: "look"}), f"trigger 'slips': its callback {each} 'look'")
+      for each in ("before", "after", "prepare")),
+    (row(dest=None), "its internal transition in 'stick'"),
+    (small(transitions=[["go", "stick", "slip"], ["go", "slip", "stick"]]),
+     r"trigger 'go': it stands for several edges \(stick -> slip, slip -> stick\)"),
+    (small(transitions=[["go", "stick", "slip"]] * 2), "'go': it stands for several edges"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("machine", "said"), BEYOND, ids=[said for _, said in BEYOND])
+def test_what_a_machine_has_beyond_a_chart_is_named(machine: Any, said: str) -> None:
+    with pytest.raises(ChartError, match=said):
+        Chart.from_transitions(machine, **TEXTS)
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        ({"gards": {}}, "there is no argument 'gards'; there are name, reference"),
+        ({"guards": {"slip": "v > 1"}}, "guards: there is no edge 'slip'; there are 'slips'"),
+        ({"guards": "v > 1"}, "guards is 'v > 1'; it gives a text for each name"),
+        ({"actions": {"x": {}}}, "actions: there is no edge 'x'"),
+        ({"actions": [1]}, r"actions is \[1\]; it gives texts for each edge"),
+        ({"flows": {"stuck": {}}}, "flows: there is no state 'stuck'; there are 'stick', 'slip'"),
+        ({"entry": 3}, "entry is 3; it gives texts for each state"),
+        ({"locked": "stick"}, "locked is 'stick'; give a tuple"),
+        ({"locked": ["stuck"]}, "locked: there is no state 'stuck'"),
+        ({"parameters": "k"}, "parameters is 'k'; give a tuple"),
+        ({"parameters": [{"unit": "N"}]}, "a parameter has no name"),
+        ({"parameters": [{"name": "k", "size": 1}]}, "a parameter has unknown fields size"),
+        ({"outputs": {}}, "no output 'F'"),
+    ],
+)
+def test_wrong_texts_are_named(texts: dict[str, Any], said: str) -> None:
+    with pytest.raises(ChartError, match=said):
+        Chart.from_transitions(small(), **{**TEXTS, **texts})
+
+
+def test_texts_are_parsed_as_those_of_any_chart() -> None:
+    with pytest.raises(ExpressionError, match="edge 'slips', guard"):
+        Chart.from_transitions(small(), **TEXTS | {"guards": {"slips": "w > 1", "sticks": "True"}})
