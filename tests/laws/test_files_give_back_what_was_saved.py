@@ -8,18 +8,34 @@ import numpy as np
 
 from gms_fsm import Session, System, Trace
 from gms_fsm.lowering.program import lower
-from tests.corpus import CORPUS, FAILING, FEW, SYSTEM_RUNS, each, outcome, run, trace
-from tests.helpers import other_parts, same_bits
+from gms_fsm.traces.monitors import examine
+from tests.corpus import (
+    CORPUS,
+    ENGINES,
+    FAILING,
+    FEW,
+    RIG_RUNS,
+    SYSTEM_RUNS,
+    Run,
+    each,
+    outcome,
+    run,
+    trace,
+)
+from tests.helpers import FASTEST, other_parts, same_bits
 
 FUNCTIONS = {"a function", "no slope"}
 
 
 @each(CORPUS)
 def test_a_trace_in_npz_is_whole(name: str, tmp_path: Path) -> None:
-    """Rows, stops, log, settings and titles; the chart is that of the run."""
+    """Rows, stops, log, settings and titles; the chart is that of the run; equal, its bytes too."""
     one = trace(name)
-    read = Trace.load(one.save(tmp_path / "run.npz"))
+    path = one.save(tmp_path / "run.npz")
+    read = Trace.load(path)
     assert other_parts(read, one) == []
+    assert (read.stops is read.rows) == (one.stops is one.rows)
+    assert read.save(tmp_path / "again.npz").read_bytes() == path.read_bytes()
     assert (read.title, read.contacts) == (one.title, one.contacts)
     assert dict(read.settings) == dict(one.settings)
     assert [read.contact(each).model.chart for each in read.contacts] == [
@@ -28,6 +44,16 @@ def test_a_trace_in_npz_is_whole(name: str, tmp_path: Path) -> None:
     if name not in FUNCTIONS:
         times = np.linspace(one.t[0], one.t[-1], 7)
         same_bits(read.sample(times), one.sample(times))
+
+
+@each(sorted({*RIG_RUNS, *FEW} - FUNCTIONS))
+def test_what_is_read_runs_as_it_did(name: str, tmp_path: Path) -> None:
+    """Model and rig, or system, of the file, also those of one's own."""
+    one = trace(name)
+    read = Trace.load(one.save(tmp_path / "run.npz"))
+    subject = (read.model, read.rig) if len(run(name).subject) == 2 else (read.system,)
+    again = Run(subject, run(name).t_end, run(name).how)(engine=FASTEST)
+    assert other_parts(again, one) == []
 
 
 @each([*FEW, *FAILING])
@@ -40,6 +66,24 @@ def test_a_trace_in_csv_is_whole_but_for_its_stops(name: str, tmp_path: Path) ->
     assert [part for part in other_parts(read, one) if not part.startswith("stops")] == []
     again = read.save(tmp_path / "again.csv")
     assert again.read_bytes() == path.read_bytes()
+
+
+@each(FEW)
+def test_verdicts_are_those_of_the_run(name: str, tmp_path: Path) -> None:
+    """Of all engines and from both kinds of files; a sum may round in another order."""
+    monitors = ["all", "t < 1", "1 / t > 0"]
+    one = run(name)(engine=FASTEST, monitors=monitors)
+    for engine in ENGINES:
+        assert run(name)(engine=engine, monitors=monitors).monitors == one.monitors, engine
+    for ending in ("npz", "csv"):
+        read = Trace.load(one.save(tmp_path / f"run.{ending}"))
+        assert list(read.monitors.items()) == list(one.monitors.items())
+        if ending == "npz":
+            again = examine(read, monitors)
+            assert [each.text for each in again.values()] == [
+                each.text for each in one.monitors.values()
+            ]
+        assert read.sample([one.t[-1]]).monitors == read.refined(50).monitors == one.monitors
 
 
 @each(FEW)
