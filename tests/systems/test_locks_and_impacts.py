@@ -1,5 +1,7 @@
 """Locks are exact at rest, take no momentum by accident, and every impulse is accounted for.
 
+Contacts may lock the same motion: earlier ones carry the force, and the trace marks it.
+
 The closed forms are those of a momentum balance: an impact between two bodies with restitution e,
 on which a friction force of any size has no influence.
 """
@@ -12,10 +14,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gms_fsm import Body, Chart, Contact, LockError, State, System, Trace, Transition, simulate
+from gms_fsm import (
+    Body,
+    Chart,
+    Contact,
+    LockError,
+    Parameter,
+    State,
+    System,
+    Trace,
+    Transition,
+    simulate,
+)
 from gms_fsm.charts import CHARTS
-from gms_fsm.errors import ChartError
-from tests.systems_cases import cradle, mass, pad, stop
+from tests.systems_cases import clutched_bearings, cradle, mass, pad, pushed_against_a_stop, stop
 
 
 def run(system: System, t_end: float, **how: Any) -> Trace:
@@ -130,13 +142,6 @@ def test_a_lock_that_is_moved_and_has_no_way_out_is_refused() -> None:
     assert trace.body("b").v[-1] == pytest.approx(0.6)
 
 
-def test_only_edges_into_locked_states_take_impulses() -> None:
-    states = (State("a", outputs={"F": "0"}), State("b", locked=True))
-    edge = Transition("e", "b", "a", "F > 1", impulse=True)
-    with pytest.raises(ChartError, match="'a' is not locked"):
-        Chart("wrong", states=states, transitions=(edge,))
-
-
 def test_a_belt_that_jumps_lets_its_load_slide() -> None:
     belt = Body("belt", velocity="V", x="x_b", v="V")
     for signal in (([0.0, 1.0, 1.0, 3.0], [0.5, 0.5, -0.5, -0.5]), "0.5 * sgn(1 - t)"):
@@ -215,6 +220,39 @@ def test_a_stuck_pad_beside_a_wall_carries_nothing_of_what_the_wall_takes() -> N
         trace = run(system, 0.6, initial=start)
         found = {str(each.carrier): float(each.P) for each in trace.impulses}
         assert found == {"hit": pytest.approx(1.6), "wall": pytest.approx(1.6)}
+
+
+HIT = Chart(
+    "hit",
+    inputs=("x", "v"),
+    variables=("old", "new", "twice"),
+    parameters=(Parameter("e", rule=">= 0"), Parameter("x_s", "m", "> 0")),
+    let={"w": "2 * v"},
+    states=(State("free", outputs={"F": "0"}),),
+    transitions=(
+        Transition(
+            "bounce",
+            "free",
+            "free",
+            guard="x >= x_s and v > 0",
+            actions={"old": "v", "v": "-e * v", "new": "v", "twice": "w"},
+        ),
+    ),
+)
+
+
+def test_an_action_after_an_impulse_reads_the_new_velocity() -> None:
+    system = System(
+        "two masses",
+        bodies=[mass("a", 2.0), mass("b", 3.0)],
+        contacts=(Contact("stop", HIT, {"e": 0.5, "x_s": 1.0}, v="v_a - v_b"),),
+    )
+    trace = run(system, 2.0, initial={"v_a": 1.0})
+    stop = trace.contact("stop")
+    found = [float(stop.variable(name)[-1, 0]) for name in HIT.variables]
+    assert found == pytest.approx([1.0, -0.5, -1.0], abs=1e-15)
+    momentum = 2.0 * trace.body("a").v[-1] + 3.0 * trace.body("b").v[-1]
+    assert momentum == pytest.approx(2.0, abs=1e-15)
 
 
 # --------------------------------------------------------------------------- rest
@@ -314,3 +352,53 @@ def test_geared_locks_log_no_ghosts(ratio: float, rtol: float) -> None:
 
 def _on_the_belt(ratio: float) -> dict[str, float]:
     return {"v_a": 0.01, "v_b": 0.01 * ratio, "v_c": 0.01 * ratio / 0.7}
+
+
+# --------------------------------------------------------------------------- locks that share
+def shared(trace: Trace, contact: str) -> np.ndarray:
+    """Return where the force of a locked contact is carried by earlier ones."""
+    found: np.ndarray = trace.contact(contact).shared
+    return found
+
+
+def states(trace: Trace, contact: str) -> np.ndarray:
+    found: np.ndarray = trace.contact(contact).states[:, 0]
+    return found
+
+
+@pytest.mark.parametrize("stop_first", [False, True])
+def test_a_mass_with_stiction_comes_to_rest_at_a_stop_and_leaves_again(stop_first: bool) -> None:
+    trace = pushed_against_a_stop(stop_first=stop_first).run("ifelse")
+    stop, log = trace.contact("stop"), trace.transitions
+    rest = states(trace, "stop") == "rest"
+    assert rest.any()
+    np.testing.assert_array_equal(trace.body("mass").v[rest], 0.0)
+    push = 4.0 * np.sin(0.5 * trace.t)
+    np.testing.assert_allclose((stop.F + trace.contact("pad").F)[rest], push[rest], atol=1e-9)
+    assert [str(each) for each in log.edge[log.contact == "stop"]][-1] == "lift"
+    assert trace.body("mass").x[-1] < 0.2
+    assert {"release_forward", "release_backward"} <= {str(each) for each in log.edge}
+
+
+def test_two_bearings_and_a_clutch_let_go_one_after_the_other() -> None:
+    """The first bearing carries all, up to its stiction; then the second carries the rest."""
+    trace = clutched_bearings().run("ifelse")
+    log, R = trace.transitions, 0.5
+    assert [(str(row.contact), str(row.edge)) for row in log] == [
+        ("dog", "engage"),
+        ("bearing_a", "release_forward"),
+        ("bearing_b", "release_forward"),
+    ]
+    np.testing.assert_allclose(log.t, [1.0, 1.5 / R, (1.0 + 3.0) / R], rtol=0, atol=1e-9)
+    both = (trace.t > 1.0) & (trace.t < log.t[1])
+    assert both.any()
+    np.testing.assert_array_equal(shared(trace, "bearing_b")[both], True)
+    np.testing.assert_array_equal(trace.contact("bearing_b").F[both], 0.0)
+    np.testing.assert_allclose(trace.contact("bearing_a").F[both], R * trace.t[both], atol=1e-12)
+    for earlier in ("bearing_a", "dog"):
+        np.testing.assert_array_equal(shared(trace, earlier), False)
+    later = trace.t > log.t[1]
+    np.testing.assert_array_equal(shared(trace, "bearing_b")[later], False)
+    moving = trace.t > log.t[2]
+    np.testing.assert_array_equal(trace.body("a").v[moving], trace.body("b").v[moving])
+    assert trace.body("b").v[-1] > 0.0

@@ -22,7 +22,6 @@ from gms_fsm import (
     Transition,
 )
 from gms_fsm.charts import LUGRE
-from gms_fsm.errors import OutputError
 from gms_fsm.lowering.program import lower
 from gms_fsm.systems.system import Body, Contact, Sampled, Spring, System
 
@@ -155,18 +154,3 @@ def test_a_chart_may_be_a_file_next_to_it_or_a_name(tmp_path: Path) -> None:
     assert data["contact"][1]["chart"] == "lugre"
     assert data["contact"][0]["chart"]["name"] == "stiction"
     assert data["contact"][2]["model"]["kind"] == "GMS"
-
-
-def test_a_python_function_is_named_and_refused(tmp_path: Path) -> None:
-    system = system_with(["GMS"], lambda t: 0.5 * t)
-    with pytest.raises(OutputError, match="signal 'r' is a Python function"):
-        system.save(tmp_path / "own.toml")
-    assert not (tmp_path / "own.toml").exists()
-
-
-def test_a_file_of_somebody_else_is_kept(tmp_path: Path) -> None:
-    path = tmp_path / "own.toml"
-    path.write_text("name = 'my own'", encoding="utf-8")
-    with pytest.raises(OutputError, match="was not written by gms-fsm"):
-        system_with(["GMS"]).save(path)
-    assert path.read_text(encoding="utf-8") == "name = 'my own'"
