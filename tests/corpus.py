@@ -372,7 +372,26 @@ def odd_names() -> ChartModel:
     )
 
 
+# Edges by the time in a state, from several states, and at once.
+LAMP = Chart(
+    "lamp",
+    parameters=("T",),
+    states=(
+        State("red", outputs={"F": "1"}),
+        State("green", outputs={"F": "2"}),
+        State("broken", outputs={"F": "0"}),
+        State("passing", outputs={"F": "3"}),
+    ),
+    transitions=(
+        Transition("fails", ("red", "green"), "broken", guard="v > 0.5"),
+        Transition("go", "red", "passing", guard="after(T)"),
+        Transition("through", "passing", "green", guard="True"),
+        Transition("stop", "green", "red", guard="after(2 * T)"),
+    ),
+)
+
 OWN_RUNS: dict[str, Maker] = {
+    "ages": _on(ChartModel(LAMP, {"T": 0.3}), Prescribed("0"), 5.0),
     "odd names": _on(odd_names(), Prescribed("0.3*sin(t)"), 20.0),
     "wear": _on(wear(), Prescribed("0.3*sin(2*pi*t/17)"), 40.0),
     "wear, pulled": _on(wear(1), PulledSlider(1, 2, 0.1), 40.0, method="rk4", step=7.003e-3),

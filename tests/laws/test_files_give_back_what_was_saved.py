@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from gms_fsm import Session, System, Trace
+from gms_fsm import Record, Session, System, Trace
+from gms_fsm.charts import CHARTS
+from gms_fsm.errors import OutputError
 from gms_fsm.lowering.program import lower
 from gms_fsm.traces.monitors import examine
 from tests.corpus import (
@@ -113,3 +116,24 @@ def test_a_system_file_is_the_same_program(name: str, tmp_path: Path) -> None:
     assert (read.bodies, read.sampled, read.flow) == (system.bodies, system.sampled, system.flow)
     again = read.save(tmp_path / "again.toml")
     assert again.read_text() == (tmp_path / "own.toml").read_text()
+
+
+@pytest.mark.parametrize("name", ["a chart", "a system", "a record"])
+def test_its_own_file_is_replaced_and_any_other_is_kept(name: str, tmp_path: Path) -> None:
+    """Also its own after an edit; in a folder's place nothing is written."""
+    (system,), time = run("system servo").subject, np.arange(9.0)
+    save, ending = {
+        "a chart": (CHARTS["stiction"].save, "toml"),
+        "a system": (system.save, "toml"),
+        "a record": (Record.from_arrays(time=time, position=time).to_csv, "csv"),
+    }[name]
+    path = save(tmp_path / f"own.{ending}")
+    save(path)
+    for theirs in (b"# my notes\n" + path.read_bytes(), b"name = 'my own'\n"):
+        path.write_bytes(theirs)
+        with pytest.raises(OutputError, match="not written by gms-fsm"):
+            save(path)
+        assert path.read_bytes() == theirs
+    (tmp_path / f"folder.{ending}").mkdir()
+    with pytest.raises(OutputError):
+        save(tmp_path / f"folder.{ending}")

@@ -133,8 +133,7 @@ STIFF: dict[str, tuple[dict[str, float], PulledSlider, dict[str, float], float, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("name", STIFF)
+@pytest.mark.parametrize(("name", "law"), [*zip(STIFF, 2 * LAWS, strict=True)])
 def test_radau_with_absolute_tolerances_follows_a_stiff_run(name: str, law: str) -> None:
     values, rig, start, t_end, least_v = STIFF[name]
     n, mu_0, a, b, d_c, v_0 = (values[each] for each in ("N", "mu_0", "a", "b", "D_c", "V_0"))
