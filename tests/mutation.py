@@ -52,7 +52,7 @@ NEAR = {  # module: its tests, those that detect most first
         "run/test_callbacks_only_look",
         "run/test_callbacks_in_systems",
         "laws/test_engines_agree",
-        "traces/test_traces_of_systems_round_trip",
+        "laws/test_files_give_back_what_was_saved",
         "charts/test_gms_chart_is_the_papers",
     ],
     "integrators/advance.py": [
