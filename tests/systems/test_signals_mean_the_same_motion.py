@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Prescribed, SimulationError, Slider, Trace, simulate
+from gms_fsm import Prescribed, SimulationError, Trace, simulate
 from gms_fsm.systems.signals import Corners, Formula, as_signal, piecewise_linear
 from gms_fsm.traces.failures import NotFiniteError, SignalEndError
-from tests.helpers import pulled_mass, stick_slip
+from tests.helpers import stick_slip
 
 CORNERS = [(0.0, 0.0), (1.0, 0.2), (8.0, 0.2), (10.0, -0.2), (17.0, -0.2), (19.0, 0.1)]
 TIMES, VALUES = (np.array(column) for column in zip(*CORNERS, strict=True))
@@ -66,25 +66,6 @@ def test_the_same_motion_gives_the_same_run(given: str, reference: Trace) -> Non
     np.testing.assert_allclose(trace.x, reference.x, atol=close)
     np.testing.assert_allclose(trace.z, reference.z, atol=10 * close)
     np.testing.assert_array_equal(trace.states, reference.states)
-
-
-def test_the_same_force_gives_the_same_run() -> None:
-    model, _ = pulled_mass()
-    corners = [(0.0, 0.0), (4.0, 2.0), (8.0, -2.0), (12.0, 0.0)]
-    times, values = zip(*corners, strict=True)
-    runs = [
-        simulate(model, Slider(1.0, force), 12.0, t_eval=np.linspace(0, 12, 25), rtol=1e-8)
-        for force in (
-            corners,
-            ([*times], [*values]),
-            "max(min(0.5*t, 6 - t), 0.5*t - 6)",
-            lambda t: float(np.interp(t, times, values)),
-        )
-    ]
-    assert len(runs[0].transitions) > 3
-    for run in runs[1:]:
-        assert run.transitions.edge.tolist() == runs[0].transitions.edge.tolist()
-        np.testing.assert_allclose(run.x, runs[0].x, atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any
 
 import pytest
@@ -49,18 +48,6 @@ def test_other_numbers_give_what_a_new_reading_gives(
     again = pulled(**change)
     assert again.shape is again
     assert run(again) == found
-
-
-def test_functions_stay_apart() -> None:
-    one, other = pulled(signal=lambda t: 0.1 * t), pulled(signal=lambda t: 0.2 * t)
-    assert run(one) != run(other)
-    assert run(pulled(signal=lambda t: 0.2 * t)) == run(other)
-
-
-def test_a_pickled_system_runs_alike() -> None:
-    system = pulled(m=2.0)
-    again = pickle.loads(pickle.dumps(system))
-    assert run(again) == run(system)
 
 
 @pytest.mark.parametrize(
