@@ -21,7 +21,7 @@ from gms_fsm import (
 )
 from gms_fsm.session.explain import explain
 from gms_fsm.traces.verdicts import CoverageVerdict
-from tests.helpers import FIG4_SINE, one_element, pulled_mass, stick_slip
+from tests.helpers import FIG4_SINE, one_element, stick_slip
 
 
 def coverage(trace: Trace) -> CoverageVerdict:
@@ -74,16 +74,6 @@ def test_motion_in_one_direction_does_not() -> None:
     assert shorter.states == {"stick": (True,) * 4, "slip": (False,) * 4}
     arrest = [clause for clause in shorter.clauses if clause.edge == "arrest"]
     assert not any(any(clause.true + clause.false) for clause in arrest)
-
-
-def test_elements_are_counted_separately() -> None:
-    """Four elements of a pulled mass: each breaks away forward, none backward."""
-    model, rig = pulled_mass()
-    found = coverage(run(model, rig, 60.0))
-    assert found.edges["break_away_forward"] == (14, 8, 8, 8)
-    assert found.edges["break_away_backward"] == (0, 0, 0, 0)
-    assert found.edges["arrest"] == (13, 7, 7, 7)
-    assert found.never == ("edge break_away_backward", "z <= -s of break_away_backward true")
 
 
 @pytest.mark.parametrize("t_eval", [None, [0.0, 20.0, 50.0]])

@@ -58,7 +58,12 @@ def slip(law: str, v: float, z0: float, t: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize(
     ("law", "v", "z0"),
-    [("signed", 0.3, -0.5), ("signed", -0.3, 1.2), ("published", 0.3, 0.5), ("published", -0.3, 0)],
+    [
+        ("signed", 0.3, -0.5),
+        ("signed", 0.02, 0.0),  # slower than C: a start in slip creates energy
+        ("published", 0.3, 0.5),
+        ("published", -0.3, 0.0),
+    ],
 )
 def test_slip_at_constant_velocity(law: str, v: float, z0: float) -> None:
     model = one_element(law, k=2.0, sigma=0.3, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1)
@@ -70,6 +75,7 @@ def test_slip_at_constant_velocity(law: str, v: float, z0: float) -> None:
     assert found.stored[0] == pytest.approx(stored, abs=1e-7)
     heat = [taken - stored for taken, stored in (slip(law, v, z0, t) for t in trace.t.tolist())]
     assert found.deficit[0] == pytest.approx(max(0.0, -min(heat)), abs=1e-7)
+    assert found.deficit[0] == 0.0 or found.t_deficit[0] == trace.t[int(np.argmin(heat))]
 
 
 # --------------------------------------------------------------------------- the signed law
@@ -163,19 +169,6 @@ def test_the_signed_law_can_create_that_much() -> None:
     assert "published" not in found.text
 
 
-def test_a_start_in_slip_can_create_energy_too() -> None:
-    """From z = 0 at v < C: the closed form's lowest heat."""
-    model = one_element("signed", k=2.0, sigma=0.3, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1)
-    trace = simulate(
-        model, Prescribed(0.02), 30.0, initial={"states": ["slip"]}, monitors="passivity", **FINE
-    )  # type: ignore[arg-type]
-    taken, stored = np.array([slip("signed", 0.02, 0.0, t) for t in trace.t.tolist()]).T
-    found = passivity(trace)
-    assert not found.ok
-    assert found.deficit[0] == pytest.approx(-(taken - stored).min(), rel=1e-5)
-    assert found.t_deficit[0] == trace.t[int((taken - stored).argmin())]
-
-
 # --------------------------------------------------------------------------- the published law
 @pytest.mark.slow
 def test_the_published_law_creates_energy_in_fig_4() -> None:
@@ -203,21 +196,6 @@ def test_the_published_law_creates_energy_in_fig_4() -> None:
     assert "no element gave back more energy than it had taken" in signed.text
     # Between two times it does, because the springs wind up before each arrest.
     assert signed.made[0] == pytest.approx(6.58e-4, rel=0.01)
-
-
-@pytest.mark.slow
-@settings(max_examples=12, deadline=None, derandomize=True)
-@given(v=st.floats(0.05, 0.5), z0=st.floats(-0.9, 0.9), t=st.floats(20.0, 40.0))
-def test_the_published_law_creates_energy_in_every_backward_slip(
-    v: float, z0: float, t: float
-) -> None:
-    """z moves away from s like exp(+C t / s): far more than any rise of the Stribeck curve."""
-    model = one_element("published", k=2.0, sigma=0.3, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1)
-    start = {"z": [z0], "states": ["slip"]}
-    trace = simulate(model, Prescribed(-v), t, initial=start, monitors="passivity", **FINE)  # type: ignore[arg-type]
-    taken, stored = np.array([slip("published", -v, z0, t) for t in trace.t.tolist()]).T
-    found = passivity(trace)
-    assert found.deficit[0] == pytest.approx(max(0.0, -(taken - stored).min()), rel=1e-4, abs=1e-6)
 
 
 # --------------------------------------------------------------------------- what it applies to
