@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import Chart, Parameter, State, Transition, simulate
+from gms_fsm import Chart, Parameter, simulate
 from gms_fsm.charts.gms import gms_element
 from gms_fsm.systems.system import Body, Contact, System
 from tests.helpers import event_sequence, pulled_mass
@@ -60,44 +60,3 @@ def test_a_gms_bank_in_words_is_the_gms_model() -> None:
     np.testing.assert_allclose(one.s[-1], other.s[-1], rtol=1e-6)
 
 
-def test_a_chart_may_use_the_names_of_the_generated_text() -> None:
-    chart = Chart(
-        "names",
-        variables=("y", "n"),
-        parameters=("p", "i", "S", "own", "tables"),
-        states=(
-            State("mode", flow={"y": "p * v - i * y", "n": "y"}),
-            State("held", flow={"y": "-S * y"}),
-        ),
-        transitions=(
-            Transition("out", "mode", "held", guard="n > own and y > 0.5"),
-            Transition("edge", "held", "mode", guard="y < tables"),
-        ),
-        outputs={"F": "y + n"},
-    )
-    plain = Chart(
-        "plain",
-        variables=("a1", "a2"),
-        parameters=("b1", "b2", "b3", "b4", "b5"),
-        states=(
-            State("s1", flow={"a1": "b1 * v - b2 * a1", "a2": "a1"}),
-            State("s2", flow={"a1": "-b3 * a1"}),
-        ),
-        transitions=(
-            Transition("e1", "s1", "s2", guard="a2 > b4 and a1 > 0.5"),
-            Transition("e2", "s2", "s1", guard="a1 < b5"),
-        ),
-        outputs={"F": "a1 + a2"},
-    )
-    numbers = (2.0, 0.5, 3.0, 1.0, 0.01)
-
-    def run(chart: Chart) -> np.ndarray:
-        values = dict(zip(chart.parameter_names, numbers, strict=True))
-        system = System(
-            "names",
-            bodies=(Body("b", velocity="1 + sin(t)", x="out", v="watch"),),
-            contacts=(Contact("shared", chart, values, v="watch"),),
-        )
-        return np.asarray(simulate(system, 10.0, engine="ifelse").F)
-
-    np.testing.assert_array_equal(run(chart), run(plain))

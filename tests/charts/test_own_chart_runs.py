@@ -97,6 +97,7 @@ def test_a_bouncing_reset_meets_its_closed_form() -> None:
         assert found.z[-1, i] == pytest.approx(5.5 % top, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_or_and_not_fire_where_they_become_true() -> None:
     guards = {
         "z > 2 or (t >= 1.5 and not v < 0.3)": 1.5,
@@ -220,6 +221,7 @@ NAMES = (
     ["F_c", "F_s", "v_s", "v_dip", "sigma_2", "mass", "stiffness", "speed", "weights", "F_a"]
     + ["F_i", "S_", "n_", "i_", "sgn_v", "abs_v", "sgn_0", "v_signal", "F_a_signal", "len", "range"]
     + ["piecewise_linear", "float", "switch", "flow", "observe", "margins", "arm", "act", "load"]
+    + ["y", "n", "p", "i", "S", "own", "tables", "mode", "out", "watch", "shared", "weight"]
     + ["element", "event", "self", "model", "holds", "inf", "nan", "print", "F_c_", "dF", "ds"]
 )
 

@@ -68,6 +68,7 @@ def test_gaps_in_rows_that_are_not_selected_are_no_matter(tmp_path: Path) -> Non
         assert not any("interpolated" in note or "empty cell or" in note for note in record.notes)
 
 
+@pytest.mark.slow
 @given(
     position=st.sets(st.integers(1, ROWS - 2), max_size=12),
     force=st.sets(st.integers(1, ROWS - 2), max_size=12),

@@ -14,6 +14,7 @@ from tests.helpers import ROOT
 from tests.scenario_files import data_folder
 
 
+@pytest.mark.slow
 def test_the_damper_has_thirteen_tests() -> None:
     folder = data_folder("damper/test00.csv") / "damper"
     records = damper(folder)
@@ -32,6 +33,7 @@ def test_the_damper_has_thirteen_tests() -> None:
         assert np.mean(record.columns["force"] * record.columns["velocity"]) > 0.0
 
 
+@pytest.mark.slow
 def test_the_tribometer_is_read_as_the_scenario_reads_it(monkeypatch: pytest.MonkeyPatch) -> None:
     folder = data_folder()
     monkeypatch.setenv("GMS_FSM_DATA", str(folder))

@@ -149,6 +149,7 @@ def test_a_header_in_a_comment(tmp_path: Path, mark: str, delimiter: str) -> Non
 
 
 # --------------------------------------------------------------------------- all at once
+@pytest.mark.slow
 @given(
     delimiter=st.sampled_from([";", "\t", "|"]),
     decimal=st.sampled_from([".", ","]),

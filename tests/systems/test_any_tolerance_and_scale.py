@@ -64,6 +64,7 @@ def _puck(length: float, rtol: float) -> Trace:
     return simulate(system, 60.0, rtol=rtol, engine="ifelse")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [_pulled, _puck])
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8])
 def test_the_sequence_is_that_of_a_fine_run(run: Run, rtol: float) -> None:

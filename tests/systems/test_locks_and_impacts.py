@@ -1,7 +1,7 @@
 """Locks take no momentum by accident, and every impulse is accounted for.
 
-Contacts may lock the same motion: earlier ones carry the force, and the trace marks it. Closed forms
-of impacts, rest, belts, gears and clutches are cases of `benchmarks/conformance`.
+Contacts may lock the same motion: earlier ones carry the force, and the trace marks it. Closed
+forms of impacts, rest, belts, gears and clutches are cases of `benchmarks/conformance`.
 """
 
 import random

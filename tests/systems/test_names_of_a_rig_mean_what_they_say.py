@@ -30,6 +30,7 @@ def pushed(names: list[str], kind: str) -> Any:
     return SimpleNamespace(title="pushed", acceleration=f"{force} - F", **given)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["numbers", "signals"])
 def test_a_free_name_changes_nothing(kind: str) -> None:
     """All at once, beside names that mean nothing."""

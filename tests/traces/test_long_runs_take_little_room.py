@@ -60,6 +60,7 @@ def test_states_and_codes_have_one_byte(tmp_path: Path) -> None:
     assert again.rows.microstep.dtype == trace.rows.microstep.dtype == np.int64
 
 
+@pytest.mark.slow
 def test_a_chart_of_more_than_256_states_is_saved(tmp_path: Path) -> None:
     count = 300
     chart = Chart(

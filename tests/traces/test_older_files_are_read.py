@@ -15,6 +15,7 @@ from tests.helpers import same_bits
 TIMES = np.linspace(0.0, 12.0, 25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"t_eval": TIMES}, {"output": "end"}])
 @pytest.mark.parametrize("name", ["pulled mass", "every kind of contact", "lugre slider"])
 def test_it_is_the_run(name: str, options: dict[str, object], tmp_path: Path) -> None:

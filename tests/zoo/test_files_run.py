@@ -43,6 +43,7 @@ FILES = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "rig", "t_end", "model", "least"), FILES)
 def test_a_scenario_file_runs(
     name: str, rig: str, t_end: float, model: str, least: int, gms_fsm: CommandLine, tmp_path: Path
@@ -80,6 +81,7 @@ def test_a_system_file_names_its_normal_force(gms_fsm: CommandLine, tmp_path: Pa
     assert edges >= {"release_forward", "move_forward", "stop_forward", "lift"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", zoo_cases.CASES)
 def test_a_chart_is_drawn_and_printed_as_code(
     name: str, gms_fsm: CommandLine, tmp_path: Path

@@ -83,6 +83,7 @@ def pulled(law: str, share: float, t_end: float, method: object = "dp45") -> Tra
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_steady_sliding_is_stable_above_the_critical_stiffness_only(law: str) -> None:
     stiff, soft = pulled(law, 1.2, 1.0), pulled(law, 0.8, 1.0)
