@@ -58,5 +58,3 @@ def test_a_gms_bank_in_words_is_the_gms_model() -> None:
     np.testing.assert_allclose(one.transitions.t, other.transitions.t, atol=1e-6)
     np.testing.assert_allclose(one.F[-1], other.F[-1], rtol=1e-6)
     np.testing.assert_allclose(one.s[-1], other.s[-1], rtol=1e-6)
-
-
