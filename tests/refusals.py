@@ -1346,18 +1346,28 @@ group("monitors", ExpressionError, monitored, rows)
 
 
 # --------------------------------------------------------------------------- trace files
+BELT = "every kind of contact"
+
+
 @cache
-def saved(ending: str) -> Mapping[str, bytes]:
-    """Return the files of a short run."""
-    trace = simulate(stick_slip("signed"), Prescribed("0.3"), 2.0)
+def ran(name: str = "") -> Trace:
+    """Return a short run, or one of the corpus."""
+    return trace(name) if name else simulate(stick_slip("signed"), Prescribed("0.3"), 2.0)
+
+
+@cache
+def saved(ending: str, name: str = "") -> Mapping[str, bytes]:
+    """Return the files of a run."""
     with tempfile.TemporaryDirectory() as folder:
-        trace.save(Path(folder) / f"run{ending}")
+        ran(name).save(Path(folder) / f"run{ending}")
         return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
 
 
-def archive(change: Callable[[dict[str, Any]], object], file: str = "run.npz") -> None:
+def archive(
+    change: Callable[[dict[str, Any]], object], file: str = "run.npz", name: str = ""
+) -> None:
     """Load the arrays of an archive, one of them changed."""
-    with np.load(io.BytesIO(saved(".npz")["run.npz"])) as npz:
+    with np.load(io.BytesIO(saved(".npz", name)["run.npz"])) as npz:
         arrays = dict(npz)
     change(arrays)
     with Path(file).open("wb") as out:
@@ -1391,10 +1401,9 @@ def header(*path: Any) -> None:
     archive(to)
 
 
-def format_1(change: Callable[[Any], Any]) -> None:
+def format_1(change: Callable[[Any], Any], name: str = "") -> None:
     """Load a file of format 1 with another log."""
-    trace = simulate(stick_slip("signed"), Prescribed("0.3"), 2.0)
-    arrays = older_files.format_1(trace, Path("run.npz"))
+    arrays = older_files.format_1(ran(name), Path("run.npz"))
     arrays["transitions"] = change(arrays["transitions"])
     Trace.load(older_files.write(Path("run.npz"), arrays))
 
@@ -1822,7 +1831,7 @@ rows = {
 group("signal", ExpressionError, Prescribed, rows)
 rows = {"of nothing": ("signal, column 1", ..., "")}
 group("signal", ExpressionError, Prescribed, rows)
-rows = {f"{t} s": (t,) for t in (0.0, 0.999, 3.0, 4.0)}
+rows = {f"{t} s": (t,) for t in (0.999, 3.0)}
 group("start of a record", SignalError, starting, rows, "")
 
 
@@ -1876,30 +1885,6 @@ group("number that no float holds", ParameterError, lambda make, given: make(**g
 
 
 # --------------------------------------------------------------------------- traces of systems
-@cache
-def belt_archive() -> bytes:
-    """Return the archive of a system with two contacts that switch."""
-    with tempfile.TemporaryDirectory() as folder:
-        return trace("every kind of contact").save(Path(folder) / "run.npz").read_bytes()
-
-
-def belt_log(column: str, value: Any) -> None:
-    """Load a file of format 1 of it, with another cell in a row of the first contact."""
-    arrays = older_files.format_1(trace("every kind of contact"), Path("run.npz"))
-    log = arrays["transitions"]
-    log[column][np.flatnonzero(log["contact"] == "pad")[0]] = value
-    Trace.load(older_files.write(Path("run.npz"), arrays))
-
-
-def belt_arrays(change: Callable[[dict[str, Any]], object]) -> None:
-    """Load its arrays, changed."""
-    with np.load(io.BytesIO(belt_archive())) as npz:
-        arrays = dict(npz)
-    change(arrays)
-    np.savez("run.npz", **arrays)
-    Trace.load("run.npz")
-
-
 def edge_of_another(arrays: dict[str, Any]) -> None:
     """Let the first contact take an edge of the second."""
     arrays["log_edge"][np.flatnonzero(arrays["log_machine"] == 0)[0]] = len(
@@ -1925,7 +1910,7 @@ def no_trace(kind: str) -> None:
 
 def watched(monitor: Any) -> None:
     """Run a system with a monitor."""
-    run("every kind of contact")(monitors=[monitor])
+    run(BELT)(monitors=[monitor])
 
 
 def rows_wanted(monitor: str) -> None:
@@ -1934,32 +1919,33 @@ def rows_wanted(monitor: str) -> None:
 
 
 rows = {
-    "contact": ("contact", "none"),
-    "edge": ("edge", "break_away_forward"),
-    "element": ("element", 1),
+    "contact": (cell("contact", "none"), BELT),
+    "edge": (cell("edge", "break_away_forward"), BELT),
+    "element": (cell("element", 1), BELT),
 }
-group("log of a system of format 1", TraceFileError, belt_log, rows, "run.npz")
-rows = {"edge of another contact": (edge_of_another,), "no system": (no_system,)}
-group("archive of a system", TraceFileError, belt_arrays, rows, "run.npz")
+group("log of a system of format 1", TraceFileError, format_1, rows, "run.npz")
+rows = {
+    "edge of another contact": (edge_of_another, "run.npz", BELT),
+    "no system": (no_system, "run.npz", BELT),
+}
+group("archive of a system", TraceFileError, archive, rows, "run.npz")
 rows = {
     "array": ("run.npz", ..., "array"),
     "folder": ("run.npz", ..., "npz"),
     "CSV": ("run.csv", ..., "csv"),
 }
 group("no trace", TraceFileError, no_trace, rows)
-rows = {
-    "what one contact sees": (
-        "run.npz",
-        ...,
-        lambda: trace("every kind of contact").contact("pad").save("run.npz"),
-    )
-}
-group("saved trace", OutputError, called, rows)
+rows = {"what one contact sees": ("pad",)}
+group(
+    "saved trace",
+    OutputError,
+    lambda name: ran(BELT).contact(name).save("run.npz"),
+    rows,
+    "run.npz",
+)
 rows = {"unknown contact": ("gear: all",), "unknown contact of an object": (Coverage("gear"),)}
 group("monitors of a system", ParameterError, watched, rows, "")
-rows = {"name without a contact": ("F < 2",)}
-group("monitors of a system", ExpressionError, watched, rows, "invariant, column 1")
-rows = {"name of the system for a contact": ("pad: q1 < 2",)}
+rows = {"no contact": ("F < 2",), "name of the system for a contact": ("pad: q1 < 2",)}
 group("monitors of a system", ExpressionError, watched, rows, "invariant, column 1")
 rows = {each: (each,) for each in ("passivity", "coverage", "z <= s")}
 group("monitors of the end", ParameterError, rows_wanted, rows, "")
@@ -1995,20 +1981,17 @@ def sets(reader: Callable[[Any], Any], *last: str) -> None:
     reader(".")
 
 
-rows = {repr(unit): (unit,) for unit in ("furlong", "", "MM", "m/min", "kg", "s^-1", "µ", "mm s")}
+rows = {repr(unit): (unit,) for unit in ("", "MM", "m/min", "µ", "mm s")}
 group("unit", UnitError, lambda unit: factor("velocity", unit), rows, "")
 HOLE = "time < 0.075 s or time > 0.085 s"
 rows = {
-    "word": ({10: "0.08,lost,1"},),
     "word in a selected row": ({10: "0.08,lost,1"}, "time > 0.05 s"),
     "first of two words": ({10: "0.08,1,off", 4: "0.02,x,1"},),
     "word for a time": ({10: "late,1,1"}, "position > 0 mm"),
     "word for a force": ({10: "0.08,1,off"}, "not force > 3 N"),
-    "NaN": ({10: "0.08,nan,1"},),
     "time twice below a row left out": ({10: "0.08,lost,1", 15: "0.12,1,1"}, HOLE),
     "NaN below a row left out": ({10: "0.08,lost,1", 15: "0.13,1,nan"}, HOLE),
     "unit of another column": ({2: "s,m,N"},),
-    "unit of another quantity": ({2: "s,mm,mm"},),
     "unit of the time": ({2: "ms,mm,N"},),
     "gap at an end": ({2: "0,0,"}, "", "interpolate"),
     "gap in time": ({7: ",1,1"}, "", "interpolate"),
