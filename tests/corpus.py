@@ -343,7 +343,57 @@ def go(guard: str, **actions: str) -> ChartModel:
     return _broken(Transition("go", "stick", "slip", guard=guard, actions=actions))
 
 
+def odd_names() -> ChartModel:
+    """Names and titles of any letters, actions of every kind, numbers that no decimal is."""
+    chart = Chart(
+        'own "\u00e9", with\ncommas',
+        ("v", "s", "t"),
+        ("z", "w"),
+        ("k", "c"),
+        (
+            State("rest", {"z": "v", "w": "0"}),
+            State(
+                "l\u00e4uft", {"z": "0", "w": "abs(v)"}, entry={"z": "z / 3"}, exit={"w": "w + 1"}
+            ),
+        ),
+        (
+            Transition("go", "rest", "l\u00e4uft", "abs(z) >= s or t > 100", {"w": "c * w"}),
+            Transition("back", "l\u00e4uft", "rest", "not abs(v) > 0.05"),
+        ),
+        {"F": "k * z + 1e-3 * dw"},
+    )
+    return ChartModel(
+        chart,
+        {"k": np.array([1 / 3, 2.0]), "c": 0.1},
+        n=2,
+        weights=[0.1, 0.3],
+        stribeck=CURVE,
+        sigma_2=0.1,
+        title='mine; "quoted"\n\u00e9',
+    )
+
+
+# Edges by the time in a state, from several states, and at once.
+LAMP = Chart(
+    "lamp",
+    parameters=("T",),
+    states=(
+        State("red", outputs={"F": "1"}),
+        State("green", outputs={"F": "2"}),
+        State("broken", outputs={"F": "0"}),
+        State("passing", outputs={"F": "3"}),
+    ),
+    transitions=(
+        Transition("fails", ("red", "green"), "broken", guard="v > 0.5"),
+        Transition("go", "red", "passing", guard="after(T)"),
+        Transition("through", "passing", "green", guard="True"),
+        Transition("stop", "green", "red", guard="after(2 * T)"),
+    ),
+)
+
 OWN_RUNS: dict[str, Maker] = {
+    "ages": _on(ChartModel(LAMP, {"T": 0.3}), Prescribed("0"), 5.0),
+    "odd names": _on(odd_names(), Prescribed("0.3*sin(t)"), 20.0),
     "wear": _on(wear(), Prescribed("0.3*sin(2*pi*t/17)"), 40.0),
     "wear, pulled": _on(wear(1), PulledSlider(1, 2, 0.1), 40.0, method="rk4", step=7.003e-3),
     "order of actions": _on(

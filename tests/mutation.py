@@ -49,7 +49,7 @@ NEAR = {  # module: its tests, those that detect most first
     "gms_fsm/run/machines.py": [
         "run/test_own_machines",
         "laws/test_engines_agree",
-        "traces/test_traces_of_systems_round_trip",
+        "laws/test_files_give_back_what_was_saved",
         "charts/test_gms_chart_is_the_papers",
     ],
     "integrators/advance.py": [

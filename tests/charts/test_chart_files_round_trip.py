@@ -37,16 +37,6 @@ def test_a_planar_chart_and_plain_names_are_written_as_one_would(tmp_path: Path)
 CHART = Chart("one", states=(State("a"),), outputs={"F": "v"})
 
 
-def test_its_own_file_is_replaced_and_any_other_is_kept(tmp_path: Path) -> None:
-    path = CHART.save(tmp_path / "one.toml")
-    CHART.save(path)
-    path.write_text("# my notes\n" + path.read_text(encoding="utf-8"), encoding="utf-8")
-    with pytest.raises(OutputError, match="was not written by gms-fsm"):
-        CHART.save(path)
-    assert path.read_text(encoding="utf-8").startswith("# my notes\n")
-    assert Chart.load(path) == CHART
-
-
 def test_what_no_file_can_store_is_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"must end in \.toml"):
         CHART.save(tmp_path / "one.json")

@@ -8,46 +8,17 @@ from __future__ import annotations
 
 import builtins
 import dataclasses
-from typing import Any
 
 import pytest
 
-from gms_fsm.charts.chart import RESERVED, Chart, State, Transition
+from gms_fsm.charts.chart import RESERVED, State
 from gms_fsm.errors import ChartError
 from gms_fsm.language import CONSTANTS, FUNCTIONS, spell
-
-STICK = State("stick", flow={"z": "v"})
-SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})
-GO = Transition("go", "stick", "slip", guard="z >= s and v > v_c")
-BACK = Transition("back", "slip", "stick", guard="abs(v) <= v_c")
-
-
-def chart(**changes: Any) -> Chart:
-    """Return a valid chart with changes."""
-    sound: dict[str, Any] = {
-        "name": "rubber",
-        "inputs": ("v", "s"),
-        "variables": ("z",),
-        "parameters": ("k", "C", "v_c"),
-        "states": (STICK, SLIP),
-        "transitions": (GO, BACK),
-        "outputs": {"F": "k * z + 0.1 * dz"},
-    }
-    return Chart(**{**sound, **changes})
-
-
-def edge(**changes: Any) -> dict[str, Any]:
-    """Return the valid chart's edges with the first one changed."""
-    return {"transitions": (dataclasses.replace(GO, **changes), BACK)}
-
-
-def state(**changes: Any) -> dict[str, Any]:
-    """Return the valid chart's states with the second one changed."""
-    return {"states": (STICK, dataclasses.replace(SLIP, **changes))}
+from tests.refusals import BACK, GO, SLIP, STICK, chart, edge
 
 
 def test_the_valid_chart_is_accepted_with_its_parts() -> None:
-    sound = chart()
+    sound = chart({})
     assert sound.default_state.name == "stick"
     assert [sound.state_index(name) for name in ("stick", "slip")] == [0, 1]
     assert [(i, t.name) for i, t in sound.leaving("slip")] == [(1, "back")]
@@ -58,23 +29,23 @@ def test_the_valid_chart_is_accepted_with_its_parts() -> None:
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(part, attribute, "another")
     assert not {"guards=", "flows=", "assignments=", "forces="} & {*repr(sound).split("(")}
-    assert sound == chart()
+    assert sound == chart({})
 
 
-@pytest.mark.parametrize("name", sorted(RESERVED))
 @pytest.mark.parametrize("kind", ["parameter", "variable", "state", "edge"])
-def test_names_used_by_the_generated_code_are_reserved(name: str, kind: str) -> None:
-    changes = {
-        "parameter": {"parameters": ("k", "C", "v_c", name)},
-        "variable": {
-            "variables": ("z", name),
-            "states": tuple(State(s.name, {**s.flow, name: "0"}) for s in (STICK, SLIP)),
-        },
-        "state": {"states": (STICK, SLIP, State(name, {"z": "0"}))},
-        "edge": edge(name=name),
-    }[kind]
-    with pytest.raises(ChartError, match=rf"{kind} name '{name}' is reserved"):
-        chart(**changes)
+def test_names_used_by_the_generated_code_are_reserved(kind: str) -> None:
+    for name in sorted(RESERVED):
+        changes = {
+            "parameter": {"parameters": ("k", "C", "v_c", name)},
+            "variable": {
+                "variables": ("z", name),
+                "states": tuple(State(s.name, {**s.flow, name: "0"}) for s in (STICK, SLIP)),
+            },
+            "state": {"states": (STICK, SLIP, State(name, {"z": "0"}))},
+            "edge": edge(name=name),
+        }[kind]
+        with pytest.raises(ChartError, match=rf"{kind} name '{name}' is reserved"):
+            chart(changes)
 
 
 def test_the_words_of_the_language_are_reserved() -> None:
@@ -89,16 +60,19 @@ def test_building_a_chart_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(builtins, name, forbidden)
     # Every one of these would fail or never end if it were computed.
     built = chart(
-        **edge(guard="1 / 0 > 0 or sqrt(-1) > 0"),
-        outputs={"F": "exp(1e300) / 0"},
-        states=(State("stick", {"z": "1 / 0"}, entry={"z": "0 ** -1"}), SLIP),
+        {
+            **edge(guard="1 / 0 > 0 or sqrt(-1) > 0"),
+            "outputs": {"F": "exp(1e300) / 0"},
+            "states": (State("stick", {"z": "1 / 0"}, entry={"z": "0 ** -1"}), SLIP),
+        }
     )
     assert spell(built.flows["stick", "z"]) == "1.0 / 0.0"
 
 
 def test_sequences_become_tuples_and_texts_cannot_be_changed_afterwards() -> None:
     flow, outputs = {"z": "v"}, {"F": "k * z"}
-    built = chart(states=[State("stick", flow), SLIP], transitions=[GO, BACK], outputs=outputs)
+    states = [State("stick", flow), SLIP]
+    built = chart({"states": states, "transitions": [GO, BACK], "outputs": outputs})
     assert isinstance(built.states, tuple)
     assert isinstance(built.transitions, tuple)
     flow["z"], outputs["F"] = "-v", "0"
@@ -108,9 +82,6 @@ def test_sequences_become_tuples_and_texts_cannot_be_changed_afterwards() -> Non
 
 
 def test_names_may_contain_the_unicode_that_python_allows() -> None:
-    built = chart(
-        parameters=("k", "C", "v_c", "\u03c3"),
-        outputs={"F": "\u03c3 * z"},
-        name="\u0413\u041c\u0421",
-    )
+    parameters, force = ("k", "C", "v_c", "\u03c3"), {"F": "\u03c3 * z"}
+    built = chart({"parameters": parameters, "outputs": force, "name": "\u0413\u041c\u0421"})
     assert spell(built.forces["stick", "F"]) == "\u03c3 * z"

@@ -13,7 +13,6 @@ import pytest
 from gms_fsm import GMS, ElementMachines, GMSParameters, Prescribed, Stribeck
 from gms_fsm.charts import GMS_ELEMENT, LAWS, SLIP_LAWS, gms_element
 from gms_fsm.charts.chart import SUPPLIED
-from gms_fsm.errors import ParameterError
 from gms_fsm.language import evaluate, names_in
 from gms_fsm.lowering.program import lower
 
@@ -65,18 +64,6 @@ def test_states_edges_and_default(law: str) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_guard_texts(law: str) -> None:
-    chart = GMS_ELEMENT[law]
-    assert {e.name: e.guard for e in chart.transitions} == {
-        "break_away_forward": "z >= s and v > v_c",
-        "break_away_backward": "z <= -s and v < -v_c",
-        "arrest": "abs(v) <= v_c and abs(z) < s",
-    }
-    assert chart.guard_text("break_away_forward") == "z >= s && v > v_c"
-    assert chart.guard_text("arrest") == "|v| <= v_c && |z| < s"
-
-
-@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("state", ["stick", "slip"])
 def test_the_truth_table(law: str, state: str) -> None:
     chart = GMS_ELEMENT[law]
@@ -119,15 +106,6 @@ def test_machines_and_generated_text_have_the_same_truth_table(law: str, weight:
                 assert (names[out[0]] if out[0] >= 0 else None) == wanted
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_exactly_on_the_threshold_is_break_away(law: str) -> None:
-    chart = GMS_ELEMENT[law]
-    forward = {"z": 1.0, "s": 1.0, "v": 0.1, "v_c": V_C}
-    assert evaluate(chart.guards["break_away_forward"], forward)
-    assert evaluate(chart.guards["break_away_backward"], {**forward, "z": -1.0, "v": -0.1})
-    assert not evaluate(chart.guards["arrest"], {**forward, "v": 0.0})
-
-
 def test_slip_laws_are_the_two_of_the_literature() -> None:
     assert LAWS == ("signed", "published")
     assert SLIP_LAWS == {
@@ -157,15 +135,6 @@ def test_laws_agree_forward_and_differ_backward() -> None:
             assert signed == pytest.approx(-0.5 * z / s)
 
 
-@pytest.mark.parametrize("law", ["Published", "", "al-bender", None, 1])
-def test_an_unknown_law_is_refused_with_the_known_ones(law: object) -> None:
-    with pytest.raises(ParameterError, match=r"law is .*'published'.*'signed'") as caught:
-        gms_element(law)  # type: ignore[arg-type]
-    assert repr(law) in str(caught.value)
-    with pytest.raises(ParameterError, match="law is"):
-        GMS(GMSParameters.paper("stick-slip"), law=law)  # type: ignore[arg-type]
-
-
 def test_there_is_no_default_law() -> None:
     with pytest.raises(TypeError, match="law"):
         gms_element()  # type: ignore[call-arg]
@@ -173,10 +142,3 @@ def test_there_is_no_default_law() -> None:
         GMS(GMSParameters.paper("stick-slip"))  # type: ignore[call-arg]
     with pytest.raises(TypeError):
         GMS(GMSParameters.paper("stick-slip"), "signed")  # type: ignore[misc]
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_the_law_is_named_wherever_a_run_is(law: str) -> None:
-    model = GMS(GMSParameters.paper("stick-slip"), law=law)  # type: ignore[arg-type]
-    assert law in model.title
-    assert law in model.chart.name

@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import Chart, Parameter, State, Transition, simulate
+from gms_fsm import Chart, Parameter, simulate
 from gms_fsm.charts.gms import gms_element
 from gms_fsm.systems.system import Body, Contact, System
 from tests.helpers import event_sequence, pulled_mass
-
-ENGINES = ["ifelse", "machines", "compiled"]
 
 
 def gms_in_words() -> Chart:
@@ -60,56 +58,3 @@ def test_a_gms_bank_in_words_is_the_gms_model() -> None:
     np.testing.assert_allclose(one.transitions.t, other.transitions.t, atol=1e-6)
     np.testing.assert_allclose(one.F[-1], other.F[-1], rtol=1e-6)
     np.testing.assert_allclose(one.s[-1], other.s[-1], rtol=1e-6)
-
-
-@pytest.mark.parametrize("engine", ENGINES[1:])
-def test_engines_agree_bit_for_bit(engine: str) -> None:
-    if engine == "compiled":
-        pytest.importorskip("llvmlite")
-    one, other = (simulate(as_a_system(), 20.0, engine=each) for each in ("ifelse", engine))
-    np.testing.assert_array_equal(one.rows.y, other.rows.y)
-    np.testing.assert_array_equal(one.F_elements, other.F_elements)
-
-
-def test_a_chart_may_use_the_names_of_the_generated_text() -> None:
-    chart = Chart(
-        "names",
-        variables=("y", "n"),
-        parameters=("p", "i", "S", "own", "tables"),
-        states=(
-            State("mode", flow={"y": "p * v - i * y", "n": "y"}),
-            State("held", flow={"y": "-S * y"}),
-        ),
-        transitions=(
-            Transition("out", "mode", "held", guard="n > own and y > 0.5"),
-            Transition("edge", "held", "mode", guard="y < tables"),
-        ),
-        outputs={"F": "y + n"},
-    )
-    plain = Chart(
-        "plain",
-        variables=("a1", "a2"),
-        parameters=("b1", "b2", "b3", "b4", "b5"),
-        states=(
-            State("s1", flow={"a1": "b1 * v - b2 * a1", "a2": "a1"}),
-            State("s2", flow={"a1": "-b3 * a1"}),
-        ),
-        transitions=(
-            Transition("e1", "s1", "s2", guard="a2 > b4 and a1 > 0.5"),
-            Transition("e2", "s2", "s1", guard="a1 < b5"),
-        ),
-        outputs={"F": "a1 + a2"},
-    )
-    numbers = (2.0, 0.5, 3.0, 1.0, 0.01)
-
-    def run(chart: Chart, engine: str) -> np.ndarray:
-        values = dict(zip(chart.parameter_names, numbers, strict=True))
-        system = System(
-            "names",
-            bodies=(Body("b", velocity="1 + sin(t)", x="out", v="watch"),),
-            contacts=(Contact("shared", chart, values, v="watch"),),
-        )
-        return np.asarray(simulate(system, 10.0, engine=engine).F)
-
-    for engine in ENGINES[:2]:
-        np.testing.assert_array_equal(run(chart, engine), run(plain, engine))

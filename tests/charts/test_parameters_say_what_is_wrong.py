@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from gms_fsm import (
     Chart,
     ChartModel,
     GMSParameters,
-    LuGre,
     Parameter,
     Prescribed,
     PulledSlider,
@@ -26,40 +24,7 @@ from gms_fsm import (
     Stribeck,
     simulate,
 )
-from gms_fsm.charts import gms_element
-
-CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=1e-3)
-NAN, INF = math.nan, math.inf
-
-
-def bank(k: Any = (40, 10), sigma: Any = (1, 2), C: Any = (0.1, 0.2), **rest: Any) -> GMSParameters:
-    given: dict[str, Any] = {"sigma_2": 0.4, "stribeck": CURVE, "v_c": 1e-6}
-    return GMSParameters(k, sigma, C, **{**given, **rest})
-
-
-def shares(alpha: Any = (0.5, 0.5), k: Any = (40, 10), **rest: Any) -> GMSParameters:
-    given: dict[str, Any] = {"C": 2.0, "stribeck": CURVE, "v_c": 1e-6}
-    return GMSParameters.from_shares(alpha, k, **{**given, **rest})
-
-
-def lugre(**changes: Any) -> LuGre:
-    given: dict[str, Any] = {"sigma_0": 1e3, "sigma_1": 31.6, "sigma_2": 4.0, "stribeck": CURVE}
-    return LuGre(**{**given, **changes})
-
-
-def own(values: Any = None, *, chart: Any = None, **changes: Any) -> ChartModel:
-    given: dict[str, Any] = {"n": 2, "stribeck": CURVE}
-    values = {"k": 1.0, "sigma": 0.0, "C": 1.0, "v_c": 1e-6, **(values or {})}
-    return ChartModel(chart or gms_element("signed"), values, **{**given, **changes})
-
-
-ONLY_Q = Chart("q", ("v",), ("z",), ("q",), (State("a", {"z": "v"}),), (), {"F": "q * z"})
-
-
-def test_a_plain_name_is_short_for_a_parameter_that_may_be_any_number() -> None:
-    assert ONLY_Q.parameters == (Parameter("q"),)
-    assert ONLY_Q.unit("q") == ""
-    assert ChartModel(ONLY_Q, {"q": [-1e300, 0.0]}, n=2).n == 2
+from tests.refusals import STRIBECK, bank, lugre, own_model, shares
 
 
 def test_values_on_the_boundary_are_allowed() -> None:
@@ -67,6 +32,9 @@ def test_values_on_the_boundary_are_allowed() -> None:
     assert bank(sigma=(0, 0), C=(0, 0), sigma_2=0).sigma.tolist() == [0, 0]
     assert lugre(sigma_1=0, sigma_2=0).sigma_1 == 0
     assert PulledSlider(1, 1, 0).speed == 0
+    only_q = Chart("q", ("v",), ("z",), ("q",), (State("a", {"z": "v"}),), (), {"F": "q * z"})
+    assert only_q.parameters == (Parameter("q"),)  # a plain name may be any number
+    assert ChartModel(only_q, {"q": [-1e300, 0.0]}, n=2).n == 2
 
 
 def test_published_law_without_a_dip_warns_and_the_signed_one_does_not() -> None:
@@ -82,17 +50,19 @@ def test_published_law_without_a_dip_warns_and_the_signed_one_does_not() -> None
 def test_the_curve_is_eq_2() -> None:
     with pytest.MonkeyPatch.context() as patch:  # it evaluates its text
         patch.setattr(Stribeck, "text", "F_c + v_s * v")
-        assert float(CURVE(2.0)) == 1.002
+        assert float(STRIBECK(2.0)) == 1.002
     for v in (0.0, 1e-4, -1e-3, 2e-3, -0.5):
-        assert float(CURVE(v)) == pytest.approx(1.0 + 0.5 * math.exp(-((v / 1e-3) ** 2)), rel=1e-15)
-    assert CURVE(np.array([[0.0, 1.0]])).shape == (1, 2)
-    assert CURVE(CURVE.dip) - CURVE.F_c < 1e-16
+        assert float(STRIBECK(v)) == pytest.approx(
+            1.0 + 0.5 * math.exp(-((v / 1e-3) ** 2)), rel=1e-15
+        )
+    assert STRIBECK(np.array([[0.0, 1.0]])).shape == (1, 2)
+    assert STRIBECK(STRIBECK.dip) - STRIBECK.F_c < 1e-16
 
 
 def test_the_curve_equals_what_a_run_computes_to_the_bit() -> None:
     trace = simulate(GMS(bank(), law="signed"), Prescribed("2e-3*sin(t)"), 7.0)
     assert len(np.unique(trace.s[:, 0])) > 10
-    assert (CURVE(trace.v) == trace.s[:, 0]).all()
+    assert (STRIBECK(trace.v) == trace.s[:, 0]).all()
 
 
 def test_table_one_is_exact() -> None:
@@ -114,27 +84,27 @@ def test_table_one_is_exact() -> None:
 
 def test_shares_give_weights_and_rates() -> None:
     alpha, k = np.array([0.1, 0.2, 0.3, 0.4]), np.array([40.0, 30.0, 20.0, 10.0])
-    p = shares(alpha, k, C=2.0)
+    p = shares(alpha=alpha, k=k, C=2.0)
     assert p.weights.tolist() == (alpha / k).tolist()
     assert p.C.tolist() == (alpha * 2.0 / k).tolist()
     assert p.sigma.tolist() == [0, 0, 0, 0]
     assert p.sigma_2 == 0
-    assert shares(alpha, k, sigma=[1, 2, 3, 4], sigma_2=5).sigma.tolist() == [1, 2, 3, 4]
+    assert shares(alpha=alpha, k=k, sigma=[1, 2, 3, 4], sigma_2=5).sigma.tolist() == [1, 2, 3, 4]
 
 
 @pytest.mark.parametrize("v", [0.05, -0.05])
 def test_in_steady_slip_the_shares_carry_the_whole_friction(v: float) -> None:
-    model = GMS(shares([0.1, 0.2, 0.3, 0.4], [40.0, 30.0, 20.0, 10.0]), law="signed")
+    model = GMS(shares(alpha=[0.1, 0.2, 0.3, 0.4], k=[40.0, 30.0, 20.0, 10.0]), law="signed")
     trace = simulate(model, Prescribed(v), 30.0)
     assert (trace.states[-1] == "slip").all()
     force = float(np.sum(model.parameters.k * trace.z[-1]))
-    assert force == pytest.approx(math.copysign(float(CURVE(v)), v), abs=1e-6)
+    assert force == pytest.approx(math.copysign(float(STRIBECK(v)), v), abs=1e-6)
     assert trace.F[-1] == pytest.approx(force, abs=1e-6)
 
 
 def test_nothing_can_be_changed_afterwards() -> None:
     k = np.array([40.0, 10.0])
-    p = bank(k)
+    p = bank(k=k)
     k[0] = 1.0
     assert p.k.tolist() == [40, 10]
     for name in ("k", "sigma", "C", "weights"):
@@ -143,9 +113,9 @@ def test_nothing_can_be_changed_afterwards() -> None:
     with pytest.raises(AttributeError):
         p.v_c = 1.0  # type: ignore[misc]
     with pytest.raises(AttributeError):
-        CURVE.F_c = 2.0  # type: ignore[misc]
+        STRIBECK.F_c = 2.0  # type: ignore[misc]
     weights = np.array([1.0, 2.0])
-    model = own({"k": weights}, weights=weights)
+    model = own_model({"k": weights}, weights=weights)
     weights[0] = 9.0
     assert model.weights.tolist() == [1, 2]
     assert np.asarray(model.values["k"]).tolist() == [1, 2]

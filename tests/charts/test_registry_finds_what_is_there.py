@@ -8,25 +8,20 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import gms_fsm.charts
 from gms_fsm import (
-    Chart,
     ChartModel,
-    Parameter,
     Prescribed,
     Stribeck,
     simulate,
 )
 from gms_fsm.charts import CHARTS, GMS_ELEMENT, LAWS, LUGRE
 from gms_fsm.charts.broken import BROKEN
-from gms_fsm.charts.registry import Demonstration, Entry, entry, registered
-from gms_fsm.errors import ChartError, ParameterError
-from gms_fsm.systems.models import demonstration
-from gms_fsm.traces.failures import LivelockError
+from gms_fsm.charts.registry import entry, registered
+from gms_fsm.errors import ChartError
 from tests.helpers import same_bits
 
 CURVE = Stribeck(1.0, 1.5, 1e-3)
@@ -71,68 +66,7 @@ def test_every_parameter_has_a_unit_and_a_meaning(name: str, law: str) -> None:
         assert each.meaning
 
 
-FAULTY = [name for name, each in registered().items() if each.wrong]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", FAULTY)
-def test_a_faulty_reading_runs_alike_on_two_engines(name: str) -> None:
-    """The others are runs of the corpus of `tests/laws`."""
-    model, rig = demonstration(entry(name), ""), Prescribed("0.2*sin(t)")
-    runs = []
-    for engine in ("machines", "ifelse"):
-        try:
-            runs.append(simulate(model, rig, 8.0, engine=engine))
-        except LivelockError as error:
-            runs.append(error.trace)
-    same_bits(*runs)
-    assert len(runs[0]) > 2
-
-
-@pytest.mark.parametrize(
-    ("name", "law", "words"),
-    [
-        ("gms", "", r"law is ''; gms has 'signed' and 'published', which differ"),
-        ("gms", "al-bender", "law is 'al-bender'; gms has"),
-        ("lugre", "signed", "lugre has only one law; leave out law='signed'"),
-    ],
-)
-def test_a_law_is_chosen_where_there_are_several_and_only_there(
-    name: str, law: str, words: str
-) -> None:
-    with pytest.raises(ParameterError, match=words):
-        entry(name).chart(law)
-
-
-def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ParameterError, match=r"there is no model 'coulomb'; .*there are .*gms"):
-        entry("coulomb")
-
-
 # --------------------------------------------------------------------------- invalid entries
-def chart(*parameters: Parameter | str, inputs: tuple[str, ...] = ("v",)) -> Chart:
-    return Chart("c", inputs, ("z",), parameters, (gms_fsm.State("a", {"z": "v"}),), (), {"F": "z"})
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ((LUGRE, Demonstration({"sigma_0": 1.0}, "", stribeck=CURVE)), r"missing .*'sigma_1'"),
-        ((LUGRE, Demonstration({"sigma_0": 1.0, "sigma_1": 0.0}, "")), "takes a curve"),
-        ((chart(), Demonstration({}, "", stribeck=CURVE)), "any other chart takes none"),
-        ((chart(), Demonstration({"k": 1.0}, "")), r"unknown: \['k'\]"),
-        ((chart(Parameter("k", "N/m", "> 0")), Demonstration({"k": 0.0}, "")), "k is 0.0; .* > 0"),
-        ((chart("law"), Demonstration({"law": 0.0}, "")), "'law' has the name of a key"),
-        (({}, Demonstration({}, "")), "it has no chart"),
-        (
-            ({"a": chart("k"), "b": chart()}, Demonstration({"k": 0.0}, "")),
-            "give each its own entry",
-        ),
-    ],
-)
-def test_an_entry_that_does_not_fit_is_refused(arguments: Any, words: str) -> None:
-    with pytest.raises(ChartError, match=f"entry 'mine'.*{words}"):
-        Entry("mine", *arguments)
 
 
 # --------------------------------------------------------------------------- files

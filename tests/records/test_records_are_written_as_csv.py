@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gms_fsm import OutputError, Record, excite
+from gms_fsm import Record, excite
 
 COLUMNS = {
     "position": ("x_m", "m"),
@@ -53,20 +53,3 @@ def test_a_missing_force_is_an_empty_cell(tmp_path: Path) -> None:
     )
     path = given.to_csv(tmp_path / "own.csv")
     assert path.read_text().splitlines()[4] == "3.0,0.003,,3.0"
-
-
-def test_it_may_replace_its_own_file_only(tmp_path: Path) -> None:
-    path = record().to_csv(tmp_path / "own.csv")
-    before = path.read_bytes()
-    record(1).to_csv(path)
-    assert path.read_bytes() != before
-    (tmp_path / "notes.csv").write_text("t_s,x_m\n")
-    with pytest.raises(OutputError, match="not written by gms-fsm"):
-        record().to_csv(tmp_path / "notes.csv")
-    assert (tmp_path / "notes.csv").read_text() == "t_s,x_m\n"
-
-
-def test_a_folder_is_not_a_file(tmp_path: Path) -> None:
-    (tmp_path / "own.csv").mkdir()
-    with pytest.raises(OutputError, match="a folder is there"):
-        record().to_csv(tmp_path / "own.csv")

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from gms_fsm import Record
-from gms_fsm.errors import RecordError, UnitError
+from gms_fsm.errors import RecordError
 from gms_fsm.records.motion import Motion, motion_of
 from gms_fsm.records.record import Column
 from gms_fsm.records.units import FACTORS, convert_numbers, factor
@@ -45,35 +45,21 @@ EXPECTED = {
 EXPECTED["velocity"] |= {"nm/s": 1e-9}
 EXPECTED["force"] |= {"lbf": 4.4482216152605}
 EXPECTED["normal"] = EXPECTED["force"]
-UNITS = [(quantity, unit) for quantity, units in EXPECTED.items() for unit in units]
 
 
-def test_no_unit_is_left_untested() -> None:
-    for quantity, units in FACTORS.items():
-        assert set(units) <= set(EXPECTED[quantity])
-
-
-@pytest.mark.parametrize(("quantity", "unit"), UNITS)
-def test_every_unit_reads_as_its_si_value(quantity: str, unit: str, tmp_path: Path) -> None:
-    assert factor(quantity, unit) == EXPECTED[quantity][unit]
-    assert factor(quantity, f" {unit} ") == EXPECTED[quantity][unit]
+@pytest.mark.parametrize("quantity", EXPECTED)
+def test_every_unit_reads_as_its_si_value(quantity: str, tmp_path: Path) -> None:
+    assert set(FACTORS.get(quantity, ())) <= set(EXPECTED[quantity])
     values = np.arange(1.0, 7.0)
-    columns = {quantity: Column("a", unit)}
-    if quantity != "time":
-        columns["time"] = Column("t", "s")
-    text = table(["t", "a"], np.arange(6.0), values)
-    (tmp_path / "own.csv").write_text(text)
-    record = read_table(tmp_path / "own.csv", columns)
-    np.testing.assert_array_equal(record.columns[quantity], EXPECTED[quantity][unit] * values)
-
-
-@pytest.mark.parametrize("unit", ["furlong", "", "MM", "m/min", "kg", "s^-1", "µ", "mm s"])
-def test_an_unknown_unit_is_an_error(unit: str) -> None:
-    quantity = "velocity"
-    with pytest.raises(UnitError, match="use one of") as caught:
-        factor(quantity, unit)
-    assert repr(unit) in str(caught.value)
-    assert all(known in str(caught.value) for known in FACTORS[quantity])
+    for unit, size in EXPECTED[quantity].items():
+        assert factor(quantity, unit) == factor(quantity, f" {unit} ") == size
+        columns = {"time": Column("t", "s"), quantity: Column("a", unit, sign=-1)}
+        if quantity == "time":
+            columns = {quantity: Column("a", unit)}
+        text = table(["t", "a", "remark"], np.arange(6.0), values, values)
+        (tmp_path / "own.csv").write_text(text.replace("1.0\n", "of run 1\n"))
+        read_back = read_table(tmp_path / "own.csv", columns).columns[quantity]
+        np.testing.assert_array_equal(read_back, size * values * (1 if quantity == "time" else -1))
 
 
 @pytest.mark.parametrize(
@@ -100,35 +86,6 @@ def test_numbers_in_a_condition_are_converted(text: str, expected: str) -> None:
     ]
 
 
-# --------------------------------------------------------------------------- reading
-def test_sign_reverses_a_quantity(tmp_path: Path) -> None:
-    text = table(["t", "F"], np.arange(6.0), np.arange(6.0) - 2)
-    record = read(tmp_path, text, force=Column("F", "mN", sign=-1))
-    np.testing.assert_allclose(record.columns["force"], -1e-3 * (np.arange(6.0) - 2))
-
-
-@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
-@pytest.mark.parametrize("ending", ["\n", "\r\n"])
-@pytest.mark.parametrize("bom", [b"", b"\xef\xbb\xbf"])
-def test_tables_come_in_many_formats(
-    delimiter: str, ending: str, bom: bytes, tmp_path: Path
-) -> None:
-    lines = ["t [s]|x, in mm" if delimiter != "," else 't [s]|"x, in mm"']
-    lines += [f" {i}|{i * 0.5} " for i in range(6)]
-    text = ending.join(line.replace("|", delimiter) for line in lines)
-    (tmp_path / "own.txt").write_bytes(bom + text.encode())
-    columns = {"time": Column("t [s]", "s"), "position": Column("x, in mm", "mm")}
-    record = read_table(tmp_path / "own.txt", columns)
-    np.testing.assert_allclose(record.columns["position"], 0.5e-3 * np.arange(6))
-    assert len(record) == 6
-    assert record.rows.tolist() == [*range(2, 8)]
-
-
-def test_other_columns_may_hold_anything(tmp_path: Path) -> None:
-    text = "t,name,x\n" + "".join(f"{i},run {i},{i}\n" for i in range(6))
-    assert len(read(tmp_path, text, position=SI["position"])) == 6
-
-
 # --------------------------------------------------------------------------- selection
 T = np.arange(20.0)
 FORCE = np.where((T >= 5) & (T < 15), 5.0, 1.0)
@@ -139,9 +96,7 @@ FORCE = np.where((T >= 5) & (T < 15), 5.0, 1.0)
     [
         ("", range(20)),
         ("normal > 4.5 N", range(5, 15)),
-        ("normal > 4500 mN", range(5, 15)),
         ("normal > 4.5e6 µN", range(5, 15)),
-        ("normal > 4.5", range(5, 15)),
         ("normal > 4.5 N and time < 10 s", range(5, 10)),
         ("time < 5 s or time >= 15000 ms", [*range(5), *range(15, 20)]),
         ("not normal > 4.5 N", [*range(5), *range(15, 20)]),
@@ -197,13 +152,10 @@ def test_gaps_are_noted_with_row_numbers(tmp_path: Path) -> None:
     assert "2 gap(s)" in note
     assert "rows 21, 31" in note  # the header is row 1
     assert "1.01 s" in note
+    even = np.arange(40) * 0.01
+    assert read(tmp_path, table(["t", "x"], even, even), position=SI["position"]).notes == ()
     cut = read(tmp_path, table(["t", "x"], t, t), "time > 0.095 s", position=SI["position"])
     assert "rows 21, 31" in " ".join(cut.notes)
-
-
-def test_an_even_record_has_no_notes(tmp_path: Path) -> None:
-    t = np.arange(40) * 0.01
-    assert read(tmp_path, table(["t", "x"], t, t), position=SI["position"]).notes == ()
 
 
 # --------------------------------------------------------------------------- velocity
@@ -213,8 +165,7 @@ def amplitude(values: np.ndarray, pure: np.ndarray) -> float:
     return float((values[inner] @ pure[inner]) / (pure[inner] @ pure[inner]))
 
 
-@pytest.mark.parametrize("tau", [0.01, 0.02, 0.05])
-@pytest.mark.parametrize("shift", [0.0, 1.0])
+@pytest.mark.parametrize(("tau", "shift"), [(0.01, 0.0), (0.05, 1.0)])
 def test_the_smoothing_spline_halves_the_amplitude_where_it_says(tau: float, shift: float) -> None:
     t = np.arange(8000) * 0.002
     for omega, gain in ((0.1 / tau, 1.0), (1 / tau, 0.5), (2 / tau, 1 / 17)):
@@ -231,21 +182,16 @@ def test_the_note_states_time_constant_frequency_and_residual() -> None:
     t = np.arange(4000) * 0.005
     noise = 2e-6 * rng.standard_normal(t.size)
     position = 1e-3 * np.sin(0.5 * np.pi * t) + noise
-    (note,) = motion_of(record_of(time=t, position=position), 0.02).notes
+    motion = motion_of(record_of(time=t, position=position))  # of four intervals
+    assert motion.smoothing == pytest.approx(0.02)
+    (note,) = motion.notes
     assert "time constant 0.02 s" in note
     assert "7.96 Hz" in note  # 1 / (2 pi 0.02 s)
     left = float(note.partition("positions is ")[2].split()[0])
     assert left == pytest.approx(2e-6, rel=0.15)
 
 
-def test_the_default_smoothing_is_four_intervals() -> None:
-    t = np.arange(400) * 0.005
-    motion = motion_of(record_of(time=t, position=1e-3 * np.sin(t)))
-    assert motion.smoothing == pytest.approx(0.02)
-    assert "0.02 s" in motion.notes[0]
-
-
-@pytest.mark.parametrize("noise", [1e-7, 1e-6, 5e-6])
+@pytest.mark.parametrize("noise", [1e-7, 5e-6])
 def test_the_velocity_of_a_noisy_sine_is_near_the_true_one(noise: float) -> None:
     rng = np.random.default_rng(3)
     dt, tau, omega, size = 0.005, 0.02, 0.5 * np.pi, 1e-3
@@ -260,15 +206,7 @@ def test_the_velocity_of_a_noisy_sine_is_near_the_true_one(noise: float) -> None
     assert np.std(error) < 0.2 * np.std(raw)
 
 
-def test_without_smoothing_the_spline_goes_through_the_positions() -> None:
-    t = np.arange(400) * 0.005
-    position = 1e-3 * np.sin(8 * t)
-    motion = motion_of(record_of(time=t, position=position), 0.0)
-    np.testing.assert_allclose(motion.position, position, atol=1e-12)
-    np.testing.assert_allclose(motion.velocity[5:-5], 8e-3 * np.cos(8 * t)[5:-5], atol=1e-6)
-
-
-def test_a_measured_velocity_is_used_unchanged() -> None:
+def test_a_measured_velocity_is_used_unchanged_unless_it_is_smoothed() -> None:
     rng = np.random.default_rng(2)
     t = np.cumsum(rng.uniform(0.005, 0.015, 300))
     velocity = rng.standard_normal(t.size)
@@ -279,19 +217,10 @@ def test_a_measured_velocity_is_used_unchanged() -> None:
     assert motion.notes == ("velocity: as measured",)
     expected = cumulative_trapezoid(velocity, t, initial=0.0)
     np.testing.assert_allclose(motion.position, expected, atol=1e-12)
-
-
-def test_a_measured_velocity_can_be_smoothed_and_says_so() -> None:
-    t = np.arange(2000) * 0.005
-    pure = np.sin(t / 0.05)
-    motion = motion_of(record_of(time=t, velocity=pure), 0.05)
-    assert amplitude(motion.velocity, pure) == pytest.approx(0.5, abs=2e-3)
-    assert "0.05 s" in motion.notes[0]
-
-
-def test_a_record_without_motion_is_rejected() -> None:
-    with pytest.raises(RecordError, match=r"made.*position.*velocity"):
-        motion_of(record_of(time=T, force=T))
+    pure = np.sin(np.arange(2000) * 0.1)
+    smooth = motion_of(record_of(time=np.arange(2000) * 0.005, velocity=pure), 0.05)
+    assert amplitude(smooth.velocity, pure) == pytest.approx(0.5, abs=2e-3)
+    assert "0.05 s" in smooth.notes[0]
 
 
 # --------------------------------------------------------------------------- standstill
@@ -304,7 +233,7 @@ def dwelling(noise: float, top: float = 1e-3) -> Motion:
     return motion_of(record_of(time=0.01 * np.arange(velocity.size), velocity=velocity))
 
 
-@pytest.mark.parametrize("noise", [1e-7, 1e-6, 5e-6, 1e-5, 1e-4])
+@pytest.mark.parametrize("noise", [1e-7, 5e-6, 1e-4])
 def test_the_noise_at_standstill_is_found(noise: float) -> None:
     assert dwelling(noise).standstill == pytest.approx(noise, rel=0.15)
 
@@ -354,7 +283,7 @@ def _noisy_scenario(tmp_path: Path, v_c: str) -> Path:
 
 
 @pytest.mark.slow
-def test_the_command_line_warns_of_a_v_c_below_the_noise(
+def test_the_command_line_warns_of_a_v_c_below_the_noise_and_suggests_one(
     gms_fsm: CommandLine, tmp_path: Path
 ) -> None:
     done = gms_fsm("run", _noisy_scenario(tmp_path, "1e-6"), "-o", tmp_path / "out")
@@ -365,12 +294,9 @@ def test_the_command_line_warns_of_a_v_c_below_the_noise(
     summary = (tmp_path / "out" / "summary.md").read_text()
     assert suggested in summary
     assert "Parameters not identifiable from this record" in summary
-
-
-@pytest.mark.slow
-def test_the_suggested_v_c_causes_no_warning(gms_fsm: CommandLine, tmp_path: Path) -> None:
-    v_c = repr(dwelling(5e-6).fitting_v_c())
-    done = gms_fsm("run", _noisy_scenario(tmp_path, v_c), "-o", tmp_path / "out")
+    done = gms_fsm(
+        "run", _noisy_scenario(tmp_path, repr(dwelling(5e-6).fitting_v_c())), "-o", "good"
+    )
     assert done.code == 0, done.err
     assert "v_c" not in done.err
-    assert "velocity noise" not in (tmp_path / "out" / "summary.md").read_text()
+    assert "velocity noise" not in (tmp_path / "good" / "summary.md").read_text()

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gms_fsm import Record, RecordError
+from gms_fsm import Record
 from gms_fsm.app.scenario import load_scenario
 from tests.scenario_files import MEASURED, OPEN_LOOP, changed
 
@@ -50,12 +50,15 @@ def check(record: Record) -> None:
     ("delimiter", "decimal"),
     [(",", "."), *((each, mark) for each in (";", "\t", "|", " ", "   ") for mark in ".,")],
 )
-@pytest.mark.parametrize("stated", [True, False])
-def test_separators(tmp_path: Path, delimiter: str, decimal: str, stated: bool) -> None:
-    options = {"delimiter": delimiter[0]} if stated else {}
-    record = read(tmp_path, written(delimiter, decimal), decimal=decimal, **options)
-    check(record)
-    assert record.notes == ()
+def test_separators(tmp_path: Path, delimiter: str, decimal: str) -> None:
+    """Found or stated, and also at the ends of lines."""
+    text = written(delimiter, decimal)
+    for options in ({}, {"delimiter": delimiter[0]}):
+        record = read(tmp_path, text, decimal=decimal, **options)
+        check(record)
+        assert record.notes == ()
+    if delimiter.strip():
+        check(read(tmp_path, text.replace("\n", f"{delimiter}\n"), decimal=decimal))
 
 
 def test_decimal_commas_between_commas_are_quoted(tmp_path: Path) -> None:
@@ -64,33 +67,24 @@ def test_decimal_commas_between_commas_are_quoted(tmp_path: Path) -> None:
     check(read(tmp_path, "\n".join(lines), decimal=","))
 
 
-def test_a_header_with_more_commas_than_separators(tmp_path: Path) -> None:
-    text = written(";").replace("Zeit;Weg;Kraft", "Zeit, in, s;Weg, in, mm;Kraft")
-    columns = {"time": "Zeit, in, s", "position": ("Weg, in, mm", "mm")}
-    check(read(tmp_path, text, **columns))
-
-
 # --------------------------------------------------------------------------- encodings
-@pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize(
-    ("mark", "codec", "option"),
+    ("mark", "codec", "option", "ending"),
     [
-        (b"", "utf-8", None),
-        (codecs.BOM_UTF8, "utf-8", None),
-        (codecs.BOM_UTF8, "utf-8", "UTF8"),
-        (codecs.BOM_UTF16_LE, "utf-16-le", None),
-        (codecs.BOM_UTF16_BE, "utf-16-be", None),
-        (b"", "utf-16-be", "utf-16-be"),
-        (b"", "latin-1", "latin-1"),
-        (b"", "cp1252", "cp1252"),
+        (b"", "utf-8", None, "\r"),
+        (codecs.BOM_UTF8, "utf-8", "UTF8", "\r\n"),
+        (codecs.BOM_UTF16_LE, "utf-16-le", None, "\n"),
+        (codecs.BOM_UTF16_BE, "utf-16-be", None, "\r\n"),
+        (b"", "utf-16-be", "utf-16-be", "\r"),
+        (b"", "cp1252", "cp1252", "\r\n"),
     ],
 )
-def test_encodings(
+def test_encodings_and_line_ends(
     tmp_path: Path, mark: bytes, codec: str, option: str | None, ending: str
 ) -> None:
-    text = written(";").replace("Kraft", "Kraft [µN]").replace("\n", ending)
+    text = written(";").replace("Kraft", "Kraft, in [µN]").replace("\n", ending)
     content = mark + text.encode(codec)
-    record = read(tmp_path, content, encoding=option, force=("Kraft [µN]", "N"))
+    record = read(tmp_path, content, encoding=option, force=("Kraft, in [µN]", "N"))
     check(record)
     assert record.rows.tolist() == [*range(2, 52)]
 
@@ -111,30 +105,9 @@ def test_units_that_are_not_known_are_not_compared(tmp_path: Path, line: str) ->
     assert len(read(tmp_path, text, **options)) == 50
 
 
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("[s],[m],[N]", "row 2 gives the unit 'm' for column 'Weg', but position is read in 'mm'"),
-        ("ms,mm,N", "row 2 gives the unit 'ms' for column 'Zeit', but time is read in 's'"),
-        ("s,mm,mm", "row 2 gives the unit 'mm' for column 'Kraft', but force is read in 'N'"),
-    ],
-)
-def test_a_contradicting_line_of_units_is_refused(tmp_path: Path, line: str, said: str) -> None:
-    with pytest.raises(RecordError) as caught:
-        read(tmp_path, written().replace("\n", f"\n{line}\n", 1))
-    assert said in str(caught.value)
-
-
 def test_empty_lines_around_the_rows(tmp_path: Path) -> None:
     head, rows = written().split("\n", 1)
     check(read(tmp_path, f"\n{head}\n\n,,\n{rows}\n \n"))
-
-
-@pytest.mark.parametrize("places", ["head", "rows", "both"])
-def test_a_separator_at_the_end_of_lines(tmp_path: Path, places: str) -> None:
-    head, *rows = written(";").splitlines()
-    lines = [head + ";" * (places != "rows"), *(row + "; " * (places != "head") for row in rows)]
-    check(read(tmp_path, "\n".join(lines)))
 
 
 METADATA = ("Prüfstand 4", "", "Datum;2026-11-23;;", "Rate;100 Hz")
@@ -146,22 +119,8 @@ def test_lines_above_the_header_are_not_read(tmp_path: Path) -> None:
         check(record)
         assert record.notes == ("the header is row 5; the rows above are not read",)
         assert record.rows.tolist() == [*range(6, 56)]
-
-
-def test_the_header_can_be_far_down_if_it_is_given(tmp_path: Path) -> None:
-    text = written(above=("note",) * 1000)
-    with pytest.raises(RecordError, match=r"no column 'Zeit'.*header = "):
-        read(tmp_path, text)
-    check(read(tmp_path, text, header=1001))
-    with pytest.raises(RecordError, match="there is no row 2000"):
-        read(tmp_path, text, header=2000)
-
-
-def test_of_two_rows_with_the_names_the_header_option_chooses(tmp_path: Path) -> None:
-    text = written(above=("Zeit,Weg,Kraft",))
-    with pytest.raises(RecordError, match="row 2, column 'Zeit': 'Zeit' is not a number"):
-        read(tmp_path, text)
-    check(read(tmp_path, text, header=2))
+    check(read(tmp_path, written(above=("Zeit,Weg,Kraft",)), header=2))
+    check(read(tmp_path, written(above=("note",) * 1000), header=1001))
 
 
 @pytest.mark.parametrize("mark", ["#", "%", "//", "Rem"])
@@ -175,8 +134,7 @@ def test_comment_lines(tmp_path: Path, mark: str) -> None:
     assert record.rows.tolist() == [*range(3, 11), *range(12, 54)]
 
 
-@pytest.mark.parametrize("mark", ["# ", "%"])
-@pytest.mark.parametrize("delimiter", [" ", ",", "\t"])
+@pytest.mark.parametrize(("mark", "delimiter"), [("# ", " "), ("%", ","), ("# ", "\t")])
 def test_a_header_in_a_comment(tmp_path: Path, mark: str, delimiter: str) -> None:
     """As `numpy.savetxt` writes it."""
     np.savetxt(
@@ -191,6 +149,7 @@ def test_a_header_in_a_comment(tmp_path: Path, mark: str, delimiter: str) -> Non
 
 
 # --------------------------------------------------------------------------- all at once
+@pytest.mark.slow
 @given(
     delimiter=st.sampled_from([";", "\t", "|"]),
     decimal=st.sampled_from([".", ","]),

@@ -65,40 +65,6 @@ def test_a_row_without_a_position_between_selected_rows(tmp_path: Path, cell: st
     assert any("1 row(s) without time or position" in note for note in record.notes)
 
 
-def test_row_numbers_stay_those_of_the_file(tmp_path: Path) -> None:
-    where = "time < 0.075 s or time > 0.085 s"
-    with pytest.raises(RecordError, match=r"after row 14 \(row 14: 0\.12 s, next: 0\.12 s\)"):
-        _read(tmp_path, {10: "0.08,lost,1", 15: "0.12,1,1"}, where)
-    with pytest.raises(RecordError, match="row 15, column 'F': not a finite number"):
-        _read(tmp_path, {10: "0.08,lost,1", 15: "0.13,1,nan"}, where)
-
-
-@pytest.mark.parametrize(
-    ("changes", "where", "said"),
-    [
-        ({10: "0.08,lost,1"}, "", "row 10, column 'x': 'lost' is not a number"),
-        ({10: "0.08,lost,1"}, "time > 0.05 s", "row 10, column 'x': 'lost' is not a number"),
-        ({10: "0.08,1,off", 4: "0.02,x,1"}, "", "row 4, column 'x': 'x' is not a number"),
-        ({10: "late,1,1"}, "position > 0 mm", "row 10, column 't': 'late' is not a number"),
-        ({10: "0.08,1,off"}, "not force > 3 N", "row 10, column 'F': 'off' is not a number"),
-        ({10: "0.08,nan,1"}, "", "row 10, column 'x': not a finite number"),
-    ],
-)
-def test_in_a_selected_row_it_is_an_error_with_advice(
-    tmp_path: Path, changes: dict[int, str], where: str, said: str
-) -> None:
-    with pytest.raises(RecordError, match=rf"{said}.*exclude .* with where = \.\.\., a condition"):
-        _read(tmp_path, changes, where)
-
-
-def test_the_advice_works(tmp_path: Path) -> None:
-    """Each of these is rejected with advice, and runs when the advice is followed."""
-    for text in ("0.08,lost,1", "0.08,nan,1", "0.08,1,off"):
-        with pytest.raises(RecordError, match=r"row 10.*where = "):
-            _read(tmp_path, {10: text})
-        assert len(_read(tmp_path, {10: text}, "time < 0.075 s or time > 0.085 s")) >= 19
-
-
 def test_a_measured_signal_has_where_too(tmp_path: Path) -> None:
     (tmp_path / "own.csv").write_text("\n".join(["t,v", "s,m/s", *_signal_rows()]) + "\n")
     signal = (

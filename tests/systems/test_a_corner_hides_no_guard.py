@@ -7,25 +7,21 @@ guard was not asked on the other side, and the contact slid backwards in its sta
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
-from gms_fsm import Body, Chart, Contact, State, System, Trace, Transition, simulate
+from gms_fsm import Body, Contact, State, System, Trace, simulate
+from tests.systems_cases import STICTION
 
-FALLING = Chart(
-    "stiction with friction that falls with the speed",
-    parameters=("F_c", "F_s", "v_s"),
-    let={"level": "F_c + (F_s - F_c) * exp(-abs(v) / v_s)"},
+LEVEL = "(F_c + (F_s - F_c) * exp(-abs(v) / b))"  # friction that falls with the speed
+FALLING = replace(
+    STICTION,
+    name="falling",
     states=(
         State("stuck", locked=True),
-        State("forward", outputs={"F": "level"}),
-        State("backward", outputs={"F": "-level"}),
-    ),
-    transitions=(
-        Transition("release_forward", "stuck", "forward", guard="F > F_s"),
-        Transition("release_backward", "stuck", "backward", guard="F < -F_s"),
-        Transition("arrest_forward", "forward", "stuck", guard="v < 0"),
-        Transition("arrest_backward", "backward", "stuck", guard="v > 0"),
+        State("forward", outputs={"F": LEVEL}),
+        State("backward", outputs={"F": f"-{LEVEL}"}),
     ),
 )
 
@@ -34,7 +30,7 @@ def _pulled(share: float) -> Trace:
     system = System(
         "pulled mass",
         bodies=(Body("mass", inertia=1.0, force="2 * (A * sin(0.3 * t) - x)"),),
-        contacts=(Contact("pad", FALLING, {"F_c": 1.0, "F_s": 1.5, "v_s": 0.1}),),
+        contacts=(Contact("pad", FALLING, {"F_c": 1.0, "F_s": 1.5, "b": 0.1}),),
         numbers={"A": 3.0 + 0.1 * share},
     )
     return simulate(system, 60.0, engine="ifelse")

@@ -35,7 +35,7 @@ WINDOW = Chart(
 )
 MODES = entry("modelica").demonstration
 Run: TypeAlias = Callable[[float, float], Trace]  # of the scale of length and rtol
-LENGTHS = [1.0, 2.0**-20, 2.0**-30, 2.0**10]
+LENGTHS = [2.0**-30, 2.0**10]
 
 
 @cache
@@ -64,8 +64,9 @@ def _puck(length: float, rtol: float) -> Trace:
     return simulate(system, 60.0, rtol=rtol, engine="ifelse")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [_pulled, _puck])
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8])
 def test_the_sequence_is_that_of_a_fine_run(run: Run, rtol: float) -> None:
     coarse, fine = run(1.0, rtol).transitions, run(1.0, 1e-11).transitions
     assert coarse.edge.tolist() == fine.edge.tolist()
@@ -93,7 +94,7 @@ def _loaded(t_end: float, rtol: float) -> Trace:
 
 
 @pytest.mark.parametrize("t_end", [12.0, 40.0])
-@pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-10])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-10])
 def test_a_mass_that_has_only_just_left_rest_goes_on(t_end: float, rtol: float) -> None:
     """After the release v is 1e-30 m/s, with an acceleration that is all rounding."""
     log, fine = _loaded(t_end, rtol).transitions, _loaded(40.0, 1e-11).transitions

@@ -1,9 +1,10 @@
-"""Locks are exact at rest, take no momentum by accident, and every impulse is accounted for.
+"""Locks take no momentum by accident, and every impulse is accounted for.
 
-The closed forms are those of a momentum balance: an impact between two bodies with restitution e,
-on which a friction force of any size has no influence.
+Contacts may lock the same motion: earlier ones carry the force, and the trace marks it. Closed
+forms of impacts, rest, belts, gears and clutches are cases of `benchmarks/conformance`.
 """
 
+import random
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,10 +13,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gms_fsm import Body, Chart, Contact, LockError, State, System, Trace, Transition, simulate
+from gms_fsm import (
+    Body,
+    Chart,
+    Contact,
+    LockError,
+    Parameter,
+    State,
+    System,
+    Trace,
+    Transition,
+    simulate,
+)
 from gms_fsm.charts import CHARTS
-from gms_fsm.errors import ChartError
-from tests.systems_cases import cradle, mass, pad, stop
+from tests.systems_cases import clutched_bearings, mass, pad, pushed_against_a_stop, stop
 
 
 def run(system: System, t_end: float, **how: Any) -> Trace:
@@ -32,40 +43,6 @@ def kinetic(trace: Trace, masses: Mapping[str, float], row: int) -> float:
 
 
 # --------------------------------------------------------------------------- impacts
-def test_a_pad_does_not_swallow_the_velocity_after_an_impact() -> None:
-    bodies, contacts = [mass("a", 1.0)], [stop("stop", "v_a"), pad("pad", "v_a", 0.01, 0.01)]
-    system = System("thrown", bodies=bodies, contacts=contacts)
-    trace = run(system, 3.0, initial={"v_a": 1.0, "pad.states": ["forward"]})
-    assert edges(trace) == [("stop", "bounce"), ("pad", "reverse_forward")]
-    v, t = np.sqrt(1.0 - 2 * 0.01 * 0.5), float(trace.transitions.t[0])
-    assert t == pytest.approx((1.0 - v) / 0.01, abs=1e-12)
-    assert trace.body("a").v[-1] == pytest.approx(-0.6 * v + 0.01 * (3.0 - t), abs=1e-9)
-
-
-@pytest.mark.parametrize("stiction", [2e-6, 0.3, 1e6])
-def test_a_stuck_pad_is_no_wall_whatever_its_stiction(stiction: float) -> None:
-    contacts = [stop("stop", "v_a - v_b"), pad("pad", "v_b", min(stiction, 1.0), stiction)]
-    system = System("struck", bodies=[mass("a", 1.0), mass("b", 1.0)], contacts=contacts)
-    trace = run(system, 0.6, initial={"v_a": 1.0})
-    assert edges(trace)[:2] == [("stop", "bounce"), ("pad", "release_forward")]
-    at = np.flatnonzero(trace.t == trace.transitions.t[0])
-    assert trace.body("a").v[at[-1]] == pytest.approx(0.2, abs=1e-12)
-    assert trace.body("b").v[at[-1]] == pytest.approx(0.8, abs=1e-12)
-
-
-def test_a_stop_at_rest_carries_what_pushes_and_lets_go_of_what_pulls() -> None:
-    """A body rests on a stop; another one strikes it towards the stop, or away from it."""
-    for sign, last in ((1.0, [-0.6, 0.0]), (-1.0, [-0.2, -0.8])):
-        bodies = [mass("a", 1.0), mass("b", 1.0, "0.5")]
-        hit = stop("hit", f"{sign} * (v_a - v_b)", x_s=0.5)
-        system = System("rest", bodies=bodies, contacts=[hit, stop("wall", "v_b", x_s=0.0)])
-        start = {"v_a": sign, "wall.states": ["rest"]}
-        trace = run(system, 0.5 + 1e-9, initial=start)
-        assert [edge for edge in edges(trace) if edge[1] == "lift"] == [("wall", "lift")] * (
-            sign < 0
-        )
-        found = [trace.body(name).v[-1] for name in "ab"]
-        assert found == pytest.approx(last, abs=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["karnopp", "modelica", "stiction"])
@@ -130,40 +107,6 @@ def test_a_lock_that_is_moved_and_has_no_way_out_is_refused() -> None:
     assert trace.body("b").v[-1] == pytest.approx(0.6)
 
 
-def test_only_edges_into_locked_states_take_impulses() -> None:
-    states = (State("a", outputs={"F": "0"}), State("b", locked=True))
-    edge = Transition("e", "b", "a", "F > 1", impulse=True)
-    with pytest.raises(ChartError, match="'a' is not locked"):
-        Chart("wrong", states=states, transitions=(edge,))
-
-
-def test_a_belt_that_jumps_lets_its_load_slide() -> None:
-    belt = Body("belt", velocity="V", x="x_b", v="V")
-    for signal in (([0.0, 1.0, 1.0, 3.0], [0.5, 0.5, -0.5, -0.5]), "0.5 * sgn(1 - t)"):
-        system = System(
-            "belt",
-            bodies=[belt, mass("a", 1.0)],
-            signals={"V": signal},
-            contacts=[pad("pad", "v_a - V", 0.5, 0.7)],
-        )
-        trace = run(system, 2.9, initial={"v_a": 0.5})
-        assert edges(trace) == [("pad", "release_forward")]
-        assert trace.transitions.t[0] == pytest.approx(1.0, abs=1e-12)
-        assert trace.body("a").v[-1] == pytest.approx(0.5 - 0.5 * 1.9, abs=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("pads", [False, True])
-def test_newtons_cradle_passes_the_impact_on(pads: bool) -> None:
-    """With restitution e nearly 1, the last ball leaves with ((1 + e) / 2)**3 of the velocity."""
-    e, case = 0.999, cradle(pads=pads)
-    trace = case.run("ifelse")
-    at = np.flatnonzero(trace.t == trace.transitions.t[0])[-1]
-    v = np.sqrt(1.0 - 2 * 0.1 * 0.1) if pads else 1.0
-    assert trace.body("d").v[at] == pytest.approx(v * (0.5 * (1 + e)) ** 3, rel=1e-9)
-    assert sum(trace.body(name).v[at] for name in "abcd") == pytest.approx(v, rel=1e-12)
-
-
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
@@ -217,25 +160,40 @@ def test_a_stuck_pad_beside_a_wall_carries_nothing_of_what_the_wall_takes() -> N
         assert found == {"hit": pytest.approx(1.6), "wall": pytest.approx(1.6)}
 
 
-# --------------------------------------------------------------------------- rest
-def test_runs_of_locked_bodies_reach_their_end_in_few_steps() -> None:
-    three = System(
-        "three",
-        bodies=[mass(name, m, "3 * t") for name, m in (("a", 0.7), ("b", 2.3), ("c", 1.1))],
-        contacts=[
-            pad("p0", "v_a", 1.0, 1.5),
-            pad("p1", "v_b - v_a", 1.0, 1.5),
-            pad("p2", "v_c - v_b", 1.0, 1.5),
-            stop("stop", "v_b - v_a"),
-        ],
+HIT = Chart(
+    "hit",
+    inputs=("x", "v"),
+    variables=("old", "new", "twice"),
+    parameters=(Parameter("e", rule=">= 0"), Parameter("x_s", "m", "> 0")),
+    let={"w": "2 * v"},
+    states=(State("free", outputs={"F": "0"}),),
+    transitions=(
+        Transition(
+            "bounce",
+            "free",
+            "free",
+            guard="x >= x_s and v > 0",
+            actions={"old": "v", "v": "-e * v", "new": "v", "twice": "w"},
+        ),
+    ),
+)
+
+
+def test_an_action_after_an_impulse_reads_the_new_velocity() -> None:
+    system = System(
+        "two masses",
+        bodies=[mass("a", 2.0), mass("b", 3.0)],
+        contacts=(Contact("stop", HIT, {"e": 0.5, "x_s": 1.0}, v="v_a - v_b"),),
     )
-    trace = run(three, 0.1)
-    assert len(trace.t) < 30
-    assert trace.transitions.size == 0
-    assert not any(trace.body(name).v.any() for name in "abc")
-    trace = run(three, 0.2)  # all loads together pull with 9 t, until it is 1.5 N
-    assert edges(trace) == [("p0", "release_forward")]
-    assert trace.transitions.t[0] == pytest.approx(1.5 / 9.0, abs=1e-12)
+    trace = run(system, 2.0, initial={"v_a": 1.0})
+    stop = trace.contact("stop")
+    found = [float(stop.variable(name)[-1, 0]) for name in HIT.variables]
+    assert found == pytest.approx([1.0, -0.5, -1.0], abs=1e-15)
+    momentum = 2.0 * trace.body("a").v[-1] + 3.0 * trace.body("b").v[-1]
+    assert momentum == pytest.approx(2.0, abs=1e-15)
+
+
+# --------------------------------------------------------------------------- rest
 
 
 def test_two_gears_on_the_same_bodies_hold_them_exactly_at_zero() -> None:
@@ -247,6 +205,34 @@ def test_two_gears_on_the_same_bodies_hold_them_exactly_at_zero() -> None:
     trace = run(two, 10.0)
     assert len(trace.t) < 100
     assert not trace.rows.y.any(), "nothing has moved, not even by rounding"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2))
+def test_a_tree_of_locked_bodies_moves_as_one_whatever_the_order_of_its_contacts(seed: int) -> None:
+    """Each contact pulls all that hangs on it; the velocities are equal to the last bit."""
+    n, m = 15, 0.5
+    weld = Chart("weld", states=(State("held", locked=True),))
+    contacts = [Contact(f"c{i}", weld, v=f"v{i} - v{(i - 1) // 2}") for i in range(1, n)]
+    random.Random(seed).shuffle(contacts)
+    system = System(
+        "tree",
+        bodies=[
+            Body(f"b{i}", inertia=m, force="0" if i else "sin(t)", x=f"x{i}", v=f"v{i}")
+            for i in range(n)
+        ],
+        contacts=contacts,
+    )
+    trace = simulate(system, 5.0, rtol=1e-10, engine="ifelse")
+    hanging = [1.0] * n
+    for i in reversed(range(1, n)):
+        hanging[(i - 1) // 2] += hanging[i]
+    for i in range(1, n):
+        assert trace.body(f"b{i}").v.tolist() == trace.body("b0").v.tolist()
+        pull = -hanging[i] / n * np.sin(trace.t)
+        np.testing.assert_allclose(trace.contact(f"c{i}").F, pull, rtol=0, atol=1e-14)
+    v = (1.0 - np.cos(trace.t)) / (n * m)
+    np.testing.assert_allclose(trace.body("b0").v, v, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("first", ["belt", "ground"])
@@ -264,53 +250,51 @@ def test_locks_that_contradict_each_other_are_no_scale_and_let_go(first: str) ->
     assert trace.contact("ground").states[-1, 0] == "forward"
 
 
-BELT = ([0.0, 1.0, 1.3, 3.0], [0.0, 0.1, -1.0, -1.0])
+# --------------------------------------------------------------------------- locks that share
+def shared(trace: Trace, contact: str) -> np.ndarray:
+    """Return where the force of a locked contact is carried by earlier ones."""
+    found: np.ndarray = trace.contact(contact).shared
+    return found
 
 
-@pytest.mark.parametrize("method", ["dp45", "bs23", "rk4"])
-def test_a_slider_on_a_belt_is_released_once(method: str) -> None:
-    system = System(
-        "belt",
-        bodies=[Body("belt", velocity="V", x="x_b", v="V"), mass("a", 1.0)],
-        signals={"V": BELT},
-        contacts=[pad("pad", "v_a - V", 0.5, 0.7)],
-    )
-    step = {"step": 3.7e-3} if method == "rk4" else {}
-    trace = run(system, 2.9, method=method, **step)
-    assert edges(trace) == [("pad", "release_forward")]
-    assert trace.transitions.t[0] == pytest.approx(1.0, abs=1e-12)
-    stuck = trace.states[:, 0] == "stuck"
-    assert (trace.v[stuck] == 0.0).all()
-    assert trace.body("a").v[-1] == pytest.approx(0.1 - 0.5 * 1.9, abs=1e-9)
+def states(trace: Trace, contact: str) -> np.ndarray:
+    found: np.ndarray = trace.contact(contact).states[:, 0]
+    return found
 
 
-@pytest.mark.parametrize("ratio", [3.0, -0.7, 0.3])
-@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
-def test_geared_locks_log_no_ghosts(ratio: float, rtol: float) -> None:
-    """A gear and a belt hold three bodies; the load rises until one of them lets go."""
-    system = System(
-        "gears",
-        bodies=[
-            Body("belt", velocity="W * cos(3 * t)", x="x_w", v="v_w"),
-            mass("a", 1.0), mass("b", 2.0), mass("c", 0.5, "0.3 * t"),
-        ],
-        numbers={"W": 0.01, "r": ratio},
-        contacts=[
-            pad("p", "v_a - v_w", 4.0, 5.0),
-            pad("q", "v_b - r * v_a", 4.0, 5.0),
-            pad("s", "0.7 * v_c - v_b", 0.4, 0.5),
-        ],
-    )  # fmt: skip
-    trace = run(system, 2.0, rtol=rtol, initial=_on_the_belt(ratio))
-    log = edges(trace)
-    assert log[0] == ("s", "release_forward")
-    assert len(log) == 1
-    before = trace.t < trace.transitions.t[0]
-    w = 0.01 * np.cos(3 * trace.t[before])
-    for name, share in (("a", 1.0), ("b", ratio), ("c", ratio / 0.7)):
-        np.testing.assert_allclose(trace.body(name).v[before], share * w, rtol=0, atol=1e-17)
-    assert not trace.contact("q").v.any()
+@pytest.mark.parametrize("stop_first", [False, True])
+def test_a_mass_with_stiction_comes_to_rest_at_a_stop_and_leaves_again(stop_first: bool) -> None:
+    trace = pushed_against_a_stop(stop_first=stop_first).run("ifelse")
+    stop, log = trace.contact("stop"), trace.transitions
+    rest = states(trace, "stop") == "rest"
+    assert rest.any()
+    np.testing.assert_array_equal(trace.body("mass").v[rest], 0.0)
+    push = 4.0 * np.sin(0.5 * trace.t)
+    np.testing.assert_allclose((stop.F + trace.contact("pad").F)[rest], push[rest], atol=1e-9)
+    assert [str(each) for each in log.edge[log.contact == "stop"]][-1] == "lift"
+    assert trace.body("mass").x[-1] < 0.2
+    assert {"release_forward", "release_backward"} <= {str(each) for each in log.edge}
 
 
-def _on_the_belt(ratio: float) -> dict[str, float]:
-    return {"v_a": 0.01, "v_b": 0.01 * ratio, "v_c": 0.01 * ratio / 0.7}
+def test_two_bearings_and_a_clutch_let_go_one_after_the_other() -> None:
+    """The first bearing carries all, up to its stiction; then the second carries the rest."""
+    trace = clutched_bearings().run("ifelse")
+    log, R = trace.transitions, 0.5
+    assert [(str(row.contact), str(row.edge)) for row in log] == [
+        ("dog", "engage"),
+        ("bearing_a", "release_forward"),
+        ("bearing_b", "release_forward"),
+    ]
+    np.testing.assert_allclose(log.t, [1.0, 1.5 / R, (1.0 + 3.0) / R], rtol=0, atol=1e-9)
+    both = (trace.t > 1.0) & (trace.t < log.t[1])
+    assert both.any()
+    np.testing.assert_array_equal(shared(trace, "bearing_b")[both], True)
+    np.testing.assert_array_equal(trace.contact("bearing_b").F[both], 0.0)
+    np.testing.assert_allclose(trace.contact("bearing_a").F[both], R * trace.t[both], atol=1e-12)
+    for earlier in ("bearing_a", "dog"):
+        np.testing.assert_array_equal(shared(trace, earlier), False)
+    later = trace.t > log.t[1]
+    np.testing.assert_array_equal(shared(trace, "bearing_b")[later], False)
+    moving = trace.t > log.t[2]
+    np.testing.assert_array_equal(trace.body("a").v[moving], trace.body("b").v[moving])
+    assert trace.body("b").v[-1] > 0.0

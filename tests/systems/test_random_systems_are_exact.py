@@ -26,6 +26,7 @@ def test_what_is_well_conditioned_is_right() -> None:
     assert sum(each.transitions for each in found) > 5 * COUNT
 
 
+@pytest.mark.slow
 def test_a_slip_at_its_limit_ends_where_large_velocities_differ_by_nothing() -> None:
     found = verdict(trial(77, 379, exact_systems.SHAPES), engine="ifelse")
     assert found.kind == "right", found

@@ -5,22 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import Trace, simulate
+from gms_fsm import simulate
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.errors import ParameterError
 from gms_fsm.systems.system import Body, Contact, Sampled, System
 from tests.helpers import ROOT, stick_slip
 
-ENGINES = ["ifelse", "machines", "compiled"]
 
-
-def _run(system: System, t_end: float, engine: str, **options: object) -> Trace:
-    if engine == "compiled":
-        pytest.importorskip("llvmlite")
-    return simulate(system, t_end, engine=engine, **options)  # type: ignore[arg-type]
-
-
-def counting(offset: float = 0.0, period: float = 0.1) -> System:
+def counting(period: float = 0.1) -> System:
     return System(
         "counter",
         bodies=(Body("slide", velocity="0.2 * cos(3 * t)"),),
@@ -29,7 +20,6 @@ def counting(offset: float = 0.0, period: float = 0.1) -> System:
             Sampled(
                 "counter",
                 period=period,
-                offset=offset,
                 updates={"count": "count + 1", "twice": "2 * count", "at": "t", "seen": "x"},
                 initial={"count": -1},
             ),
@@ -37,35 +27,17 @@ def counting(offset: float = 0.0, period: float = 0.1) -> System:
     )
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("offset", [0.0, 0.03])
-def test_values_change_at_exact_multiples_of_the_period(engine: str, offset: float) -> None:
-    trace = _run(counting(offset), 1.0, engine, t_start=0.0)
-    at, count = trace.value("at"), trace.value("count")
-    ticks = [round(offset + k * 0.1, 2) for k in range(10)]  # the doubles nearest to them
-    first = 0 if offset == 0.0 else 1
-    assert sorted(set(at[first:].tolist()) - ({0.0} if offset else set())) == ticks
-    for k, tick in enumerate(ticks):
-        before, after = trace.t < tick, trace.t >= tick
-        assert (count[before] < k).all()
-        assert (count[after] >= k).all()
-
-
 def test_updates_run_in_written_order_and_see_the_results_before_them() -> None:
-    trace = _run(counting(), 1.0, "ifelse")
+    """At which times is in test_ticks_of_several_rates.py."""
+    trace = simulate(counting(), 1.0, engine="ifelse")
     assert (trace.value("twice") == 2 * trace.value("count")).all()
     rows = np.flatnonzero(trace.t == trace.value("at"))
     assert (trace.value("seen")[rows] == trace.x[rows]).all()
 
 
 def test_a_run_that_starts_later_ticks_from_its_start() -> None:
-    trace = _run(counting(period=0.25), 3.0, "ifelse", t_start=2.1)
+    trace = simulate(counting(0.25), 3.0, engine="ifelse", t_start=2.1)
     assert sorted(set(trace.value("at").tolist())) == [2.1 + k * 0.25 for k in range(4)]
-
-
-def test_too_many_ticks_are_refused() -> None:
-    with pytest.raises(ParameterError, match=r"counter: its period of 1e-09 s makes 1e\+09 ticks"):
-        simulate(counting(period=1e-9), 1.0)
 
 
 # --------------------------------------------------------------------------- a servo

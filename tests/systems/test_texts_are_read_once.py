@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any
 
 import pytest
 
 from gms_fsm import GMS, Body, Contact, GMSParameters, Sampled, System, simulate
 from gms_fsm.charts import CHARTS
-from gms_fsm.errors import ParameterError
 from gms_fsm.systems import system as module
 from gms_fsm.traces.system_scope import given_values
 
@@ -50,24 +48,6 @@ def test_other_numbers_give_what_a_new_reading_gives(
     again = pulled(**change)
     assert again.shape is again
     assert run(again) == found
-
-
-def test_functions_stay_apart() -> None:
-    one, other = pulled(signal=lambda t: 0.1 * t), pulled(signal=lambda t: 0.2 * t)
-    assert run(one) != run(other)
-    assert run(pulled(signal=lambda t: 0.2 * t)) == run(other)
-
-
-def test_an_inertia_that_is_not_positive_is_refused_each_time() -> None:
-    pulled()
-    with pytest.raises(ParameterError, match="the inertia 'm' is not positive"):
-        pulled(m=0.0)
-
-
-def test_a_pickled_system_runs_alike() -> None:
-    system = pulled(m=2.0)
-    again = pickle.loads(pickle.dumps(system))
-    assert run(again) == run(system)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
-from typing import Any
 
 import numpy as np
 import pytest
@@ -27,11 +26,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.language import names_in, parse_value
-from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.session.explain import values_at
-from gms_fsm.systems.reading.assembly import assembled
-from gms_fsm.systems.system import system_of
-from gms_fsm.traces.monitors import examine
 from gms_fsm.traces.scope import Scope, invariant_names, watch_names
 from tests.helpers import pulled_mass, stick_slip
 
@@ -178,17 +173,3 @@ def test_a_page_takes_the_same_names(case: str) -> None:
     assert found is not None
     (run,) = json.loads(found[1])["runs"]
     assert list(run["names"]) == watch_names(model)
-
-
-def test_an_invariant_and_a_watch_agree_on_a_single_element() -> None:
-    trace = simulate(*CASES["two variables"], 8.0)
-    bound = float(trace.variable("w")[:, 1].max())
-    found: Any = examine(trace, [f"w2 <= {bound!r}", f"w2 < {0.5 * bound!r}"])
-    assert [verdict.ok for verdict in found.values()] == [True, False]
-
-
-def test_a_layout_needs_no_program() -> None:
-    """It depends only on names; the program only adds the number of surfaces."""
-    for model, rig in CASES.values():
-        layout = simulate(model, rig, 0.1).program.layout
-        assert layout == SystemLayout.of(assembled(system_of(model, rig)), layout.surfaces)

@@ -18,11 +18,9 @@ import pytest
 from gms_fsm import Chart, ChartModel, Prescribed, State, Trace, Transition, simulate
 from gms_fsm.traces.files.archives import write_arrays
 from tests import older_files
-from tests.helpers import FASTEST, pulled_mass, same_bits, stick_slip
-from tests.traces.test_traces_of_systems_round_trip import belt
+from tests.helpers import FASTEST, pulled_mass, same_bits
 
 ENGINES = ["ifelse", *({FASTEST} - {"ifelse"})]
-TIMES = np.linspace(0.0, 20.0, 41)
 
 
 def bytes_of(trace: Trace) -> int:
@@ -48,43 +46,7 @@ def test_saving_and_showing_a_run_does_not_spell_out_its_log(tmp_path: Path) -> 
         assert "records" not in {*vars(trace.firings), *vars(again.firings)}
 
 
-def test_the_log_is_spelled_out_once() -> None:
-    trace = simulate(*pulled_mass(), 20.0)
-    assert trace.transitions is trace.transitions
-    assert trace.sample([1.0]).transitions is trace.transitions
-
-
-@pytest.mark.parametrize("whole", [True, False])
-def test_a_record_array_is_a_table_of_pandas(whole: bool) -> None:
-    pandas = pytest.importorskip("pandas", reason="needs pandas (extra: pandas)")
-    trace = simulate(belt(), 8.0, initial={"q2": 0.2})
-    log = (trace if whole else trace.contact("pad")).transitions
-    frame = pandas.DataFrame(log)
-    assert list(frame.columns) == [
-        *("t", "element", "edge", "source", "target", "z", "v", "s", "F_before", "F_after"),
-        "contact",
-    ]
-    assert frame["edge"].tolist() == log.edge.tolist()
-    assert set(frame["contact"]) == ({"pad", "bank"} if whole else {"pad"})
-
-
 # --------------------------------------------------------------------------- rows
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("name", ["run.npz", "run.csv"])
-def test_rows_are_not_stops_as_well(engine: str, name: str, tmp_path: Path) -> None:
-    trace = simulate(*pulled_mass(), 20.0, engine=engine)
-    assert trace.stops is trace.rows
-    again = Trace.load(trace.save(tmp_path / name))
-    assert again.stops is again.rows
-    same_bits(trace, again)
-
-
-def test_requested_rows_are_not_written_as_stops(tmp_path: Path) -> None:
-    trace = simulate(*pulled_mass(), 20.0, t_eval=np.linspace(0.0, 20.0, 5000))
-    arrays = older_files.arrays_of(trace.save(tmp_path / "run.npz"))
-    assert len(arrays["stops_t"]) == len(trace.stops) < 200
-    again = Trace.load(tmp_path / "run.npz")
-    same_bits(trace.whole(), again.whole())
 
 
 # --------------------------------------------------------------------------- archives
@@ -98,6 +60,7 @@ def test_states_and_codes_have_one_byte(tmp_path: Path) -> None:
     assert again.rows.microstep.dtype == trace.rows.microstep.dtype == np.int64
 
 
+@pytest.mark.slow
 def test_a_chart_of_more_than_256_states_is_saved(tmp_path: Path) -> None:
     count = 300
     chart = Chart(
@@ -139,14 +102,6 @@ def test_what_shrinks_is_compressed(array: Any, packed: bool, tmp_path: Path) ->
     assert (info.compress_type == zipfile.ZIP_DEFLATED) == packed
     file.seek(0)
     np.testing.assert_array_equal(np.load(file)["a"], array)
-
-
-def test_equal_runs_give_equal_files(tmp_path: Path) -> None:
-    one, other = (
-        simulate(stick_slip("signed"), Prescribed("0.3"), 3.0).save(tmp_path / name).read_bytes()
-        for name in ("one.npz", "two.npz")
-    )
-    assert one == other
 
 
 # --------------------------------------------------------------------------- CSV

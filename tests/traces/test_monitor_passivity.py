@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import functools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,7 +23,6 @@ from gms_fsm import (
     Chart,
     ChartModel,
     GMSParameters,
-    LuGre,
     Prescribed,
     State,
     Stribeck,
@@ -32,9 +30,9 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.traces.failures import SimulationError
-from gms_fsm.traces.monitors import Passivity, examine
+from gms_fsm.traces.monitors import Passivity
 from gms_fsm.traces.verdicts import PassivityVerdict
-from tests.helpers import FASTEST, FIG4_SINE, non_drifting, one_element, pulled_mass, stick_slip
+from tests.helpers import FASTEST, FIG4_SINE, one_element, stick_slip
 
 FINE = {"rtol": 1e-9, "atol": 1e-12, "max_step": 0.05}
 
@@ -46,17 +44,6 @@ def passivity(trace: Trace) -> PassivityVerdict:
 
 
 # --------------------------------------------------------------------------- closed forms
-@pytest.mark.parametrize("v", [0.2, -0.2])
-@pytest.mark.parametrize("law", ["signed", "published"])
-def test_stick_at_constant_velocity(law: str, v: float) -> None:
-    """z = v t: k v**2 t**2 / 2 goes into the spring, sigma v**2 t becomes heat."""
-    k, sigma, t = 3.0, 0.7, 2.0
-    model = one_element(law, k=k, sigma=sigma)
-    found = passivity(simulate(model, Prescribed(v), t, monitors="passivity"))
-    assert found.ok
-    assert found.stored[0] == pytest.approx(0.5 * k * (v * t) ** 2, rel=1e-12)
-    assert found.taken[0] - found.stored[0] == pytest.approx(sigma * v**2 * t, rel=1e-9)
-    assert (found.deficit, found.made) == ((0.0,), (0.0,))
 
 
 def slip(law: str, v: float, z0: float, t: float) -> tuple[float, float]:
@@ -69,9 +56,15 @@ def slip(law: str, v: float, z0: float, t: float) -> tuple[float, float]:
     return k * v * area + sigma * v * (z - z0), 0.5 * k * (z**2 - z0**2)
 
 
-@pytest.mark.parametrize("z0", [-0.5, 0.0, 0.5, 1.2])
-@pytest.mark.parametrize("v", [0.3, -0.3])
-@pytest.mark.parametrize("law", ["signed", "published"])
+@pytest.mark.parametrize(
+    ("law", "v", "z0"),
+    [
+        ("signed", 0.3, -0.5),
+        ("signed", 0.02, 0.0),  # slower than C: a start in slip creates energy
+        ("published", 0.3, 0.5),
+        ("published", -0.3, 0.0),
+    ],
+)
 def test_slip_at_constant_velocity(law: str, v: float, z0: float) -> None:
     model = one_element(law, k=2.0, sigma=0.3, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1)
     start = {"z": [z0], "states": ["slip"]}
@@ -82,19 +75,7 @@ def test_slip_at_constant_velocity(law: str, v: float, z0: float) -> None:
     assert found.stored[0] == pytest.approx(stored, abs=1e-7)
     heat = [taken - stored for taken, stored in (slip(law, v, z0, t) for t in trace.t.tolist())]
     assert found.deficit[0] == pytest.approx(max(0.0, -min(heat)), abs=1e-7)
-
-
-@pytest.mark.slow
-def test_over_a_run_heat_and_spring_add_up_to_what_was_taken() -> None:
-    """On a separate fine grid, by the trapezoid rule, from the forces of the trace."""
-    model, rig = pulled_mass()
-    times = np.linspace(0.0, 20.0, 200_001)
-    fine = simulate(model, rig, 20.0, t_eval=times, engine=FASTEST)
-    power = fine.F_elements * fine.v[:, np.newaxis]
-    taken = np.sum(0.5 * (power[1:] + power[:-1]), axis=0) * 1e-4
-    found = passivity(simulate(model, rig, 20.0, monitors="passivity"))
-    np.testing.assert_allclose(found.taken, taken, atol=2e-6)
-    np.testing.assert_allclose(found.stored, 0.5 * model.values["k"] * fine.z[-1] ** 2, atol=1e-6)
+    assert found.deficit[0] == 0.0 or found.t_deficit[0] == trace.t[int(np.argmin(heat))]
 
 
 # --------------------------------------------------------------------------- the signed law
@@ -188,19 +169,6 @@ def test_the_signed_law_can_create_that_much() -> None:
     assert "published" not in found.text
 
 
-def test_a_start_in_slip_can_create_energy_too() -> None:
-    """From z = 0 at v < C: the closed form's lowest heat."""
-    model = one_element("signed", k=2.0, sigma=0.3, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1)
-    trace = simulate(
-        model, Prescribed(0.02), 30.0, initial={"states": ["slip"]}, monitors="passivity", **FINE
-    )  # type: ignore[arg-type]
-    taken, stored = np.array([slip("signed", 0.02, 0.0, t) for t in trace.t.tolist()]).T
-    found = passivity(trace)
-    assert not found.ok
-    assert found.deficit[0] == pytest.approx(-(taken - stored).min(), rel=1e-5)
-    assert found.t_deficit[0] == trace.t[int((taken - stored).argmin())]
-
-
 # --------------------------------------------------------------------------- the published law
 @pytest.mark.slow
 def test_the_published_law_creates_energy_in_fig_4() -> None:
@@ -223,45 +191,14 @@ def test_the_published_law_creates_energy_in_fig_4() -> None:
         "try law='signed'",
     ):
         assert part in found.text
-
-
-def test_the_signed_law_creates_none_in_fig_4() -> None:
-    found = passivity(
-        simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 100.0, monitors="passivity")
-    )
-    assert found.ok
-    assert found.deficit == (0.0,) * 4
-    assert "no element gave back more energy than it had taken" in found.text
+    signed = passivity(simulate(stick_slip("signed"), rig, 100.0, monitors="passivity"))
+    assert (signed.ok, signed.deficit) == (True, (0.0,) * 4)
+    assert "no element gave back more energy than it had taken" in signed.text
     # Between two times it does, because the springs wind up before each arrest.
-    assert found.made[0] == pytest.approx(6.58e-4, rel=0.01)
-
-
-@pytest.mark.slow
-@settings(max_examples=12, deadline=None, derandomize=True)
-@given(v=st.floats(0.05, 0.5), z0=st.floats(-0.9, 0.9), t=st.floats(20.0, 40.0))
-def test_the_published_law_creates_energy_in_every_backward_slip(
-    v: float, z0: float, t: float
-) -> None:
-    """z moves away from s like exp(+C t / s): far more than any rise of the Stribeck curve."""
-    model = one_element("published", k=2.0, sigma=0.3, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1)
-    start = {"z": [z0], "states": ["slip"]}
-    trace = simulate(model, Prescribed(-v), t, initial=start, monitors="passivity", **FINE)  # type: ignore[arg-type]
-    taken, stored = np.array([slip("published", -v, z0, t) for t in trace.t.tolist()]).T
-    found = passivity(trace)
-    assert found.deficit[0] == pytest.approx(max(0.0, -(taken - stored).min()), rel=1e-4, abs=1e-6)
+    assert signed.made[0] == pytest.approx(6.58e-4, rel=0.01)
 
 
 # --------------------------------------------------------------------------- what it applies to
-@pytest.mark.slow
-def test_lugre_is_a_spring_and_a_damper_too() -> None:
-    model = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4.0, stribeck=Stribeck(1.0, 1.5, 1e-3))
-    trace = simulate(model, Prescribed("0.01*sin(t)"), 10.0, monitors="passivity")
-    found = passivity(trace)
-    assert found.applicable
-    times = np.linspace(0, 10, 100_001)
-    fine = simulate(model, Prescribed("0.01*sin(t)"), 10.0, t_eval=times, engine=FASTEST)
-    power = fine.F_elements[:, 0] * fine.v
-    assert found.taken[0] == pytest.approx(0.5e-4 * (power[1:] + power[:-1]).sum(), rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -306,14 +243,7 @@ def exactly() -> PassivityVerdict:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
-    [
-        {},
-        {"rtol": 1e-4},
-        {"method": "bs23"},
-        {"method": "rk4", "step": 0.01},
-        {"method": "heun", "step": 1e-3},
-        {"t_eval": np.linspace(0.0, 60.0, 301)},
-    ],
+    [{"rtol": 1e-4}, {"method": "rk4", "step": 0.01}, {"t_eval": np.linspace(0.0, 60.0, 301)}],
     ids=str,
 )
 def test_the_tolerance_covers_the_error_of_the_sums(options: dict[str, object]) -> None:
@@ -339,9 +269,6 @@ def test_too_few_rows_are_reported() -> None:
 
 
 def test_rest_is_passive() -> None:
-    model, rig = non_drifting("signed")
-    found = passivity(simulate(model, rig, 1e-3, monitors=[Passivity(0.0)]))
-    assert found.ok
     still = passivity(simulate(stick_slip("signed"), Prescribed(0.0), 5.0, monitors="passivity"))
     assert still.ok
     assert still.taken == still.stored == still.deficit == (0.0,) * 4
@@ -358,12 +285,3 @@ def test_a_run_that_grows_without_bound_is_checked_while_it_is_finite() -> None:
     assert not found.ok
     assert "values are not finite after t = " in found.text
     assert all(math.isfinite(value) for value in (*found.taken, *found.made, *found.tolerance))
-
-
-def test_a_signal_that_a_file_cannot_store_is_no_obstacle(tmp_path: Path) -> None:
-    rig = Prescribed(lambda t: 0.15 * math.sin(2 * math.pi * t / 25))
-    trace = simulate(stick_slip("published"), rig, 60.0, monitors="passivity")
-    read = Trace.load(trace.save(tmp_path / "run.npz"))
-    again = examine(read, "passivity")["passivity"]
-    assert isinstance(again, PassivityVerdict)
-    assert again.deficit == pytest.approx(passivity(trace).deficit, abs=max(again.tolerance))

@@ -10,6 +10,7 @@ from gms_fsm import Trace
 from gms_fsm.app.scenario import load_scenario
 from tests.helpers import same_bits
 from tests.scenario_files import CommandLine
+from tests.zoo import zoo_cases
 
 SCENARIO = """
 [rig]
@@ -29,7 +30,6 @@ CURVE = "stribeck = { F_c = 1.0, F_s = 1.5, v_s = 0.05, delta = 1.0 }"
 BRISTLE = f"sigma_0 = 1e3\nsigma_1 = 31.623\nsigma_2 = 0.4\n{CURVE}"
 # Name, rig, end, model, and the least number of transitions.
 FILES = (
-    ("karnopp", PULLED, 20.0, "F_c = 1.0\nF_s = 1.5\nsigma_2 = 0.1\nD = 1e-3", 4),
     (
         "modelica",
         PULLED,
@@ -38,15 +38,12 @@ FILES = (
         'inputs = { N = "10 + sin(t)" }',
         4,
     ),
-    ("dahl", DRIVEN, 6.0, "sigma_0 = 1e5\nF_c = 1.0", 0),
-    ("lugre-sigma1", PULLED, 10.0, f"v_d = 0.05\n{BRISTLE}", 0),
-    ("reset-integrator", DRIVEN, 6.0, "sigma_0 = 1e5\nsigma_1 = 30.0\na_0 = 0.5\nz_0 = 1e-5", 4),
     ("elasto-plastic", DRIVEN, 6.0, f"z_ba = 1e-5\n{BRISTLE}", 4),
     ("maxwell-slip", DRIVEN, 6.0, "k = [4e4, 1e4]\nF_c = [0.5, 0.5]", 4),
-    ("prandtl-tomlinson", PULLED, 10.0, "F_0 = 1.0\na_0 = 0.2\nc = 4.0", 0),
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "rig", "t_end", "model", "least"), FILES)
 def test_a_scenario_file_runs(
     name: str, rig: str, t_end: float, model: str, least: int, gms_fsm: CommandLine, tmp_path: Path
@@ -84,7 +81,8 @@ def test_a_system_file_names_its_normal_force(gms_fsm: CommandLine, tmp_path: Pa
     assert edges >= {"release_forward", "move_forward", "stop_forward", "lift"}
 
 
-@pytest.mark.parametrize("name", [row[0] for row in FILES])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", zoo_cases.CASES)
 def test_a_chart_is_drawn_and_printed_as_code(
     name: str, gms_fsm: CommandLine, tmp_path: Path
 ) -> None:

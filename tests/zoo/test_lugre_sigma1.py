@@ -22,6 +22,7 @@ def run(name: str, **own: float) -> Trace:
     return simulate(model, PULL, 12.0, rtol=1e-10, t_eval=grid, engine="ifelse")
 
 
+@pytest.mark.slow
 def test_with_a_large_v_d_it_is_lugre() -> None:
     one, other = run("lugre"), run("lugre-sigma1", v_d=1e12)
     assert (one.x == other.x).all()

@@ -24,6 +24,7 @@ def pulled(K: float, *, V: float, t_end: float) -> Trace:
     return simulate(model, PulledSlider(1.0, K, V), t_end, t_eval=grid, engine="ifelse")
 
 
+@pytest.mark.slow
 def test_a_soft_spring_makes_atomic_stick_slip() -> None:
     K, V = 2.0, 0.002
     trace = pulled(K, V=V, t_end=1000.0)

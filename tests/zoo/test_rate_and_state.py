@@ -83,6 +83,7 @@ def pulled(law: str, share: float, t_end: float, method: object = "dp45") -> Tra
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_steady_sliding_is_stable_above_the_critical_stiffness_only(law: str) -> None:
     stiff, soft = pulled(law, 1.2, 1.0), pulled(law, 0.8, 1.0)
@@ -133,8 +134,7 @@ STIFF: dict[str, tuple[dict[str, float], PulledSlider, dict[str, float], float, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("name", STIFF)
+@pytest.mark.parametrize(("name", "law"), [*zip(STIFF, 2 * LAWS, strict=True)])
 def test_radau_with_absolute_tolerances_follows_a_stiff_run(name: str, law: str) -> None:
     values, rig, start, t_end, least_v = STIFF[name]
     n, mu_0, a, b, d_c, v_0 = (values[each] for each in ("N", "mu_0", "a", "b", "D_c", "V_0"))

@@ -14,6 +14,7 @@ TAU = P["tau_L"]
 COST = {1.0: (4e-6, 1.1e-3), 10.0: (4e-4, 1.1e-2), 25.0: (2.5e-3, 2.7e-2)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("w", COST)
 def test_the_cost_of_the_lag_is_as_documented(w: float) -> None:
     """In the steady state of v = 1e-3 (1.5 + cos w t); f is 0.5 N to 1e-5 N after a long rest."""

@@ -1,7 +1,7 @@
-"""In steady sliding an elasto-plastic bristle stays plastic, with the defaults as with rtol 1e-10.
+"""An elasto-plastic bristle stays plastic in steady sliding, and does not drift below break-away.
 
-z tends to z_ss there. With a guard at z_ss, errors of the steps decided: 26 transitions in place of
-14 in the first case, wrong ones in a third of the random cases.
+z tends to z_ss in steady sliding. With a guard at z_ss, errors of the steps decided: 26 transitions
+in place of 14 in the first case, wrong ones in a third of the random cases.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gms_fsm import ChartModel, Prescribed, Stribeck, simulate
+from gms_fsm import ChartModel, Prescribed, Slider, Stribeck, simulate
 from gms_fsm.charts import CHARTS
 from tests.helpers import FASTEST
 
@@ -77,3 +77,30 @@ def test_the_deflection_is_that_of_the_paper() -> None:
     wanted = solve_ivp(rate, (0.0, 0.2), [0.0], method="DOP853", **given).y[0]
     trace = simulate(model, Prescribed(FAST), 0.2, engine=FASTEST, t_eval=times, rtol=1e-9)
     np.testing.assert_allclose(trace.z[:, 0], wanted, rtol=0, atol=1e-6 * size)
+
+
+# --------------------------------------------------------------------------- drift
+# The bench: F_c = 1 N, F_s = 1.5 N, elastic up to 0.9 N; a load of 0.6 N with a ripple of 0.2 N.
+CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=1e-3)
+BRISTLE = {"sigma_0": 1e5, "sigma_1": 316.23}
+LOAD = "min(0.3 * t, 0.6) + 0.2 * sin(2 * pi * t)"
+ELASTIC = (0.6 + 0.2) / 1e5  # m: the deflection at the largest load
+
+
+def creep(name: str, **own: float) -> float:
+    """Return how far the mass has moved between two times with the same load, m."""
+    model = ChartModel(CHARTS[name], {**BRISTLE, **own}, stribeck=CURVE, sigma_2=0.4)
+    trace = simulate(model, Slider(1.0, LOAD), 30.0, t_eval=[10.0, 30.0], engine="ifelse")
+    return float(np.diff(trace.x)[0])
+
+
+@pytest.mark.slow
+def test_it_does_not_drift_where_lugre_does() -> None:
+    drift, elastic = creep("lugre"), creep("elasto-plastic", z_ba=9e-6)
+    assert drift > 7e-5 > ELASTIC
+    assert abs(elastic) < 1e-9
+
+
+@pytest.mark.slow
+def test_it_drifts_beyond_its_elastic_range() -> None:
+    assert creep("elasto-plastic", z_ba=4e-6) > 1e-6
