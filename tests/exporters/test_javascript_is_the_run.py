@@ -28,7 +28,7 @@ from gms_fsm import (
     export,
 )
 from tests.helpers import ROOT, matrix, stick_slip
-from tests.platforms import (
+from tests.soak.platforms import (
     COMPILERS,
     Case,
     check,
@@ -71,7 +71,7 @@ def test_a_random_system_has_the_same_bits_in_javascript(index: int, tmp_path: P
     trace, _ = case.run("ifelse")
     assert trace is not None
     differ = differences(case, trace, in_javascript(case, tmp_path))
-    assert differ == [], f"repeat with: python -m tests.platforms --seed {SEED} --first {index}"
+    assert differ == []
 
 
 @needs_node

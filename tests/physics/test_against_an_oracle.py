@@ -61,16 +61,8 @@ def oracle(law, C, weight, F_c, F_s, v_s, times, speeds):
                 def gap(u, z_of=z_of, sign=sign):
                     return sign * z_of(u) - s_of(u)
             else:
-                arc = solve_ivp(
-                    slip,
-                    (t, b),
-                    [z],
-                    "DOP853",
-                    rtol=1e-11,
-                    atol=1e-13,
-                    args=(sign,),
-                    dense_output=True,
-                )
+                fine = {"rtol": 1e-11, "atol": 1e-13, "dense_output": True}
+                arc = solve_ivp(slip, (t, b), [z], "DOP853", args=(sign,), **fine)
 
                 def z_of(u, arc=arc):
                     return float(arc.sol(u)[0])
@@ -124,22 +116,9 @@ def cases(draw):
     }
 
 
-# No shrinking: the oracle is slow, and the example as drawn is just as informative.
-@settings(
-    max_examples=30,
-    deadline=None,
-    derandomize=True,
-    phases=[Phase.generate],
-    suppress_health_check=[HealthCheck.too_slow],  # of the oracle, on a busy machine
-)
-@given(cases())
-def test_same_events_same_deflections(case):
-    """The same sequence of (element, edge), times to 1e-6, z to 1e-6."""
+def compared(case):
+    """Assert the same sequence of (element, edge), times and z to 1e-6; return the events."""
     events, z = bank(**case)
-    # A case decided by a millionth of the threshold tests neither side.
-    for nudge in (1 - 1e-6, 1 + 1e-6):
-        near, _ = bank(**case | {"weights": [w * nudge for w in case["weights"]]})
-        assume([e[1:] for e in near] == [e[1:] for e in events])
     n = len(case["C"])
     parameters = GMSParameters(
         [1.0] * n,
@@ -151,62 +130,58 @@ def test_same_events_same_deflections(case):
         weights=case["weights"],
     )
     times = case["times"]
-    trace = simulate(
-        GMS(parameters, law=case["law"]),
-        Prescribed(list(zip(times, case["speeds"], strict=True))),
-        times[-1],
-        rtol=1e-9,
-        atol=1e-12,
-    )
+    rig = Prescribed(list(zip(times, case["speeds"], strict=True)))
+    trace = simulate(GMS(parameters, law=case["law"]), rig, times[-1], rtol=1e-9, atol=1e-12)
     assert event_sequence(trace) == [(i, edge) for _, i, edge in events]
-    np.testing.assert_allclose(
-        trace.transitions.t, [t for t, _, _ in events], rtol=0, atol=1e-6 * times[-1]
-    )
+    found = [t for t, _, _ in events]
+    np.testing.assert_allclose(trace.transitions.t, found, rtol=0, atol=1e-6 * times[-1])
     np.testing.assert_allclose(trace.z[-1], z, rtol=0, atol=1e-6 * max(1.0, np.abs(z).max()))
+    return events
 
 
-def test_the_oracle_takes_all_edges():
-    """The comparison is meaningful: a known case takes all three edges."""
-    events, _ = bank(
-        "signed",
-        [0.1, 0.3],
-        [0.2, 0.4],
-        0.5,
-        1.0,
-        0.05,
-        [0.0, 2.0, 4.0, 6.0],
-        [0.5, 0.4, -0.6, 0.5],
-    )
-    assert {edge for _, _, edge in events} == {
-        "break_away_forward",
-        "break_away_backward",
-        "arrest",
-    }
-
-
-def test_a_break_away_near_a_reversal_is_found_in_one_long_step():
-    """While it sticks, z is a parabola, so steps have any length; s has a narrow peak."""
-    case = {
-        "law": "signed",
-        "C": [0.17100516],
-        "weights": [0.3288219],
-        "F_c": 0.3345674,
-        "F_s": 0.49560633256551995,
-        "v_s": 0.02461438,
-        "times": [0.0, 1.712764, 3.425528, 4.690292],
-        "speeds": [0.4468584, -0.1231416, 0.1276584, -0.1831416],
-    }
+# No shrinking: the oracle is slow, and the example as drawn is just as informative.
+@settings(
+    max_examples=20,
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.generate],
+    suppress_health_check=[HealthCheck.too_slow],  # of the oracle, on a busy machine
+)
+@given(cases())
+def test_same_events_same_deflections(case):
     events, _ = bank(**case)
-    parameters = GMSParameters(
-        [1.0],
-        [0.1],
-        case["C"],
-        sigma_2=0.1,
-        stribeck=Stribeck(case["F_c"], case["F_s"], case["v_s"]),
-        v_c=V_C,
-        weights=case["weights"],
-    )
-    rig = Prescribed(list(zip(case["times"], case["speeds"], strict=True)))
-    trace = simulate(GMS(parameters, law="signed"), rig, case["times"][-1], rtol=1e-9)
-    assert event_sequence(trace) == [(i, edge) for _, i, edge in events]
-    assert len(events) == 4
+    # A case decided by a millionth of the threshold tests neither side.
+    for nudge in (1 - 1e-6, 1 + 1e-6):
+        near, _ = bank(**case | {"weights": [w * nudge for w in case["weights"]]})
+        assume([e[1:] for e in near] == [e[1:] for e in events])
+    compared(case)
+
+
+# All three edges; and a break-away near a reversal in one long step: while it sticks, z is a
+# parabola, so steps have any length, and s has a narrow peak.
+ALL_EDGES = {
+    "law": "signed",
+    "C": [0.1, 0.3],
+    "weights": [0.2, 0.4],
+    "F_c": 0.5,
+    "F_s": 1.0,
+    "v_s": 0.05,
+    "times": [0.0, 2.0, 4.0, 6.0],
+    "speeds": [0.5, 0.4, -0.6, 0.5],
+}
+NEAR_A_REVERSAL = {
+    "law": "signed",
+    "C": [0.17100516],
+    "weights": [0.3288219],
+    "F_c": 0.3345674,
+    "F_s": 0.49560633256551995,
+    "v_s": 0.02461438,
+    "times": [0.0, 1.712764, 3.425528, 4.690292],
+    "speeds": [0.4468584, -0.1231416, 0.1276584, -0.1831416],
+}
+
+
+def test_known_cases():
+    edges = {"break_away_forward", "break_away_backward", "arrest"}
+    assert {edge for _, _, edge in compared(ALL_EDGES)} == edges
+    assert len(compared(NEAR_A_REVERSAL)) == 4

@@ -1,4 +1,4 @@
-"""The reference of `tests.exact_systems` gives closed forms to rounding."""
+"""The reference of `tests.soak.exact_systems` gives closed forms to rounding."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.exact_reference import (
+from tests.soak.exact_reference import (
     Controller,
     Endless,
     Plain,

@@ -1,6 +1,6 @@
 """Fuzz bodies: bytes become a hostile input, and only documented exceptions may answer it.
 
-Each body is a plain function of bytes, so that hypothesis, a loop over seeds (tests/soak.py) or any
+Each body is a plain function of bytes, so that hypothesis, a loop over seeds (tests/soak) or any
 other fuzzer can drive it. The bytes are read as choices: which valid input to start from, what to
 break in it, and by how much. Accepted inputs are then used, because an input that is accepted and
 breaks later code is a finding too.
