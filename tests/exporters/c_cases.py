@@ -13,7 +13,7 @@ from gms_fsm import GMS, Body, Contact, GMSParameters, LuGre, Model, Stribeck, S
 from gms_fsm.app.scenario import load_system
 from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
 from gms_fsm.systems.models import ChartModel
-from tests.physics.test_sliding_between_states import follower
+from tests.physics.test_sliding_follows_filippov import follower
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 Case = tuple[Model | System, np.ndarray, Mapping[str, np.ndarray]]

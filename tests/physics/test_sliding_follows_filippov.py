@@ -423,9 +423,8 @@ def test_why_and_the_ribbon_name_both_states() -> None:
 
 
 # --------------------------------------------------------------------------- other loops, jumps
-@pytest.mark.parametrize("engine", sorted({"ifelse", FASTEST}))
-def test_stepping_gives_the_same_bits_and_the_mean_force(engine: str) -> None:
-    """z is driven back to 0 by c; there F is the velocity itself."""
+def follower() -> ChartModel:
+    """Return z driven back to 0 by c; there F is the velocity itself."""
     chart = Chart(
         "follower",
         inputs=("v",),
@@ -440,11 +439,15 @@ def test_stepping_gives_the_same_bits_and_the_mean_force(engine: str) -> None:
             Transition("fall", "above", "below", guard="z < 0"),
         ),
     )
-    model = ChartModel(chart, {"c": 1.0})
+    return ChartModel(chart, {"c": 1.0})
+
+
+@pytest.mark.parametrize("engine", sorted({"ifelse", FASTEST}))
+def test_stepping_gives_the_same_bits_and_the_mean_force(engine: str) -> None:
     t = np.linspace(0.0, 6.0, 121)
     v = 1.5 * np.sin(t) + 0.3 * np.sin(7.0 * t)
-    trace = simulate(model, Prescribed((t, v)), 6.0, engine="ifelse", t_eval=t)
-    friction = FrictionState(model, engine=engine)
+    trace = simulate(follower(), Prescribed((t, v)), 6.0, engine="ifelse", t_eval=t)
+    friction = FrictionState(follower(), engine=engine)
     forces, means, log = [friction.peek(v[0], v[0], 0.0)], [], []
     for j in range(1, len(t)):
         forces.append(friction.advance_to(v[j - 1], v[j], t[j]))
