@@ -409,7 +409,13 @@ def in_c(module, folder):
     return CLibrary(folder / "text.so")
 
 
-@pytest.fixture(scope="module", params=["llvm", "llvm, outside", "c99", "c99, outside"])
+OTHERS = ("llvm, outside", "c99", "c99, outside")
+
+
+@pytest.fixture(
+    scope="module",
+    params=["llvm", *(pytest.param(each, marks=pytest.mark.slow) for each in OTHERS)],
+)
 def made(request, tmp_path_factory):
     """All functions, compiled together; their arrays inside the block of arguments, or not."""
     printer, _, outside = request.param.partition(", ")

@@ -9,6 +9,8 @@ from scipy.integrate import BDF, DOP853, LSODA, RK45, Radau
 from gms_fsm import simulate
 from tests.helpers import FASTEST, event_sequence, open_loop, pulled_mass, stick_slip
 
+pytestmark = pytest.mark.slow
+
 SOLVERS = [RK45, DOP853, Radau, BDF, LSODA]
 solvers = pytest.mark.parametrize("solver", SOLVERS, ids=lambda s: s.__name__)
 
@@ -29,7 +31,6 @@ def tight(name):
     return simulate(*what, t_end, rtol=1e-12, atol=1e-15, engine=FASTEST)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "solver"), CASES)
 def test_the_sequence_is_that_of_our_own_tight_run(name, solver):
     what, t_end, rtol, t_bound, z_bound = RUNS[name]
