@@ -51,7 +51,7 @@ from gms_fsm.traces.failures import (
     StepLimitError,
     StepSizeError,
 )
-from tests import random_systems, systems_cases
+from tests import systems_cases
 from tests.helpers import (
     CURVE,
     FASTEST,
@@ -69,6 +69,7 @@ from tests.helpers import (
     wear,
 )
 from tests.scenario_files import data_folder
+from tests.soak import random_systems
 from tests.zoo import zoo_cases
 
 ENGINES = ("ifelse", "machines", *(("compiled",) if importlib.util.find_spec("llvmlite") else ()))

@@ -23,6 +23,7 @@ from unittest import mock
 
 import numpy as np
 import scipy.integrate
+from scipy.integrate import RK45
 
 from gms_fsm import (
     GMS,
@@ -30,6 +31,11 @@ from gms_fsm import (
     Chart,
     ChartModel,
     Contact,
+    Element,
+    ElementMachines,
+    FrictionBank,
+    FrictionEquations,
+    FrictionState,
     GMSError,
     GMSParameters,
     LuGre,
@@ -65,6 +71,7 @@ from gms_fsm.errors import (
     ParameterError,
     RecordError,
     ScenarioError,
+    SessionError,
     SignalError,
     TraceFileError,
     UnitError,
@@ -73,9 +80,10 @@ from gms_fsm.records import damper, tribometer
 from gms_fsm.records.units import factor
 from gms_fsm.systems.signals import as_signal
 from gms_fsm.traces.monitors import Chattering, Coverage, Passivity
-from tests import older_files, own_files
+from tests import older_files, own_files, systems_cases
 from tests.corpus import run, trace
-from tests.helpers import ROOT, stick_slip
+from tests.helpers import FIG4_SINE, ROOT, pulled_mass, stick_slip
+from tests.inspection.sessions import a_system, fig4, locked
 from tests.scenario_files import MEASURED, OPEN_LOOP, changed, sine_table, table
 
 APPROVED = ROOT / "tests" / "refusals.approved.txt"
@@ -83,6 +91,8 @@ APPROVED = ROOT / "tests" / "refusals.approved.txt"
 VARYING = (
     r"(?<=not valid TOML: )[^;]*",
     r"(?<=\()(Validation|Key|Value|Type|Overflow|UnicodeDecode|EOF|Attribute)?Error: .*?(?=\); w)",
+    r"(?<=\()(Validation|Key|Value|Overflow|UnicodeDecode|EOF|Attribute)?Error: .*?(?=\); write)",
+    r"(?<=not a session file, or damaged \()(Validation|Key|Value|Type|JSONDecode)Error: .*",
     r"(?<=\()BadZipFile: .*?(?=\); write)",
     r"\[Errno .*",
     r"embedded null[^)]*",
@@ -1374,6 +1384,332 @@ rows = {
 group("monitors", ExpressionError, monitored, rows)
 
 
+# --------------------------------------------------------------------------- branches
+def forked(given: dict[str, Any]) -> None:
+    Session(stick_slip("signed"), Prescribed("0.1*t"), 1.0).fork(**given)
+
+
+rows = {
+    "values in a list": ("values", [], {"values": []}),
+    "a number for a law": ("law", 7, {"law": 7}),
+    "a number for a name": ("name", 7, {"name": 7}),
+}
+group("fork", ParameterError, forked, rows)
+# --------------------------------------------------------------------------- runs
+GIVEN = stick_slip("signed")
+
+
+def running(given: dict[str, Any]) -> None:
+    """Simulate for a second with these arguments."""
+    simulate(GIVEN, Prescribed("0.2"), **{"t_end": 1.0, **given})
+
+
+wrong: dict[str, tuple[Any, ...]] = {
+    "t_end": (NAN, INF, "long", None),
+    "t_start": ("now",),
+    "method": ("rk5", 5, None, dict),
+    "step": (0.0, -0.1, NAN, "big"),
+    "rtol": (0.0, -1e-6, "fine"),
+    "atol": (0.0, NAN),
+    "max_step": (0.0, NAN, "x", None),
+    "max_steps": (0, -3, 2.5, True, "many"),
+    "events": ("never", None),
+    "engine": ("turbo",),
+    "output": ("rows", 3, True),
+    "t_eval": (["a"], "often"),
+    "initial": (5, [1.0] * 4),
+    "settings": ({"rtol": 1e-3},),
+}
+wrong_initial: dict[str, tuple[Any, ...]] = {
+    "z": (["a"] * 4,),
+    "x": ("far",),
+    "states": ("stick", ["stick"] * 3, None, 4),
+}
+rows = {
+    f"{name} = {value!r}": (name, value, {name: value})
+    for name, several in wrong.items()
+    for value in several
+}
+rows |= {
+    f"initial {name} = {value!r}": (f"initial['{name}']", value, {"initial": {name: value}})
+    for name, several in wrong_initial.items()
+    for value in several
+}
+rows |= {
+    "NaN among the times": ("t_eval[1] (element 2)", NAN, {"t_eval": [0.1, NAN]}),
+    "NaN among the z": ("initial['z'][2] (element 3)", NAN, {"initial": {"z": [0, 0, NAN, 0]}}),
+}
+group("argument of simulate", ParameterError, running, rows)
+OWN, OTHERS = ElementMachines(GIVEN), ElementMachines(stick_slip("published"))
+rows = {
+    "no time at all": ({"t_end": 0.0},),
+    "end before the start": ({"t_start": 1.0},),
+    "no step": ({"method": "rk4"},),
+    "no step for ticks": ({"events": "held"},),
+    "no step for events by step": ({"events": "step"},),
+    "no rows": ({"t_eval": []},),
+    "row behind the end": ({"t_eval": [0.0, 2.0]},),
+    "row before the start": ({"t_eval": [-0.5, 0.5]},),
+    "rows out of order": ({"t_eval": [0.1, 0.5, 0.2]},),
+    "row twice": ({"t_eval": [0.1, 0.5, 0.5]},),
+    "row that is no list": ({"t_eval": 0.5},),
+    "rows in rows": ({"t_eval": [[0.1, 0.2]]},),
+    "t_eval without times": ({"output": "t_eval"},),
+    "the end, and times": ({"output": "end", "t_eval": [0.5]},),
+    "all, and times": ({"output": "all", "t_eval": [0.5]},),
+    "unknown initial value": ({"initial": {"q": [1]}},),
+    "too few z": ({"initial": {"z": [1.0]}},),
+    "z that is one number": ({"initial": {"z": 1.0}},),
+    "z with an axis more": ({"initial": {"z": [[0.0] * 4]}},),
+    "velocity that is prescribed": ({"initial": {"v": 1.0}},),
+    "unknown argument": ({"rtoll": 1e-3},),
+    "compiled, and a solver of SciPy": ({"engine": "compiled", "method": RK45},),
+    "checkpoint, and a solver of SciPy": ({"checkpoint": "a", "method": RK45},),
+    "machines that run nothing": ({"engine": "ifelse", "machines": OWN},),
+    "machines twice": ({"engine": OWN, "machines": OWN},),
+    "machines of another model": ({"machines": OTHERS},),
+    "machines of another model, compiled": ({"engine": "compiled", "machines": OTHERS},),
+}
+group("arguments of simulate", ParameterError, running, rows, "")
+rows = {
+    "unknown state": ({"initial": {"states": ["stick"] * 3 + ["glue"]}},),
+    "state by number": ({"initial": {"states": [0, 0, 0, 0]}},),
+}
+group("arguments of simulate", ChartError, running, rows, "")
+group(
+    "arguments of simulate",
+    OutputError,
+    running,
+    {"checkpoint in no folder": ({"checkpoint": "no/run.checkpoint"},)},
+    "",
+)
+PAIR = systems_cases.two_blocks()
+
+
+def on_pads(machines: Callable[[], Any]) -> None:
+    """Simulate two blocks with these machines."""
+    simulate(PAIR.system, 1.0, initial=PAIR.initial, machines=machines())
+
+
+def of_pad() -> ElementMachines:
+    """Return machines of the first pad."""
+    return ElementMachines(PAIR.system.contact("pad1"))
+
+
+rows = {
+    "of an unknown contact": ("", ..., lambda: {"pad3": of_pad()}),
+    "of another contact": ("", ..., lambda: {"pad2": of_pad()}),
+    "that are a contact": (
+        "machines['pad1']",
+        PAIR.system.contact("pad1"),
+        lambda: {"pad1": PAIR.system.contact("pad1")},
+    ),
+    "of several contacts": (
+        "machines",
+        PAIR.system.contact("pad1"),
+        lambda: PAIR.system.contact("pad1"),
+    ),
+}
+group("machines of a system", ParameterError, on_pads, rows)
+
+
+@dataclasses.dataclass
+class Equal(Element):
+    """Elements that are equal: `transitions` would register one of them only."""
+
+    hits: int = 0
+
+
+KICKED = Chart("kick", states=(State("on", entry={"v": "1"}, outputs={"F": "0"}),))
+rows = {
+    "text for a model": ("model", "GMS", lambda: simulate("GMS", Prescribed("0"), 1.0)),
+    "text for a rig": ("rig", "0.1*t", lambda: simulate(GIVEN, "0.1*t", 1.0)),
+    "argument of a session": ("", ..., lambda: Session(GIVEN, Prescribed("0"), 1.0, steps=3)),
+    "elements of no class": ("element", dict, lambda: ElementMachines(GIVEN, dict)),
+    "elements that are equal": ("", ..., lambda: ElementMachines(GIVEN, Equal)),
+    "entry that sets the velocity": (
+        "chart 'kick'",
+        ...,
+        lambda: simulate(ChartModel(KICKED, {}), Slider(1.0, "1"), 1.0),
+    ),
+}
+group("run", ParameterError, lambda make: make(), rows)
+
+
+# --------------------------------------------------------------------------- sweeps
+def sweeping(parameters: Any, **options: Any) -> None:
+    """Sweep the pulled mass."""
+    sweep(*pulled_mass(), 1.0, parameters, **{"engine": "machines", **options})
+
+
+rows = {
+    "unknown": ({"q": [1, 2]},),
+    "number of another rig": ({"F_a": [1, 2]},),
+    "no parameters": ({},),
+    "no runs": ({"F_s": []},),
+    "no runs, wide": ({"k": np.empty((0, 4))},),
+    "different lengths": ({"F_s": [1, 2], "k": np.ones((3, 4))},),
+    "one number": ({"F_s": 1.5},),
+    "one number, wide": ({"k": 1.5},),
+    "too many elements": ({"k": np.ones((2, 5))},),
+    "too deep": ({"k": np.ones((2, 4, 1))},),
+    "wide where one is meant": ({"v_c": np.ones((2, 4))},),
+    "words": ({"F_s": ["much", "more"]},),
+    "ragged": ({"k": [[1, 2], [1]]},),
+    "nothing": ({"F_s": None},),
+}
+group("parameters of a sweep", ParameterError, sweeping, rows, "")
+rows = {
+    "all rows": ("", ..., {"output": "all"}),
+    "times that are missing": ("", ..., {"output": "t_eval"}),
+    "typo": ("", ..., {"t_evil": [0.5]}),
+    "unknown engine": ("engine", "turbo", {"engine": "turbo"}),
+    "negative tolerance": ("rtol", -1.0, {"rtol": -1}),
+    "unknown initial value": ("", ..., {"initial": {"q": 1}}),
+}
+group("option of a sweep", ParameterError, lambda how: sweeping({"F_s": [1.5]}, **how), rows)
+
+
+def sweeping_system(*given: Any) -> None:
+    """Sweep two blocks."""
+    sweep(PAIR.system, *given, initial=PAIR.initial, engine="ifelse")
+
+
+rows = {
+    "unknown": ("", ..., 1.0, {"m": [1.0]}),
+    "wide": ("", ..., 1.0, {"pad1.F_s": [[1.5, 1.6]]}),
+    "no names": ("parameters", [1.0], 1.0, [1.0]),
+    "rig": ("rig", 9.0, 9.0, 1.0, {"pad1.F_s": [1.0]}),
+}
+group("parameters of a sweep of a system", ParameterError, sweeping_system, rows)
+
+
+# --------------------------------------------------------------------------- stepping
+def started(*models: Any) -> Any:
+    """Return a friction after some samples: of one joint, or a bank of several."""
+    friction = FrictionBank(models) if len(models) > 1 else FrictionState(*models)
+    for _ in range(7):
+        friction.advance(*[0.1 if len(models) == 1 else [0.1] * len(models)] * 2, 0.3)
+    return friction
+
+
+def unchanged(friction: Any, call: Callable[[Any], object]) -> None:
+    """Make a call that must leave the friction as it was."""
+    before = repr((friction.to_array().tolist(), friction.t, friction.states, friction.switches))
+    try:
+        call(friction)
+    finally:
+        after = friction.to_array().tolist(), friction.t, friction.states, friction.switches
+        assert repr(after) == before
+
+
+BRISTLE = lugre()
+rows = {
+    "NaN": ("v0", NAN, lambda f: f.advance(NAN, 0.1, 0.1)),
+    "infinity": ("v1", INF, lambda f: f.peek(0.1, INF, 0.1)),
+    "word": ("v0", "fast", lambda f: f.advance("fast", 0.1, 0.1)),
+    "nothing": ("v0", None, lambda f: f.advance(None, 0.1, 0.1)),
+    "list": ("v1", [0.1, 0.2], lambda f: f.advance(0.1, [0.1, 0.2], 0.1)),
+    "back in time": ("dt", -1e-3, lambda f: f.advance(0.1, 0.1, -1e-3)),
+    "NaN seconds": ("dt", NAN, lambda f: f.peek(0.1, 0.1, NAN)),
+    "long time": ("t", 10000000002.1, lambda f: f.advance(0.1, 0.1, 1e10)),
+    "earlier time": ("t", 1.0, lambda f: f.advance_to(0.1, 0.1, 1.0)),
+    "input": ("", ..., lambda f: f.advance(0.1, 0.1, 0.1, N=(1.0, 1.0))),
+    "snapshot of another model": (
+        "snapshot",
+        ...,
+        lambda f: f.restore(FrictionState(BRISTLE).snapshot()),
+    ),
+    "snapshot of a bank": ("snapshot", ..., lambda f: f.restore(FrictionBank([GIVEN]).snapshot())),
+    "no snapshot": ("snapshot", [1.0], lambda f: f.restore([1.0])),
+    "short array": ("array", ..., lambda f: f.from_array(f.to_array()[:-1])),
+    "array of NaN": ("array[0] (element 1)", NAN, lambda f: f.from_array(NAN * f.to_array())),
+    "array that was changed": ("array", ..., lambda f: f.from_array(f.to_array() + 0.5)),
+}
+group("step", ParameterError, lambda call: unchanged(started(GIVEN), call), rows)
+rows = {
+    "one number": ("", ..., lambda b: b.advance(0.1, [0.1, 0.1], 0.1)),
+    "three numbers": ("v1", ..., lambda b: b.advance([0.1] * 2, [0.1] * 3, 0.1)),
+    "NaN": ("v0[1] (element 2)", NAN, lambda b: b.advance([0.1, NAN], [0.1] * 2, 0.1)),
+    "back in time": ("dt", -1.0, lambda b: b.peek([0.1] * 2, [0.1] * 2, -1.0)),
+    "snapshot of three": (
+        "snapshot",
+        ...,
+        lambda b: b.restore(FrictionBank([GIVEN] * 3).snapshot()),
+    ),
+    "short array": ("array", ..., lambda b: b.from_array(b.to_array()[:-2])),
+    "half an array": ("array", ..., lambda b: b.from_array([*b.to_array()[:-5], *[0.5] * 5])),
+}
+group("step of a bank", ParameterError, lambda call: unchanged(started(GIVEN, BRISTLE), call), rows)
+PUSHED = Chart("loaded", inputs=("v", "N"), states=(State("only", outputs={"F": "N * v"}),))
+READS_A = Chart(
+    "feels",
+    states=(State("a"), State("b")),
+    transitions=(Transition("go", "a", "b", guard="a > 1"),),
+    outputs={"F": "v"},
+)
+
+
+def placed(chart: Chart | str, **more: Any) -> Contact:
+    """Return a contact with a chart of one's own or an included one."""
+    if isinstance(chart, Chart):
+        return Contact("pad", chart, **more)
+    return Contact("pad", CHARTS[chart], entry(chart).demonstration.values, **more)
+
+
+PLANAR = entry("planar-coulomb").demonstration.inputs
+
+
+def pressed() -> FrictionState:
+    """Return a friction with the normal force as an input."""
+    return FrictionState(placed(PUSHED, inputs={"N": "N_0"}))
+
+
+locks = ("stiction", "karnopp", "modelica", "dog-clutch", "end-stop")
+rows = {
+    "number": ("model_or_contact", 3, lambda: FrictionState(3)),
+    "class": ("model_or_contact", GMS, lambda: FrictionState(GMS)),
+    "late start": ("t", 1e9, lambda: FrictionState(GIVEN, t=1e9)),
+    "sample that the clock does not resolve": (
+        "dt", 1e-9, lambda: FrictionState(GIVEN, t=1e8).advance(0.1, 0.1, 1e-9)),
+    "input with the name of an argument": (
+        "contact 'pad'", ..., lambda: FrictionState(placed(PUSHED, inputs={"N": "2 * dt"}))),
+    "input that is not given": (
+        "", ..., lambda: pressed().advance(0.0, 0.1, 0.1)),
+    "input that is no pair": (
+        "N_0", 5.0, lambda: pressed().peek(0, 0, 0, N_0=5.0)),
+    "input that is NaN": (
+        "N_0", NAN,
+        lambda: pressed().peek(0, 0, 0, N_0=(1.0, NAN))),
+    "engine": ("engine", "machines", lambda: FrictionState(GIVEN, engine="machines")),
+    "tolerance": ("rtol", -1.0, lambda: FrictionState(GIVEN, rtol=-1.0)),
+    "initial velocity": ("", ..., lambda: FrictionState(GIVEN, initial={"v": 1.0})),
+    **{
+        f"lock of {name}": ("", ..., lambda name=name: FrictionState(placed(name)))
+        for name in locks
+    },
+    "two velocities": (
+        "", ..., lambda: FrictionState(placed("planar-coulomb", v=("v", "w"), inputs=PLANAR))),
+    "period": ("contact 'pad'", ..., lambda: FrictionState(Contact("pad", GIVEN, period=0.1))),
+    "mean before a sample": ("", ..., lambda: FrictionState(GIVEN).mean_force),
+    "slope before a sample": ("", ..., lambda: FrictionState(GIVEN).dF_dv),
+    "empty bank": ("models", ..., lambda: FrictionBank([])),
+    "joint": ("models[1]: model_or_contact", 3, lambda: FrictionBank([GIVEN, 3])),
+    "initial values of two": ("initial", ..., lambda: FrictionBank([GIVEN], initial=[{}, {}])),
+    "equations with a lock": ("", ..., lambda: FrictionEquations(placed("stiction"))),
+    "equations with two velocities": (
+        "", ..., lambda: FrictionEquations(placed("planar-coulomb", v=("v", "w"), inputs=PLANAR))),
+    "equations with a period": (
+        "contact 'pad'", ..., lambda: FrictionEquations(Contact("pad", GIVEN, period=1e-3))),
+    "equations that read the acceleration": (
+        "chart 'feels'", ..., lambda: FrictionEquations(ChartModel(READS_A, {}))),
+    "equations with an unknown input": (
+        "chart 'loaded'", ..., lambda: FrictionEquations(placed(PUSHED))),
+    "equations of a number": ("model_or_contact", 3, lambda: FrictionEquations(3)),
+    "equations before the first settle": (
+        "", ..., lambda: FrictionEquations(GIVEN).force(0.0, np.zeros(5), 0.0)),
+}  # fmt: skip
+group("stepping", ParameterError, lambda make: make(), rows)
 # --------------------------------------------------------------------------- sessions
 FIG4 = stick_slip("published"), Prescribed(FIG4_SINE)
 
@@ -1381,9 +1717,11 @@ FIG4 = stick_slip("published"), Prescribed(FIG4_SINE)
 def unmoved(move: Callable[[Session], object], made: Callable[[], Session] = fig4) -> None:
     """Ask a session for a move; it stays where it is, with its branches and breakpoints."""
     session = made()
+    (original,) = session.tree.forks.values()
     try:
         move(session)
     finally:
+        assert session.tree.forks == {0: original}
         assert (session.here.row, len(session.branches), session.breakpoints) == (0, 1, [])
 
 

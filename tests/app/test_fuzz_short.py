@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests import fuzz
+from tests.soak import fuzz
 
 
 @pytest.mark.slow

@@ -288,3 +288,20 @@ def test_states_and_edges_may_differ_by_case_only(
     except ChartError:
         return
     _equal_but_for_names(model, plain)
+
+
+def test_a_chart_without_variables_has_no_deflection(monkeypatch: pytest.MonkeyPatch) -> None:
+    """NaN, whatever memory had before: a product of signalling NaNs is a warning."""
+    chart = Chart("damper", ("v",), (), ("b",), (State("on"),), (), {"F": "b * v"})
+    trace = simulate(ChartModel(chart, {"b": 2.0}), Prescribed("sin(t)"), 1.0)
+    empty = np.empty
+
+    def stray(*given: Any, **options: Any) -> Any:
+        found = empty(*given, **options)
+        if found.dtype == np.float64:
+            found.view(np.int64)[...] = 0x7FF0000000000001
+        return found
+
+    monkeypatch.setattr(np, "empty", stray)
+    assert np.isnan(trace.z).all()
+    assert np.isnan(trace.dz).all()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from tests.physics.test_sliding_between_states import follower
 
 from gms_fsm import (
     GMS,
@@ -29,7 +30,6 @@ from gms_fsm.charts.registry import entry
 from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
 from gms_fsm.systems.models import demonstration
 from tests.helpers import ROOT
-from tests.physics.test_sliding_between_states import follower
 
 CHARTS = ("lugre", "elasto-plastic", "seven-parameter", "maxwell-slip", "reset-integrator")
 NAMES = ("gms-4-signed", "gms-4-published", "gms-16-signed", "gms-16-published", *CHARTS)

@@ -29,7 +29,7 @@ from gms_fsm import (
     export,
 )
 from tests.helpers import ROOT, matrix, stick_slip
-from tests.platforms import (
+from tests.soak.platforms import (
     COMPILERS,
     Case,
     check,
@@ -72,9 +72,10 @@ def test_a_scenario_has_the_same_bits_in_c_and_in_javascript(name: str) -> None:
     assert check(scenario(SCENARIOS / f"{name}.toml"), compilers, ("node",)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", matrix([0, 1], [0]))
 def test_a_random_system_has_the_same_bits(index: int, tmp_path: Path) -> None:
-    """Repeat a difference with: python -m tests.platforms --seed 11 --first INDEX."""
+    """Repeat a difference with: python -m tests.soak.platforms --seed 11 --first INDEX."""
     same(random_case(SEED, index), tmp_path)
 
 

@@ -229,7 +229,7 @@ def test_folders_that_cannot_be_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize("form", ["", "c", "C99", "../c99", 3, None, ["c99"]])
 def test_an_unknown_format(form: Any, tmp_path: Path) -> None:
     said = str(refused(tmp_path, PAPER, form, tmp_path / "out"))
-    assert "there is no such format" in said
+    assert "there is no format" in said
     assert all(each in said for each in formats())
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from gms_fsm import export
 from tests.helpers import stick_slip
-from tests.platforms import COMBINATIONS, Case, check, demonstrations, random_case, scenarios
+from tests.soak.platforms import COMBINATIONS, Case, check, demonstrations, random_case, scenarios
 
 # A command, and how it is called here; what is not installed is not run.
 ENGINES = {"node": ["node"], "SpiderMonkey": ["js102", "-m"], "JavaScriptCore": ["jsc", "-m"]}

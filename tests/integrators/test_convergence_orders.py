@@ -1,4 +1,4 @@
-"""Every method has its order: on smooth flow, and across a located break-away.
+"""Every method has its order: on smooth flow, across a located break-away, corners and jumps.
 
 The slope of log(error) against log(step) is a least-squares fit over 14 fixed steps whose errors
 all lie above 1e-13; it is at least p - 0.3.
@@ -9,8 +9,18 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from gms_fsm import GMS, GMSParameters, Prescribed, Slider, Stribeck, simulate
-from tests.helpers import event_sequence
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    Prescribed,
+    Slider,
+    State,
+    Stribeck,
+    simulate,
+)
+from tests.helpers import event_sequence, non_drifting, one_element
 
 ORDERS = {"euler": 1, "heun": 2, "bs23": 3, "rk4": 4, "dp45": 5}
 SIZES = np.unique(np.round(np.geomspace(6, 40, 14)).astype(int))  # steps in a unit of time
@@ -73,3 +83,43 @@ def test_order_across_a_break_away(method):
         places.append(abs(trace.transitions.t[0] - t_star))
     assert fitted_slope(steps, np.array(errors)) >= ORDERS[method] - 0.3
     assert max(places) < max(steps)
+
+
+def slipping(h: float) -> float:
+    """z > s while v turns: sgn(v) jumps in the slip flow at t = 1."""
+    trace = simulate(
+        one_element("signed", F_s=1.0, C=0.3, v_s=1e-3),
+        Prescribed("0.4*cos(pi*t/2)"),
+        2.0,
+        method="rk4",
+        step=h,
+        initial={"z": [3.0], "states": ["slip"]},
+    )
+    turn = 1 + 2 * np.exp(-0.3)
+    return float(trace.z[-1, 0] - (-1 + (turn + 1) * np.exp(-0.3)))
+
+
+def pushed(h: float | None) -> float:
+    """A force that jumps at 0.33 s, on a bank."""
+    rig = Slider(1.0, [(0, 0), (0.33, 0), (0.33, 0.2), (2, 0.2)])
+    how = {"method": "rk4", "step": h} if h else {"rtol": 1e-12, "atol": 1e-14}
+    return float(simulate(non_drifting("published")[0], rig, 1.0, **how).x[-1])
+
+
+def bent(h: float | None) -> float:
+    """A stiffness that changes at x = 0.3."""
+    states = (State("on", flow={"z": "v"}),)
+    chart = Chart("bent", ("v", "x"), ("z",), ("c",), states, (), {"F": "c * abs(x - 0.3)"})
+    how = {"method": "rk4", "step": h} if h else {"rtol": 1e-12, "atol": 1e-14}
+    return float(simulate(ChartModel(chart, {"c": 5.0}), Slider(1.0, "1"), 1.0, **how).x[-1])
+
+
+def test_rk4_keeps_its_order_across_a_sign_a_jump_and_a_corner():
+    """An error by h^4: no stage looks beyond the place, and steps end on it."""
+    for run, exact, steps in (
+        (slipping, 0.0, [2 / 7, 2 / 13, 2 / 25, 2 / 49]),
+        (pushed, pushed(None), [0.02, 0.01]),
+        (bent, bent(None), [1 / 20, 1 / 40, 1 / 80]),
+    ):
+        errors = np.abs([run(h) - exact for h in steps])
+        assert np.polyfit(np.log(steps), np.log(errors), 1)[0] > 3.5

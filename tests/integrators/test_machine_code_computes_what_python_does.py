@@ -31,6 +31,7 @@ from integrators.runners import columns, stepping
 from integrators.runners.compiled import INLINE
 from integrators.step_size import retry_factor
 from integrators.switching import sliding_bounds
+from tests.soak.platforms import CLibrary
 
 SIZE = 5
 INFINITY = float("inf")
@@ -383,16 +384,20 @@ def bits(arguments: Given) -> list[bytes]:
     return [struct.pack(f"<{len(p)}d", *map(float, p)) for p in parts]
 
 
-def module_of(function, inside: bool):
+def module_of(functions, inside: bool):
     layout = BlockLayout(given(0), callable, inside=inside)
     translator = Translator()
-    translator.entry("entry", function, [layout.value])
+    for each in functions:
+        translator.entry(f"entry_{each.__name__}", each, [layout.value])
     return layout, translator.module
 
 
+def called(address):
+    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)
+
+
 def in_llvm(module):
-    library = objects.Library(objects.compiled(llvm_text(module)))
-    return library, library.address("entry")
+    return objects.Library(objects.compiled(llvm_text(module)))
 
 
 def in_c(module, folder):
@@ -401,19 +406,30 @@ def in_c(module, folder):
                "-fPIC", "-shared", "text.c", "-o", "text.so", "-lm"]  # fmt: skip
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    library = ctypes.CDLL(str(folder / "text.so"))
-    return library, ctypes.cast(library.entry, ctypes.c_void_p).value
+    return CLibrary(folder / "text.so")
 
 
-@pytest.mark.parametrize("inside", [True, False], ids=["inside", "outside"])
-@pytest.mark.parametrize("printer", ["llvm", "c99"])
-@pytest.mark.parametrize("function", CASES, ids=lambda each: each.__name__)
-def test_same_bits(function, printer, inside, tmp_path):
+OTHERS = ("llvm, outside", "c99", "c99, outside")
+
+
+@pytest.fixture(
+    scope="module",
+    params=["llvm", *(pytest.param(each, marks=pytest.mark.slow) for each in OTHERS)],
+)
+def made(request, tmp_path_factory):
+    """All functions, compiled together; their arrays inside the block of arguments, or not."""
+    printer, _, outside = request.param.partition(", ")
     if printer == "c99" and shutil.which("cc") is None:
         pytest.skip("there is no C compiler")
-    layout, module = module_of(function, inside)
-    library, address = in_llvm(module) if printer == "llvm" else in_c(module, tmp_path)
-    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)
+    layout, module = module_of(CASES, not outside)
+    folder = tmp_path_factory.mktemp("c")
+    return layout, in_llvm(module) if printer == "llvm" else in_c(module, folder)
+
+
+@pytest.mark.parametrize("function", CASES, ids=lambda each: each.__name__)
+def test_same_bits(function, made):
+    layout, library = made
+    call = called(library.address(f"entry_{function.__name__}"))
     for seed in range(40):
         expected = given(seed)
         result = plainly(function, expected)
@@ -421,7 +437,6 @@ def test_same_bits(function, printer, inside, tmp_path):
         block.update(block.contents)
         assert call(block.address) == result, f"given({seed})"
         assert bits(block.contents) == bits(expected), f"given({seed})"
-    assert library
 
 
 def test_c_text_leaves_out_what_nobody_reads():
@@ -443,14 +458,14 @@ signal = HostFunction(0)
 
 
 def test_a_host_function_is_called():
-    layout, module = module_of(asks, True)
-    library, address = in_llvm(module)
+    layout, module = module_of([asks], True)
+    library = in_llvm(module)
     thunk = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda t: 3.0 * t)
     place = ctypes.c_void_p.from_address(library.variable("callbacks"))
     place.value = ctypes.cast(thunk, ctypes.c_void_p).value
     block = MemoryBlock(layout, given(1))
     block.update(block.contents)
-    ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)(block.address)
+    called(library.address("entry_asks"))(block.address)
     assert block.contents.out.tolist() == [3.0 * u + 1.0 for u in given(1).x]
 
 
@@ -481,8 +496,8 @@ def test_a_column_may_change_between_calls():
     layout = BlockLayout(example, callable)
     translator = Translator()
     translator.entry("entry", columns_of, list(layout.value.fields.values()))
-    library = objects.Library(objects.compiled(llvm_text(translator.module)))
-    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(library.address("entry"))
+    library = in_llvm(translator.module)
+    call = called(library.address("entry"))
     block = MemoryBlock(layout, example)
     for length in (3, 10):
         column = np.arange(1.0, length + 1.0)
@@ -490,6 +505,7 @@ def test_a_column_may_change_between_calls():
         block.update((column, 2.0))
         assert call(block.address) == length
         assert column[0] == total
+    assert library
 
 
 def test_numbers_of_a_dataclass_are_words_of_the_block():
@@ -590,7 +606,7 @@ def two_results(g):
 )
 def test_an_error_names_the_line(function, line):
     with pytest.raises(TranslationError) as caught:
-        module_of(function, True)
+        module_of([function], True)
     assert caught.value.line == line
     number = function.__code__.co_firstlineno
     lines = [f"line {number + k}, in {function.__name__}" for k in range(4)]
@@ -605,24 +621,19 @@ def test_what_is_said_about_putting_inline_is_said_about_functions_that_exist():
     assert INLINE.keys() - known == program
 
 
-@pytest.mark.parametrize(("inline", "mark"), [(True, "alwaysinline"), (False, "noinline")])
-def test_functions_are_put_inline_as_said(inline, mark):
-    translator = Translator({"retry_factor": inline})
-    translator.entry(
-        "entry", retry_factor, [NumberValue(Local("f", "e")), NumberValue(Local("i", "order"))]
-    )
-    text = llvm_text(translator.module)
-    assert text.count(mark) == 1
-    assert "@retry_factor(double" in text[: text.index(mark)].splitlines()[-1]
+def test_functions_are_put_inline_as_said_but_not_long_ones(monkeypatch):
+    def text(inline):
+        translator = Translator({"retry_factor": inline})
+        given = [NumberValue(Local("f", "e")), NumberValue(Local("i", "order"))]
+        translator.entry("entry", retry_factor, given)
+        return llvm_text(translator.module)
 
-
-def test_long_functions_are_not_put_inline(monkeypatch):
+    for inline, mark in ((True, "alwaysinline"), (False, "noinline")):
+        said = text(inline)
+        assert said.count(mark) == 1
+        assert "@retry_factor(double" in said[: said.index(mark)].splitlines()[-1]
     monkeypatch.setattr(llvm, "LONGEST", 3)
-    translator = Translator({"retry_factor": True})
-    translator.entry(
-        "entry", retry_factor, [NumberValue(Local("f", "e")), NumberValue(Local("i", "order"))]
-    )
-    assert "inline" not in llvm_text(translator.module)
+    assert "inline" not in text(True)
 
 
 def half(x, _ignored):

@@ -11,7 +11,7 @@ import math
 
 import pytest
 
-from integrators import BS23, DP45, EULER, HEUN, METHODS, RK4, Tableau
+from integrators import DP45, METHODS, Tableau
 
 ALL = list(METHODS.values())
 NAMED = pytest.mark.parametrize("method", ALL, ids=lambda method: method.name)
@@ -22,17 +22,9 @@ def _changed(row: tuple[float, ...], j: int, by: float) -> tuple[float, ...]:
 
 
 def test_methods_are_found_by_their_names() -> None:
-    assert list(METHODS) == ["euler", "heun", "rk4", "bs23", "dp45"]
-    assert [METHODS[name].name for name in METHODS] == list(METHODS)
-    assert [m.order for m in (EULER, HEUN, RK4, BS23, DP45)] == [1, 2, 4, 3, 5]
+    orders = {"euler": 1, "heun": 2, "rk4": 4, "bs23": 3, "dp45": 5}
+    assert {name: method.order for name, method in METHODS.items()} == orders
     assert {m.name for m in ALL if m.adaptive} == {"bs23", "dp45"}
-
-
-@NAMED
-def test_a_tableau_is_frozen(method: Tableau) -> None:
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        method.order = 9  # type: ignore[misc]
-    assert dataclasses.replace(method) == method
 
 
 @NAMED

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from fractions import Fraction
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from integrators.crossings import NO_CHANGE, Path, first_change, is_quiet_step, watched
+from integrators.crossings import (
+    NO_CHANGE,
+    Path,
+    first_change,
+    is_quiet_step,
+    longest_next,
+    watched,
+)
 from integrators.runners.states import beginning
 from integrators.steps import ArcMotion, Dense, Now, Scratch
 
@@ -95,6 +105,25 @@ def test_a_margin_that_is_never_quiet_is_evaluated_512_times_per_step() -> None:
     assert _first(lambda t: rough(t, 2.0)) == (NO_CHANGE, 512)  # the end, and 511 in between
 
 
+@pytest.mark.slow
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(st.floats(0.02, 0.9), st.floats(0.01, 0.5), st.floats(0.05, 1.0), st.floats(0.1, 10.0))
+def test_of_any_window_and_line_the_earlier_counts(
+    a: float, width: float, late: float, steepness: float
+) -> None:
+    """The step's end shows only the line; the search continues before it for the window."""
+
+    def hump(t: float) -> float:
+        return -(t - a) * (t - a - width)
+
+    def line(t: float) -> float:
+        return steepness * (t - late)
+
+    for margins in ((hump, line), (line, hump)):
+        assert _first(*margins)[0] == pytest.approx(min(a, late), abs=1.1e-12)
+    assert _first(lambda t: -hump(t), strict=True)[0] == pytest.approx(a, abs=1.1e-12)
+
+
 def test_of_two_windows_the_earlier_counts_though_the_later_is_seen_first() -> None:
     def two(t: float) -> float:
         return -(t - 0.18) * (t - 0.22) * (t - 0.48) * (t - 0.52)
@@ -119,45 +148,73 @@ def test_a_margin_that_starts_or_touches_at_zero_changes_as_its_kind_says() -> N
     assert _first(lambda t: touching + t * (1 - t), strict=True)[0] == NO_CHANGE
 
 
-def test_a_distant_curved_margin_is_quiet_after_one_evaluation() -> None:
-    assert _first(lambda t: -10.0 + t * (1 - t)) == (NO_CHANGE, 2)
-    assert _first(lambda t: 10.0 - t * (1 - t)) == (NO_CHANGE, 2)
-    assert _first(lambda t: -1e-3 - t * t * 0.1 - t) == (NO_CHANGE, 2)  # near, but monotone
-    assert _first(lambda t: -1e-9) == (NO_CHANGE, 2)
+QUIET: dict[str, Margin] = {
+    "distant": lambda t: -10.0 + t * (1 - t),
+    "distant, true": lambda t: 10.0 - t * (1 - t),
+    "near, but monotone": lambda t: -1e-3 - t * t * 0.1 - t,
+    # Its slopes differ by 0.08, which is too little to reach zero from -0.46.
+    "bent": lambda t: -0.5 + 0.16 * t * (1.0 - t),
+    "constant": lambda t: -1e-9,
+    "hardly negative": lambda t: -1e-300,
+    "hardly positive": lambda t: 1e-300,
+    "zero": lambda t: 0.0,  # as that of v > 0 while v = 0: it does not bend, and has no window
+}
 
 
-def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
-    # y = t**3 between 1 and 3: the cubic's midpoint is 8, a line's is 14, and t = 2 is passed on.
-    w = watched([False], 1)
-    w.watch[0] = 1
-    w.active.append(0)
-    seen = []
+@pytest.mark.parametrize("strict", [False, True])
+@pytest.mark.parametrize("name", QUIET)
+def test_a_quiet_margin_is_evaluated_at_the_end_and_in_the_middle_only(
+    name: str, strict: bool
+) -> None:
+    assert _first(QUIET[name], strict=strict) == (NO_CHANGE, 2)
+
+
+def _step(times: tuple[float, float], *margins: Callable[[float, float], float], watch: int = 4):
+    """Return a step of y = t**3, as `is_quiet_step` takes it, and where margins were asked."""
+    w, seen = watched([False] * len(margins), 1), []
 
     def fill(t: float, y: list[float], mode: list, p: None, watch: list, out: list) -> None:
         seen.append((t, y[0]))
-        out[0] = y[0] - 100.0
+        out[:] = [margin(t, y[0]) for margin in margins]
 
-    w.start[0] = 1.0 - 100.0
-    now = Now(**beginning(1.0, 9.0), y=[1.0], f=[3.0], mode=[], held=[], floor=[])
-    scratch = Scratch([], y_new=[27.0], f_new=[27.0], error=[], dense=Dense([], [], [], [], []))
-    assert is_quiet_step(ArcMotion(fill, fill, None, None), now, 3.0, scratch, w)
-    assert seen == [(3.0, 27.0), (2.0, 8.0)]
-
-
-def test_a_margin_far_from_zero_is_evaluated_at_the_end_and_in_the_middle_only() -> None:
-    """Its slopes differ by 0.08, which is too little to reach zero from -0.46."""
-    assert _first(lambda t: -0.5 + 0.16 * t * (1.0 - t)) == (NO_CHANGE, 2)
-
-
-@pytest.mark.parametrize("height", [-1.0, -1e-300, 1e-300, 1.0])
-def test_a_constant_margin_is_evaluated_at_the_end_and_in_the_middle_only(height: float) -> None:
-    assert _first(lambda t: height) == (NO_CHANGE, 2)
+    start, end = times
+    for r, margin in enumerate(margins):
+        w.watch[r], w.start[r] = watch, margin(start, start**3)
+        w.truth[r] = w.start[r] >= 0.0
+        w.active.append(r)
+    now = Now(**beginning(start, 9.0), y=[start**3], f=[3 * start**2], mode=[], held=[], floor=[])
+    dense = Dense([], [], [], [], [])
+    scratch = Scratch([], y_new=[end**3], f_new=[3 * end**2], error=[], dense=dense)
+    return (ArcMotion(fill, fill, None, None), now, end, scratch, w), seen
 
 
-@pytest.mark.parametrize("strict", [True, False])
-def test_a_margin_that_rests_at_zero_is_not_searched(strict: bool) -> None:
-    """As that of v > 0 while v = 0: it does not bend, and so has no window."""
-    assert _first(lambda t: 0.0, strict=strict) == (NO_CHANGE, 2)
+def test_between_two_ends_y_is_the_cubic_of_both_slopes() -> None:
+    """A line's midpoint between 1 and 3 is 14, not 8; the quarter point is 1.5**3."""
+    step, seen = _step((1.0, 3.0), lambda t, y: y - 100.0)
+    assert is_quiet_step(*step)
+    longest_next(*step)
+    assert seen == [(3.0, 27.0), (2.0, 8.0), (1.5, 3.375)]
+
+
+def _longest(margin: Callable[[float, float], float], watch: int = 4) -> float:
+    step, _ = _step((0.0, 2.0), margin, watch=watch)
+    is_quiet_step(*step)
+    return longest_next(*step)
+
+
+def test_waiting_margins_limit_the_next_step_by_their_bend() -> None:
+    """To h (size / 10 bend)^(1/2), but not to less than this step: a sine every 2 radians."""
+    assert _longest(lambda t, y: -1.0 - t * (2.0 - t)) == pytest.approx(2.0)
+    assert _longest(lambda t, y: -20.0 - t * (2.0 - t)) == pytest.approx(
+        2.0 * (0.1 * 21 / 2) ** 0.5
+    )
+    assert _longest(lambda t, y: -1.0 - t * (2.0 - t), watch=3) == math.inf  # it does not wait
+    for straight in (lambda t, y: -1.0, lambda t, y: -1.0 - t, lambda t, y: -1.0 - 1e-11 * t * t):
+        assert _longest(straight) == math.inf  # but for rounding
+    # A sine does not bend where it is steepest; between the quarter and the middle it does.
+    steep = _longest(lambda t, y: -2.0 - math.sin(math.pi * (t - 1.0)))
+    assert steep == 2.0
+    assert _longest(lambda t, y: t - 1.0) == math.inf  # the step ends earlier
 
 
 def test_the_search_is_wary_of_a_bend_four_times_as_high() -> None:

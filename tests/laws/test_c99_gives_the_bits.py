@@ -8,7 +8,7 @@ import pytest
 
 from tests.corpus import each, run, trace
 from tests.helpers import other_parts
-from tests.platforms import in_c
+from tests.soak.platforms import in_c
 
 pytest.importorskip("llvmlite", reason="needs the extra fast")
 

@@ -12,7 +12,7 @@ import pytest
 import gms_fsm
 from tests.corpus import CORPUS, ENGINES, FAILING, FAILURES, each, outcome, run, trace
 from tests.helpers import other_parts, same_logs
-from tests.random_systems import trial
+from tests.soak.random_systems import trial
 
 STILL = {  # the others switch: the laws would hold where nothing happens, too
     "fig. 3",

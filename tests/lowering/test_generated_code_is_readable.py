@@ -93,12 +93,6 @@ if S != S:
     assert "+ sigma_2 * v  # (4)" in source
 
 
-def test_one_text_serves_every_parameter_set_and_every_number_of_elements() -> None:
-    rig = pulled_mass()[1]
-    texts = {lower(odd_numbers(n, seed), rig).source for n in (1, 2, 5) for seed in (1, 2)}
-    assert len(texts) == 1
-
-
 def test_no_user_value_is_in_the_text() -> None:
     model, rig = odd_numbers(4, seed=3), Slider(0.7351, [(0.123, 0.456), (0.789, 0.987)])
     p = model.parameters
@@ -109,21 +103,18 @@ def test_no_user_value_is_in_the_text() -> None:
     found = _numbers(lower(model, rig).source)
     assert found & {float(number) for number in theirs} == set()
     assert all(number == int(number) and number < 20 for number in found)
+    # So one text serves every parameter set and every number of elements.
+    texts = {lower(odd_numbers(n, seed), rig).source for n in (1, 2, 5) for seed in (1, 2)}
+    assert len(texts) == 1
 
 
 @pytest.mark.parametrize(("model", "rig"), CASES)
-def test_lines_are_short_enough_to_read(model: Model, rig: Rig) -> None:
-    source = lower(model, rig).source
-    assert max(len(line) for line in source.splitlines()) <= 100
-    assert "\t" not in source
-    for function in lower(model, rig).functions.values():
-        assert function.__doc__
-
-
-@pytest.mark.parametrize(("model", "rig"), CASES)
-def test_inspect_finds_every_function(model: Model, rig: Rig) -> None:
+def test_lines_are_short_and_inspect_finds_every_function(model: Model, rig: Rig) -> None:
     program = lower(model, rig)
+    assert max(len(line) for line in program.source.splitlines()) <= 100
+    assert "\t" not in program.source
     for name, function in program.functions.items():
+        assert function.__doc__
         text = inspect.getsource(function)
         assert text.startswith(f"def {name}(")
         assert text in program.source

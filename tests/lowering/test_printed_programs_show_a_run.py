@@ -23,9 +23,11 @@ from gms_fsm.systems.rigs import Prescribed, PulledSlider, Slider
 from tests.helpers import ROOT, matrix
 from tests.scenario_files import CommandLine, data_folder
 
+pytestmark = pytest.mark.slow
+
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
-FAST = ("gms-signed", "servo")
-SLOW = ("stiction", "backlash", "pulled_mass")  # the others are left to make foreign
+# The others are left to make foreign.
+KEPT = ("gms-signed", "servo", "stiction", "backlash", "pulled_mass")
 NAMED = os.environ.get("GMS_FSM_DATA", "")
 LAWS = {
     "-".join(filter(None, (each.name, law))): (each.name, law)
@@ -35,15 +37,15 @@ LAWS = {
 }
 
 
+def run(path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a printed program without gms-fsm and numpy."""
+    command = [sys.executable, "-I", "-S", str(path), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
 def program(path: Path, *arguments: str) -> list[str]:
-    """Run a printed program without gms-fsm and numpy; return its lines."""
-    done = subprocess.run(
-        [sys.executable, "-I", "-S", str(path), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+    """Return the lines that a program prints."""
+    done = run(path, *arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
 
@@ -57,9 +59,8 @@ def printed(gms_fsm: CommandLine, *arguments: str) -> Path:
 
 
 def marked(names: list[str]) -> list[Any]:
-    assert {*names} & {*SLOW}
-    slow = [pytest.param(name, marks=pytest.mark.slow) for name in names if name in SLOW]
-    return [*slow, *matrix([name for name in names if name not in SLOW], FAST)]
+    assert {*names} & {*KEPT}
+    return matrix(names, KEPT)
 
 
 @pytest.mark.parametrize("name", marked([*LAWS]))
@@ -133,7 +134,6 @@ def test_the_switches_are_those_of_simulate(
     assert said(lines) == log_of(trace)
 
 
-@pytest.mark.slow
 def test_a_servo_with_a_controller_and_two_contacts(gms_fsm: CommandLine) -> None:
     loaded = load_scenario(ROOT / "scenarios" / "servo.toml")
     path = printed(gms_fsm, str(ROOT / "scenarios" / "servo.toml"))
@@ -145,11 +145,6 @@ def test_a_servo_with_a_controller_and_two_contacts(gms_fsm: CommandLine) -> Non
 
 def test_too_few_steps_are_refused_in_one_sentence(gms_fsm: CommandLine) -> None:
     path = printed(gms_fsm, "dahl")
-    done = subprocess.run(
-        [sys.executable, "-I", "-S", str(path), "25", "400"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run(path, "25", "400")
     assert done.returncode == 1
     assert "not finite: take more than 400 steps to t = 25.0 s, or an earlier end" in done.stderr

@@ -1,7 +1,7 @@
 """A run's memory is its transition log: under 1,000 bytes per transition, and none for its steps.
 
 With ``output="end"`` nothing else grows, however long the run. This test runs twenty thousand
-transitions; tests/soak.py runs a million and checks what the operating system reports.
+transitions; tests/soak runs a million and checks what the operating system reports.
 """
 
 from __future__ import annotations

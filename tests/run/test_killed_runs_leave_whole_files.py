@@ -3,7 +3,7 @@
 Writers write two known contents alternately, again and again, and are killed with SIGKILL at a
 random moment; then every file is the one or the other, to the last bit. Other leftovers of a kill
 are named ``.<file>.<random>.gms-fsm-part`` and are gone after the next run. Six kills here, 200 in
-tests/soak.py.
+tests/soak.
 """
 
 from __future__ import annotations

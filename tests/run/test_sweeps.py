@@ -107,7 +107,7 @@ def test_a_dataframe_has_columns_of_elements() -> None:
     np.testing.assert_array_equal(again.F, one.F)
     with pytest.raises(ParameterError, match=r"'k' for some elements, but not k3"):
         sweep(model, rig, 6.0, frame.drop(columns="k3"), engine="ifelse")
-    with pytest.raises(ParameterError, match=r"'k5'; known here are k, sigma"):
+    with pytest.raises(ParameterError, match=r"'k5'; did you mean 'k'"):
         sweep(model, rig, 6.0, frame.assign(k5=1.0), engine="ifelse")
 
 

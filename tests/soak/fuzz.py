@@ -1,6 +1,6 @@
 """Fuzz bodies: bytes become a hostile input, and only documented exceptions may answer it.
 
-Each body is a plain function of bytes, so that hypothesis, a loop over seeds (tests/soak.py) or any
+Each body is a plain function of bytes, so that hypothesis, a loop over seeds (tests/soak) or any
 other fuzzer can drive it. The bytes are read as choices: which valid input to start from, what to
 break in it, and by how much. Accepted inputs are then used, because an input that is accepted and
 breaks later code is a finding too.
@@ -172,36 +172,19 @@ def _mutated_text(choices: Choices, text: str) -> str:
     return text
 
 
+WRAPS = [
+    ("(", ")"), ("abs(", ")"), ("-", ""), ("not ", ""), ("", "**2"), ("", "+v"), ("min(", ",v)"),
+    ("min(", ",v" * 48 + ")"), ("max(v,", ",z,s)"), ("v if z else ", ""), ("[", "]"), ("{", "}"),
+    ("f'{", "}'"), ("", " < v"), ("", " and z < s"), ("", "*(v"), ("lambda: ", ""),
+    ("state(", ")"), ("v**", ""), ("(", "**8)"), ("", ".a"), ("", "()"),
+]  # fmt: skip
+
+
 def _nested(choices: Choices) -> str:
     """Nest deeply, chain long, or both."""
     text = choices.one_of(["v", "z < s", "", "1"])
     for _ in range(1 + choices.below(4)):
-        before, after = choices.one_of(
-            [
-                ("(", ")"),
-                ("abs(", ")"),
-                ("-", ""),
-                ("not ", ""),
-                ("", "**2"),
-                ("", "+v"),
-                ("min(", ",v)"),
-                ("min(", ",v" * 48 + ")"),
-                ("max(v,", ",z,s)"),
-                ("v if z else ", ""),
-                ("[", "]"),
-                ("{", "}"),
-                ("f'{", "}'"),
-                ("", " < v"),
-                ("", " and z < s"),
-                ("", "*(v"),
-                ("lambda: ", ""),
-                ("state(", ")"),
-                ("v**", ""),
-                ("(", "**8)"),
-                ("", ".a"),
-                ("", "()"),
-            ]
-        )
+        before, after = choices.one_of(WRAPS)
         times = choices.one_of([1, 3, 30, 58, 59, 60, 61, 100, 300, 1000, 5000])
         if times * (len(before) + len(after)) > 60_000:
             times = 60_000 // (len(before) + len(after))
@@ -271,11 +254,7 @@ def one_expression(data: bytes) -> bool:
 
     Only `ExpressionError` may be raised, with a column inside the text. An accepted tree prints as
     a text that parses to the same values, and every algebra can process it.
-
-    Returns
-    -------
-    bool
-        Whether the text was accepted as either.
+    Returns whether it was accepted.
     """
     choices = Choices(data)
     text = _text(choices)
@@ -604,11 +583,7 @@ def one_scenario(data: bytes) -> bool:
 
     Only `ScenarioError` and `RecordError` may be raised for a file, and only `GMSError` for its
     run; a run that fails keeps its rows.
-
-    Returns
-    -------
-    bool
-        Whether the file was accepted.
+    Returns whether it was accepted.
     """
     choices = Choices(data)
     record = _mutated_record(choices) if choices.below(3) == 2 else sine_table().encode()
@@ -678,31 +653,11 @@ def _valid_traces() -> list[dict[str, bytes]]:
 
 HEADERS = [
     *[value for value in NASTY if not isinstance(value, datetime.date | datetime.time)],
-    None,
-    "formula",
-    "corners",
-    "function",
-    "compiled",
-    "located",
-    "step",
-    10**15,
-    "__import__('os')",
-    "1 +",
-    "z",
-    ["v"],
-    ["z", "z"],
-    [{"name": "a", "flow": {"z": "v"}}],
-    {"z": "v"},
-    "Slider",
-    "PulledSlider",
-    {"k": [1.0]},
-    {"engine": None},
-    [0.0] * 4,
-    "stick",
+    None, "formula", "corners", "function", "compiled", "located", "step", 10**15,
+    "__import__('os')", "1 +", "z", ["v"], ["z", "z"], [{"name": "a", "flow": {"z": "v"}}],
+    {"z": "v"}, "Slider", "PulledSlider", {"k": [1.0]}, {"engine": None}, [0.0] * 4, "stick",
     "z >= s",
-]
-
-
+]  # fmt: skip
 _UNFIT = (ValueError, TypeError, OverflowError, RuntimeError)
 
 
@@ -749,39 +704,35 @@ def _mutated_array(choices: Choices, array: Any) -> Any:
     return changed
 
 
+def _large_array(choices: Choices) -> bytes:
+    """Return an array whose header claims many entries; it may have them."""
+    head = io.BytesIO()
+    count = choices.one_of([0, 10**4, 10**6, 4 * 10**7, 10**9, 10**15, 2**62, -1])
+    shape = choices.one_of([(count,), (count, 5), (5, count), (count, 0)])
+    kind = choices.one_of(["<f8", "<i8", "<U2000", "|V8", "|O", "<U2000000"])
+    np.lib.format.write_array_header_1_0(
+        head, {"descr": kind, "fortran_order": False, "shape": shape}
+    )
+    return head.getvalue() + bytes(min(max(0, count), 10**6) * 8 * choices.one_of([0, 1]))
+
+
 def _mutated_npz(choices: Choices, content: bytes) -> bytes:
     how = choices.below(8)
     if how == 0:
         return damaged(choices, content)
     with np.load(io.BytesIO(content)) as file:
         arrays = dict(file)
-    if how == 1:  # a valid archive with a damaged member
+    if how in (1, 2):  # a valid archive with a damaged member, or one that claims to be large
         name = choices.one_of(sorted(arrays))
-        out = io.BytesIO()
-        method = choices.one_of([zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA])
+        methods = [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA]
+        method = choices.one_of(methods) if how == 1 else zipfile.ZIP_DEFLATED
+        out, large = io.BytesIO(), _large_array(choices) if how == 2 else b""
         with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(out, "w", method) as new:
             for member in old.namelist():
                 data = old.read(member)
-                new.writestr(member, damaged(choices, data) if member == f"{name}.npy" else data)
-        return out.getvalue()
-    if how == 2:  # an array that claims to be large, and may be
-        name = choices.one_of(sorted(arrays))
-        out, head = io.BytesIO(), io.BytesIO()
-        count = choices.one_of([0, 10**4, 10**6, 4 * 10**7, 10**9, 10**15, 2**62, -1])
-        shape = choices.one_of([(count,), (count, 5), (5, count), (count, 0)])
-        kind = choices.one_of(["<f8", "<i8", "<U2000", "|V8", "|O", "<U2000000"])
-        np.lib.format.write_array_header_1_0(
-            head, {"descr": kind, "fortran_order": False, "shape": shape}
-        )
-        filling = min(max(0, count), 10**6) * 8 * choices.one_of([0, 1])
-        with (
-            zipfile.ZipFile(io.BytesIO(content)) as old,
-            zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as new,
-        ):
-            for member in old.namelist():
-                data = old.read(member)
-                large = head.getvalue() + bytes(filling)
-                new.writestr(member, large if member == f"{name}.npy" else data)
+                if member == f"{name}.npy":
+                    data = large or damaged(choices, data)
+                new.writestr(member, data)
         return out.getvalue()
     if how in (3, 4):
         header = json.loads(str(arrays["header"]))
@@ -834,11 +785,7 @@ def one_trace_file(data: bytes) -> bool:
 
     Only `TraceFileError` may be raised. An accepted trace has all its columns, can be sampled,
     explained and summarized, and saves and loads unchanged.
-
-    Returns
-    -------
-    bool
-        Whether the file was accepted.
+    Returns whether it was accepted.
     """
     choices = Choices(data)
     if choices.below(12) == 11:

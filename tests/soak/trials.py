@@ -1,7 +1,7 @@
 """Random runs at default tolerances against a reference: is the sequence of switches the same?
 
-``python -m tests.trials --family pulled --count 500 --seed 1`` prints each run that is wrong or
-fails, with the line that repeats it, and a table.
+``python -m tests.soak.trials --family pulled --count 500 --seed 1`` prints each run that is wrong
+or fails; ``--witness yes`` checks the reference instead.
 
 Families, all of one to six elements, thresholds as shares/k or free:
 
@@ -18,7 +18,7 @@ compiled; the model is drawn around them, which amounts to the same.
 The judge
 ---------
 The reference is our own engine at rtol 1e-12 and an atol far below thresholds and v_c
-(`tests.witness` checks it). A default run is *right* if its sequence of (element, edge) is the
+(`tests.soak.witness` checks it). A default run is *right* if its sequence of (element, edge) is the
 reference's. It is *wrong* only if the run is well conditioned: the reference keeps its sequence
 at rtol 1e-11, and also when every parameter is changed by a relative 1e-5, up or down at random,
 four times over; and no gap between switches of two elements changes by half of itself meanwhile.
@@ -30,18 +30,16 @@ within 1e-6 of the time of each other, or an arrest with |z| nearer to s than 1e
 steady slip, where z tends to s and the parameters do not matter. All else is *ill*: counted, not
 judged.
 
-Switching times and the state at the end are reported, not judged.
+Switching times and the state at the end are not judged.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
-import time
 import zlib
+from argparse import Namespace
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -50,6 +48,8 @@ import numpy as np
 from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider, Stribeck, Trace, simulate
 from gms_fsm.errors import GMSError
 from gms_fsm.traces.failures import SimulationError
+from tests.soak.trying import Seen, examine
+from tests.soak.witness import witness
 
 JUDGED = ("pulled", "forced", "sines", "literature")
 FAMILIES = (*JUDGED, "undamped")
@@ -73,7 +73,6 @@ WORK = 2e4  # t_end in units of the fastest time; a reference then takes at most
 CALLS = 40  # of progress until a run is abandoned; the compiled engine calls every 20,000 steps
 NUDGES, NUDGE, SMALL_NUDGE = 4, 1e-5, 1e-6
 RTOL = 1e-6  # of the runs under test
-LARGE = 1e-4  # an error of the end state large enough to count
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +88,8 @@ class Trial:
 
     @property
     def again(self) -> str:
-        """The command that repeats it."""
-        return (
-            f"python -m tests.trials --family {self.family} --seed {self.seed} --index {self.index}"
-        )
+        """The arguments that repeat it."""
+        return f"--family {self.family} --seed {self.seed} --index {self.index}"
 
     @property
     def atol(self) -> float:
@@ -145,14 +142,17 @@ def trial(family: str, seed: int, index: int) -> Trial:
     model, rig, t_end = made(draw, law)
     if family == "undamped":
         p = model.parameters
-        model = GMS(_bank(p.k, 0 * p.k, p.C, p.sigma_2, p.stribeck, p.v_c, p.weights), law=law)
+        model = _model(law, p.k, 0 * p.k, p.C, p.sigma_2, p.stribeck, p.v_c, p.weights)
     return Trial(family, seed, index, model, rig, t_end)
 
 
-def _bank(
-    k: Any, sigma: Any, C: Any, sigma_2: float, curve: Stribeck, v_c: float, weights: Any
-) -> GMSParameters:
-    return GMSParameters(k, sigma, C, sigma_2=sigma_2, stribeck=curve, v_c=v_c, weights=weights)
+def _model(
+    law: Any, k: Any, sigma: Any, C: Any, sigma_2: float, curve: Stribeck, v_c: float, weights: Any
+) -> GMS:
+    parameters = GMSParameters(
+        k, sigma, C, sigma_2=sigma_2, stribeck=curve, v_c=v_c, weights=weights
+    )
+    return GMS(parameters, law=law)
 
 
 def _elements(draw: Draw, k_total: float) -> tuple[Any, Any]:
@@ -211,18 +211,8 @@ def pulled(draw: Draw, law: Any) -> tuple[GMS, PulledSlider, float]:
     curve = _curve(draw, F_c, speed * draw.decades(-1.3, 0.7))
     sigma = 2 * np.sqrt(k * mass) * draw.decades(-2, -0.3, k.size)
     C = weights * F_c * omega * draw.decades(-0.7, 1.5, k.size)
-    model = GMS(
-        _bank(
-            k,
-            sigma,
-            C,
-            mass * omega * draw.decades(-2, 0),
-            curve,
-            speed * draw.decades(-6, -3),
-            weights,
-        ),
-        law=law,
-    )
+    sigma_2, v_c = mass * omega * draw.decades(-2, 0), speed * draw.decades(-6, -3)
+    model = _model(law, k, sigma, C, sigma_2, curve, v_c, weights)
     return model, *_pulled(PulledSlider(mass, stiffness, speed), model)
 
 
@@ -247,18 +237,8 @@ def forced(draw: Draw, law: Any) -> tuple[GMS, Slider, float]:
     curve = _curve(draw, F_c, speed * draw.decades(-2.5, -0.3), most=0.0)
     sigma = 2 * np.sqrt(k * mass) * draw.decades(-2, -0.3, k.size)
     C = weights * F_c * omega * draw.decades(-0.5, 2, k.size)
-    model = GMS(
-        _bank(
-            k,
-            sigma,
-            C,
-            mass * omega * draw.decades(-2, 0),
-            curve,
-            speed * draw.decades(-7, -3.5),
-            weights,
-        ),
-        law=law,
-    )
+    sigma_2, v_c = mass * omega * draw.decades(-2, 0), speed * draw.decades(-7, -3.5)
+    model = _model(law, k, sigma, C, sigma_2, curve, v_c, weights)
     return model, Slider(mass, force), min(end, WORK / _fastest(model, mass))
 
 
@@ -270,18 +250,8 @@ def sines(draw: Draw, law: Any) -> tuple[GMS, Prescribed, float]:
     curve = _curve(draw, F_c, speed * draw.decades(-2.5, -0.3))
     sigma = draw.decades(-2, 0, k.size) * k / omega
     C = weights * F_c * omega * draw.decades(-0.5, 2, k.size)
-    model = GMS(
-        _bank(
-            k,
-            sigma,
-            C,
-            F_c / speed * draw.decades(-2, 0),
-            curve,
-            speed * draw.decades(-7, -3.5),
-            weights,
-        ),
-        law=law,
-    )
+    sigma_2, v_c = F_c / speed * draw.decades(-2, 0), speed * draw.decades(-7, -3.5)
+    model = _model(law, k, sigma, C, sigma_2, curve, v_c, weights)
     return model, Prescribed(velocity), end
 
 
@@ -303,9 +273,8 @@ def literature(draw: Draw, law: Any) -> tuple[GMS, PulledSlider | Slider, float]
         if draw.chance(0.5)
         else weights * F_c * draw.decades(0.5, 3, k.size)
     )
-    model = GMS(
-        _bank(k, sigma, C, draw.decades(0, 2.5), curve, draw.decades(-7, -5), weights), law=law
-    )
+    sigma_2, v_c = draw.decades(0, 2.5), draw.decades(-7, -5)
+    model = _model(law, k, sigma, C, sigma_2, curve, v_c, weights)
     if is_pulled:
         rig = PulledSlider(mass, draw.decades(2.5, 4.5), draw.decades(-3.5, -2))
         return model, *_pulled(rig, model)
@@ -325,13 +294,12 @@ class Outcome:
     t: Any
     end: Any
     failed: str
-    seconds: float
     nearest: float = math.inf  # smallest ||z| / s - 1| at an arrest
 
 
 def run(trial: Trial, engine: str = "compiled", **options: float) -> Outcome:
     """Run a trial with the defaults, or with options of `simulate`."""
-    calls, began, failed = 0, time.perf_counter(), ""
+    calls, failed = 0, ""
 
     def patience(_: object) -> None:
         nonlocal calls
@@ -354,15 +322,14 @@ def run(trial: Trial, engine: str = "compiled", **options: float) -> Outcome:
         trace, failed = error.trace, type(error).__name__
     except (GMSError, TooLong) as error:
         failed = type(error).__name__
-    seconds = time.perf_counter() - began
     if trace is None:
-        return Outcome((), np.empty(0), np.empty(0), failed, seconds)
+        return Outcome((), np.empty(0), np.empty(0), failed)
     log = trace.transitions
     sequence = tuple(zip(log.element.tolist(), log.edge.tolist(), strict=True))
     end = np.array([trace.x[-1], trace.v[-1], *trace.z[-1]])
     arrests = log[log.edge == "arrest"]
     nearest = float(np.min(np.abs(np.abs(arrests.z) / arrests.s - 1.0), initial=math.inf))
-    return Outcome(sequence, np.array(log.t), end, failed, seconds, nearest)
+    return Outcome(sequence, np.array(log.t), end, failed, nearest)
 
 
 def reference(trial: Trial, engine: str = "compiled", rtol: float = 1e-12) -> Outcome:
@@ -381,14 +348,13 @@ def nudged(trial: Trial, number: int, size: float) -> Trial:
     p, rig = trial.model.parameters, trial.rig
     F_c, rise = near(p.stribeck.F_c), near(p.stribeck.F_s - p.stribeck.F_c)
     curve = Stribeck(F_c, F_c + rise, near(p.stribeck.v_s))
-    bank = _bank(
-        near(p.k), near(p.sigma), near(p.C), near(p.sigma_2), curve, near(p.v_c), near(p.weights)
-    )
+    numbers = (near(p.k), near(p.sigma), near(p.C), near(p.sigma_2))
+    model = _model(trial.model.law, *numbers, curve, near(p.v_c), near(p.weights))
     if isinstance(rig, PulledSlider):
         rig = PulledSlider(near(rig.mass), near(rig.stiffness), near(rig.speed))
     elif isinstance(rig, Slider):
         rig = Slider(near(rig.mass), rig.force)
-    return replace(trial, model=GMS(bank, law=trial.model.law), rig=rig)
+    return replace(trial, model=model, rig=rig)
 
 
 # --------------------------------------------------------------------------- judging
@@ -417,42 +383,26 @@ def is_undecided(exact: Outcome) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A verdict with its figures.
-
-    `late` is the largest error of a switching time in units of t_end; `off` the largest error of
-    the end state, x and z in units of the value plus the smallest threshold, v of the value plus
-    v_s. Both are NaN unless the sequences are equal.
-    """
+    """A verdict, and the runs that it is about."""
 
     trial: Trial
     verdict: str  # right, wrong, close, ill, failed, reference failed
     default: Outcome
     exact: Outcome
-    late: float = math.nan
-    off: float = math.nan
 
 
 def judge(trial: Trial, engine: str = "compiled", **options: float) -> Judged:
     """Compare a run with the defaults (or with options, to test the judge) with the reference."""
     default, exact = run(trial, engine, **options), reference(trial, engine)
-    if exact.failed or default.failed:
-        return Judged(trial, "reference failed" if exact.failed else "failed", default, exact)
-    late = off = math.nan
     same = default.sequence == exact.sequence
-    if same:
-        p = trial.model.parameters
-        threshold = np.min(p.weights) * p.stribeck.F_c
-        scale = np.array([threshold, p.stribeck.v_s, *np.full(trial.model.n, threshold)])
-        late = float(np.max(np.abs(default.t - exact.t), initial=0.0) / trial.t_end)
-        off = float(np.max(np.abs(default.end - exact.end) / (np.abs(exact.end) + scale)))
-    if is_steady(trial, exact, NUDGE, engine):
-        unsure = not same and is_undecided(exact)
-        verdict = "right" if same else "close" if unsure else "wrong"
-    elif not same and is_steady(trial, exact, SMALL_NUDGE, engine):
-        verdict = "close"
+    if exact.failed or default.failed:
+        verdict = "reference failed" if exact.failed else "failed"
+    elif is_steady(trial, exact, NUDGE, engine):
+        verdict = "right" if same else "close" if is_undecided(exact) else "wrong"
     else:
-        verdict = "ill"
-    return Judged(trial, verdict, default, exact, late, off)
+        close = not same and is_steady(trial, exact, SMALL_NUDGE, engine)
+        verdict = "close" if close else "ill"
+    return Judged(trial, verdict, default, exact)
 
 
 def is_finding(judged: Judged) -> bool:
@@ -463,9 +413,8 @@ def is_finding(judged: Judged) -> bool:
     return judged.verdict == "wrong" or (bool(failed) and judged.trial.model.law == "signed")
 
 
-# --------------------------------------------------------------------------- printing
 def said(judged: Judged) -> str:
-    """Return a line about a run that is not right, and the command that repeats it."""
+    """Return a line about a run that is not right, and the arguments that repeat it."""
     default, exact = judged.default, judged.exact
     what = f"{judged.verdict}: {len(default.sequence)} switches, the reference has "
     what += f"{len(exact.sequence)}"
@@ -481,39 +430,8 @@ def said(judged: Judged) -> str:
     return f"{what} ({judged.trial.model.law} law)\n  {judged.trial.again}"
 
 
-def table(found: Iterable[Judged]) -> str:
-    """Return the summary: one row per family and law."""
-    head = (
-        f"{'family':22} {'runs':>5} {'right':>6} {'wrong':>6} {'close':>6} {'ill':>5} "
-        f"{'(differ)':>8} {'failed':>7} {'ref. f.':>7} {'switches':>9} {'late':>8} {'off':>8} "
-        f"{'>1e-4':>6} {'ms':>6} {'ref. ms':>8}"
-    )
-    groups: dict[tuple[str, str], list[Judged]] = {}
-    for judged in found:
-        groups.setdefault((judged.trial.family, judged.trial.model.law), []).append(judged)
-    lines = [head]
-    for (family, law), group in sorted(groups.items()):
-        count = Counter(judged.verdict for judged in group)
-        differ = sum(j.verdict == "ill" and math.isnan(j.off) for j in group)
-        right = [j for j in group if j.verdict == "right"]
-        switches = [len(j.exact.sequence) for j in group]
-        off = [j.off for j in right] or [math.nan]
-        lines.append(
-            f"{family + ', ' + law:22} {len(group):5} {count['right']:6} {count['wrong']:6} "
-            f"{count['close']:6} {count['ill']:5} {differ:8} {count['failed']:7} "
-            f"{count['reference failed']:7} {np.median(switches):9.0f} "
-            f"{max((j.late for j in right), default=math.nan):8.1e} {max(off):8.1e} "
-            f"{sum(u > LARGE for u in off):6} "
-            f"{1e3 * np.median([j.default.seconds for j in group]):6.1f} "
-            f"{1e3 * np.median([j.exact.seconds for j in group]):8.1f}"
-        )
-    return "\n".join(lines)
-
-
 def witnessed(trial: Trial, engine: str = "compiled") -> str:
     """Return how the reference differs from the witness; empty if it does not."""
-    from tests.witness import witness
-
     exact = reference(trial, engine)
     seen = witness(trial.model, trial.rig, trial.t_end)
     if exact.failed:
@@ -524,60 +442,24 @@ def witnessed(trial: Trial, engine: str = "compiled") -> str:
     return "" if late < 1e-8 * trial.t_end else f"a switch is {late:.2g} s late"
 
 
-def details(trial: Trial, engine: str) -> str:
-    """Return everything about one trial."""
-    judged = judge(trial, engine)
-    lines = [str(trial), said(judged)]
-    for name, outcome in (("default", judged.default), ("reference", judged.exact)):
-        lines.append(f"{name}: {outcome.failed or 'to the end'}, end (x, v, z) = {outcome.end}")
-        lines += [
-            f"  {t:.12g} s  element {element}  {edge}"
-            for t, (element, edge) in zip(outcome.t, outcome.sequence, strict=True)
-        ]
-    return "\n".join(lines)
-
-
-def main() -> None:
-    """Judge the requested number of runs in each requested family."""
-    parser = argparse.ArgumentParser(description="Random runs against a reference.")
-    parser.add_argument("--family", choices=FAMILIES, action="append", help="default: all")
-    parser.add_argument("--count", type=int, default=100, help="runs of each family")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--index", type=int, help="this one run, in full")
-    parser.add_argument("--engine", default="compiled")
-    parser.add_argument(
-        "--witness", action="store_true", help="check the reference instead, by tests.witness"
-    )
-    given = parser.parse_args()
-    families = given.family or FAMILIES
-    if given.index is not None:
-        for family in families:
-            one = trial(family, given.seed, given.index)
-            if given.witness:
-                print(witnessed(one, given.engine) or "the witness agrees")
-            else:
-                print(details(one, given.engine))
-        return
-    found, findings = [], 0
-    for family in families:
-        for index in range(given.count):
-            one = trial(family, given.seed, index)
-            if given.witness:
-                differs = witnessed(one, given.engine)
-                findings += bool(differs)
-                if differs:
-                    print(f"{differs}\n  {one.again} --witness", flush=True)
-                continue
-            judged = judge(one, given.engine)
-            found.append(judged)
-            findings += is_finding(judged)
-            if judged.verdict not in ("right", "ill"):
-                print(("FINDING " if is_finding(judged) else "") + said(judged), flush=True)
-    if found:
-        print(table(found))
-    print(f"{findings} findings, seed {given.seed}")
-    sys.exit(1 if findings else 0)
+def look(given: Namespace, index: int) -> Iterator[Seen]:
+    """Judge one run of each requested family, or its reference."""
+    for family in (given.family,) if given.family else FAMILIES:
+        one = trial(family, given.seed, index)
+        again = f"--family {family} --index {index}"
+        if given.witness:
+            yield Seen(again, {family: 1}, witnessed(one), shown=[one])
+            continue
+        judged = judge(one)
+        shown = [one, said(judged)]
+        for outcome in (judged.default, judged.exact):
+            shown += [outcome.failed, outcome.end, *zip(outcome.t, outcome.sequence, strict=True)]
+        counts = Counter([f"{family}, {one.model.law}, {judged.verdict}"])
+        counts["switches"] = len(judged.exact.sequence)
+        finding = said(judged) if is_finding(judged) else ""
+        open_ = judged.verdict not in ("right", "ill")
+        yield Seen(again, counts, finding, said(judged) if open_ else "", shown)
 
 
 if __name__ == "__main__":
-    main()
+    examine("trials", "Random runs against a reference", look, count=100, family="", witness="")

@@ -1,24 +1,20 @@
 """Random systems give equal bits in all engines: machines, if-else text, machine code.
 
-``python -m tests.random_systems --count 500 --seed 1`` prints each system whose runs differ, with
-the line that repeats it, and a table of what was drawn.
+``python -m tests.soak.random_systems --count 500 --seed 1`` prints each system whose runs differ.
 
 A trial is a pure function of (seed, index, shapes). Its *shape* - bodies, contacts and their
-charts, controllers, signals, method - is one of `shapes` many, because every shape is compiled
-anew; its numbers, initial values and tolerances are its own. A run that cannot continue must do so
-in all engines with the same words, and with the same rows until then.
+charts, controllers, signals, method - is one of `shapes` many; its numbers, initial values and
+tolerances are its own. A run that cannot continue must do so in all engines with the same words,
+and with the same rows until then.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
-import time
+from argparse import Namespace
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from random import Random
 from typing import Any
 
 import numpy as np
@@ -37,12 +33,10 @@ from gms_fsm import (
     System,
     Trace,
     Transition,
-    simulate,
 )
 from gms_fsm.charts import CHARTS
-from gms_fsm.errors import GMSError
-from gms_fsm.traces.failures import SimulationError
 from tests.helpers import other_parts
+from tests.soak.trying import Dice, Seen, examine, outcome, shaped
 
 SHAPES = 60
 MOST_STEPS = 3000  # of a run; some of these systems chatter
@@ -57,36 +51,9 @@ class Trial:
     system: System
     how: dict[str, Any]
     kinds: tuple[str, ...]
-    again: str
 
 
 # --------------------------------------------------------------------------- what is drawn
-@dataclass(frozen=True, eq=False)
-class Dice:
-    """Two sources of chance: one for the shape, one for the numbers."""
-
-    shape: Random
-    numbers: Random
-    digits: int = 3
-
-    def one_of(self, *options: Any) -> Any:
-        """Choose a part of the shape."""
-        return self.shape.choice(options)
-
-    def spread(self, low: float, high: float) -> float:
-        """Draw a number with a few digits, evenly over decades."""
-        value = math.exp(self.numbers.uniform(math.log(low), math.log(high)))
-        return float(f"{value:.{self.digits}g}")
-
-    def even(self, low: float, high: float) -> float:
-        """Draw a number with a few digits; it occasionally falls on a boundary."""
-        return float(f"{self.numbers.uniform(low, high):.{self.digits}g}")
-
-    def spreads(self, n: int, low: float, high: float) -> list[float]:
-        """Draw several numbers."""
-        return [self.spread(low, high) for _ in range(n)]
-
-
 def _curve(dice: Dice) -> Stribeck:
     F_c = dice.spread(0.2, 1.0)
     return Stribeck(F_c, F_c * dice.even(1.0, 2.0), dice.spread(1e-3, 0.2))
@@ -151,15 +118,9 @@ def _own(dice: Dice) -> ChartModel:
     return ChartModel(chart, values, n=n, stribeck=_curve(dice), weights=weights)
 
 
-def _stiction(dice: Dice) -> dict[str, float]:
+def _thresholds(dice: Dice) -> dict[str, float]:
     F_c = dice.spread(0.1, 2.0)
-    return {"F_c": F_c, "F_s": F_c * dice.even(1.0, 1.8), "b": dice.even(0.0, 0.3)}
-
-
-def _karnopp(dice: Dice) -> dict[str, float]:
-    F_c = dice.spread(0.1, 2.0)
-    F_s = F_c * dice.even(1.0, 1.8)
-    return {"F_c": F_c, "F_s": F_s, "sigma_2": dice.even(0.0, 0.5), "D": dice.spread(1e-5, 1e-2)}
+    return {"F_c": F_c, "F_s": F_c * dice.even(1.0, 1.8)}
 
 
 MODELS: dict[str, Callable[[Dice], Any]] = {
@@ -173,8 +134,12 @@ MODELS: dict[str, Callable[[Dice], Any]] = {
     ),
 }
 VALUES: dict[str, Callable[[Dice], dict[str, Any]]] = {
-    "stiction": _stiction,
-    "karnopp": _karnopp,
+    "stiction": lambda dice: {**_thresholds(dice), "b": dice.even(0.0, 0.3)},
+    "karnopp": lambda dice: {
+        **_thresholds(dice),
+        "sigma_2": dice.even(0.0, 0.5),
+        "D": dice.spread(1e-5, 1e-2),
+    },
     "backlash": lambda dice: {
         "k": dice.spread(20.0, 500.0),
         "d": dice.even(0.0, 1.0),
@@ -198,13 +163,9 @@ KINDS = ("gms", "gms", "gms", "own", "own", "stiction", "stiction", *MODELS, *VA
 
 def _contact(dice: Dice, name: str, kind: str, x: str, v: str) -> Contact:
     """A contact of a kind on one relative motion."""
-    if kind in MODELS:
-        model = MODELS[kind](dice)
-        inputs = {"x": x} if "x" in model.chart.inputs else {}
-        return Contact(name, model, v=v, inputs=inputs)
-    chart = CHARTS[kind]
-    inputs = {"x": x} if "x" in chart.inputs else {}
-    return Contact(name, chart, VALUES[kind](dice), v=v, inputs=inputs)
+    given = (MODELS[kind](dice),) if kind in MODELS else (CHARTS[kind], VALUES[kind](dice))
+    chart = getattr(given[0], "chart", given[0])
+    return Contact(name, *given, v=v, inputs={"x": x} if "x" in chart.inputs else {})
 
 
 def _signal(dice: Dice) -> tuple[Any, dict[str, float]]:
@@ -286,40 +247,19 @@ def _options(dice: Dice, system: System) -> dict[str, Any]:
 
 
 def trial(seed: int, index: int, shapes: int = SHAPES) -> Trial:
-    """Return a trial; the same arguments give the same one.
-
-    Shapes that are refused, such as locks that depend on each other, are skipped.
-    """
-    command = f"python -m tests.random_systems --seed {seed} --shapes {shapes} --index {index}"
-    for attempt in range(50):
-        which = f"{seed}:{index % shapes}:{attempt}"
-        dice = Dice(Random(f"shape {which}"), Random(f"numbers {which}:{index}"))
-        try:
-            system = _system(dice)
-        except GMSError:
-            continue
-        kinds = tuple(each.name.rpartition("_")[0] for each in system.contacts)
-        return Trial(system, _options(dice, system), kinds, command)
-    raise AssertionError(f"no system in fifty attempts: {command}")
+    """Return a trial; the same arguments give the same one."""
+    system, dice = shaped(_system, seed, index, shapes)
+    kinds = tuple(each.name.rpartition("_")[0] for each in system.contacts)
+    return Trial(system, _options(dice, system), kinds)
 
 
 # --------------------------------------------------------------------------- comparing
-def run(trial: Trial, engine: str) -> tuple[Trace | None, str]:
-    """Return the trace, also of a run that stops, and how it ended."""
-    try:
-        return simulate(trial.system, T_END, engine=engine, **trial.how), "end"
-    except SimulationError as error:
-        return error.trace, f"{type(error).__name__}: {error}"
-    except GMSError as error:
-        return None, f"{type(error).__name__}: {error}"
-
-
 def differences(trial: Trial, engines: tuple[str, ...] = ENGINES) -> tuple[list[str], Trace | None]:
     """Return what differs from the first engine, and its trace."""
-    trace, end = run(trial, engines[0])
+    trace, end = outcome(trial.system, T_END, engine=engines[0], **trial.how)
     found = []
     for engine in engines[1:]:
-        other, its_end = run(trial, engine)
+        other, its_end = outcome(trial.system, T_END, engine=engine, **trial.how)
         if its_end != end:
             found.append(f"{engine}: {its_end!r} and not {end!r}")
         if parts := other_parts(trace, other):
@@ -327,35 +267,17 @@ def differences(trial: Trial, engines: tuple[str, ...] = ENGINES) -> tuple[list[
     return found, trace
 
 
-def main() -> None:
-    """Compare the requested number of systems; exit with 1 if runs differ."""
-    parser = argparse.ArgumentParser(description="Random systems: equal bits in all engines?")
-    parser.add_argument("--count", type=int, default=500)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--shapes", type=int, default=SHAPES, help="each is compiled once")
-    parser.add_argument("--index", type=int, help="this one, in full")
-    given = parser.parse_args()
-    began, findings, firings = time.monotonic(), 0, 0
-    drawn: Counter[str] = Counter()
-    indices = range(given.count) if given.index is None else [given.index]
-    for index in indices:
-        one = trial(given.seed, index, given.shapes)
-        differ, trace = differences(one)
-        findings += bool(differ)
-        firings += 0 if trace is None else len(trace.transitions)
-        drawn.update(one.kinds)
-        drawn["to the end"] += trace is not None and bool((trace.t[-1:] == T_END).any())
-        if differ:
-            print(f"FINDING {'; '.join(differ)}\n  {one.again}", flush=True)
-        if given.index is not None:
-            print(one.system, one.how, trace, sep="\n")
-    print(", ".join(f"{name} {count}" for name, count in sorted(drawn.items())))
-    print(
-        f"{findings} of {len(indices)} systems differ, seed {given.seed}; {firings:,} transitions, "
-        f"{time.monotonic() - began:.0f} s"
-    )
-    sys.exit(1 if findings else 0)
+def look(given: Namespace, index: int) -> Iterator[Seen]:
+    """Compare the engines on one system."""
+    one = trial(given.seed, index, given.shapes)
+    differ, trace = differences(one)
+    counts = Counter(one.kinds)
+    if trace is not None:
+        counts["transitions"] = len(trace.transitions)
+        counts["to the end"] = bool((trace.t[-1:] == T_END).any())
+    again = f"--shapes {given.shapes} --index {index}"
+    yield Seen(again, counts, "; ".join(differ), shown=(one.system, one.how, trace))
 
 
 if __name__ == "__main__":
-    main()
+    examine("random_systems", "Equal bits in all engines?", look, count=500, shapes=SHAPES)

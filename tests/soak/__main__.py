@@ -1,11 +1,10 @@
 """Stress tests for minutes and hours: ``python -m tests.soak --minutes 10``, or ``make soak``.
 
-The three fuzz bodies for the given number of minutes each, 200 kills at random moments, a run of a
-million transitions, new random runs of tests/physics/test_hard_random_runs.py and of
-tests/trials.py, new records to step along, new systems of tests/random_systems.py in all engines,
-and of tests/exact_systems.py against an exact reference. Each part runs in separate processes, with
-limits on memory and time; findings are printed with the command that repeats them, and the exit
-code is then 1.
+Three fuzz bodies for the given number of minutes each, 200 kills at random moments, a run of a
+million transitions, new random runs of tests/physics/test_hard_random_runs.py, new records to step
+along, and new trials of the other modules of this folder. Each part runs in separate processes,
+with limits on memory and time; findings are printed with the command that repeats them, and the
+exit code is then 1.
 """
 
 from __future__ import annotations
@@ -22,10 +21,12 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from tests.soak import fuzz
+
+ROOT = Path(__file__).resolve().parents[2]
 SIZES = (8, 32, 128, 512, 2048)  # bytes of an input
 SLOWEST = 60  # s allowed for one input
 MEMORY = 4 * 2**30  # bytes of address space for a process
@@ -46,26 +47,10 @@ def _used() -> int:
 
 # --------------------------------------------------------------------------- a child that fuzzes
 def fuzz_here(name: str, seed: int, seconds: float, watch: Path) -> dict[str, float]:
-    """Try inputs for a while in this process; print the findings.
+    """Try inputs for a while in this process; print the findings, and return figures.
 
-    Parameters
-    ----------
-    name : str
-        A body in tests/fuzz.py.
-    seed : int
-        Seed of the inputs.
-    seconds : float
-        Duration.
-    watch : Path
-        File for the index of the current input, in case this process dies.
-
-    Returns
-    -------
-    dict
-        Figures: inputs, accepted, slowest [s], MB, findings.
+    The index of the current input is written to `watch`, in case this process dies.
     """
-    from tests import fuzz
-
     body, known = fuzz.BODIES[name], set()
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     index = accepted = found = 0
@@ -109,27 +94,30 @@ def _again(name: str, seed: int, index: int) -> str:
 
 
 # --------------------------------------------------------------------------- the parts
+def in_a_child(
+    arguments: Sequence[str], folder: str, limit: float | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a module; machine code of random charts is kept in a folder that is removed."""
+    return subprocess.run(
+        [sys.executable, "-m", *arguments],
+        cwd=ROOT,
+        env={**os.environ, "GMS_FSM_CACHE": folder},
+        stdout=subprocess.PIPE,
+        text=True,
+        timeout=limit,
+        check=False,
+    )
+
+
 def fuzzing(name: str, seed: int, minutes: float) -> bool:
     """Run one body in a child; return whether there were no findings."""
     with tempfile.TemporaryDirectory() as folder:
         watch = Path(folder) / "index"
-        command = [
-            *(sys.executable, "-m", "tests.soak", "--only", name, "--seed", str(seed)),
-            *("--child", str(60 * minutes), "--watch", str(watch)),
-        ]
-        # Machine code of hostile charts should not be cached.
-        surroundings = {**os.environ, "GMS_FSM_CACHE": folder}
+        arguments = ["tests.soak", "--only", name, "--seed", str(seed)]
+        arguments += ["--child", str(60 * minutes), "--watch", str(watch)]
         limit = 60 * minutes + 2 * SLOWEST + 60
         try:
-            done = subprocess.run(
-                command,
-                cwd=ROOT,
-                env=surroundings,
-                stdout=subprocess.PIPE,
-                text=True,
-                timeout=limit,
-                check=False,
-            )
+            done = in_a_child(arguments, folder, limit)
         except subprocess.TimeoutExpired:
             print(f"FINDING no end: {_again(name, seed, _index(watch))}")
             return False
@@ -181,9 +169,10 @@ def killing(seed: int, kills: int) -> bool:
 
 def million(transitions: int) -> bool:
     """Run many transitions in a child; return whether its memory stayed within bounds."""
-    from tests.run.test_a_million_transitions import BYTES_A_FIRING, in_a_child
+    from tests.run.test_a_million_transitions import BYTES_A_FIRING
+    from tests.run.test_a_million_transitions import in_a_child as counted
 
-    few, many = in_a_child("compiled", 1000), in_a_child("compiled", transitions)
+    few, many = counted("compiled", 1000), counted("compiled", transitions)
     each = (many.peak - few.peak) / (many.transitions - few.transitions)
     good = each < BYTES_A_FIRING and many.transitions >= transitions
     print(
@@ -198,37 +187,30 @@ def million(transitions: int) -> bool:
 def child(part: str, *command: str, ends: str = "") -> bool:
     """Run a part in a process of its own, which prints what it finds; see also `main`."""
     began = time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:  # for machine code that is not needed again
-        done = subprocess.run(
-            [sys.executable, "-m", *command],
-            cwd=ROOT,
-            env={**os.environ, "GMS_FSM_CACHE": folder},
-            stdout=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
+    with tempfile.TemporaryDirectory() as folder:
+        done = in_a_child(command, folder)
     good = done.returncode == 0 and ends in done.stdout
-    print(f"{'' if good else 'FINDING '}{part}, {time.monotonic() - began:.0f} s: {done.stdout}",
-          end="", flush=True)  # fmt: skip
+    said = f"{'' if good else 'FINDING '}{part}, {time.monotonic() - began:.0f} s: {done.stdout}"
+    print(said, end="", flush=True)
     return good
 
 
 # --------------------------------------------------------------------------- all parts
+PARTS = (*fuzz.BODIES, "kill", "million", "runs", "trials", "stepping", "systems", "exact")
+COUNTS = {
+    "kills": 200, "examples": 300, "transitions": 1_000_000, "trials": 2000, "records": 1000,
+    "systems": 500, "exact": 1000,
+}  # fmt: skip
+
+
 def main() -> None:
     """Run the requested parts; exit with 1 if there were findings."""
-    parts = ("expression", "scenario", "trace", "kill", "million", "runs", "trials")
-    parts += ("stepping", "systems", "exact")
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0, help="for each of the three")
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(10**9))
-    parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--examples", type=int, default=300, help="of each kind of random run")
-    parser.add_argument("--transitions", type=int, default=1_000_000)
-    parser.add_argument("--trials", type=int, default=2000, help="random runs to judge")
-    parser.add_argument("--records", type=int, default=1000, help="random records to step along")
-    parser.add_argument("--systems", type=int, default=500, help="random systems to compare")
-    parser.add_argument("--exact", type=int, default=1000, help="random systems to judge")
-    parser.add_argument("--only", choices=parts, action="append")
+    for name, default in COUNTS.items():
+        parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--only", choices=PARTS, action="append")
     parser.add_argument("--input", type=int, help="repeat this input of the one part given")
     parser.add_argument("--child", type=float, help=argparse.SUPPRESS)
     parser.add_argument("--watch", type=Path, help=argparse.SUPPRESS)
@@ -237,8 +219,6 @@ def main() -> None:
         print(json.dumps(fuzz_here(given.only[0], given.seed, given.child, given.watch)))
         return
     if given.input is not None:
-        from tests import fuzz
-
         faulthandler.dump_traceback_later(SLOWEST, exit=True)
         data = input_bytes(given.seed, given.input)
         print(data.hex())
@@ -248,22 +228,29 @@ def main() -> None:
     os.environ["GMS_FSM_EXAMPLES"] = str(given.examples)  # of each kind of random run
     seed, hard = str(given.seed), "tests/physics/test_hard_random_runs.py"
     of_each = str(-(-given.trials // 5))  # there are five families
-    work: dict[str, Callable[[], bool]] = {
-        "expression": lambda: fuzzing("expression", given.seed, given.minutes),
-        "scenario": lambda: fuzzing("scenario", given.seed, given.minutes),
-        "trace": lambda: fuzzing("trace", given.seed, given.minutes),
-        "kill": lambda: killing(given.seed, given.kills),
-        "million": lambda: million(given.transitions),
-        "runs": lambda: child("random runs", "pytest", "-q", hard, f"--hypothesis-seed={seed}"),
-        "trials": lambda: child("trials", "tests.trials", "--count", of_each, "--seed", seed),
-        "stepping": lambda: child("stepping", "tests.run.test_stepping_equals_simulate", seed,
-                                  str(given.records), ends=f"0 of {given.records} differ"),
-        "systems": lambda: child("systems", "tests.random_systems", "--count",
-                                 str(given.systems), "--seed", seed),
-        "exact": lambda: child("exact systems", "tests.exact_systems", "--count",
-                               str(given.exact), "--seed", seed),
-    }  # fmt: skip
-    good = [work[part]() for part in given.only or parts]
+    trying = {
+        "trials": ("tests.soak.trials", of_each),
+        "systems": ("tests.soak.random_systems", str(given.systems)),
+        "exact": ("tests.soak.exact_systems", str(given.exact)),
+    }
+    none_differs = f"0 of {given.records} differ"
+
+    def done(part: str) -> bool:
+        if part in fuzz.BODIES:
+            return fuzzing(part, given.seed, given.minutes)
+        if part in trying:
+            module, count = trying[part]
+            return child(part, module, "--count", count, "--seed", seed)
+        if part == "kill":
+            return killing(given.seed, given.kills)
+        if part == "million":
+            return million(given.transitions)
+        if part == "runs":
+            return child("random runs", "pytest", "-q", hard, f"--hypothesis-seed={seed}")
+        stepping = "tests.run.test_stepping_equals_simulate"
+        return child(part, stepping, seed, str(given.records), ends=none_differs)
+
+    good = [done(part) for part in given.only or PARTS]
     print("nothing found" if all(good) else "see FINDING above")
     sys.exit(0 if all(good) else 1)
 

@@ -1,4 +1,4 @@
-"""A slow, hand-written simulation of a GMS bank, to check the reference of `tests.trials`.
+"""A slow, hand-written simulation of a GMS bank, to check the reference of `tests.soak.trials`.
 
 It shares no code with the packages: SciPy's DOP853 between points where a flag changes (whether v
 is above v_c, below -v_c, of which sign; whether z_i is above s_i, below -s_i), guards as if-else
@@ -95,18 +95,14 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
         """Fire everything enabled; the flags of v and z are known."""
         over, under = bits[5 : 5 + n] >= 0, bits[5 + n :] <= 0
         fast, back = bits[0] > 0, bits[1] < 0
-        edges = [
-            ("arrest" if not (fast or back or over[i] or under[i]) else "")
-            if slip[i]
-            else "break_away_forward"
-            if over[i] and fast
-            else "break_away_backward"
-            if under[i] and back
-            else ""
-            for i in range(n)
-        ]
-        for i in np.flatnonzero(edges):
-            said.transitions.append((t, int(i), edges[i]))
+        arrests = slip & ~over & ~under & (not (fast or back))
+        edges = np.select(
+            [arrests, ~slip & over & fast, ~slip & under & back],
+            ["arrest", "break_away_forward", "break_away_backward"],
+            "",
+        )
+        for i in np.flatnonzero(edges != ""):
+            said.transitions.append((t, int(i), str(edges[i])))
             slip[i] = not slip[i]
 
     while t < t_end:

@@ -1,11 +1,11 @@
 """Random systems of locks, impacts, gears and samplers against an exact reference.
 
-``python -m tests.exact_systems --count 1000 --seed 1`` prints each system that goes wrong, with the
-first difference and the line that repeats it, then those that are ill-conditioned, and totals.
+``python -m tests.soak.exact_systems --count 1000 --seed 1`` prints each system that goes wrong with
+the first difference, then those that are ill-conditioned, and totals.
 
 A trial is a pure function of (seed, index, shapes). Its *shape* - bodies, springs, loads, contacts,
-motions, controllers - is one of `shapes` many, because every shape is compiled once; its numbers
-and initial values are its own. `tests.exact_reference` computes what is right, from numbers alone.
+motions, controllers - is one of `shapes` many; its numbers and initial values are its own.
+`tests.soak.exact_reference` computes what is right, from numbers alone.
 
 A difference counts only where the answer does not hang on the last digits. Where it does, the
 reference itself finds other transitions, or much later ones, after a change of all numbers by a
@@ -14,29 +14,23 @@ millionth part or less; such a system is listed as ill-conditioned.
 
 from __future__ import annotations
 
-import argparse
-import importlib.util
 import math
-import sys
-import time
+from argparse import Namespace
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from random import Random
 from typing import Any
 
-from gms_fsm import GMS, Body, Contact, GMSParameters, Sampled, Stribeck, System, Trace, simulate
+from gms_fsm import GMS, Body, Contact, GMSParameters, Sampled, Stribeck, System, Trace
 from gms_fsm.charts import CHARTS
-from gms_fsm.errors import GMSError
-from gms_fsm.traces.failures import SimulationError
-from tests import exact_reference
-from tests.exact_reference import Controller, Endless, Plain, Run, Touch, Undecided, perturbed
-from tests.random_systems import Dice
+from tests.helpers import FASTEST
+from tests.soak import exact_reference
+from tests.soak.exact_reference import Controller, Endless, Plain, Run, Touch, Undecided, perturbed
+from tests.soak.trying import Dice, Seen, examine, outcome, shaped
 
 SHAPES = 60
 T_END = 3.0  # s
 MOST_STEPS = 60_000  # a run of these takes a few hundred to a few thousand
-ENGINE = "compiled" if importlib.util.find_spec("llvmlite") else "ifelse"
 RTOL = 1e-6
 TIME = 1.0  # s: times may differ by this times rtol, the end by this part of 1 and itself ...
 STATE = 10.0
@@ -53,7 +47,6 @@ class Trial:
     system: System
     initial: dict[str, Any]
     plain: Plain
-    again: str
 
 
 # --------------------------------------------------------------------------- what is drawn
@@ -105,8 +98,8 @@ def _motion(dice: Dice, free: int, belts: int) -> dict[int, float]:
             return {i: 1.0, free: -1.0}
 
 
-def _plain(dice: Dice) -> tuple[Plain, dict[str, str]]:
-    """Draw a system as numbers, and what of its shape its texts need."""
+def _plain(dice: Dice) -> Plain:
+    """Draw a system as numbers."""
     free, belts = dice.one_of(2, 2, 3, 4), dice.one_of(0, 0, 0, 1)
     springs, loads = [], []
     for i in range(free):
@@ -119,15 +112,8 @@ def _plain(dice: Dice) -> tuple[Plain, dict[str, str]]:
         A, w, phi = dice.spread(0.5, 8.0), dice.even(0.5, 8.0), dice.even(-3.0, 3.0)
         phi = dice.numbers.choice((0.0, phi, phi))
         B, C = dice.even(-3.0, 3.0), dice.even(-3.0, 3.0)
-        loads.append(
-            (
-                A if kind in ("sine", "all") else 0.0,
-                w,
-                phi,
-                B if kind in ("constant", "all") else 0.0,
-                C if kind in ("ramp", "all") else 0.0,
-            )
-        )
+        sine, constant, ramp = (kind in (name, "all") for name in ("sine", "constant", "ramp"))
+        loads.append((A if sine else 0.0, w, phi, B if constant else 0.0, C if ramp else 0.0))
     corners = []
     if belts:
         times = [0.0, *sorted(dice.even(0.2, T_END - 0.2) for _ in range(dice.one_of(1, 2, 3)))]
@@ -244,20 +230,14 @@ def _contact(touch: Touch) -> Contact:
 
 
 def trial(seed: int, index: int, shapes: int = SHAPES) -> Trial:
-    """Return a trial; the same arguments give the same one.
+    """Return a trial; the same arguments give the same one."""
 
-    Shapes that are refused are skipped.
-    """
-    again = f"python -m tests.exact_systems --seed {seed} --shapes {shapes} --index {index}"
-    for attempt in range(50):
-        which = f"{seed}:{index % shapes}:{attempt}"
-        plain = _plain(Dice(Random(f"shape {which}"), Random(f"numbers {which}:{index}"), digits=4))
-        try:
-            system, initial = as_system(plain)
-        except GMSError:
-            continue
-        return Trial(system, initial, plain, again)
-    raise AssertionError(f"no system in fifty attempts: {again}")
+    def draw(dice: Dice) -> Trial:
+        plain = _plain(dice)
+        return Trial(*as_system(plain), plain)
+
+    found, _ = shaped(draw, seed, index, shapes, digits=4)
+    return found  # type: ignore[no-any-return]
 
 
 # --------------------------------------------------------------------------- comparing
@@ -265,14 +245,9 @@ Sequences = Mapping[tuple[str, int], list[tuple[str, float]]]
 
 
 def run(trial: Trial, **how: Any) -> tuple[Trace | None, str]:
-    """Return the trace, also of a run that stops, and how it ended."""
-    how = {"engine": ENGINE, "max_steps": MOST_STEPS, "output": "end"} | how
-    try:
-        return simulate(trial.system, trial.plain.t_end, initial=trial.initial, **how), ""
-    except SimulationError as error:
-        return error.trace, f"{type(error).__name__}: {error}"
-    except (GMSError, ArithmeticError) as error:
-        return None, f"{type(error).__name__}: {error}"
+    """Return the trace, also of a run that stops, and how it failed."""
+    how = {"engine": FASTEST, "max_steps": MOST_STEPS, "output": "end"} | how
+    return outcome(trial.system, trial.plain.t_end, initial=trial.initial, **how)
 
 
 def sequences(firings: Sequence[tuple[float, str, int, str]], t_end: float) -> Sequences:
@@ -355,7 +330,7 @@ class Verdict:
     t: float = math.inf
 
 
-def verdict(trial: Trial, *, rtol: float = RTOL, engine: str = ENGINE) -> Verdict:
+def verdict(trial: Trial, *, rtol: float = RTOL, engine: str = FASTEST) -> Verdict:
     """Compare a run with the reference."""
     plain = trial.plain
     try:
@@ -427,60 +402,28 @@ def conditioning(plain: Plain, right: Sequences, end: Sequence[float]) -> tuple[
     return "", times, states
 
 
-def main() -> None:
-    """Compare the requested number of systems; exit with 1 if one is wrong."""
-    parser = argparse.ArgumentParser(description="Random systems against an exact reference")
-    parser.add_argument("--count", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--shapes", type=int, default=SHAPES, help="each is compiled once")
-    parser.add_argument("--index", type=int, help="this one, in full")
-    parser.add_argument("--rtol", type=float, default=RTOL)
-    parser.add_argument("--engine", default=ENGINE)
-    given = parser.parse_args()
-    began, totals, drawn = time.monotonic(), Counter[str](), Counter[str]()
-    transitions, ill = 0, []
-    indices = range(given.count) if given.index is None else [given.index]
-    for index in indices:
-        one = trial(given.seed, index, given.shapes)
-        found = verdict(one, rtol=given.rtol, engine=given.engine)
-        totals[found.kind] += 1
-        transitions += found.transitions
-        drawn.update(each.kind for each in one.plain.touches)
-        if found.kind in ("ill-conditioned", "no answer"):
-            ill.append(f"{found.kind}: {found.what}\n  {one.again}")
-        elif found.kind != "right":
-            print(f"{found.kind.upper()}: {found.what}\n  {one.again}", flush=True)
-        if given.index is not None:
-            show(one, found, rtol=given.rtol, engine=given.engine)
-    print(*ill, sep="\n")
-    print(", ".join(f"{name} {count}" for name, count in sorted(drawn.items())))
-    print(", ".join(f"{name} {count}" for name, count in sorted(totals.items())))
-    wrong = len(indices) - totals["right"] - totals["ill-conditioned"] - totals["no answer"]
-    print(
-        f"{wrong} of {len(indices)} systems wrong, seed {given.seed}; {transitions:,} transitions, "
-        f"{time.monotonic() - began:.0f} s"
-    )
-    sys.exit(1 if wrong else 0)
-
-
-def show(one: Trial, found: Verdict, **how: Any) -> None:
-    """Print a trial in full: what it is, and both logs side by side."""
-    plain = one.plain
-    for body in one.system.bodies:
-        print(body)
-    for touch in plain.touches:
-        print(touch)
-    for each in plain.controllers:
-        print(each)
-    print(plain.belts, one.system.numbers, one.initial, sep="\n")
-    trace, failure = run(one, **how)
-    ours = [] if trace is None else _firings(trace)
-    try:
-        theirs: list[Any] = list(exact_reference.simulate(plain).firings)
-    except (Undecided, Endless) as error:
-        theirs = [str(error)]
-    print(failure, found, "the run:", *ours[:200], "the reference:", *theirs[:200], sep="\n")
+def look(given: Namespace, index: int) -> Iterator[Seen]:
+    """Judge one system."""
+    one = trial(given.seed, index, given.shapes)
+    found = verdict(one)
+    counts = Counter(each.kind for each in one.plain.touches)
+    counts.update({found.kind: 1, "transitions": found.transitions})
+    said = f"{found.kind}: {found.what}"
+    open_ = found.kind in ("ill-conditioned", "no answer")
+    shown: list[Any] = []
+    if given.index is not None:
+        trace, failure = run(one)
+        shown = [one.plain, one.system.numbers, one.initial, failure, found, "the run:"]
+        shown += [] if trace is None else _firings(trace)[:200]
+        try:
+            shown += ["the reference:", *exact_reference.simulate(one.plain).firings[:200]]
+        except (Undecided, Endless) as error:
+            shown.append(error)
+    again = f"--shapes {given.shapes} --index {index}"
+    wrong = found.kind != "right" and not open_
+    yield Seen(again, counts, said if wrong else "", said if open_ else "", shown)
 
 
 if __name__ == "__main__":
-    main()
+    examine("exact_systems", "Random systems against an exact reference", look,
+            count=1000, shapes=SHAPES)  # fmt: skip
