@@ -20,6 +20,11 @@ from __future__ import annotations
 
 import math
 
+__all__ = [
+    "acos", "asin", "asinh", "atan", "atan2", "cos", "cosh", "exp", "log", "power", "sin", "sinh",
+    "tan", "tanh",
+]  # fmt: skip
+
 INF, NAN = math.inf, math.nan
 LARGEST = 710.4758600739439  # the sinh of more overflows
 SPLIT = 134217729.0  # 2**27 + 1

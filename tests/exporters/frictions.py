@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from tests.physics.test_sliding_between_states import follower
+from tests.physics.test_sliding_follows_filippov import follower
 
 from gms_fsm import (
     GMS,
