@@ -148,8 +148,21 @@ def _servo(random: np.random.Generator) -> Subject:
 
 def _between_states(random: np.random.Generator) -> Subject:
     """Return a deflection that is driven back to 0 from two states, and slides there."""
+    chart = Chart(
+        "follower",
+        variables=("z",),
+        parameters=("c",),
+        states=(
+            State("below", flow={"z": "v + c"}, outputs={"F": "-c"}),
+            State("above", flow={"z": "v - c"}, outputs={"F": "c"}),
+        ),
+        transitions=(
+            Transition("rise", "below", "above", guard="z > 0"),
+            Transition("fall", "above", "below", guard="z < 0"),
+        ),
+    )
     t = times(random, 20.0)
-    return follower(), t, {"v": 1.5 * np.sin(3.0 * t) + walk(random, t, 0.3)}
+    return ChartModel(chart, {"c": 1.0}), t, {"v": 1.5 * np.sin(3.0 * t) + walk(random, t, 0.3)}
 
 
 DENSE: Mapping[str, Callable[[np.random.Generator], Subject]] = {

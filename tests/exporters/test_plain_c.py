@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from gms_fsm import Chart, ChartModel, Contact, GMSParameters, State, Transition
+from gms_fsm import Body, Chart, ChartModel, GMSParameters, State, System, Transition, simulate
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import plain_c
 from tests.exporters.c_programs import COMPILERS, needs_c, plain_compared, plain_step
-from tests.exporters.frictions import case
+from tests.exporters.frictions import case, loaded
 
 
 @needs_c
@@ -30,33 +32,16 @@ def test_the_bits_of_the_engine(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_further_inputs_position_and_time(tmp_path: Path) -> None:
     """What a chart reads besides v becomes an argument; x is the integral of v."""
-    chart = Chart(
-        "loaded",
-        inputs=("v", "x", "t", "N"),
-        variables=("z",),
-        parameters=("mu",),
-        states=(State("a", flow={"z": "v - z * abs(v) / (mu * max(N, 1))"}), State("b")),
-        transitions=(
-            Transition(
-                "go", "a", "b", guard="x > 0.5 and (t > 1 or not N < 1)", actions={"z": "z / 2"}
-            ),
-            Transition("back", "b", "a", guard="age > 0.2 and sgn(v) < 0"),
-        ),
-        outputs={"F": "N * z + min(x, t)**2.5"},
-    )
-    contact = Contact("c", chart, {"mu": 0.3}, inputs={"N": "load + 1"})
-    step = plain_step(tmp_path, Subject.of(contact, "c99", name="loaded"))
-    x, z, age, state, dt = 0.0, 0.0, 0.0, "a", 2.0**-6
-    for k in range(400):
-        t, v, N = k * dt, float(np.cos(3 * k * dt)), 1.5
-        if state == "a" and x > 0.5 and (t > 1 or not N < 1):
-            z, state, age = z / 2, "b", 0.0
-        elif state == "b" and age > 0.2 and v < 0:
-            state, age = "a", 0.0
-        F = N * z + np.power(max(min(x, t), 0.0), 2.5) if min(x, t) >= 0 else np.nan
-        assert step(v, 0.5, t, dt) == pytest.approx(F, rel=1e-14, nan_ok=True)
-        dz = v - z * abs(v) / (0.3 * max(N, 1)) if state == "a" else 0.0
-        z, x, age = z + dt * dz, x + dt * v, age + dt
+    step = plain_step(tmp_path, Subject.of(loaded(), "c99", name="loaded"))
+    body = Body("body", velocity="cos(3 * t)")
+    system = System("moved", bodies=(body,), contacts=(loaded("0.5"),))
+    how: Any = {"method": "euler", "step": 2.0**-6, "events": "step", "engine": "ifelse"}
+    trace = simulate(system, 6.0, **how)
+    last = np.append(np.diff(trace.t) > 0.0, True)  # of the rows at one time: after switching
+    t, F = trace.t[last].tolist(), trace.contact("contact").F[last].tolist()
+    found = [step(math.cos(3 * one), 0.5, one, two - one) for one, two in itertools.pairwise(t)]
+    assert found == pytest.approx(F[:-1], rel=1e-12)
+    assert len(trace.transitions) > 2
 
 
 def test_no_memory_but_the_struct() -> None:
