@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -181,8 +182,8 @@ class Columns:
             self.log.stops_microstep[0] = 0
             self.log.stops = 1
 
-    def __del__(self) -> None:
-        if hasattr(self, "block"):
+    def __del__(self, ended: Callable[[], bool] = sys.is_finalizing) -> None:
+        if not ended() and hasattr(self, "block"):  # at the end modules are emptied already
             self.prepared.take_back(self.block)
 
     def run(self, most_steps: int, *, pause: bool) -> int:
