@@ -279,7 +279,6 @@ rows = {
 group("value of a scenario", ScenarioError, edited, rows)
 rows = {
     "end before the start": (END, "t_end = -1.0"),
-    "no time at all": (END, "t_end = 0.0"),
     "step under the clock": (END, f"{END}\nmax_step = 1e-18"),
     "no step for a method without error estimate": (END, f'{END}\nmethod = "rk4"'),
     "events per step without a step": (END, f'{END}\nevents = "step"'),
@@ -294,16 +293,13 @@ rows = {
     "half a table head": (OPEN_LOOP.replace("[run]", "[run"),),
     "a key twice": (OPEN_LOOP + "figures = []\n",),
     "binary": (bytes(range(256)) * 10,),
-    "zeros": (bytes(1000),),
     "UTF-16": (OPEN_LOOP.encode("utf-16"),),
     "brackets without end": ("a = " + "[" * 5000,),
     "a line of 2 MB": ("title = '" + "a" * 2_000_000 + "'\n",),
-    "YAML": ("model:\n  kind: GMS\n",),
     "no number at all": ("title = 1.2.3",),
     "a text that ends before a point": ("title = '.5' x",),
     "a bare key without end": ("\n" + "a." * 300_000 + "a = 1\n",),
     "a quoted key without end": ("\n" + '"a".' * 200_000 + "a = 1\n",),
-    "a spaced key without end": ("\n" + "'a' . " * 100_000 + "a = 1\n",),
     "a head without end": ("\n[" + "a." * 300_000 + "a]\n",),
     "an inline key without end": ("\nk = { " + "a." * 300_000 + "a = 1 }\n",),
 }
@@ -455,9 +451,7 @@ rows = {
     "chart file with a law": ("chart own.toml --law signed",),
     "contact that is missing": ("check pair.toml --contact pad",),
     "law that is missing": ("code --law foo",),
-    "lesson by another name": ("lesson hysteresis",),
     "lesson by another number": ("lesson 99",),
-    "lesson by a fraction": ("lesson 1.0",),
 }
 group("command", ParameterError, command, rows, "")
 rows = {
@@ -614,7 +608,6 @@ rows = {
     "line end as delimiter": (FILE, f'{FILE}\ndelimiter = "\\n"'),
     "start before the record": ("[output]", "[run]\nt_start = -1.0\n[output]"),
     "start after the record": ("[output]", "[run]\nt_start = 0.7\n[output]"),
-    "end before the record": ("[output]", "[run]\nt_end = -0.7\n[output]"),
 }
 group("setting of a record", ScenarioError, setting, rows, "a.toml")
 rows = {
@@ -1120,7 +1113,6 @@ rows = {
     "parameter t": ({"parameters": (*K, "t")},),
     "parameter v": ({"inputs": ("s",), "parameters": ("v",)},),
     "edge x": (edge(name="x"),),
-    "name with a digit before": ({"parameters": (*K, "2k")},),
     "empty name": ({"parameters": (*K, "")},),
     "keyword": ({"parameters": (*K, "if")},),
     "number for a parameter": ({"parameters": (*K, 3)},),
@@ -1238,7 +1230,6 @@ def pushed(mass: Any) -> Slider:
 rows = {
     "curve with F_c = 0": ("F_c", 0.0, curve, {"F_c": 0}),
     "curve with F_c = NAN": ("F_c", NAN, curve, {"F_c": NAN}),
-    "curve with F_c = [1, 2]": ("F_c", [1, 2], curve, {"F_c": [1, 2]}),
     "curve with F_s = INF": ("F_s", INF, curve, {"F_s": INF}),
     "curve with v_s = 0": ("v_s", 0.0, curve, {"v_s": 0}),
     "curve with v_s = 'fast'": ("v_s", "fast", curve, {"v_s": "fast"}),
@@ -1258,7 +1249,6 @@ rows = {
     "shares with C = NAN": ("C", NAN, shares, {"C": NAN}),
     "lugre with sigma_0 = 0": ("sigma_0", 0.0, lugre, {"sigma_0": 0}),
     "lugre with stribeck = 3": ("stribeck", 3, lugre, {"stribeck": 3}),
-    "own with n = 0": ("n", 0, own_model, {"n": 0}),
     "own with n = 2.5": ("n", 2.5, own_model, {"n": 2.5}),
     "own with n = 'two'": ("n", "two", own_model, {"n": "two"}),
     "own with weights = (1, -1)": ("weights[1] (element 2)", -1.0, own_model, {"weights": (1, -1)}),
@@ -1288,7 +1278,6 @@ rows = {
 group("parameter", ParameterError, lambda make, given: make(**given), rows)
 rows = {
     "curve with F_s = 0.5": (curve, {"F_s": 0.5}),
-    "bank with k = 40": (bank, {"k": 40}),
     "bank with k = []": (bank, {"k": []}),
     "bank with k = None": (bank, {"k": None}),
     "bank with sigma = 1": (bank, {"sigma": 1}),
@@ -2029,7 +2018,6 @@ rows = {
     "y is flat": ("rows_y", lambda a: a[:, 0]),
     "y of a stop has a column too few": ("stops_y", lambda a: a[:, :-1]),
     "y holds text": ("rows_y", lambda a: a.astype("U32")),
-    "y is complex": ("rows_y", lambda a: a + 1j),
     "t is shorter": ("rows_t", lambda a: a[:-1]),
     "t is one number": ("rows_t", lambda a: np.float64(0)),
     "t goes backward": ("rows_t", lambda a: a[::-1]),
@@ -2044,12 +2032,10 @@ rows = {
     "F holds text": ("observed_F", lambda a: a.astype("U32")),
     "s has a column too few": ("observed_s", lambda a: a[:, :-1]),
     "times of the log are text": ("log_t", lambda a: a.astype("U32")),
-    "times of the log are records": ("log_t", lambda a: np.zeros(3, dtype=[("a", "f8")])),
     "times of the log are not finite": ("log_t", lambda a: a * NAN),
     "times of the log are late": ("log_t", lambda a: a + 9e9),
     "edges are fractions": ("log_edge", lambda a: a + 0.5),
     "edges are negative": ("log_edge", lambda a: a.astype(np.int64) - 1),
-    "edges are too large": ("log_edge", lambda a: a + 99),
     "edges are huge": ("log_edge", lambda a: a.astype(np.uint64) + 2**63),
     "edges are 2**32 too large": ("log_edge", lambda a: a.astype(np.int64) + 2**32),
     "machine too many": ("log_machine", lambda a: a + 99),
@@ -2112,7 +2098,6 @@ rows = {
 }
 group("header of a trace file", TraceFileError, header, rows, "run.npz")
 rows = {
-    "no columns": (lambda a: np.zeros(3),),
     "other columns": (lambda a: np.zeros(3, dtype=[("a", "f8")]),),
     "two axes": (lambda a: a[:, None],),
     "element too many": (lambda a: np.array([(0.0, 99, *list(r)[2:]) for r in a], a.dtype),),
@@ -2121,7 +2106,6 @@ rows = {
     "source of another edge": (cell("source", "slip"),),
     "unknown target": (cell("target", "x"),),
     "time that is not finite": (cell("t", NAN),),
-    "time that is late": (cell("t", 9e9),),
 }
 group("log of format 1", TraceFileError, format_1, rows, "run.npz")
 rows = {

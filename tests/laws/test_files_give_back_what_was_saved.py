@@ -71,6 +71,7 @@ def test_a_trace_in_csv_is_whole_but_for_its_stops(name: str, tmp_path: Path) ->
     assert again.read_bytes() == path.read_bytes()
 
 
+@pytest.mark.slow
 @each(FEW)
 def test_verdicts_are_those_of_the_run(name: str, tmp_path: Path) -> None:
     """Of all engines and from both kinds of files; a sum may round in another order."""

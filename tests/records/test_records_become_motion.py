@@ -206,6 +206,14 @@ def test_the_velocity_of_a_noisy_sine_is_near_the_true_one(noise: float) -> None
     assert np.std(error) < 0.2 * np.std(raw)
 
 
+def test_without_smoothing_the_spline_goes_through_the_positions() -> None:
+    t = np.arange(400) * 0.005
+    position = 1e-3 * np.sin(8 * t)
+    motion = motion_of(record_of(time=t, position=position), 0.0)
+    np.testing.assert_allclose(motion.position, position, atol=1e-12)
+    np.testing.assert_allclose(motion.velocity[5:-5], 8e-3 * np.cos(8 * t)[5:-5], atol=1e-6)
+
+
 def test_a_measured_velocity_is_used_unchanged_unless_it_is_smoothed() -> None:
     rng = np.random.default_rng(2)
     t = np.cumsum(rng.uniform(0.005, 0.015, 300))

@@ -41,6 +41,9 @@ def test_a_column_can_be_given_in_four_ways(tmp_path: Path, force: Any) -> None:
     same(record, Record.from_arrays(time=T, position=1e-3 * X, force=F))
     assert (record.name, record.path) == ("rig", tmp_path / "rig.csv")
     assert repr(record) == "<Record 'rig': 40 rows, 9.75 s, position, force>"
+    some = in_file(tmp_path, where="time < 2 s or time > 3 s", name="x" * 10_000)
+    assert "40 rows (35 selected), 9.75 s" in repr(some)
+    assert len(repr(some)) < 300
 
 
 @pytest.mark.parametrize("kind", [list, tuple, np.asarray, np.ma.asarray, np.float32])

@@ -72,6 +72,7 @@ def test_decimal_commas_between_commas_are_quoted(tmp_path: Path) -> None:
     ("mark", "codec", "option", "ending"),
     [
         (b"", "utf-8", None, "\r"),
+        (codecs.BOM_UTF8, "utf-8", None, "\n"),
         (codecs.BOM_UTF8, "utf-8", "UTF8", "\r\n"),
         (codecs.BOM_UTF16_LE, "utf-16-le", None, "\n"),
         (codecs.BOM_UTF16_BE, "utf-16-be", None, "\r\n"),
@@ -82,9 +83,9 @@ def test_decimal_commas_between_commas_are_quoted(tmp_path: Path) -> None:
 def test_encodings_and_line_ends(
     tmp_path: Path, mark: bytes, codec: str, option: str | None, ending: str
 ) -> None:
-    text = written(";").replace("Kraft", "Kraft, in [µN]").replace("\n", ending)
+    text = written(";").replace("Kraft", "Kraft, in, say, [µN]").replace("\n", ending)
     content = mark + text.encode(codec)
-    record = read(tmp_path, content, encoding=option, force=("Kraft, in [µN]", "N"))
+    record = read(tmp_path, content, encoding=option, force=("Kraft, in, say, [µN]", "N"))
     check(record)
     assert record.rows.tolist() == [*range(2, 52)]
 

@@ -26,6 +26,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import CHARTS
+from tests.corpus import ENGINES
 from tests.systems_cases import clutched_bearings, mass, pad, pushed_against_a_stop, stop
 
 
@@ -179,13 +180,14 @@ HIT = Chart(
 )
 
 
-def test_an_action_after_an_impulse_reads_the_new_velocity() -> None:
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_action_after_an_impulse_reads_the_new_velocity(engine: str) -> None:
     system = System(
         "two masses",
         bodies=[mass("a", 2.0), mass("b", 3.0)],
         contacts=(Contact("stop", HIT, {"e": 0.5, "x_s": 1.0}, v="v_a - v_b"),),
     )
-    trace = run(system, 2.0, initial={"v_a": 1.0})
+    trace = simulate(system, 2.0, initial={"v_a": 1.0}, engine=engine)
     stop = trace.contact("stop")
     found = [float(stop.variable(name)[-1, 0]) for name in HIT.variables]
     assert found == pytest.approx([1.0, -0.5, -1.0], abs=1e-15)

@@ -32,13 +32,6 @@ def test_a_slip_at_its_limit_ends_where_large_velocities_differ_by_nothing() -> 
     assert found.kind == "right", found
 
 
-def test_the_same_arguments_give_the_same_system() -> None:
-    one, same, other = (trial(SEED, index, SHAPES) for index in (3, 3, 3 + SHAPES))
-    assert one.plain == same.plain
-    assert [each.kind for each in one.plain.touches] == [each.kind for each in other.plain.touches]
-    assert one.plain.masses != other.plain.masses
-
-
 @pytest.mark.slow
 def test_another_motion_is_found() -> None:
     one = trial(SEED, 0, SHAPES)
@@ -47,9 +40,3 @@ def test_another_motion_is_found() -> None:
     other, _ = exact_systems.as_system(heavier)
     found = verdict(replace(one, system=other), engine="ifelse")
     assert found.kind in ("wrong times", "wrong end", "wrong sequence"), found
-
-
-def test_a_run_that_stops_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exact_systems, "run", lambda trial, **how: (None, "StepLimitError: 1"))
-    found = verdict(trial(SEED, 0, SHAPES))
-    assert (found.kind, found.what) == ("failed", "StepLimitError: 1")

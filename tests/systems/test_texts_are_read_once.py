@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import pytest
@@ -48,6 +49,12 @@ def test_other_numbers_give_what_a_new_reading_gives(
     again = pulled(**change)
     assert again.shape is again
     assert run(again) == found
+
+
+def test_a_pickled_system_runs_alike() -> None:
+    system = pulled(m=2.0)
+    again = pickle.loads(pickle.dumps(system))
+    assert run(again) == run(system)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gms_fsm import Body, Chart, Contact, State, System, Trace, Transition, simulate
+from gms_fsm import Body, Chart, Contact, Prescribed, State, System, Trace, Transition, simulate
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.traces.failures import LivelockError
 from gms_fsm.traces.monitors import Coverage, Invariant, Passivity, checked, examine
@@ -92,6 +92,14 @@ def test_where_passivity_does_not_apply_it_says_why(case: str, said: str) -> Non
     assert isinstance(verdict, PassivityVerdict)
     assert (verdict.ok, verdict.applicable) == (True, False)
     assert verdict.text.startswith(f"not applicable: {said}")
+
+
+def test_a_held_force_is_no_spring_force() -> None:
+    trace = simulate(stick_slip("signed"), Prescribed("0.1"), 1.0, events="held", step=0.01)
+    assert examine(trace, "passivity")["passivity"].text == (
+        "not applicable: the contact has a period, and F is held between ticks, so it is not a "
+        "spring force k * z [+ sigma * dz]"
+    )
 
 
 TO_AND_FRO = Chart(

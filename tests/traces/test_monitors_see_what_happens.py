@@ -34,6 +34,7 @@ from gms_fsm.traces.monitors import Chattering, Coverage, Invariant, Passivity, 
 from gms_fsm.traces.verdicts import ChatteringVerdict, InvariantVerdict
 from tests.helpers import (
     FIG4_SINE,
+    FunctionBelt,
     banging,
     one_element,
     pulled_mass,
@@ -54,25 +55,21 @@ def memoryless(weights: list[float]) -> ChartModel:
     )
 
 
-def blinker(period: float) -> ChartModel:
-    """An element that switches on and off once per period, at known times."""
-    return ChartModel(
-        Chart(
-            "blinker",
-            inputs=("t",),
-            variables=("z",),
-            parameters=("T", "k"),
-            states=(State("off", flow={"z": "0"}), State("on", flow={"z": "0"})),
-            transitions=(
-                Transition("rise", "off", "on", guard="sin(2*pi*t/T) > 0"),
-                Transition("fall", "on", "off", guard="sin(2*pi*t/T) < 0"),
-            ),
-            outputs={"F": "k * z"},
+def blinking(phase: str, t_end: float, monitor: Chattering) -> Trace:
+    """Run an element that switches on and off once per 0.1 s of a phase, at known times."""
+    chart = Chart(
+        "blinker",
+        inputs=("t",),
+        variables=("z",),
+        states=(State("off", flow={"z": "0"}), State("on", flow={"z": "0"})),
+        transitions=(
+            Transition("rise", "off", "on", guard=f"sin(20*pi*({phase})) > 0"),
+            Transition("fall", "on", "off", guard=f"sin(20*pi*({phase})) < 0"),
         ),
-        {"T": period, "k": 1.0},
-        n=1,
-        stribeck=Stribeck(1.0, 1.0, 1.0),
+        outputs={"F": "z"},
     )
+    model = ChartModel(chart, {})
+    return simulate(model, Prescribed("0"), t_end, monitors=[monitor], max_step=0.01)
 
 
 def chattering(trace: Trace) -> ChatteringVerdict:
@@ -117,14 +114,21 @@ def test_memoryless_guards_chatter() -> None:
 @pytest.mark.parametrize(("within", "ok"), [(0.3999, True), (0.4001, False)])
 def test_firings_are_counted_within_the_time_window(within: float, ok: bool) -> None:
     """Five rises of a blinker of 0.1 s take 0.4 s."""
-    monitor = Chattering(times=5, within=within)
-    trace = simulate(blinker(0.1), Prescribed("0"), 2.02, monitors=[monitor], max_step=0.01)
+    trace = blinking("t", 2.02, Chattering(times=5, within=within))
     assert chattering(trace).ok == ok
     if not ok:
         (episode,) = chattering(trace).episodes
         assert episode.edge in ("rise", "fall")
         assert episode.count == 20 + (episode.edge == "rise")
         assert episode.t_last - episode.t_first == pytest.approx(0.1 * (episode.count - 1))
+
+
+def test_the_longest_episode_is_reported() -> None:
+    """Fast for half a second, slow, fast for a second: the second interval is reported."""
+    trace = blinking("min(t, 0.5) + max(0, min(t - 5, 1))", 8.0, Chattering(4, 0.35))
+    (episode,) = chattering(trace).episodes
+    assert episode.t_first == pytest.approx(5.0, abs=0.11)
+    assert episode.count in (9, 10, 11)
 
 
 def test_a_livelock_is_reported_with_the_partial_trace() -> None:
@@ -137,6 +141,15 @@ def test_a_livelock_is_reported_with_the_partial_trace() -> None:
     assert found.episodes[0].count >= 49
     assert found.episodes[0].t_last - found.episodes[0].t_first < 1e-9
     assert caught.value.trace.monitors["coverage"].ok
+
+
+def test_a_livelock_of_a_surface_has_no_edge() -> None:
+    chart = Chart("free", ("v",), ("z",), ("k",), (State("on", {"z": "0"}),), (), {"F": "k * z"})
+    model = ChartModel(chart, {"k": 0.0})
+    with pytest.raises(LivelockError) as caught:
+        simulate(model, FunctionBelt(), 5.0, initial={"v": 1.0}, monitors=["chattering"])
+    found = chattering(caught.value.trace)
+    assert (found.ok, found.livelock, found.episodes) == (False, True, ())
 
 
 def test_a_slide_is_not_a_livelock() -> None:
