@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -78,12 +78,7 @@ class OwnFile:
             )
         several = self.system.contacts
         if len(several) > 1 and not contact:
-            names = ", ".join(repr(each.name) for each in several)
-            raise ParameterError(
-                f"it has the contacts {names}",
-                place=str(self.path),
-                advice=f"give --contact {several[0].name}",
-            )
+            raise contacts_error(self.path, [each.name for each in several], "give")
         chosen: Any = self.system.contact(contact) if contact else several[0]
         single: Model = chosen if len(several) > 1 or chosen.model is None else chosen.model
         return single
@@ -93,13 +88,18 @@ class OwnFile:
         found = self.charts(contact)
         if len(found) > 1:
             assert self.system is not None
-            names = ", ".join(repr(each.name) for each in self.system.contacts)
-            raise ParameterError(
-                f"it has the contacts {names}, with different charts",
-                place=str(self.path),
-                advice=f"give --contact {self.system.contacts[0].name}",
-            )
+            names = [each.name for each in self.system.contacts]
+            raise contacts_error(self.path, names, "give", ", with different charts")
         return next(iter(found.values()))
+
+
+def contacts_error(path: Path, names: Sequence[str], advice: str, more: str = "") -> ParameterError:
+    """Return what is said of a file with several contacts, one of which must be chosen."""
+    return ParameterError(
+        f"it has the contacts {', '.join(map(repr, names))}{more}",
+        place=str(path),
+        advice=f"{advice} --contact {names[0]}",
+    )
 
 
 def own_file(name: str, law: str = "") -> OwnFile | None:

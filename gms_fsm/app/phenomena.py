@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from gms_fsm.app._own_files import OwnFile, own_file
+from gms_fsm.app._own_files import OwnFile, contacts_error, own_file
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
 from gms_fsm.foundation.files import output_folder, write_text
@@ -173,12 +173,7 @@ def _model_of(file: OwnFile, contact: str, values: Mapping[str, float]) -> Model
         if contact:
             return file.system.contact(contact)
         if len(contacts) > 1:
-            names = ", ".join(repr(each.name) for each in contacts)
-            raise ParameterError(
-                f"it has the contacts {names}",
-                place=str(file.path),
-                advice=f"say which one: --contact {contacts[0].name}",
-            )
+            raise contacts_error(file.path, [each.name for each in contacts], "say which one:")
         return contacts[0]
     assert file.chart is not None
     missing = [each for each in file.chart.parameters if each.name not in values]

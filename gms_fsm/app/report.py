@@ -16,6 +16,7 @@ from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
 from gms_fsm.foundation.files import output_folder, refuse_input, write_text
 from gms_fsm.foundation.markdown import plain, table_lines
+from gms_fsm.foundation.quantities import named_numbers
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
@@ -260,7 +261,11 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
     else:
         lines += [
             f"- system: {plain(trace.system.name)}",
-            *([f"- numbers: {_values(trace.system.numbers)}"] if trace.system.numbers else []),
+            *(
+                [f"- numbers: {named_numbers(trace.system.numbers)}"]
+                if trace.system.numbers
+                else []
+            ),
             f"- run: {settings}",
             result,
             *_held(trace),
@@ -273,11 +278,6 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
     if loaded.record is not None and loaded.motion is not None:
         lines += ["", *_measurement(loaded.record, loaded.motion, trace)]
     return "\n".join(lines) + "\n"
-
-
-def _values(numbers: Mapping[str, float]) -> str:
-    """Return numbers by name."""
-    return ", ".join(f"{name} = {value:.6g}" for name, value in numbers.items())
 
 
 def _end_tables(trace: Trace, system: System) -> list[str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from gms_fsm.debugger._over_time import Ribbons
 from gms_fsm.debugger._view import BranchView, ContactView, Screen, StateView
+from gms_fsm.foundation.quantities import named_numbers
 from gms_fsm.session.session import Breakpoint
 
 WIDTH = 80  # columns, where there is no terminal
@@ -51,9 +52,8 @@ def _body_lines(view: Screen) -> Iterator[str]:
         given = "  (given)" if body.driven else ""
         yield f"{body.name:<{wide}}  {x} = {position:.6g}, {v} = {velocity:.6g}{given}"
     for each in view.values:
-        values = ", ".join(f"{name} = {value:.6g}" for name, value in each.values.items())
         tick = "" if each.tick is None else f"; next tick at t = {each.tick:.9g} s"
-        yield f"{each.title}: {values}{tick}"
+        yield f"{each.title}: {named_numbers(each.values)}{tick}"
     if view.bodies:
         yield from ending_lines(view.ending)
 

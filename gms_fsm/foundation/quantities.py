@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate(["a", *"fpnµm", "", *"kMGT"])}
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
@@ -32,6 +32,11 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     if -4 <= power < digits:
         return f"{rounded:.{digits - 1 - power}f} {unit}".rstrip()
     return f"{rounded:.{digits - 1}e} {unit}".rstrip()
+
+
+def named_numbers(values: Mapping[str, float]) -> str:
+    """Return numbers by name: ``z = 0.1, s = 0.2``."""
+    return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
 
 
 def sparkline(values: Sequence[float | None]) -> str:

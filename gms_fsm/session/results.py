@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import TypeVar
 
 import numpy as np
@@ -273,15 +274,9 @@ def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> BranchCom
     """Compare two branches that have been computed to their ends."""
     t = min(float(first.t[-1]), float(second.t[-1]))
     logs = [trace.transitions[trace.transitions.t <= t] for trace in (first, second)]
-    differs = None
-    for p, q in zip(*logs, strict=False):
-        if _who(p) != _who(q):
-            differs = float(min(p.t, q.t))
-            break
-    else:
-        shorter, longer = sorted(logs, key=len)
-        if len(longer) > len(shorter):
-            differs = float(longer.t[len(shorter)])
+    pairs = ([each for each in pair if each is not None] for pair in zip_longest(*logs))
+    unlike = (pair for pair in pairs if len({_who(each) for each in pair}) > 1 or len(pair) == 1)
+    differs = min((float(each.t) for each in next(unlike, [])), default=None)
     times = np.linspace(float(first.t[0]), t, SAMPLES)
     columns = [_compared_columns(trace.sample(times)) for trace in (first, second)]
     differences = {

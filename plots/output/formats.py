@@ -1,4 +1,4 @@
-"""The formats of pictures, films, pages and chart texts, rows of `gms_fsm.formats`.
+"""The formats of pictures, films, pages and chart texts: rows of `gms_fsm.formats.FORMATS`.
 
 A format is added by one row here, or with `register` from anywhere else.
 """
@@ -33,6 +33,10 @@ def _dot(graph: Any) -> bytes:
     return text.encode()
 
 
+def _graph(form: str) -> Callable[[Any], bytes]:
+    return _late("output.graphviz", "picture", form)
+
+
 def _html(page: Any) -> bytes:
     text: str = page.html
     return text.encode()
@@ -43,16 +47,15 @@ def _html(page: Any) -> bytes:
 _png = _late("figures.saving", "picture", "png", {})
 _svg = _late("figures.saving", "picture", "svg", {"Date": None})
 _pdf = _late("figures.saving", "picture", "pdf", {"CreationDate": None})
-_graph = {form: _late("output.graphviz", "picture", form) for form in ("svg", "png", "pdf")}
 _mp4 = _late("film.files", "video", "mp4", "libx264")
 _webm = _late("film.files", "video", "webm", "libvpx-vp9")
 _mermaid, _plantuml, _tikz = (
     _late(f"output.{name}", name) for name in ("mermaid", "plantuml", "tikz")
 )
 for _row in (
-    Format(".svg", "graph", "a picture", "Graphviz", _graph["svg"], "render", usual=True),
-    Format(".png", "graph", "a picture", "Graphviz", _graph["png"], "render", usual=True),
-    Format(".pdf", "graph", "a picture", "Graphviz", _graph["pdf"], "render"),
+    Format(".svg", "graph", "a picture", "Graphviz", _graph("svg"), "render", usual=True),
+    Format(".png", "graph", "a picture", "Graphviz", _graph("png"), "render", usual=True),
+    Format(".pdf", "graph", "a picture", "Graphviz", _graph("pdf"), "render"),
     Format(".dot", "graph", "DOT text", "gms-fsm", _dot),
     Format(".gv", "graph", "DOT text", "gms-fsm", _dot),
     Format(".mmd", "chart", "Mermaid text", "gms-fsm", _mermaid),

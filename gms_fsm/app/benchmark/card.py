@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,7 @@ from gms_fsm.app.benchmark.datasets import DATA_SETS, DataSet, held_rows, score
 from gms_fsm.app.benchmark.methods import METHODS, Method, Predictor
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError
-
-Told = Callable[[str, float], object]
+from gms_fsm.phenomena.measure import Progress
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ def make(
     only: Sequence[str] = (),
     data: Sequence[DataSet] = DATA_SETS,
     methods: Sequence[Method] = METHODS,
-    told: Told | None = None,
+    progress: Progress | None = None,
 ) -> Card:
     """Train and score the methods; Ctrl-C ends it with what is complete."""
     chosen = [each for each in data if not only or each.name in only]
@@ -115,8 +114,8 @@ def make(
         mine = [method for method in methods if each.name in method.on]
         try:
             for i, method in enumerate(mine):
-                if told is not None:
-                    told(f"{each.name}: {method.name}", i / len(mine))
+                if progress is not None:
+                    progress(f"{each.name}: {method.name}", i / len(mine))
                 rows.append(_row(method, each, splits))
         except KeyboardInterrupt:
             complete = False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
@@ -20,6 +19,7 @@ from gms_fsm.app.paper import (
     VELOCITY,
 )
 from gms_fsm.charts.zoo.bristles.lugre import BENCHMARK
+from gms_fsm.phenomena.measure import Progress
 from gms_fsm.run.simulate import Moment, simulate
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model
@@ -28,7 +28,6 @@ from gms_fsm.traces.trace import Trace
 
 __all__ = ["PaperExperiment", "Progress", "experiments", "lugre_like", "run", "run_one"]
 
-Progress = Callable[[str, float], object]
 # For runs that no other engine repeats: the same bits, forty times faster.
 FASTEST = "compiled" if find_spec("llvmlite") else "ifelse"
 

@@ -47,7 +47,7 @@ def benchmark_command(
                 tasks[""] = bars.add_task(name, total=1.0)
             bars.update(tasks[""], completed=done, description=name)
 
-        card = make(folder, only=names, told=show)
+        card = make(folder, only=names, progress=show)
     files = write(card, output)
     typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
     if not card.complete:

@@ -19,20 +19,17 @@ if TYPE_CHECKING:
 
 def _of_contact(path: Path, contact: str) -> Trace:
     """Return a saved run as one contact sees it: the one chosen, or the only one."""
+    from gms_fsm.app._own_files import contacts_error
+
     run = _loaded(path)
-    known = ", ".join(map(repr, run.contacts))
     if contact and contact not in run.contacts:
         raise ParameterError(
             f"{path} has no contact {shown(contact)}",
             place="--contact",
-            advice=f"there are {known}",
+            advice=f"there are {', '.join(map(repr, run.contacts))}",
         )
     if not contact and len(run.contacts) > 1:
-        raise ParameterError(
-            f"it has the contacts {known}",
-            place=str(path),
-            advice=f"say which one to show: --contact {run.contacts[0]}",
-        )
+        raise contacts_error(path, run.contacts, "say which one to show:")
     return run.contact(contact or run.contacts[0])
 
 

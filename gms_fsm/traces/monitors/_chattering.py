@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.foundation.quantities import named_numbers
 from gms_fsm.traces.failures import LivelockError
-from gms_fsm.traces.monitors._kinds import Chattering
-from gms_fsm.traces.monitors._words import elements_text, values_text
+from gms_fsm.traces.monitors._kinds import Chattering, elements_text
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import ChatteringVerdict, Episode
 
@@ -26,7 +26,7 @@ def chattering(monitor: Chattering, trace: Trace, error: Exception | None) -> Ch
         parts.append(
             f"{elements_text([first.element])}{others} took {first.edge}"
             f"{f', and back {back},' if back else ''} {first.count} times in {span:.3g} s, from "
-            f"t = {first.t_first:.9g} s ({values_text(first.values)}): {_advice(trace, first)}"
+            f"t = {first.t_first:.9g} s ({named_numbers(first.values)}): {_advice(trace, first)}"
         )
     quiet = f"no element took an edge {monitor.times} times within {monitor.within:g} s"
     return ChatteringVerdict(not parts, "; ".join(parts) or quiet, episodes, livelock)

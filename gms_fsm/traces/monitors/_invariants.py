@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, SignalError
+from gms_fsm.foundation.quantities import named_numbers
 from gms_fsm.language import Condition, names_in, parse_condition, states_in, truths
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces.between import first_true, interpolated
-from gms_fsm.traces.monitors._kinds import Invariant
-from gms_fsm.traces.monitors._words import elements_text, values_text
+from gms_fsm.traces.monitors._kinds import Invariant, elements_text
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import Scope, invariant_names
 from gms_fsm.traces.system_scope import SystemScope, owners_of, system_names
@@ -105,7 +105,7 @@ def invariant_verdict(monitor: Invariant, trace: Trace) -> InvariantVerdict:
         state = str(place.states[0, i])
         who = f", {elements_text([i])} in {state}"
     text = (
-        f"first broken at t = {t:.9g} s{who}{f' ({values_text(values)})' if values else ''}, at "
+        f"first broken at t = {t:.9g} s{who}{f' ({named_numbers(values)})' if values else ''}, at "
         f"{broken.size} of {rows} rows, last at t = {t_last:.9g} s; look at it with "
         f"`goto {t:.9g}` in gms-fsm debug, or widen the bound if this is intended"
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -13,6 +13,12 @@ from gms_fsm.errors import ParameterError
 def named(contact: str, name: str) -> str:
     """Return the name of a monitor, with that of its contact: ``gear: passivity``."""
     return f"{contact}: {name}" if contact else name
+
+
+def elements_text(numbers: Iterable[int]) -> str:
+    """Return the names of elements, numbered from 1."""
+    words = [str(i + 1) for i in numbers]
+    return f"element{'s' if len(words) > 1 else ''} {', '.join(words)}"
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from gms_fsm.errors import SignalError
 from gms_fsm.language import MATLAB_LIKE, Binary, Name, Value, evaluate, spell
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.between import slopes
-from gms_fsm.traces.monitors._kinds import Passivity
-from gms_fsm.traces.monitors._words import elements_text
+from gms_fsm.traces.monitors._kinds import Passivity, elements_text
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import PassivityVerdict
 
