@@ -1341,9 +1341,11 @@ FIG4 = stick_slip("published"), Prescribed(FIG4_SINE)
 def unmoved(move: Callable[[Session], object], made: Callable[[], Session] = fig4) -> None:
     """Ask a session for a move; it stays where it is, with its branches and breakpoints."""
     session = made()
+    (original,) = session.tree.forks.values()
     try:
         move(session)
     finally:
+        assert session.tree.forks == {0: original}
         assert (session.here.row, len(session.branches), session.breakpoints) == (0, 1, [])
 
 
