@@ -25,12 +25,8 @@ from tests.page_blocks import Page, agrees, blocks_of
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Run the command of docs/paper.md, which writes the whole reproduction, once."""
-    pytest.importorskip("matplotlib", reason="the figures need the extra 'plots'")
-    pytest.importorskip("pygraphviz", reason="the charts need Graphviz, extra 'render'")
-    place = tmp_path_factory.mktemp("page")
+def reproduced(place: Path) -> Path:
+    """Run the command of docs/paper.md in a folder; return the folder of the reproduction."""
     seen: dict[str, list[float]] = {}
     files: list[Path] = []
 
@@ -101,7 +97,7 @@ CLAIMS = [
 ]
 
 
-def test_every_claim_has_a_measured_figure_and_a_verdict(folder: Path) -> None:
+def every_claim_has_a_measured_figure_and_a_verdict(folder: Path) -> None:
     lines = (folder / "claims.md").read_text().splitlines()
     for claim, measured, verdict in CLAIMS:
         (row,) = [line for line in lines if claim in line]
@@ -110,7 +106,7 @@ def test_every_claim_has_a_measured_figure_and_a_verdict(folder: Path) -> None:
         assert re.fullmatch(rf"\*\*{verdict}.*\*\*", judged), judged
 
 
-def test_claims_state_our_choices_and_how_far_the_engines_agree(folder: Path) -> None:
+def claims_state_our_choices_and_how_far_the_engines_agree(folder: Path) -> None:
     text = (folder / "claims.md").read_text()
     assert paper.FORCE in text
     assert paper.VELOCITY in text
@@ -126,7 +122,7 @@ def test_claims_state_our_choices_and_how_far_the_engines_agree(folder: Path) ->
     assert (holds, condition) == (text.count("| **holds** |"), text.count("| **holds only"))
 
 
-def test_figures_are_complete_and_small_and_have_the_panels_of_the_paper(folder: Path) -> None:
+def figures_are_complete_and_small_and_have_the_panels_of_the_paper(folder: Path) -> None:
     charts = ["chart_element", "chart_bank", "block_diagram", "chart_lugre"]
     names = ["fig3", "fig3_slipping", "fig4", "fig4_laws", "residual", "residual_held", *charts]
     for name in names:
@@ -142,7 +138,7 @@ def test_figures_are_complete_and_small_and_have_the_panels_of_the_paper(folder:
             assert f"<!-- {letter} -->" in text, (name, letter)
 
 
-def test_traces_and_logs_are_there_and_agree(folder: Path) -> None:
+def traces_and_logs_are_there_and_agree(folder: Path) -> None:
     for experiment in experiments():
         trace = Trace.load(folder / "traces" / f"{experiment.name}.npz")
         assert trace.t[-1] == experiment.t_end
@@ -154,6 +150,17 @@ def test_traces_and_logs_are_there_and_agree(folder: Path) -> None:
         Trace.load(folder / "traces" / f"fig4_{name}.npz") for name in ("chart", "ifelse")
     )
     np.testing.assert_array_equal(chart.F, ifelse.F)
+
+
+def test_the_command_writes_what_it_promises(tmp_path: Path) -> None:
+    """In one test, so that the command is run once, whoever runs the tests."""
+    pytest.importorskip("matplotlib", reason="the figures need the extra 'plots'")
+    pytest.importorskip("pygraphviz", reason="the charts need Graphviz, extra 'render'")
+    folder = reproduced(tmp_path)
+    every_claim_has_a_measured_figure_and_a_verdict(folder)
+    claims_state_our_choices_and_how_far_the_engines_agree(folder)
+    figures_are_complete_and_small_and_have_the_panels_of_the_paper(folder)
+    traces_and_logs_are_there_and_agree(folder)
 
 
 def test_an_unwritable_folder_is_reported_before_anything_runs(tmp_path: Path) -> None:

@@ -121,20 +121,15 @@ def test_without_figures_nothing_is_drawn(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 # --------------------------------------------------------------------------- the tribometer
-@pytest.fixture(scope="module")
-def tribometer(tmp_path_factory: pytest.TempPathFactory) -> tuple[Loaded, Trace, list[Path]]:
-    pytest.importorskip("matplotlib", reason="the figures need the extra 'plots'")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GMS_FSM_DATA", str(data_folder()))
-        loaded = load_scenario(ROOT / "scenarios" / "tribometer.toml", [f"run.engine={FASTEST!r}"])
-    trace, files = run_scenario(loaded, tmp_path_factory.mktemp("tribometer") / "out")
-    return loaded, trace, files
-
-
-def test_the_tribometer_explains_the_measurement(
-    tribometer: tuple[Loaded, Trace, list[Path]],
+def test_the_tribometer_explains_the_measurement_and_shows_its_loops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    loaded, trace, files = tribometer
+    """The overview has the measured loops and those of the model in one panel."""
+    from plots import figures
+
+    monkeypatch.setenv("GMS_FSM_DATA", str(data_folder()))
+    loaded = load_scenario(ROOT / "scenarios" / "tribometer.toml", [f"run.engine={FASTEST!r}"])
+    trace, files = run_scenario(loaded, tmp_path / "out")
     check_report(loaded, trace, files, drawn=True)
     assert loaded.record is not None
     assert loaded.motion is not None
@@ -158,18 +153,6 @@ def test_the_tribometer_explains_the_measurement(
     for said in ("Stribeck", "F_s, v_s and sigma_2", "C:", "sigma_i"):
         assert said in doubts, said
     assert "velocity noise" not in doubts  # the v_c of the scenario is above it
-
-
-def test_the_tribometer_shows_its_loops(tribometer: tuple[Loaded, Trace, list[Path]]) -> None:
-    """The overview has the measured loops and those of the model in one panel."""
-    pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")
-    loaded, trace, files = tribometer
-    (picture,) = [path for path in files if path.name == "overview.png"]
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    from plots import figures
-
-    assert loaded.record is not None
-    assert loaded.motion is not None
     times, force = measured_force(loaded.record)
     measured = figures.Measured(times, loaded.motion.position[loaded.record.chosen], force)
     (panel,) = [

@@ -260,6 +260,9 @@ def test_branches_follow_their_parents() -> None:
     tree.set({"F_s": 1.8}, first)
     assert tree.beginning(first) == 0.0
     assert tree.forks[first].text == "F_s = 1.8, z1 = -1.4 at 25 s"
+    alone = tree_of(with_values(PUBLISHED, {"F_s": 1.8}), FIG4, 40.0)
+    alone.poke({"z": {0: -1.4}}, t=25.0)
+    same_bits(tree.trace(first), alone.trace())
 
 
 def test_a_failed_run_is_kept() -> None:

@@ -13,7 +13,8 @@ from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.session.explain import explain
 from gms_fsm.session.session import Session
 from tests.helpers import FIG4_SINE, one_element, stick_slip
-from tests.inspection.sessions import a_system, fig4, pulled, pushed
+from tests.inspection.sessions import a_system, fig4, pulled
+from tests.systems_cases import CASES
 
 
 @cache
@@ -113,17 +114,15 @@ def test_a_condition_narrows_hits_count_and_the_first_of_several_stops() -> None
     ]
 
 
-def test_breakpoints_of_one_contact_and_of_all() -> None:
-    session = a_system(6.0)
-    session.break_on("enter", "slip", "bank 2")
-    session.break_on("fires", "arrest_forward", "pad")
-    wanted = [
-        each.t
-        for each in simulate(pushed(), 6.0).transitions
-        if (each.contact, each.element, each.target) == ("bank", 1, "slip")
-        or (each.contact, each.edge) == ("pad", "arrest_forward")
-    ]
-    assert [session.at(row).t for row, _ in stops(session)] == wanted != []
+@pytest.mark.slow
+def test_breakpoints_of_one_contact_leave_out_those_of_others_with_the_same_names() -> None:
+    case = CASES["two_blocks"]()
+    session = Session(case.system, 20.0, initial=case.initial)
+    session.break_on("enter", "stuck", "pad2")
+    log = simulate(case.system, 20.0, initial=case.initial).transitions
+    assert {*log.contact[log.target == "stuck"]} == {"pad1", "pad2"}
+    wanted = log.t[(log.target == "stuck") & (log.contact == "pad2")].tolist()
+    assert [session.at(row).t for row, _ in stops(session)] == wanted
 
 
 # --------------------------------------------------------------------------- until
