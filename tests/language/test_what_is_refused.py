@@ -294,17 +294,16 @@ def test_pow_takes_two_arguments() -> None:
     "text",
     [
         "-" * 5000 + "v",
-        "(" * 5000 + "v" + ")" * 5000,
         "(" * 150 + "v" + ")" * 150 + "+" + "-" * 70 + "v",
-        "abs(" * 70 + "v" + ")" * 70,
         "v" + "**v" * 70,
-        "v+" * 6000 + "v",
         "9" * 20_000,
         "not " * 2000 + "v",
+        f"min({', '.join(['v'] * 500)})",
+        f"max(v{', min(v' * 40}{')' * 41}" + ", v" * 20,
     ],
     ids=lambda text: f"{text[:8]}... {len(text)} characters",
 )
-def test_too_deep_or_too_long_is_refused(text: str) -> None:
+def test_too_deep_or_too_long_is_refused_in_few_words(text: str) -> None:
     assert len(str(_refused(parse_value, text))) < 1000
     assert len(str(_refused(parse_condition, text + " < v"))) < 1000
 
