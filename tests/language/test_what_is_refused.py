@@ -44,13 +44,15 @@ FOREIGN = "is not part of the language"
 
 # What is said, or advised: texts and their columns.
 NO_VALUES: dict[str, list[tuple[str, int]]] = {
-    "attribute": [("z.real", 1), ("z\xa0+\u2003u.real", 5)],
+    "attribute": [("z.real", 1), ("v + z.real", 5), ("z\xa0+\u2003u.real", 5)],
     FOREIGN: [
         ("__import__('os').system('ls')", 1), ("abs(v)(z)", 1), ("2(v)", 1), ("[v for v in z]", 1),
         ("{v: z}", 1), ("(v, z)", 1), ("v % 2", 1), ("z + v // 2", 5), ("z + v @ s", 5),
         ("1 + ~v", 5), ("...", 1), ("await v", 1), ("'a'", 1), ("1 + 'a'", 5), ("b'a'", 1),
-        ("None", 1), ("1j", 1), ("abs(*v)", 5), ("abs(**v)", 1), ("'\xe9\u20ac\U0001f600' + u", 1),
+        ("None", 1), ("1j", 1), ("v + 2.5j", 5), ("abs(*v)", 5), ("abs(**v)", 1),
+        ("'\xe9\u20ac\U0001f600' + u", 1),
     ],
+    "unknown function '__import__'": [("__import__('os')", 1)],
     "unknown function 'cosh'": [("v + cosh(z)", 5)],
     "lambda": [("lambda: 1", 1)],
     "index": [("z[0]", 1)],
@@ -59,9 +61,11 @@ NO_VALUES: dict[str, list[tuple[str, int]]] = {
     "abs(...) instead": [("v | z", 3)],
     "f-string": [("f'{v}'", 1)],
     "True is not a number": [("True", 1)],
-    "too large": [("1e999", 1), ("v + " + "9" * 400, 5), ("0x" + "f" * 400, 1)],
+    "False is not a number": [("v * False", 5)],
+    "too large": [("1e999", 1), ("-1e999", 2), ("v + " + "9" * 400, 5), ("0x" + "f" * 400, 1)],
     NUMBER_WANTED: [("z < s", 1), ("1 + (z < s)", 6), ("z == s", 1), ("not v", 1), ("v and z", 1)],
     "the function 'abs' needs": [("v + abs", 5)],
+    "abs got 0 arguments": [("abs()", 1)],
     "abs got 2 arguments": [("1 + abs(v, z)", 5)],
     "min got 1 argument": [("min(v)", 1)],
     "<= or >= instead": [("abs(v, x=1)", 9), ("v = z", 3)],
@@ -72,14 +76,14 @@ NO_VALUES: dict[str, list[tuple[str, int]]] = {
     "unknown name '\xe9'": [("\xe9", 1), ("v + \xe9 * u", 5)],
     "cannot be read": [
         ("v + \u20ac + u", 5), ("v + \ud800", 5), ("v z", 3), ("v)", 2), ("1 + (v * (z)", 5),
-        ("1 + (v]", 7), ("v + $", 5),
+        ("1 + (v]", 7), ("v + $", 5), ("v + \U0001f600", 5), ("1 + v) * (z", 6), ("(v", 1),
     ],
     "- instead": [("v \u2212 z", 3)],
     "empty": [("", 1), (" \t\n", 1)],
     "unexpected '#'": [("v # comment", 3)],
     "unexpected ';'": [("v; z", 2)],
     "unexpected": [("v \\ z", 3), ("v + \x00", 5)],
-    "ends too early": [("v +", 4), ("\xe9 + v **", 9), ("-", 2)],
+    "ends too early": [("v +", 4), ("  v *", 6), ("\xe9 + v **", 9), ("-", 2)],
 }  # fmt: skip
 NO_CONDITIONS: dict[str, list[tuple[str, int]]] = {
     COMPARISON_WANTED: [
@@ -294,17 +298,16 @@ def test_pow_takes_two_arguments() -> None:
     "text",
     [
         "-" * 5000 + "v",
-        "(" * 5000 + "v" + ")" * 5000,
         "(" * 150 + "v" + ")" * 150 + "+" + "-" * 70 + "v",
-        "abs(" * 70 + "v" + ")" * 70,
         "v" + "**v" * 70,
-        "v+" * 6000 + "v",
         "9" * 20_000,
         "not " * 2000 + "v",
+        f"min({', '.join(['v'] * 500)})",
+        f"max(v{', min(v' * 40}{')' * 41}" + ", v" * 20,
     ],
     ids=lambda text: f"{text[:8]}... {len(text)} characters",
 )
-def test_too_deep_or_too_long_is_refused(text: str) -> None:
+def test_too_deep_or_too_long_is_refused_in_few_words(text: str) -> None:
     assert len(str(_refused(parse_value, text))) < 1000
     assert len(str(_refused(parse_condition, text + " < v"))) < 1000
 

@@ -16,7 +16,6 @@ from tests.corpus import HELD, MICROMETRES, PUSHED
 from tests.helpers import pulled_mass
 from tests.soak.trials import (
     FAMILIES,
-    JUDGED,
     Trial,
     is_finding,
     judge,
@@ -37,7 +36,7 @@ COUNT = 5  # make soak takes 500 of each family
 CLOSE_TO_S = (("literature", 202, 41), ("literature", 206, 20), ("literature", 306, 84))
 
 
-@pytest.mark.parametrize("family", JUDGED)
+@pytest.mark.parametrize("family", FAMILIES)
 def test_no_switch_is_lost_or_made_up(family: str) -> None:
     found = [judge(trial(family, 14, index)) for index in range(COUNT)]
     assert [said(judged) for judged in found if is_finding(judged)] == []
@@ -111,7 +110,7 @@ def test_the_witness_agrees_about_the_pulled_mass() -> None:
     agrees(Trial("pulled mass", 0, 0, *pulled_mass(), 20.0))
 
 
-@pytest.mark.parametrize("family", JUDGED)
+@pytest.mark.parametrize("family", FAMILIES)
 def test_the_witness_agrees_about_a_trial_of_each_family(family: str) -> None:
     sample = (trial(family, 14, index) for index in range(100))
     agrees(next(one for one in sample if 6 <= len(reference(one).sequence) <= 20))

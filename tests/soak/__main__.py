@@ -25,6 +25,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tests.soak import fuzz
+from tests.soak.trials import FAMILIES
 
 ROOT = Path(__file__).resolve().parents[2]
 SIZES = (8, 32, 128, 512, 2048)  # bytes of an input
@@ -227,7 +228,7 @@ def main() -> None:
     print(f"seed {given.seed}", flush=True)
     os.environ["GMS_FSM_EXAMPLES"] = str(given.examples)  # of each kind of random run
     seed, hard = str(given.seed), "tests/physics/test_hard_random_runs.py"
-    of_each = str(-(-given.trials // 5))  # there are five families
+    of_each = str(-(-given.trials // len(FAMILIES)))
     trying = {
         "trials": ("tests.soak.trials", of_each),
         "systems": ("tests.soak.random_systems", str(given.systems)),

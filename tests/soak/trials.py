@@ -9,7 +9,6 @@ Families, all of one to six elements, thresholds as shares/k or free:
 ``forced``      a mass under a force of sines or ramps
 ``sines``       a prescribed velocity of sines, occasionally of ramps
 ``literature``  k 1e5..1e7 N/m, thresholds of micrometres, v_c 1e-7..1e-5 m/s, 0.5..100 kg
-``undamped``    any of these with sigma = 0; its outcome is reported, not judged
 
 Part of each family has the published law and is counted separately. A trial is a pure function of
 (family, seed, index). The formulas in t come from a small pool, because each new text has to be
@@ -51,8 +50,7 @@ from gms_fsm.traces.failures import SimulationError
 from tests.soak.trying import Seen, examine
 from tests.soak.witness import witness
 
-JUDGED = ("pulled", "forced", "sines", "literature")
-FAMILIES = (*JUDGED, "undamped")
+FAMILIES = ("pulled", "forced", "sines", "literature")
 # Text, amplitude, angular frequency (rad/s).
 FORCES = (
     ("2.9*sin(4.7*t)", 2.9, 4.7),
@@ -137,13 +135,8 @@ def trial(family: str, seed: int, index: int) -> Trial:
     """Return one run of a family."""
     draw = Draw(zlib.crc32(family.encode()), seed, index)
     law = "published" if draw.chance(PUBLISHED) else "signed"
-    kind = draw.one_of(JUDGED) if family == "undamped" else family
-    made = {"pulled": pulled, "forced": forced, "sines": sines, "literature": literature}[kind]
-    model, rig, t_end = made(draw, law)
-    if family == "undamped":
-        p = model.parameters
-        model = _model(law, p.k, 0 * p.k, p.C, p.sigma_2, p.stribeck, p.v_c, p.weights)
-    return Trial(family, seed, index, model, rig, t_end)
+    made = {"pulled": pulled, "forced": forced, "sines": sines, "literature": literature}[family]
+    return Trial(family, seed, index, *made(draw, law))
 
 
 def _model(
@@ -407,8 +400,6 @@ def judge(trial: Trial, engine: str = "compiled", **options: float) -> Judged:
 
 def is_finding(judged: Judged) -> bool:
     """Return whether a verdict is a fault: a wrong sequence, or a run that cannot continue."""
-    if judged.trial.family not in JUDGED:
-        return False
     failed = judged.default.failed or judged.exact.failed
     return judged.verdict == "wrong" or (bool(failed) and judged.trial.model.law == "signed")
 
