@@ -9,17 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import (
-    GMS,
-    Chart,
-    ChartModel,
-    GMSParameters,
-    Slider,
-    State,
-    Stribeck,
-    Transition,
-    simulate,
-)
+from gms_fsm import GMS, GMSParameters, Slider, Stribeck, simulate
 from tests.physics.test_hard_random_runs import (
     guards_say_so,
     nothing_is_overdue,
@@ -50,20 +40,3 @@ def test_v_is_zero_in_every_row_of_a_slide(step: float, mass: float) -> None:
     rows_and_log_agree(trace)
     guards_say_so(trace)
     nothing_is_overdue(trace)
-
-
-def test_an_edge_at_the_beginning_of_a_slide_is_shown_as_the_log_has_it() -> None:
-    """Its row is of neither the arc before nor of the slide."""
-    chart = Chart(
-        "dry friction that remembers a rest",
-        inputs=("v",),
-        parameters=("F_c",),
-        states=(State("moving"), State("stopped")),
-        transitions=(Transition("stop", "moving", "stopped", guard="v <= 0"),),
-        outputs={"F": "F_c * sgn(v)"},
-    )
-    trace = simulate(ChartModel(chart, {"F_c": 1.0}), Slider(1.0, "0.2"), 3.0, initial={"v": 1.0})
-    (record,) = trace.transitions
-    row = int(np.argmax(trace.states[:, 0] == "stopped"))
-    assert trace.t[row] == record.t == trace.sliding.t_start[0]
-    assert (record.F_before, record.F_after) == (trace.F[row - 1], trace.F[row])

@@ -1,0 +1,123 @@
+"""Faults that were mended once and that no law, table or closed form would notice."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import (
+    GMS,
+    Body,
+    Chart,
+    ChartModel,
+    Contact,
+    GMSParameters,
+    Prescribed,
+    Record,
+    Slider,
+    State,
+    Stribeck,
+    System,
+    Transition,
+    fit,
+    simulate,
+)
+from gms_fsm.charts import CHARTS
+from gms_fsm.run.problem import Problem
+from tests.identification.records import bank, measured, sine
+
+
+def test_where_no_scale_is_known_forces_give_free_bodies_a_floor() -> None:
+    """A driven body has none, and a user's function is not called ahead of time."""
+    called = []
+
+    def force(t: float) -> float:
+        called.append(t)
+        return 1.0
+
+    system = System(
+        "cart on a belt",
+        bodies=(Body("cart", inertia=1.0, force="f"), Body("belt", velocity="0", x="x_b", v="v_b")),
+        contacts=(
+            Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 2.0, "b": 0.0}, v="v-v_b"),
+        ),
+        signals={"f": force},
+    )
+    start = Problem.of(system, None, 10.0)
+    floor = dict(zip(start.program.layout.y.shared, start.options.floor or (), strict=True))
+    assert floor == pytest.approx({"x": 1e-13, "v": 1e-14, "x_b": 0.0}, rel=1e-6, abs=0.0)
+    assert {*called} == {0.0}
+
+
+def test_a_chart_without_variables_has_no_deflection(monkeypatch: pytest.MonkeyPatch) -> None:
+    """NaN, whatever memory had before: a product of signalling NaNs is a warning."""
+    chart = Chart("damper", ("v",), (), ("b",), (State("on"),), (), {"F": "b * v"})
+    trace = simulate(ChartModel(chart, {"b": 2.0}), Prescribed("sin(t)"), 1.0)
+    empty = np.empty
+
+    def stray(*given: Any, **options: Any) -> Any:
+        found = empty(*given, **options)
+        if found.dtype == np.float64:
+            found.view(np.int64)[...] = 0x7FF0000000000001
+        return found
+
+    monkeypatch.setattr(np, "empty", stray)
+    assert np.isnan(trace.z).all()
+    assert np.isnan(trace.dz).all()
+
+
+def test_an_edge_at_the_beginning_of_a_slide_is_shown_as_the_log_has_it() -> None:
+    """Its row is of neither the arc before nor of the slide."""
+    chart = Chart(
+        "dry friction that remembers a rest",
+        inputs=("v",),
+        parameters=("F_c",),
+        states=(State("moving"), State("stopped")),
+        transitions=(Transition("stop", "moving", "stopped", guard="v <= 0"),),
+        outputs={"F": "F_c * sgn(v)"},
+    )
+    trace = simulate(ChartModel(chart, {"F_c": 1.0}), Slider(1.0, "0.2"), 3.0, initial={"v": 1.0})
+    (record,) = trace.transitions
+    row = int(np.argmax(trace.states[:, 0] == "stopped"))
+    assert trace.t[row] == record.t == trace.sliding.t_start[0]
+    assert (record.F_before, record.F_after) == (trace.F[row - 1], trace.F[row])
+
+
+def test_v_is_zero_in_a_slide_also_where_a_step_ends_beyond_it() -> None:
+    """Steps far too long for these bristles end where no sign holds the mass at rest."""
+    parameters = GMSParameters(
+        [17.3, 41.8, 4.16, 33.5],
+        [0.292, 1.0, 0.18, 0.133],
+        [0.416, 0.187, 0.279, 0.199],
+        sigma_2=0.191,
+        stribeck=Stribeck(0.154, 0.462, 0.035),
+        v_c=1e-4,
+        weights=[0.0492, 0.277, 0.0315, 0.0492],
+    )
+    model = GMS(parameters, law="published")
+    trace = simulate(model, Slider(0.452, "9*cos(t)"), 6.0, method="euler", step=0.02)
+    slides = trace.rows.mode[:, trace.n :].any(axis=1)
+    assert slides.sum() > 10
+    np.testing.assert_allclose(trace.v[slides], 0.0, rtol=0.0, atol=1e-14)
+
+
+def test_a_crossing_a_few_ticks_before_a_corner_ends_no_run() -> None:
+    """A velocity made from positions turns at 1e-17 m/s, and not at the sample's 0."""
+    t = np.linspace(0.0, 20.0, 801)
+    v = Record.from_arrays(time=t, position=1e-3 * np.sin(0.8 * np.pi * t)).motion().velocity
+    model = ChartModel(CHARTS["maxwell-slip"], {"k": 1e4, "F_c": 1.0})
+    run = simulate(model, Prescribed((t, v)), 20.0, engine="ifelse", t_eval=t)
+    assert sum(edge.startswith("turn") for edge in run.transitions.edge) == 16
+    assert np.abs(run.F).max() == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_a_profile_ends_at_a_bound() -> None:
+    pytest.importorskip("llvmlite", reason="fits take long without machine code")
+    record = measured(bank([2e4, 5e3], [5e-5, 1e-4]), sine(3e-4, 2.0, 5.0), 0.01, 0)
+    bounds = {"k": (2.8e4, 1e5)}  # the best is 2.88e4
+    found = fit(record, bank([3e4], [5e-5]), free=["k"], bounds=bounds, search="local")
+    profile = found.profile("k1", restarts=False)
+    assert profile.low == profile.values.min() == 2.8e4
