@@ -26,6 +26,7 @@ from gms_fsm import (
 )
 from gms_fsm.charts import CHARTS
 from gms_fsm.run.problem import Problem
+from tests.helpers import FASTEST
 from tests.identification.records import bank, measured, sine
 
 
@@ -83,6 +84,16 @@ def test_an_edge_at_the_beginning_of_a_slide_is_shown_as_the_log_has_it() -> Non
     row = int(np.argmax(trace.states[:, 0] == "stopped"))
     assert trace.t[row] == record.t == trace.sliding.t_start[0]
     assert (record.F_before, record.F_after) == (trace.F[row - 1], trace.F[row])
+
+
+@pytest.mark.parametrize("engine", sorted({"ifelse", FASTEST}))
+def test_the_row_before_a_slide_is_of_the_arc_before(engine: str) -> None:
+    chart = Chart("dry friction", ("v",), (), ("F_c",), (State("on"),), (), {"F": "F_c * sgn(v)"})
+    model = ChartModel(chart, {"F_c": 1.0})
+    how: Any = {"engine": engine, "initial": {"v": 1.0}, "max_step": 0.1}
+    trace = simulate(model, Slider(1.0, "0.2"), 3.0, **how)
+    row = int(np.argmax(trace.rows.mode[:, -1]))
+    assert trace.F[row - 1 : row + 1] == pytest.approx([1.0, 0.2])
 
 
 def test_v_is_zero_in_a_slide_also_where_a_step_ends_beyond_it() -> None:
