@@ -9,64 +9,21 @@ import pytest
 
 from gms_fsm import (
     GMS,
-    Body,
     Chart,
     ChartModel,
-    Contact,
     GMSParameters,
     Prescribed,
     Record,
     Slider,
     State,
     Stribeck,
-    System,
     Transition,
     fit,
     simulate,
 )
 from gms_fsm.charts import CHARTS
-from gms_fsm.run.problem import Problem
 from tests.helpers import FASTEST
 from tests.identification.records import bank, measured, sine
-
-
-def test_where_no_scale_is_known_forces_give_free_bodies_a_floor() -> None:
-    """A driven body has none, and a user's function is not called ahead of time."""
-    called = []
-
-    def force(t: float) -> float:
-        called.append(t)
-        return 1.0
-
-    system = System(
-        "cart on a belt",
-        bodies=(Body("cart", inertia=1.0, force="f"), Body("belt", velocity="0", x="x_b", v="v_b")),
-        contacts=(
-            Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 2.0, "b": 0.0}, v="v-v_b"),
-        ),
-        signals={"f": force},
-    )
-    start = Problem.of(system, None, 10.0)
-    floor = dict(zip(start.program.layout.y.shared, start.options.floor or (), strict=True))
-    assert floor == pytest.approx({"x": 1e-13, "v": 1e-14, "x_b": 0.0}, rel=1e-6, abs=0.0)
-    assert {*called} == {0.0}
-
-
-def test_a_chart_without_variables_has_no_deflection(monkeypatch: pytest.MonkeyPatch) -> None:
-    """NaN, whatever memory had before: a product of signalling NaNs is a warning."""
-    chart = Chart("damper", ("v",), (), ("b",), (State("on"),), (), {"F": "b * v"})
-    trace = simulate(ChartModel(chart, {"b": 2.0}), Prescribed("sin(t)"), 1.0)
-    empty = np.empty
-
-    def stray(*given: Any, **options: Any) -> Any:
-        found = empty(*given, **options)
-        if found.dtype == np.float64:
-            found.view(np.int64)[...] = 0x7FF0000000000001
-        return found
-
-    monkeypatch.setattr(np, "empty", stray)
-    assert np.isnan(trace.z).all()
-    assert np.isnan(trace.dz).all()
 
 
 def test_an_edge_at_the_beginning_of_a_slide_is_shown_as_the_log_has_it() -> None:

@@ -333,3 +333,20 @@ def test_a_chart_without_the_input_s_needs_no_curve_and_one_element_is_enough() 
     assert trace.n == 1
     assert trace.transitions.edge.tolist() == ["stop", "leave"]
     np.testing.assert_allclose(trace.transitions.t, [math.acos(0.5), math.pi], atol=1e-8)
+
+
+def test_a_chart_without_variables_has_no_deflection(monkeypatch: pytest.MonkeyPatch) -> None:
+    """NaN, whatever memory had before: a product of signalling NaNs is a warning."""
+    chart = Chart("damper", ("v",), (), ("b",), (State("on"),), (), {"F": "b * v"})
+    trace = simulate(ChartModel(chart, {"b": 2.0}), Prescribed("sin(t)"), 1.0)
+    empty = np.empty
+
+    def stray(*given: Any, **options: Any) -> Any:
+        found = empty(*given, **options)
+        if found.dtype == np.float64:
+            found.view(np.int64)[...] = 0x7FF0000000000001
+        return found
+
+    monkeypatch.setattr(np, "empty", stray)
+    assert np.isnan(trace.z).all()
+    assert np.isnan(trace.dz).all()

@@ -8,8 +8,10 @@ import pytest
 
 from gms_fsm import (
     GMS,
+    Body,
     Chart,
     ChartModel,
+    Contact,
     GMSParameters,
     LuGre,
     Prescribed,
@@ -17,13 +19,15 @@ from gms_fsm import (
     Slider,
     State,
     Stribeck,
+    System,
     Transition,
     simulate,
     sweep,
 )
-from gms_fsm.charts import gms_element
+from gms_fsm.charts import CHARTS, gms_element
 from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.scales import scales_of
+from gms_fsm.run.problem import Problem
 from tests.corpus import MICROMETRES
 from tests.helpers import FASTEST, ROOT, pulled_mass
 
@@ -225,3 +229,25 @@ def test_the_element_chart_alone_has_the_same_scales():
         weights=[0.00625],
     )
     assert scales_of(own) == scales_of(GMS(p, law="signed"))
+
+
+def test_where_no_scale_is_known_forces_give_free_bodies_a_floor():
+    """A user's function is not called ahead of time for it."""
+    called = []
+
+    def force(t):
+        called.append(t)
+        return 1.0
+
+    system = System(
+        "cart on a belt",
+        bodies=(Body("cart", inertia=1.0, force="f"), Body("belt", velocity="0", x="x_b", v="v_b")),
+        contacts=(
+            Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 2.0, "b": 0.0}, v="v - v_b"),
+        ),
+        signals={"f": force},
+    )
+    start = Problem.of(system, None, 10.0)
+    floor = dict(zip(start.program.layout.y.shared, start.options.floor, strict=True))
+    assert floor == pytest.approx({"x": 1e-13, "v": 1e-14, "x_b": 0.0}, rel=1e-6, abs=0.0)
+    assert {*called} == {0.0}
