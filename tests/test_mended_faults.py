@@ -18,12 +18,10 @@ from gms_fsm import (
     State,
     Stribeck,
     Transition,
-    fit,
     simulate,
 )
 from gms_fsm.charts import CHARTS
 from tests.helpers import FASTEST
-from tests.identification.records import bank, measured, sine
 
 
 def test_an_edge_at_the_beginning_of_a_slide_is_shown_as_the_log_has_it() -> None:
@@ -79,13 +77,3 @@ def test_a_crossing_a_few_ticks_before_a_corner_ends_no_run() -> None:
     run = simulate(model, Prescribed((t, v)), 20.0, engine="ifelse", t_eval=t)
     assert sum(edge.startswith("turn") for edge in run.transitions.edge) == 16
     assert np.abs(run.F).max() == pytest.approx(1.0, abs=1e-9)
-
-
-@pytest.mark.slow
-def test_a_profile_ends_at_a_bound() -> None:
-    pytest.importorskip("llvmlite", reason="fits take long without machine code")
-    record = measured(bank([2e4, 5e3], [5e-5, 1e-4]), sine(3e-4, 2.0, 5.0), 0.01, 0)
-    bounds = {"k": (2.8e4, 1e5)}  # the best is 2.88e4
-    found = fit(record, bank([3e4], [5e-5]), free=["k"], bounds=bounds, search="local")
-    profile = found.profile("k1", restarts=False)
-    assert profile.low == profile.values.min() == 2.8e4
