@@ -10,9 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from gms_fsm import System, Trace
-from tests.corpus import Run, each, run
+from tests.corpus import Run, run
 
 TIGHT = {"rtol": 1e-9, "atol": 1e-12, "engine": "ifelse", "t_eval": None}
 DECLARED = (
@@ -38,7 +39,8 @@ def switches(one: Trace, contact: str) -> list[tuple[int, str]]:
     return [(int(row.element), str(row.edge)) for row in log]
 
 
-@each(DECLARED)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DECLARED)
 def test_the_opposite_order(name: str) -> None:
     (system,), how = run(name).subject, {**run(name).how, **TIGHT}
     one = Run((system,), run(name).t_end, how)()

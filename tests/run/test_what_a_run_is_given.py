@@ -35,6 +35,7 @@ FIXED = Settings(method="rk4", step=0.01, rtol=1e-4, max_steps=5000, engine="ife
 
 
 # --------------------------------------------------------------------------- settings
+@pytest.mark.slow
 def test_simulate_a_session_and_a_sweep_run_alike(tmp_path: Path) -> None:
     fields = {each.name for each in dataclasses.fields(Settings)}
     assert set(get_type_hints(SettingOptions)) == fields, "the arguments are the fields"
