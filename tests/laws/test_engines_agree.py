@@ -86,6 +86,7 @@ def test_random_systems_are_drawn_again_by_their_numbers() -> None:
     assert one.system.numbers != other.system.numbers
 
 
+@pytest.mark.slow
 def test_another_bit_is_found() -> None:
     changed = run("random system 0")(engine=ENGINES[0], rtol=1e-5)
     again = run("random system 0")(engine=ENGINES[0], rtol=1.0000000001e-5)

@@ -51,6 +51,7 @@ def test_a_run_goes_on_bit_for_bit(name: str, tmp_path: Path) -> None:
     assert not path.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", sorted({*ENGINES} - {FASTEST}))
 @each(["open loop", "ramps with jumps", "wear", "sliding", "karnopp", "every kind of contact"])
 def test_it_goes_on_in_every_engine(name: str, engine: str, tmp_path: Path) -> None:
@@ -59,6 +60,7 @@ def test_it_goes_on_in_every_engine(name: str, engine: str, tmp_path: Path) -> N
     assert other_parts(again, trace(name, engine)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", [{"output": "end"}, {"t_eval": [0.0, 7.7, 20.0, 30.0]}])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_whatever_is_recorded(output: dict[str, Any], engine: str, tmp_path: Path) -> None:
@@ -77,6 +79,7 @@ def test_whatever_is_recorded(output: dict[str, Any], engine: str, tmp_path: Pat
     assert other_parts(run("pulled mass")(engine=engine, **output, **how), whole) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [7, 50, 203])
 def test_no_row_is_lost_between_ticks(after: int, tmp_path: Path) -> None:
     """A checkpoint after a tick once left out the tick's row, which was then 0 at time 0."""

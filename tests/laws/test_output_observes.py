@@ -84,6 +84,7 @@ def test_a_trace_can_be_pickled(name: str) -> None:
     assert other_parts(pickle.loads(pickle.dumps(trace(name))), trace(name)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["open loop", "system servo"])
 def test_requested_rows_may_be_one_or_many(name: str) -> None:
     for rows in ([0.0], [run(name).t_end], np.linspace(0, run(name).t_end, 2501)):

@@ -365,6 +365,7 @@ def test_data_that_unpacks_to_more_than_the_file_is_not_unpacked(path: Path) -> 
         goes_on(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "value"), [("loop_mode", 3), ("loop_edges", 9), ("kept_log", "none")]
 )
@@ -455,6 +456,7 @@ def test_a_killed_process_can_be_resumed(tmp_path: Path) -> None:
     assert not (tmp_path / "long.checkpoint").exists()
 
 
+@pytest.mark.slow
 def test_the_command_line_resumes(tmp_path: Path, gms_fsm: Any) -> None:
     """`gms-fsm run --checkpoint`, interrupted, then the same command again."""
     loaded = load_scenario(ROOT / "scenarios" / "pulled_mass.toml", [])

@@ -145,6 +145,7 @@ def test_two_restitutions_in_turn_are_one_sequence() -> None:
 
 
 # --------------------------------------------------------------------------- too many steps
+@pytest.mark.slow
 def test_the_steps_of_a_run_are_limited() -> None:
     """Every engine ends at the same row: tests/laws/test_engines_agree.py."""
     model, rig = pulled_mass()
@@ -180,6 +181,7 @@ def stiff(C: float) -> GMS:
     return GMS(parameters, law="signed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", [{}, {"output": "end"}, {"t_eval": [5.0]}])
 @pytest.mark.parametrize("engine", BOTH)
 def test_a_stiff_run_is_reported_after_a_few_thousand_steps(
@@ -207,6 +209,7 @@ def test_a_mildly_stiff_run_that_can_end_ends() -> None:
     assert len(trace) > 5000
 
 
+@pytest.mark.slow
 def test_a_session_ends_with_the_same_message_and_a_scenario_takes_the_limit() -> None:
     session = Session(stiff(200.0), SLOW, 10.0, engine=FASTEST)
     session.proceed()

@@ -106,6 +106,7 @@ def test_all_variables_are_shown(engine: str) -> None:
     assert before == [("2.0", "4.0"), ("3.0", "5.0")]
 
 
+@pytest.mark.slow
 @called
 def test_more_firings_than_the_columns_hold_at_first(engine: str) -> None:
     model, calls = pulled_mass()[0], list[tuple[Any, ...]]()

@@ -72,6 +72,7 @@ def known(friction: Any) -> tuple[Any, ...]:
 
 
 # --------------------------------------------------------------------------- forward and back
+@pytest.mark.slow
 @made
 @engines
 def test_a_snapshot_serves_its_friction_and_another_one(kind: str, engine: str) -> None:

@@ -41,6 +41,7 @@ def _load(arrays: dict[str, Any], folder: Path) -> Sweep:
     return Sweep.load(path)
 
 
+@pytest.mark.slow
 def test_every_shape_and_type_is_checked(arrays: dict[str, Any], tmp_path: Path) -> None:
     assert len(_load(arrays, tmp_path)) == 3
     assert arrays["program"] == gms_fsm.__version__

@@ -80,6 +80,7 @@ def test_one_number_applies_to_all_elements_and_what_is_given_is_kept() -> None:
     assert other.parameters["F_s"].dtype == np.float64
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_an_exponent_of_two_among_others_is_a_run_like_them(engine: str) -> None:
     """It gives another text than other exponents, and so other machine code."""
@@ -92,6 +93,7 @@ def test_an_exponent_of_two_among_others_is_a_run_like_them(engine: str) -> None
         assert set(result.F[delta == value]) == {alone.F[-1]}
 
 
+@pytest.mark.slow
 def test_a_dataframe_has_columns_of_elements() -> None:
     pandas = pytest.importorskip("pandas", reason="needs the extra pandas")
     model, rig = pulled_mass()
@@ -187,6 +189,7 @@ class Backwards(Executor):
         return future
 
 
+@pytest.mark.slow
 def test_the_order_is_that_of_the_parameters_wherever_they_ran() -> None:
     model, rig = pulled_mass()
     sets = _sets(10) | {"mass": [1.0] * 9 + [-1.0]}
