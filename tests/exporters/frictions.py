@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from tests.physics.test_sliding_follows_filippov import follower
 
 from gms_fsm import (
     GMS,
