@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import cast
 
+from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
 from plots.charts.statechart import ChartSheet, chosen
@@ -100,20 +101,22 @@ def animate(
     """
     check_trace(trace)
     formats.chosen(path, "animation")
-    if not 0 < fps <= FASTEST:
+    if not 0 < checked_scalar("fps", fps, "finite") <= FASTEST:
         raise ParameterError(f"it must be above 0 and at most {FASTEST}", place="fps", value=fps)
+    if progress is not None and not callable(progress):
+        raise ParameterError("it must be a function", place="progress", value=progress)
     count = _frames(frames, seconds, fps)
     ChartSheet(trace.model.chart, notation, "TB", theme)  # refuses wrong options before any work
     chosen(trace.n if elements is None else elements, trace.n)
     first, last = float(trace.t.min()), float(trace.t.max())
-    begin = first if t_start is None else t_start
-    end = last if t_end is None else t_end
+    begin = first if t_start is None else checked_scalar("t_start", t_start, "finite")
+    end = last if t_end is None else checked_scalar("t_end", t_end, "finite")
     if not first <= begin < end <= last:
         raise ParameterError(
             f"t_start is {shown(begin)} s and t_end is {shown(end)} s",
             advice=f"they must lie within the run, {first:g} to {last:g} s, in this order",
         )
-    window = (float(begin), float(end))
+    window = (begin, end)
     pace = paced(trace, window, count, fps)
     chart = FilmChart(pace, elements, notation, theme)
     with rc_context(RC | EXACT):

@@ -171,7 +171,7 @@ STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/
             for each in ("state", "history", "invoke", "initial")
         ),
         (STATE, "<state/>" + STATE, "a <state> has no id"),
-        ('initial="stick"', 'initial="stuck"', "its initial state is 'stuck'"),
+        ('initial="stick"', 'initial="stuck"', "there is no initial state 'stuck'"),
         ('<data id="z" expr="0"/>', '<data id="z" src="z.json"/>', "<data src=...> has no"),
         ('target="slip"/>', "/>", "transition 3: a transition without target, or internal"),
         ('target="slip"/>', 'target="slip" type="internal"/>', "without target, or internal"),
@@ -330,12 +330,15 @@ def test_what_a_machine_has_beyond_a_chart_is_named(machine: Any, said: str) -> 
 @pytest.mark.parametrize(
     ("texts", "said"),
     [
-        ({"gards": {}}, "there is no argument 'gards'; there are name, reference"),
-        ({"guards": {"slip": "v > 1"}}, "guards: there is no edge 'slip'; there are 'slips'"),
+        (
+            {"gards": {}},
+            "there is no argument 'gards'; did you mean 'guards'",
+        ),
+        ({"guards": {"slip": "v > 1"}}, "guards: there is no edge 'slip'; did you mean 'slips'"),
         ({"guards": "v > 1"}, "guards is 'v > 1'; it gives a text for each name"),
         ({"actions": {"x": {}}}, "actions: there is no edge 'x'"),
         ({"actions": [1]}, r"actions is \[1\]; it gives texts for each edge"),
-        ({"flows": {"stuck": {}}}, "flows: there is no state 'stuck'; there are 'stick', 'slip'"),
+        ({"flows": {"stuck": {}}}, "flows: there is no state 'stuck'; did you mean 'stick'"),
         ({"entry": 3}, "entry is 3; it gives texts for each state"),
         ({"locked": "stick"}, "locked is 'stick'; give a tuple"),
         ({"locked": ["stuck"]}, "locked: there is no state 'stuck'"),
