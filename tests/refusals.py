@@ -2279,7 +2279,7 @@ rows = {
     "an unread input": ("system 'pair', contact 'gear'", ..., "inputs.s", "inputs.q"),
     "an unbound input": ("system 'pair', contact 'gear'", ..., "inputs.s = 1\n", ""),
     "a value": ("line 18, contact.0: sigma_1", -31.6, "31.6", "-31.6"),
-    "an unknown chart": ("line 21, contact.0.chart: chart", "lugree", '"lugre"', '"lugree"'),
+    "an unknown chart": ("line 21, contact.0.chart", ..., '"lugre"', '"lugree"'),
     "no chart": ("line 18, contact.0: contact 'gear'", ..., 'chart = "lugre"\n', ""),
     "a name used twice": ("line 16, body.1.x: system 'pair'", ..., '"x2"', '"x1"'),
     "a contact's name": ("line 25, contact.1.name: system 'pair'", ..., '"pad"', '"gear"'),

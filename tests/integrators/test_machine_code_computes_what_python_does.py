@@ -444,7 +444,7 @@ def test_c_text_leaves_out_what_nobody_reads():
         left = cos(g.x[0]) + 1.0  # noqa: F841  # a compiler would warn
         return g.count
 
-    _, module = module_of(forgets, True)
+    _, module = module_of([forgets], True)
     assert "cos" not in c99_text(module).partition(" forgets(")[2]
 
 
