@@ -42,6 +42,7 @@ NEAR = {  # module: its tests, those that detect most first
         "charts/test_named_expressions_mean_what_they_stand_for",
         "charts/test_chart_files_round_trip",
         "charts/test_gms_chart_is_the_papers",
+        "systems/test_locks_and_impacts",
         "run/test_own_machines",
     ],
     "gms_fsm/run/machines.py": [
