@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 from html import unescape
 from typing import Any
 
+import pytest
 from textual.pilot import Pilot
 
 from gms_fsm.app.scenario import scenario_to_debug, session_of
@@ -58,7 +59,11 @@ def drive(
             await settle(pilot)
             await action(app, pilot)
 
-    asyncio.run(main())
+    with pytest.MonkeyPatch.context() as patch:
+        # Textual looks every 20 ms whether the process is idle, twice after each key.
+        patch.setattr("textual._wait.SLEEP_GRANULARITY", 0.004, raising=False)
+        patch.setattr("textual._wait.SLEEP_IDLE", 0.0004, raising=False)
+        asyncio.run(main())
     return app
 
 

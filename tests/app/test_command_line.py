@@ -16,7 +16,7 @@ import pytest
 from gms_fsm import GMS, GMSParameters, Prescribed, __version__, simulate
 from gms_fsm.errors import ScenarioError, TraceFileError
 from gms_fsm.lowering.program import lower
-from tests.helpers import ROOT, stick_slip
+from tests.helpers import ROOT, matrix, stick_slip
 from tests.scenario_files import (
     MEASURED,
     OPEN_LOOP,
@@ -63,7 +63,7 @@ def test_help_lists_every_verb_and_imports_nothing_heavy() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["signed", "published"])
+@pytest.mark.parametrize("law", matrix(["signed", "published"], ["signed"]))
 def test_code_prints_the_generated_program(law: str, gms_fsm: CommandLine) -> None:
     done = said(gms_fsm("code", "--law", law))
     model = GMS(GMSParameters.paper("stick-slip"), law=law)  # type: ignore[arg-type]
@@ -122,7 +122,7 @@ def test_usage_errors_and_terminal_codes(broken: CommandLine) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("debug", [False, True])
+@pytest.mark.parametrize("debug", matrix([False, True], [False]))
 def test_in_a_shell(debug: bool, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", "run", "none.toml"]

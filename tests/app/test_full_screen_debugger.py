@@ -37,6 +37,7 @@ from tests.helpers import FIG4_SINE, ROOT, stick_slip
 from tests.scenario_files import CommandLine, one_message
 
 pytestmark = pytest.mark.slow
+MIDDLE = (140, 45)
 ANSWER = "arrest does not fire: |z| < s is false by 0.776 m."
 
 
@@ -149,7 +150,7 @@ def test_branches_are_poked_compared_and_marked_where_they_differ() -> None:
         await press(pilot, "o")
         assert app.commands.session.current == 0
 
-    drive(action, LARGE)
+    drive(action, MIDDLE)
 
 
 def test_commands_are_completed_remembered_and_repeated() -> None:
@@ -189,7 +190,7 @@ def test_a_panel_that_fails_does_not_end_it(monkeypatch: pytest.MonkeyPatch) -> 
         assert app.panels["chart"].shown == "cannot be shown here: division by zero"
         assert _row(app) == 1
 
-    assert drive(action, LARGE).return_code in (0, None)
+    assert drive(action, MIDDLE).return_code in (0, None)
 
 
 def test_clicks_give_commands() -> None:
@@ -221,7 +222,7 @@ def test_clicks_give_commands() -> None:
         await settle(pilot)
         assert _row(app) == row - 1
 
-    drive(action, LARGE)
+    drive(action, MIDDLE)
 
 
 def test_escape_stops_a_long_move_and_leaving_does_not_wait_for_one() -> None:

@@ -128,7 +128,7 @@ RUNS: dict[str, Callable[[], Trace]] = {
     "timed": lambda: pushed(Contact("pad", TIMED, {"T_d": 0.3, "F_c": 1.0, "F_s": 1.5})),
     "shared": lambda: pushed(Contact("pad", SHARED, {"k": 10.0, "F_c": 1.0, "b": 0.2})),
     "puck": lambda: puck().run(),
-    **{name: partial(shown, name) for name in ("backlash", "dahl", "rate-state-ageing")},
+    "dahl": partial(shown, "dahl"),
     "karnopp": lambda: CASES["karnopp"](1.0).run(),
     "elasto-plastic": lambda: CASES["elasto-plastic"](1.0).run(),
     "microseconds": lambda: in_units(1e-6),
