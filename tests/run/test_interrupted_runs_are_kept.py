@@ -28,7 +28,7 @@ from tests.scenario_files import OPEN_LOOP
 
 pytestmark = pytest.mark.slow
 
-OPTIONS = {"all": {}, "t_eval": {"t_eval": np.linspace(0, 4, 56)}}
+OPTIONS = {"all": {}, "t_eval": {"t_eval": np.linspace(0, 8, 111)}}
 
 
 def begins(whole: Trace, part: Trace) -> None:
@@ -63,10 +63,10 @@ def test_ctrl_c_within_a_step_keeps_the_previous_steps(call: int) -> None:
 def test_ctrl_c_between_any_two_lines_of_the_recorder_leaves_a_complete_trace(
     options: str, tmp_path: Path
 ) -> None:
-    whole = simulate(*pulled_mass(), 4.0, **OPTIONS[options])
+    whole = simulate(*pulled_mass(), 8.0, **OPTIONS[options])
     codes = {Recorder.take.__code__, _Columns.add.__code__}
     struck = 0
-    for line in itertools.chain(range(1, 60), range(100, 400, 17)):
+    for line in itertools.chain(range(1, 60), range(100, 400, 37)):
         lines = itertools.count(1)
 
         def strike(frame: FrameType, event: str, _: object, line=line, lines=lines) -> Any:
@@ -79,7 +79,7 @@ def test_ctrl_c_between_any_two_lines_of_the_recorder_leaves_a_complete_trace(
         before = sys.gettrace()
         sys.settrace(strike)
         try:
-            simulate(*pulled_mass(), 4.0, **OPTIONS[options])
+            simulate(*pulled_mass(), 8.0, **OPTIONS[options])
         except KeyboardInterrupt as error:
             if not hasattr(error, "trace"):  # before the run
                 continue

@@ -16,7 +16,7 @@ from gms_fsm.errors import GMSError
 from tests.helpers import FASTEST
 from tests.run.stepping_cases import friction, jumping, record
 
-CASES = 20  # make soak takes 1,000
+CASES = 28  # make soak takes 1,000
 BOTH = sorted({"ifelse", FASTEST})
 COMPILED = ("LuGre bristle", "Elasto", "Reset")  # of the charts; each takes seconds
 

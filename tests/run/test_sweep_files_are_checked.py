@@ -86,15 +86,15 @@ def test_runs_are_in_order_and_there_are_some(arrays: dict[str, Any], tmp_path: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["t", "states", "rows_z", "transitions"])
+@pytest.mark.parametrize("name", ["rows_z", "transitions"])
 def test_data_that_unpacks_to_more_than_a_sweep_has_is_not_unpacked(
     name: str, arrays: dict[str, Any], tmp_path: Path
 ) -> None:
-    bomb = np.zeros(5_000_000)
-    with pytest.raises(TraceFileError, match="unpacks to 40000128 bytes"):
+    bomb = np.zeros(20_000_000)
+    with pytest.raises(TraceFileError, match="unpacks to 160000128 bytes"):
         _load(arrays | {name: bomb}, tmp_path)
     with zipfile.ZipFile(tmp_path / "runs.npz") as archive:
-        assert archive.getinfo(f"{name}.npy").compress_size < 50_000
+        assert archive.getinfo(f"{name}.npy").compress_size < 200_000
 
 
 def test_other_files_say_what_they_are(arrays: dict[str, Any], tmp_path: Path) -> None:
