@@ -84,7 +84,7 @@ def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
 def test_ten_times_the_steps_take_no_more_memory(engine: str) -> None:
     load_once(engine)
     few, first = peak(engine, 16)
-    many, second = peak(engine, 16, max_step=0.05)  # a thousand of steps, a few times more
+    many, second = peak(engine, 16, max_step=0.05)  # a thousand steps, a few times more
     assert len(first.transitions) == len(second.transitions)
     assert many < few + 100_000
 
@@ -133,6 +133,7 @@ def measured(engine: str, transitions: int) -> None:
     print(len(trace.transitions), seconds, 1024 * int(line.split()[1]))
 
 
+@pytest.mark.matrix  # tests/soak asks it of a million
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
 def test_the_operating_system_reports_the_same() -> None:
     few, many = in_a_child("ifelse", 64), in_a_child("ifelse", 800)
