@@ -11,7 +11,7 @@ import functools
 import importlib.util
 import math
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -623,6 +623,17 @@ FEW = (
     "maxwell-slip", "system two blocks", "system puck", "system servo",
     "system pushed against a stop", "several rates", "every kind of contact", "random system 3",
 )  # fmt: skip
+# One of each kind of run, for laws over the whole corpus; make foreign runs the others, too.
+KINDS = (
+    *FEW,
+    "fig. 3", "twelve elements", "before zero", "started", "velocity window",
+    "open loop, bs23", "fig. 4, published, euler", "fig. 3, slipping, dp45 by step",
+    "fig. 4, published, held", "open loop, t_eval", "open loop, dp45 on a grid",
+    "a jump at the start and at the end", "a record with jumps", "all functions", "a function",
+    "odd names", "order of actions", "held at standstill", "an infinite side",
+    "divided by zero", "elasto-plastic", "rate-state-slip", "system impact", "system gear box",
+    "loads", "scenario pulled_mass", "scenario servo",
+)  # fmt: skip
 QUICK = (  # for make quick
     "pulled mass", "open loop, rk4 by step", "ramps with jumps", "wear", "sliding", "karnopp",
     "system two blocks", "system pushed against a stop", "random system 3",
@@ -647,10 +658,16 @@ def outcome(name: str, engine: str = FASTEST) -> tuple[Trace | None, str]:
     return run(name).outcome(engine=engine)
 
 
-def each(names: Iterable[str]) -> pytest.MarkDecorator:
-    """Parametrise a test by the names of runs; most of them are slow."""
-    slow = pytest.mark.slow
-    values = [pytest.param(name, marks=() if name in QUICK else slow) for name in names]
+def each(names: Iterable[str], kept: Collection[str] | None = None) -> pytest.MarkDecorator:
+    """Parametrise a test by the names of runs, most of them slow; those not kept are `matrix`."""
+    slow, matrix = pytest.mark.slow, pytest.mark.matrix
+    values = [
+        pytest.param(
+            name,
+            marks=[slow] * (name not in QUICK) + [matrix] * (kept is not None and name not in kept),
+        )
+        for name in names
+    ]
     return pytest.mark.parametrize("name", values)
 
 

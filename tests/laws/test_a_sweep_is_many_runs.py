@@ -13,7 +13,7 @@ import numpy as np
 from gms_fsm import Sweep, Trace, simulate, sweep
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in, value_in, varied
-from tests.corpus import FAILING, FEW, each, in_turn, outcome, run
+from tests.corpus import FAILING, FEW, QUICK, each, in_turn, outcome, run
 
 FACTORS = (1.0, 1.01, 0.99)  # of every number at once
 LEFT_OUT = {"numbers.V"}  # the velocity that a run begins with
@@ -52,7 +52,7 @@ def same(found: Sweep, other: Sweep) -> None:
     assert (found.edges, found.contacts) == (other.edges, other.contacts)
 
 
-@each(FEW)
+@each(FEW, {*QUICK, "system servo"})
 def test_each_row_is_a_run(name: str, tmp_path: Path) -> None:
     found, alone = swept(name)
     assert found.outcome.tolist() == ["ok"] * len(FACTORS)

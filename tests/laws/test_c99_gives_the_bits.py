@@ -24,7 +24,7 @@ TRANSLATED = (
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
-@each(TRANSLATED)
+@each(TRANSLATED, {*TRANSLATED} - {"system puck"})
 def test_a_run_in_c_is_the_run(name: str) -> None:
     with in_c("cc", "-O2", STRICT) as translated:
         found = run(name)(engine="compiled")

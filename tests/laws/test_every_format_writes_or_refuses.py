@@ -6,6 +6,7 @@ error with a place, and nothing is written.
 
 from __future__ import annotations
 
+import itertools
 import shutil
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import pytest
 from gms_fsm import GMSError, Model, System, export
 from gms_fsm.exporters import formats
 from tests.corpus import run
+from tests.helpers import matrix
 
 pytestmark = [
     pytest.mark.slow,
@@ -22,6 +24,8 @@ pytestmark = [
 ]
 RUNS = ("open loop", "system servo")
 NOT_OF_SYSTEMS = {"scxml", "transitions", "matlab", "modelica", "st"}
+PAIRS = [*itertools.product(formats(), RUNS)]
+SLOWER = {("fmu3", "open loop"), ("fmu2", "system servo"), ("js", "open loop")}
 
 
 def subject_of(name: str) -> Model | System:
@@ -35,8 +39,7 @@ def there(folder: Path) -> dict[str, bytes]:
     return {each.relative_to(folder).as_posix(): each.read_bytes() for each in files}
 
 
-@pytest.mark.parametrize("name", RUNS)
-@pytest.mark.parametrize("form", formats())
+@pytest.mark.parametrize(("form", "name"), matrix(PAIRS, {*PAIRS} - SLOWER))
 def test_it_is_written_or_refused(
     form: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,6 +17,8 @@ from tests.corpus import (
     ENGINES,
     FAILING,
     FEW,
+    KINDS,
+    QUICK,
     RIG_RUNS,
     SYSTEM_RUNS,
     Run,
@@ -30,7 +32,7 @@ from tests.helpers import FASTEST, other_parts, same_bits
 FUNCTIONS = {"a function", "no slope"}
 
 
-@each(CORPUS)
+@each(CORPUS, KINDS)
 def test_a_trace_in_npz_is_whole(name: str, tmp_path: Path) -> None:
     """Rows, stops, log, settings and titles; the chart is that of the run; equal, its bytes too."""
     one = trace(name)
@@ -49,7 +51,7 @@ def test_a_trace_in_npz_is_whole(name: str, tmp_path: Path) -> None:
         same_bits(read.sample(times), one.sample(times))
 
 
-@each(sorted({*RIG_RUNS, *FEW} - FUNCTIONS))
+@each(sorted({*RIG_RUNS, *FEW} - FUNCTIONS), KINDS)
 def test_what_is_read_runs_as_it_did(name: str, tmp_path: Path) -> None:
     """Model and rig, or system, of the file, also those of one's own."""
     one = trace(name)
@@ -72,7 +74,7 @@ def test_a_trace_in_csv_is_whole_but_for_its_stops(name: str, tmp_path: Path) ->
 
 
 @pytest.mark.slow
-@each(FEW)
+@each(FEW, QUICK)
 def test_verdicts_are_those_of_the_run(name: str, tmp_path: Path) -> None:
     """Of all engines and from both kinds of files; a sum may round in another order."""
     monitors = ["all", "t < 1", "1 / t > 0"]
@@ -90,7 +92,7 @@ def test_verdicts_are_those_of_the_run(name: str, tmp_path: Path) -> None:
         assert read.sample([one.t[-1]]).monitors == read.refined(50).monitors == one.monitors
 
 
-@each(FEW)
+@each(FEW, {*QUICK, "several rates"})
 def test_a_session_is_where_it_was(name: str, tmp_path: Path) -> None:
     """After a walk, a poke and a breakpoint; saved twice it is the same file."""
     subject, how, t_end = run(name).subject, run(name).how, run(name).t_end
@@ -108,7 +110,7 @@ def test_a_session_is_where_it_was(name: str, tmp_path: Path) -> None:
     assert other_parts(read.branch.trace(), session.branch.trace()) == []
 
 
-@each(name for name in SYSTEM_RUNS if "random" not in name)
+@each((name for name in SYSTEM_RUNS if "random" not in name), {*SYSTEM_RUNS} - {"cradle with pads"})
 def test_a_system_file_is_the_same_program(name: str, tmp_path: Path) -> None:
     (system,) = run(name).subject
     read = System.load(system.save(tmp_path / "own.toml"))

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gms_fsm import Trace, simulate
-from tests.corpus import CORPUS, ENGINES, each, rates, run, trace
+from tests.corpus import CORPUS, ENGINES, KINDS, each, rates, run, trace
 from tests.helpers import FASTEST, other_parts
 
 LEFT_OUT = {"a function"}  # it may be another one
@@ -43,7 +43,7 @@ def _short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gms_fsm.run.recording.compiled_run.STEPS_AT_ONCE", 30)
 
 
-@each(sorted(set(CORPUS) - LEFT_OUT))
+@each(sorted(set(CORPUS) - LEFT_OUT), KINDS)
 def test_a_run_goes_on_bit_for_bit(name: str, tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     again, _ = until_done(name, FASTEST, path, 0.4)
@@ -53,7 +53,10 @@ def test_a_run_goes_on_bit_for_bit(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", sorted({*ENGINES} - {FASTEST}))
-@each(["open loop", "ramps with jumps", "wear", "sliding", "karnopp", "every kind of contact"])
+@each(
+    ["open loop", "ramps with jumps", "wear", "sliding", "karnopp", "every kind of contact"],
+    ["open loop", "sliding", "karnopp", "every kind of contact"],
+)
 def test_it_goes_on_in_every_engine(name: str, engine: str, tmp_path: Path) -> None:
     again, times = until_done(name, engine, tmp_path / "run.checkpoint", 0.3)
     assert times > 0

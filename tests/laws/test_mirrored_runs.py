@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import Prescribed, PulledSlider, Slider
-from tests.corpus import FORCES, GMS_RUNS, METHOD_RUNS, SIGNAL_RUNS, Run, each, run, trace
+from tests.corpus import FORCES, GMS_RUNS, KINDS, METHOD_RUNS, SIGNAL_RUNS, Run, each, run, trace
 
 ODD = [name for name in {**GMS_RUNS, **METHOD_RUNS, **SIGNAL_RUNS} if "published" not in name]
 ODD = [name for name in ODD if name not in FORCES]
@@ -52,7 +52,7 @@ def exchanged(edge: str) -> str:
     return f"{head}_{pair[last]}" if last in pair else edge
 
 
-@each(ODD)
+@each(ODD, KINDS)
 def test_the_mirrored_run(name: str) -> None:
     one, other = trace(name, "ifelse"), mirror_of(run(name))(engine="ifelse")
     assert other.t.tolist() == one.t.tolist()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
-from tests.corpus import CORPUS, FEW, each, in_turn, run, trace
+from tests.corpus import CORPUS, FEW, KINDS, each, in_turn, run, trace
 from tests.helpers import other_parts, same_logs
 
 
@@ -25,7 +25,7 @@ def whole_of(name: str) -> Trace:
     return trace(name, in_turn(name))
 
 
-@each(CORPUS)
+@each(CORPUS, KINDS)
 def test_the_end_is_the_last_of_all_rows(name: str) -> None:
     whole, end = whole_of(name), run(name)(engine=in_turn(name), t_eval=None, output="end")
     assert len(end) == len(end.stops) == 1
@@ -36,7 +36,7 @@ def test_the_end_is_the_last_of_all_rows(name: str) -> None:
     same_logs(end, whole)
 
 
-@each(CORPUS)
+@each(CORPUS, KINDS)
 def test_requested_rows_are_those_of_the_run(name: str) -> None:
     """A row on a switch is the one after it; both sides of every stop are kept beside them."""
     whole, t_end = whole_of(name), run(name).t_end
@@ -58,7 +58,7 @@ def test_requested_rows_are_those_of_the_run(name: str) -> None:
         assert (some.stops.t == t).sum() >= 2 - (t in (start, t_end)), "before and after"
 
 
-@each(CORPUS)
+@each(CORPUS, KINDS)
 def test_samples_at_rows_are_the_rows(name: str) -> None:
     one = trace(name)
     last = np.append(np.flatnonzero(np.diff(one.t) > 0), len(one) - 1)[-200:]

@@ -12,7 +12,7 @@ import pytest
 from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, PulledSlider, Slider, Trace, simulate
 from gms_fsm.charts import CHARTS
 from gms_fsm.systems.models import ChartModel
-from tests.corpus import DEMONSTRATIONS, RIG_RUNS, Run, each, run, trace
+from tests.corpus import DEMONSTRATIONS, KINDS, RIG_RUNS, Run, each, run, trace
 from tests.helpers import event_sequence, pulled_mass
 from tests.scaled import AXES, factors, other_bits, scaled
 from tests.zoo import zoo_cases
@@ -41,7 +41,7 @@ def in_units(name: str, **by: float) -> list[str]:
     return other_bits(there, here, **by)
 
 
-@each(RIG_RUNS)
+@each(RIG_RUNS, KINDS)
 def test_every_run_on_a_shipped_rig(name: str) -> None:
     """Each in one other unit, in turn."""
     model, rig = run(name).subject

@@ -80,7 +80,7 @@ def cases(draw: st.DrawFn) -> dict[str, Any]:
 
 # No shrinking: the witness is slow, and the example as drawn is just as informative.
 @settings(
-    max_examples=12,
+    max_examples=8,
     deadline=None,
     derandomize=True,
     phases=[Phase.generate],

@@ -135,7 +135,7 @@ def fired(trace: Trace) -> None:
     event(f"transitions: {count if count < 3 else '3 or more' if count < 10 else '10 or more'}")
 
 
-@hard(80)
+@hard(50)
 @given(chart_models() | banks(), rigs(), options(), rounded(1, 6))
 def test_the_invariants_hold(model: Any, rig: Any, given: dict[str, Any], t_end: float) -> None:
     trace, end = attempt(model, rig, t_end, **given)
@@ -197,7 +197,7 @@ def mirrored(model: GMS, one: Any, other: Any, t_end: float, given: dict[str, An
     return a
 
 
-@hard(30)
+@hard(20)
 @given(banks("signed"), ramps(jumps=True), options(), st.integers(0, 2))
 def test_under_the_signed_law_the_mirrored_signal_gives_the_mirrored_run(
     model: GMS, corners: Any, given: dict[str, Any], kind: int
@@ -229,7 +229,7 @@ ARGUMENTS = (
 )  # fmt: skip
 
 
-@hard(50)
+@hard(35)
 @given(
     chart_models() | banks(),
     rigs(),

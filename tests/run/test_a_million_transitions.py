@@ -21,7 +21,7 @@ import pytest
 from gms_fsm import Trace, simulate
 from integrators import elementary
 from integrators.runners import quick
-from tests.helpers import ROOT, open_loop, stick_slip
+from tests.helpers import ROOT, matrix, open_loop, stick_slip
 
 pytestmark = pytest.mark.slow
 
@@ -66,7 +66,10 @@ def peak(engine: str, transitions: int, **options: float) -> tuple[int, Trace]:
         gc.unfreeze()
 
 
-@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 400), ("machines", 200)])
+@pytest.mark.parametrize(
+    ("engine", "transitions"),
+    matrix([compiled, ("ifelse", 200), ("machines", 200)], [compiled, ("ifelse", 200)]),
+)
 def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
     load_once(engine)
     few, first = peak(engine, transitions // 4)
@@ -80,8 +83,8 @@ def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
 @pytest.mark.parametrize("engine", [pytest.param("compiled", marks=compiled.marks), "ifelse"])
 def test_ten_times_the_steps_take_no_more_memory(engine: str) -> None:
     load_once(engine)
-    few, first = peak(engine, 64)
-    many, second = peak(engine, 64, max_step=0.05)  # thousands of steps, a few times more
+    few, first = peak(engine, 16)
+    many, second = peak(engine, 16, max_step=0.05)  # a thousand steps, a few times more
     assert len(first.transitions) == len(second.transitions)
     assert many < few + 100_000
 
@@ -130,6 +133,7 @@ def measured(engine: str, transitions: int) -> None:
     print(len(trace.transitions), seconds, 1024 * int(line.split()[1]))
 
 
+@pytest.mark.matrix  # tests/soak asks it of a million
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
 def test_the_operating_system_reports_the_same() -> None:
     few, many = in_a_child("ifelse", 64), in_a_child("ifelse", 800)

@@ -315,8 +315,11 @@ def test_a_damaged_checkpoint_is_refused(path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", BOTH)
-@pytest.mark.parametrize("options", [{}, {"t_eval": np.linspace(0, 25, 333)}], ids=["all", "eval"])
+@pytest.mark.parametrize(
+    ("engine", "options"),
+    [*zip(BOTH, [{"t_eval": np.linspace(0, 25, 333)}, {}], strict=False)],  # in turn
+    ids=BOTH,
+)
 def test_every_integer_and_every_shape_is_checked(
     engine: str, options: dict[str, Any], path: Path
 ) -> None:
@@ -358,10 +361,10 @@ def test_data_that_unpacks_to_more_than_the_file_is_not_unpacked(path: Path) -> 
     begun(path)
     whole = _arrays(path)
     with path.open("wb") as file:
-        np.savez_compressed(file, **{**whole, "loop_y": np.zeros(50_000_000)})
+        np.savez_compressed(file, **{**whole, "loop_y": np.zeros(10_000_000)})
     with zipfile.ZipFile(path) as archive:
         assert archive.getinfo("loop_y.npy").file_size > 100 * path.stat().st_size
-    with pytest.raises(CheckpointError, match="unpacks to 400000128 bytes"):
+    with pytest.raises(CheckpointError, match="unpacks to 80000128 bytes"):
         goes_on(path)
 
 

@@ -47,8 +47,8 @@ pytestmark = [
 def _traces() -> tuple[Trace, Trace]:
     """Return two runs that differ in every row and in the number of transitions."""
     return (
-        simulate(stick_slip("signed"), Prescribed("0.15*sin(2*pi*t/25)"), 40.0),
-        simulate(stick_slip("published"), Prescribed("0.2*sin(2*pi*t/20)"), 61.0),
+        simulate(stick_slip("signed"), Prescribed("0.15*sin(2*pi*t/25)"), 40.0, engine="ifelse"),
+        simulate(stick_slip("published"), Prescribed("0.2*sin(2*pi*t/20)"), 61.0, engine="ifelse"),
     )
 
 

@@ -86,7 +86,7 @@ def test_runs_are_in_order_and_there_are_some(arrays: dict[str, Any], tmp_path: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["t", "states", "rows_z", "transitions"])
+@pytest.mark.parametrize("name", ["rows_z", "transitions"])
 def test_data_that_unpacks_to_more_than_a_sweep_has_is_not_unpacked(
     name: str, arrays: dict[str, Any], tmp_path: Path
 ) -> None:

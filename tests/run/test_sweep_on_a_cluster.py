@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
 
-RUNS = 128
+RUNS = 64
 
 
 def sets(runs: int = RUNS) -> dict[str, Any]:
@@ -32,17 +32,21 @@ def sets(runs: int = RUNS) -> dict[str, Any]:
     return {"k": k, "weights": 1 / (4 * k)}
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """Two worker processes of one thread each."""
+    """Two worker processes of one thread each, which are started again when they are killed."""
+    dask = pytest.importorskip("dask", reason="needs the extra cluster")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    with distributed.LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        processes=True,
-        dashboard_address=":0",
-        silence_logs=logging.CRITICAL,
-    ) as made:
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        distributed.LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=":0",
+            silence_logs=logging.CRITICAL,
+        ) as made,
+    ):
         yield made
 
 
@@ -99,22 +103,11 @@ class Deadly(Executor):
 
 
 @quiet
-def test_a_run_that_kills_every_worker_is_a_row_that_says_so() -> None:
-    dask = pytest.importorskip("dask", reason="needs the extra cluster")
+def test_a_run_that_kills_every_worker_is_a_row_that_says_so(cluster: Any) -> None:
     pytest.importorskip("llvmlite", reason="needs the extra fast")
     model, rig = pulled_mass()
     here = sweep(model, rig, 6.0, sets(8), engine="ifelse")
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
-        distributed.LocalCluster(
-            n_workers=2,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=":0",
-            silence_logs=logging.CRITICAL,
-        ) as made,
-        distributed.Client(made) as client,
-    ):
+    with distributed.Client(cluster) as client:
         executor = client.get_executor()
         far = sweep(model, rig, 6.0, sets(8), executor=Deadly(executor))
         again = sweep(model, rig, 6.0, sets(8), executor=executor)

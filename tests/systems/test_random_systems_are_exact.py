@@ -9,7 +9,7 @@ import pytest
 from tests.soak import exact_systems
 from tests.soak.exact_systems import trial, verdict
 
-SEED, SHAPES, COUNT = 7, 40, 28
+SEED, SHAPES, COUNT = 7, 40, 20
 
 
 @pytest.mark.slow

@@ -79,7 +79,7 @@ def system_with(contacts: list[str], signal: Any = "0.5 * sin(t)", m: float = 1.
     signal=SIGNALS,
     m=st.floats(1e-3, 1e3),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_any_system_has_the_same_program_and_numbers(
     contacts: list[str], signal: Any, m: float, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
