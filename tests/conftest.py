@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
+import functools
 import gc
+import importlib.util
 from pathlib import Path
 
 import pytest
 
 from tests.scenario_files import CommandLine, command_line
 
+# Typer makes all its commands anew in every call of a program; hundreds of tests call it.
+if importlib.util.find_spec("typer"):
+    import typer.main
+
+    typer.main.get_command = functools.cache(typer.main.get_command)
+
+# Their examples fit, write a film or a page, or run a lesson.
+SLOW_EXAMPLES = (
+    "gms_fsm/app/lessons/",
+    "gms_fsm/identification/choose.py",
+    "gms_fsm/identification/fit.py",
+    "plots/handouts/page.py",
+    "plots/style/presets.py",
+    "gms_fsm/exporters/alone.py",
+    "gms_fsm/exporters/_registry.py",
+)
+
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the examples of lessons as slow: each one runs its lesson."""
+    """Mark examples that take long as slow."""
     for item in items:
-        if item.nodeid.startswith("gms_fsm/app/lessons/"):
+        if item.nodeid.startswith(SLOW_EXAMPLES):
             item.add_marker(pytest.mark.slow)
 
 

@@ -636,7 +636,7 @@ KINDS = (
 )  # fmt: skip
 QUICK = (  # for make quick
     "pulled mass", "open loop, rk4 by step", "ramps with jumps", "wear", "sliding", "karnopp",
-    "system two blocks", "system pushed against a stop", "random system 3",
+    "system two blocks", "random system 3",
 )  # fmt: skip
 
 

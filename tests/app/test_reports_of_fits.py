@@ -42,6 +42,7 @@ def table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_the_page_names_its_files_every_parameter_and_score(folder: Path) -> None:
     written = {path.name for path in folder.iterdir()}
     wanted = set(report_files()) - {"fitted.csv"}  # for a long motion
@@ -98,6 +99,7 @@ def test_a_better_fit_met_on_the_walk_is_said(tmp_path: Path) -> None:
     assert f"- a better fit was met on the way (rise {lower.rise.min():.3g})" in page
 
 
+@pytest.mark.slow
 def test_tables_have_all_digits(folder: Path) -> None:
     rows = table(folder / "parameters.csv")
     assert [row["name"] for row in rows] == [each.name for each in small().table]
@@ -114,6 +116,7 @@ def test_tables_have_all_digits(folder: Path) -> None:
     assert np.array_equal(again.columns["force"], part.measured - part.modelled)
 
 
+@pytest.mark.slow
 def test_the_scenario_runs_and_gives_the_fitted_force(folder: Path) -> None:
     (part,) = small().residuals()
     trace = load_scenario(folder / "fitted.toml").simulate(t_eval=part.t)

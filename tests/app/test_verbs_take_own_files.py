@@ -55,6 +55,7 @@ def test_check_refutes_a_chart_file_by_a_counterexample(verb: CommandLine) -> No
     assert "F_s = -1" in done.out
 
 
+@pytest.mark.slow
 def test_code_of_a_chart_file_runs(verb: CommandLine) -> None:
     done = verb("code", "own.toml", "--rig", "slider")
     assert done.code == 0, done.err

@@ -45,9 +45,9 @@ def compiled(folder: Path, compiler: str, made: str, *arguments: str) -> Path:
     return folder / made
 
 
-def built(folder: Path, name: str, compiler: str = "cc") -> Path:
+def built(folder: Path, name: str, compiler: str = "cc", *more: str) -> Path:
     """Compile an exported program."""
-    return compiled(folder, compiler, f"{name}-{compiler}", f"{name}.c", f"{name}_main.c")
+    return compiled(folder, compiler, f"{name}-{compiler}", *more, f"{name}.c", f"{name}_main.c")
 
 
 def run(program: Path, t: np.ndarray, **inputs: np.ndarray) -> Output:
@@ -142,9 +142,10 @@ def same_bits(
 class Library:
     """An exported engine, called from Python."""
 
-    def __init__(self, folder: Path, made: CEngine, compiler: str = "cc") -> None:
+    def __init__(self, folder: Path, made: CEngine, compiler: str = "cc", *more: str) -> None:
         self.made, name = made, made.name
-        path = compiled(folder, compiler, f"{name}-{compiler}.so", "-fPIC", "-shared", f"{name}.c")
+        arguments = (*more, "-fPIC", "-shared", f"{name}.c")
+        path = compiled(folder, compiler, f"{name}-{compiler}.so", *arguments)
         found = ctypes.CDLL(str(path))
         kinds = {True: ctypes.c_int64, False: ctypes.c_double}
         fields: list[tuple[str, Any]] = [("t", ctypes.c_double)]

@@ -41,6 +41,7 @@ from tests.exporters.frictions import DENSE, dense
 from tests.helpers import matrix, stick_slip
 
 pytestmark = [needs_c, pytest.mark.slow]
+QUICK = "-O0"  # compiles in a fraction of the time, where the claim is not about -O2
 
 
 # A bank, a sampled controller, sliding.
@@ -60,7 +61,7 @@ def model(k: float = 0.7, **curve: float) -> GMS:
 
 def library(folder: Path, given: GMS | ChartModel) -> Library:
     export(given, "c99", folder, name="it")
-    return Library(folder, engine_of(Subject.of(given, "c99", name="it")))
+    return Library(folder, engine_of(Subject.of(given, "c99", name="it")), "cc", QUICK)
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +143,7 @@ def test_the_entry_of_the_default_state_follows_a_number(tmp_path: Path) -> None
 
 
 # --------------------------------------------------------------------------- the program
-@pytest.mark.parametrize("start", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("start", matrix([0.0, 0.5, 1.0], [0.0, 1.0]))
 def test_jumps_and_a_later_start(start: float, tmp_path: Path) -> None:
     friction = ChartModel(CHARTS["maxwell-slip"], {"k": 10.0, "F_c": 0.2}, sigma_2=0.1)
     force = Corners(np.array([0, 1, 1, 2, 2, 3.0]), np.array([0, 0.5, 2, 2, -1, -1]), held=False)
@@ -153,7 +154,7 @@ def test_jumps_and_a_later_start(start: float, tmp_path: Path) -> None:
         signals={"f": force},
     )
     export(system, "c99", tmp_path, name="it", t_start=start)
-    program = built(tmp_path, "it", COMPILERS[0])
+    program = built(tmp_path, "it", COMPILERS[0], QUICK)
     with (tmp_path / "it_record.csv").open() as record:
         done = subprocess.run([program], stdin=record, capture_output=True, text=True, check=True)
     table = np.genfromtxt(io.StringIO(done.stdout), delimiter=",", names=True)
@@ -165,7 +166,7 @@ def test_jumps_and_a_later_start(start: float, tmp_path: Path) -> None:
 
 def test_a_broken_record_is_named(tmp_path: Path) -> None:
     export(stick_slip("signed"), "c99", tmp_path, name="it")
-    program = built(tmp_path, "it", COMPILERS[0])
+    program = built(tmp_path, "it", COMPILERS[0], QUICK)
     for record, said in {
         "t,v\n0,0\n1\n": "row 3: it must have 2 numbers",
         "t,v\n0,0\n1,abc\n": "row 3: it must have 2 numbers",

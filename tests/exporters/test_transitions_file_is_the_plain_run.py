@@ -57,7 +57,7 @@ Case = tuple[Any, dict[str, str], float, float, int]  # friction, record, end, s
 CASES: dict[str, Case] = {
     "forces in guards, inputs, several elements": (SEVERAL, {"v": "sin(2 * t)"}, 20.0, 1e-2, 20),
     "a load from outside": (LOADED, {"v": "sin(2 * t)", **LOAD}, 20.0, 1e-2, 10),
-    "a load on the thresholds of a model": (PRESSED, {"v": SINE}, 25.0, 5e-3, 2),
+    "a load on the thresholds of a model": (PRESSED, {"v": SINE}, 25.0, 2e-2, 2),
 }
 
 
@@ -66,7 +66,7 @@ def case(name: str) -> Case:
     if name in CASES:
         return CASES[name]
     switches = -1 if not CHARTS[name].transitions or name == "backlash" else 2
-    record = ({"v": SINE}, 25.0, 5e-3) if name.startswith("gms") else ({"v": SLOW}, 7.5, 1e-3)
+    record = ({"v": SINE}, 25.0, 1e-2) if name.startswith("gms") else ({"v": SLOW}, 7.5, 1e-3)
     return model(name), *record, switches
 
 

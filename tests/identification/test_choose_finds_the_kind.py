@@ -95,7 +95,7 @@ PERIOD, NOISE = 2.0, 0.01
 
 
 def made(model: Model, cycles: int, size: float = 1e-3, seed: int = 0) -> Record:
-    t = np.linspace(0.0, PERIOD * cycles, 60 * cycles + 1)
+    t = np.linspace(0.0, PERIOD * cycles, 40 * cycles + 1)
     v = size * 2.0 * np.pi / PERIOD * np.cos(2.0 * np.pi * t / PERIOD)
     run = simulate(model, Prescribed((t, v)), float(t[-1]), t_eval=t, engine=FASTEST)
     force = run.F + 0.1 + NOISE * noise(seed, t.size)

@@ -55,7 +55,7 @@ def test_the_truth_is_within_three_standard_deviations() -> None:
     k, weights = [2.5e4, 6e3], [2e-5, 9e-5]
     truth = {"k1": k[0], "k2": k[1], "weights1": weights[0], "weights2": weights[1], "C": 5e-4}
     truth |= {"F_s": 1.2, "v_s": 2e-4, "sigma_2": 80.0, "offset": 0.0}
-    motion = excite(3e-4, [1e-4, 5e-4, 2e-3], rate=100.0)
+    motion = excite(3e-4, [1e-4, 4e-4, 1.4e-3], rate=50.0)
     record = measured(bank(k, weights, sigma_2=80.0), motion, 0.02, seed=3)
     first = initial_bank(record, 2)
     thresholds = first.weights * first.stribeck.F_c

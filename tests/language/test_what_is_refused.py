@@ -333,7 +333,9 @@ def calls_of(work: Callable[[], object]) -> int:
     return count
 
 
-@pytest.mark.parametrize("power", ["2", "8", "9", "0.5", "-3"])
+@pytest.mark.parametrize(
+    "power", ["2", "8", "9", pytest.param("0.5", marks=pytest.mark.slow), "-3"]
+)
 def test_powers_of_powers_cost_no_more_than_their_length(power: str) -> None:
     """The work once doubled with each level: 50 levels would have taken years."""
     text = "(" * 50 + "v" + f")**{power}" * 50

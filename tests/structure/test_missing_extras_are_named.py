@@ -18,7 +18,7 @@ from gms_fsm import Prescribed, Sweep, Trace, prove, simulate, sweep
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.foundation.extras import EXTRAS, missing, require
 from tests.helpers import ROOT, stick_slip
-from tests.structure.source import sources
+from tests.structure.source import PACKAGES
 
 FOR_DEVELOPERS = {"all", "bench", "cluster", "dev", "docs", "foreign", "hosts", "mutation", "test"}
 
@@ -37,10 +37,14 @@ def test_a_message_names_the_command_and_what_works_without(extra: str) -> None:
     assert said.endswith(f"(without it: {without})")
 
 
-@pytest.mark.slow
 def test_the_text_is_in_one_place() -> None:
-    homes = {each.path for each in sources().values() if "gms-fsm[" in each.text}
-    raised = {each.path for each in sources().values() if "MissingExtraError(" in each.text}
+    texts = {
+        path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*.py")
+    }
+    homes = {path for path, text in texts.items() if "gms-fsm[" in text}
+    raised = {path for path, text in texts.items() if "MissingExtraError(" in text}
     assert homes == {"gms_fsm/foundation/extras.py"}
     assert raised == {"gms_fsm/foundation/extras.py", "gms_fsm/errors.py"}
 

@@ -180,7 +180,9 @@ HIT = Chart(
 )
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    "engine", [pytest.param(e, marks=pytest.mark.slow) if e == "compiled" else e for e in ENGINES]
+)
 def test_an_action_after_an_impulse_reads_the_new_velocity(engine: str) -> None:
     system = System(
         "two masses",

@@ -50,6 +50,7 @@ def servo() -> System:
     return system
 
 
+@pytest.mark.slow
 def test_the_servo_is_where_an_independent_loop_has_it() -> None:
     """SciPy with a hand-written loop gave 1.32993 mm at 0.2 s."""
     trace = simulate(servo(), 0.2, engine="ifelse")

@@ -42,6 +42,7 @@ def test_a_soft_spring_makes_atomic_stick_slip() -> None:
     assert pull[late].mean() > 0.4 * F_0
 
 
+@pytest.mark.slow
 def test_a_stiff_spring_slides_without_friction() -> None:
     K, V = 3 * STEEP, 0.01
     trace = pulled(K, V=V, t_end=60.0)

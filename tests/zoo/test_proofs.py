@@ -54,6 +54,7 @@ def test_what_is_proved_and_why_the_rest_is_not(name: str) -> None:
         assert sum(reason in text for text in texts) == number
 
 
+@pytest.mark.slow
 def test_the_refuting_point_of_modelica_is_an_instant_of_freedom() -> None:
     (finding,) = prove(CHARTS["modelica"], entry("modelica").domain).refuted
     assert finding.where == ("stuck", "lift", "free", "engage_at_rest")
