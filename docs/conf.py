@@ -34,8 +34,8 @@ extensions = [
     "sphinx_copybutton",
 ]
 # With `-t draft`, as the tests build it, the site has no pages of sources, one lesson that is run,
-# few positions of its sliders, a search that knows the first page only, no names of the API in the contents
-# beside a page, and no dark pictures of the zoo.
+# few positions of its sliders, a search that knows the first page only, no names of the API in the
+# contents beside a page, and no dark pictures of the zoo.
 toc_object_entries = not tags.has("draft")  # noqa: F821  # defined by Sphinx
 if toc_object_entries:
     extensions.append("sphinx.ext.viewcode")
