@@ -34,8 +34,10 @@ extensions = [
     "sphinx_copybutton",
 ]
 # With `-t draft`, as the tests build it, the site has no pages of sources, one lesson that is run,
-# and few positions of its sliders.
-if not tags.has("draft"):  # noqa: F821  # defined by Sphinx
+# few positions of its sliders, a search that knows the first page only, no names of the API in the
+# contents beside a page, and no dark pictures of the zoo.
+toc_object_entries = not tags.has("draft")  # noqa: F821  # defined by Sphinx
+if toc_object_entries:
     extensions.append("sphinx.ext.viewcode")
 exclude_patterns = ["**/__pycache__"]
 smartquotes_action = "D"  # "dp45" can be copied literally
@@ -133,6 +135,14 @@ def make_lessons(app: Sphinx) -> None:
     notebooks.write_all(HERE / "lessons", *([[1]] if app.tags.has("draft") else []))
 
 
+def leave_out_index(app: Sphinx) -> None:
+    """Let the search of a draft know the first page only."""
+    if app.tags.has("draft"):
+        builder: Any = app.builder
+        feed = builder.index_page
+        builder.index_page = lambda name, *rest: feed(name, *rest) if name == "index" else None
+
+
 def copy_replay_pages(app: Sphinx, error: Exception | None) -> None:
     """Copy the lessons' replay pages next to their pages."""
     if error is None:
@@ -149,4 +159,5 @@ def setup(app: Sphinx) -> None:
     app.connect("html-page-context", mend_ways_back)
     app.connect("html-page-context", open_to_all, priority=900)  # after the theme
     app.connect("builder-inited", make_lessons)
+    app.connect("builder-inited", leave_out_index)
     app.connect("build-finished", copy_replay_pages)

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from gms_fsm.app.scenario import Scenario
 from gms_fsm.exporters import FORMATS, formats
+from tests.helpers import matrix
 from tests.page_blocks import ROOT, Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow
@@ -28,13 +31,39 @@ PAGES = [
     if not path.name.startswith("lesson_")  # made from the lessons and run as notebooks
     and path.name != "paper.md"  # run in tests/app/test_paper_reproduction.py
 ]
+# Long runs: `make foreign` runs these pages, `make test` those of the other models.
+LONG = ("bouc-wen.md", "elasto-plastic.md", "lugre-sigma1.md", "seven-parameter.md")
+FIGURES = "exporting-figures.md"  # draws each format; tests/plots draws each figure
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
 EXTRAS = set(
     tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 )
 
 
-@pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+def _saving(every: bool) -> Callable[..., None]:
+    """Return a `savefig` that draws the first figure of each format, or none."""
+    from matplotlib.figure import Figure
+
+    draw, drawn = Figure.savefig, set[str]()
+
+    def savefig(figure: Figure, target: Any, **options: Any) -> None:
+        kind = str(options.get("format") or Path(str(target)).suffix)
+        if every and kind not in drawn:
+            draw(figure, target, **options)
+        elif hasattr(target, "write"):
+            target.write(b"drawn in tests/plots")
+        else:
+            Path(target).write_bytes(b"drawn in tests/plots")
+        drawn.add(kind)
+
+    return savefig
+
+
+@pytest.mark.parametrize(
+    "path",
+    matrix(PAGES, [path for path in PAGES if path.name not in LONG]),
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
 def test_page(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
@@ -42,6 +71,7 @@ def test_page(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr("warnings.showwarning", None)  # the command line sets its own
     assert formats()  # all are in the table
     monkeypatch.setattr("gms_fsm.formats.FORMATS", list(FORMATS))  # a page adds one
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", _saving(path.name == FIGURES))
     page = Page(str(path.relative_to(ROOT)))
     printed: str | None = None
     for block in blocks_of(path.read_text(encoding="utf-8")):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-import subprocess
+import runpy
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import unquote, urldefrag
 
@@ -91,19 +92,19 @@ def test_a_lesson_is_run_and_its_predictions_are_answered(built: Built) -> None:
     assert (built.site / "lessons/lesson_1_replay.html").is_file()
 
 
-def test_ways_back_from_a_source_page_lead_to_the_documented_name() -> None:
+def test_ways_back_from_a_source_page_lead_to_the_documented_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The tests' site has no pages of sources, which take a third of the time."""
-    code = (
-        "import sys; sys.path.insert(0, 'docs'); from types import SimpleNamespace as Any\n"
-        "import builtins; builtins.tags = Any(has=lambda _: True); import conf\n"
-        "domain = Any(objects={'gms_fsm.Trace': Any(docname='api/run')})\n"
-        "app = Any(env=Any(get_domain=lambda _: domain))\n"
-        'back = \'<a class="viewcode-back" href="../../../api/run.html#{}">\'\n'
-        "page = {'body': back.format('gms_fsm.traces.trace.Trace') + back.format('a.b')}\n"
-        "conf.mend_ways_back(app, '_modules/gms_fsm/traces/trace', '', page, None)\n"
-        "assert page['body'] == back.format('gms_fsm.Trace') + back.format('a.b'), page\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
+    monkeypatch.setattr(sys, "path", [*sys.path])  # the configuration adds its folder
+    tags = SimpleNamespace(has=lambda _: True)
+    conf = runpy.run_path(str(ROOT / "docs" / "conf.py"), {"tags": tags})
+    domain = SimpleNamespace(objects={"gms_fsm.Trace": SimpleNamespace(docname="api/run")})
+    app = SimpleNamespace(env=SimpleNamespace(get_domain=lambda _: domain))
+    back = '<a class="viewcode-back" href="../../../api/run.html#{}">'
+    page = {"body": back.format("gms_fsm.traces.trace.Trace") + back.format("a.b")}
+    conf["mend_ways_back"](app, "_modules/gms_fsm/traces/trace", "", page, None)
+    assert page["body"] == back.format("gms_fsm.Trace") + back.format("a.b")
 
 
 def _leads_somewhere(page: Path, link: str, pages: dict[Path, Links]) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import runpy
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -31,10 +33,21 @@ def test_a_page_says_what_the_model_shows_and_where_it_is_published() -> None:
 
 
 @pytest.mark.slow
-def test_the_pages_are_what_the_script_makes() -> None:
+def test_the_pages_are_what_the_script_makes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The runs are those of test_docs_are_true.py, which runs each page; here one is run."""
     for module in ("matplotlib", "pygraphviz", "z3"):
         pytest.importorskip(module, reason="the pages have pictures and proofs")
-    pages = runpy.run_path(str(ROOT / "docs" / "make_zoo.py"))["pages"]
+    script = runpy.run_path(str(ROOT / "docs" / "make_zoo.py"))
+    pages = script["pages"]
+
+    def example(item: Any) -> Iterator[str]:
+        text = (PAGES / f"{item.name}.md").read_text(encoding="utf-8")
+        part = text.partition("## Run it\n\n")[2].partition("\n\n## Proofs")[0]
+        driven = "<!-- file: driven.toml -->" in part
+        assert f"```toml\n{script['system_file'](item, driven=driven)}```" in part, item.name
+        yield from script["example"](item) if item.name == "lugre" else [part]
+
+    monkeypatch.setitem(pages.__globals__, "example", example)
     for name, text in pages().items():
         assert (PAGES / name).read_text(encoding="utf-8") == text, f"{name}: run make gallery"
 
