@@ -47,6 +47,7 @@ NEAR = {  # module: its tests, those that detect most first
     ],
     "gms_fsm/run/machines.py": [
         "run/test_own_machines",
+        "systems/test_locks_and_impacts",
         "laws/test_engines_agree",
         "laws/test_files_give_back_what_was_saved",
         "charts/test_gms_chart_is_the_papers",
