@@ -373,7 +373,7 @@ def test_edges_and_columns_have_the_contact_s_name(tmp_path: Path) -> None:
     found = sweep(case.system, 5.0, {"pad1.F_s": [15.0, 20.0]}, **how)
     assert found.sequence(0)[0][1].startswith(("pad1.", "pad2."))
     assert {"one.x", "belt.v", "pad1.F", "pad2.state1", "pad1.F_s"} < {*found.columns()}
-    with pytest.raises(ParameterError, match="there is no contact 'pat'; did you mean 'pad"):
+    with pytest.raises(ParameterError, match="there is no contact 'pat'; there are pad1, pad2"):
         found.contact("pat")
     with np.load(found.save(tmp_path / "runs.npz")) as file:
         arrays = dict(file)
