@@ -69,6 +69,8 @@ def error_norm(
     --------
     >>> error_norm([2e-6], 0.5, [0.0], [1.0], rtol=1e-6, atol=[0.0])
     1.0
+    >>> [error_norm([each], 0.5, [0.0], [0.0], rtol=1e-6, atol=[0.0]) for each in (0.0, 1e-9)]
+    [0.0, inf]
     """
     worst = 0.0
     for j in range(len(y)):

@@ -159,8 +159,8 @@ def latex_name(name: str) -> str:
 
     Examples
     --------
-    >>> print(latex_name("sigma_0"), latex_name("v_s"), latex_name("load"))
-    \sigma_{0} v_{s} \mathrm{load}
+    >>> print(latex_name("sigma_0"), latex_name("v_s"), latex_name("load"), latex_name("x2"))
+    \sigma_{0} v_{s} \mathrm{load} x_{2}
     """
     head, _, index = name.partition("_")
     if head.lower() in _GREEK and len(head) > 1:

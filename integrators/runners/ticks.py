@@ -47,7 +47,14 @@ class Ticks:
         return int(self.bits[row]) if row < len(self) and self.times[row] == t else 0
 
     def after(self, t: float, bit: int) -> float | None:
-        """Return the first tick of a bit after a time; None if there is none."""
+        """Return the first tick of a bit after a time; None if there is none.
+
+        Examples
+        --------
+        >>> ticks = Ticks.of([np.array([0.1, 0.2])], [1])
+        >>> ticks.after(0.1, 1), ticks.after(0.2, 1)
+        (0.2, None)
+        """
         for row in range(int(np.searchsorted(self.times, t, "right")), len(self)):
             if self.bits[row] & bit:
                 return float(self.times[row])

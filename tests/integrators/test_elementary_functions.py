@@ -10,12 +10,14 @@ from random import Random
 from typing import Any
 
 import mpmath
+import numpy as np
 import pytest
 
 from integrators import elementary
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.tree import Local
+from integrators.runners import quick
 
 TWO = ("atan2", "power")
 ODD = ("asin", "asinh", "atan", "sin", "sinh", "tan", "tanh")
@@ -141,3 +143,19 @@ def compiled() -> Callable[[str], Callable[..., float]]:
         return lambda *given: ctypes.CFUNCTYPE(*kinds)(address)(*given)
 
     return function
+
+
+@pytest.mark.parametrize(("function", "loop"), [("exp", "_of_one"), ("atan2", "_of_two")])
+def test_long_columns_have_the_same_bits(
+    function: str, loop: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A loop is compiled for them; without llvmlite each entry is computed as it stands."""
+    own = getattr(elementary, function)
+    rows = np.random.default_rng(3).normal(size=(2, 4, 5))[: 1 + (function in TWO)]
+    told = np.empty(rows[0].size)
+    getattr(quick, loop)(own, *(row.ravel().tolist() for row in rows), told)
+    monkeypatch.setattr(quick, "FREE", 10)
+    assert quick.each(own, *rows).tobytes() == told.tobytes()
+    monkeypatch.setattr(quick, "find_spec", lambda name: None)
+    assert quick.each(own, *rows).tobytes() == told.tobytes()
+    assert quick.scalar(own, len(rows)) is own

@@ -7,6 +7,7 @@ when a comparison fails.
 import ctypes
 import linecache
 import math
+import re
 import shutil
 import struct
 import subprocess
@@ -24,6 +25,7 @@ from integrators.machine_code import llvm, objects
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.front_end.translate import HostFunction, TranslationError, Translator
 from integrators.machine_code.front_end.values import ArrayValue, NumberValue
+from integrators.machine_code.javascript import javascript_text, library_text
 from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.tree import Const, Local
@@ -261,9 +263,9 @@ def zeros(g):
 
 def longer_of(g, j):
     if j > 1:
-        return g.x, 1.5
+        return g.x, 2
     if j > 0:
-        return g.y, 2
+        return g.y, 1.5
     return g.x[:j], 0.0
 
 
@@ -341,10 +343,26 @@ def after_loops(g):
     return last_turn(g, g.count) + 10 * last_turn(g, 0)
 
 
+def which_one():
+    return scaled
+
+
+def truth(g):
+    """Truth values are integers where integers are asked for; constants are computed before."""
+    if SIZE:
+        g.whole[0] = -g.flags[0] + min(g.flags[1], g.flags[2]) + 2**3
+    g.whole[1] = (g.flags[0] & g.flags[1]) + (g.flags[2] | g.flags[3]) + int(g.flags[4])
+    g.out[0] = which_one()(g.x[0], 3) + math.nextafter(g.y[0], 1.0)
+    count = 0
+    while len(first_of(g.x, count)) < 3:
+        count += 1
+    return len(g) + count
+
+
 CASES = [
     arithmetic, conversions, choices, undefined, functions, loops, records, fields, tables, passed,
     lengths, zeros, returns, now_and_later, once,
-    after_loops,
+    after_loops, truth,
 ]  # fmt: skip
 
 
@@ -522,6 +540,15 @@ def test_numbers_of_a_dataclass_are_words_of_the_block():
     assert (state.t, copy.contents.state.count) == (0.5, 8)
 
 
+def test_a_block_takes_over_arrays_that_are_outside():
+    layout = BlockLayout(given(0), callable)
+    block, other = MemoryBlock(layout, given(1)), MemoryBlock(layout, given(2))
+    other.become(block)
+    assert bits(other.contents) == bits(block.contents)
+    other.contents.out[0] += 1.0
+    assert bits(other.contents) != bits(block.contents)
+
+
 def test_a_column_of_a_dataclass_is_replaced():
     example = (State(0.0, 0, False, OuterArray()),)
     block = MemoryBlock(BlockLayout(example, callable), example)
@@ -611,6 +638,72 @@ def test_an_error_names_the_line(function, line):
     number = function.__code__.co_firstlineno
     lines = [f"line {number + k}, in {function.__name__}" for k in range(4)]
     assert any(caught.value.place.endswith(each) for each in lines)
+
+
+REFUSED = {
+    "a = applied(scaled, g.x, g.out)": "the function returns nothing",
+    "a = [g.scale]": "this expression is not part of the subset",
+    "a = -g.x": "g.x is not a number",
+    "a = g.x + 1.0": "g.x is not a number",
+    "a = g.x[g.scale]": "g.scale is not an integer",
+    "g.out[0] = a; a = 1.0": "a is read before it is assigned",
+    "a = g.nothing": "there is no nothing",
+    "a = g.scale[0]": "g.scale is not an array",
+    "a = g.x[1:]": "only the first entries of an array",
+    "a = g.scale ** 2": "a power of floats is not part of the subset: call elementary.power",
+    "a = g.count ** 2": "a power of integers is not part of the subset",
+    "a = g.scale @ g.scale": "this operator is not part of the subset",
+    "a = g.scale % 2.0": "% is for integers only",
+    "a = g.count // 0": "division by zero",
+    "a = g.count is g.count": "this comparison is not part of the subset",
+    "a = g.flags[0] and len(first_of(g.x, 2)) > 1": "after and and or only plain expressions",
+    "a = first_of(g.x, 2) if g.flags[0] else g.y": "the alternatives must be plain expressions",
+    "a = g.x if g.flags[0] else 1.0": "the alternatives differ in kind",
+    "a = g.x(1)": "g.x is not a function",
+    "a = min(g.scale, key=1)": "arguments are given by place",
+    "a = min(g.x, 1.0)": "the function takes numbers",
+    "a = len(g.scale)": "a number has no length",
+    "a = Pair(g.x)": "Pair takes first, second",
+    "a = scaled(g.scale)": "it takes 2 arguments, not 1",
+    "for u in g.scale: pass": "a loop goes over a range or over an array of numbers",
+    "for j in range(5, 0, -1): pass": "the step of a range must be a positive constant",
+    "for j in range(3): pass\n    for j in g.x: pass": "j would be of two kinds",
+    "j = 1.0\n    for j in range(3): pass": "j would be of two kinds",
+    "for u in (1, 2): break": "a loop over a tuple cannot be left",
+    "a, b = g.scale": "only tuples can be unpacked",
+    "a, b = 1, 2, 3": "the numbers of names and values differ",
+    "g.out[0] += raised(g)": "call the function first",
+    "g.out[0] = g.x": "an entry or a field is a number",
+    "if g.flags[0]: return": "the function returns a value or nothing",
+    "if g.flags[0]: return g.x if g.flags[1] else g.y": "is an array and a number",
+}
+
+
+@pytest.mark.parametrize(("text", "reason"), REFUSED.items())
+def test_what_is_outside_the_subset_is_refused(text, reason, tmp_path):
+    path = tmp_path / "refused.py"
+    path.write_text(f"def function(g):\n    {text}\n    return 0\n")
+    names = dict(globals())
+    exec(compile(path.read_text(), str(path), "exec"), names)
+    with pytest.raises(TranslationError, match=re.escape(reason)):
+        module_of([names["function"]], True)
+
+
+def test_javascript_refuses_what_it_cannot_call_or_address():
+    with pytest.raises(ValueError, match="cannot call a function of the host program"):
+        javascript_text(module_of([asks], True)[1])
+    with pytest.raises(ValueError, match="no address within a word"):
+        javascript_text(module_of([truth], True)[1])  # a truth value has one byte
+
+
+def stepped(u, v):
+    return math.nextafter(u, v) + int(u > v)
+
+
+def test_javascript_has_integers_of_truth_values_and_neighbours():
+    text = library_text({"stepped": stepped})
+    assert "nextafter(u_0, v_1) + ((u_0 > v_1 ? 1 : 0) + 0)" in text
+    assert "function nextafter(" in text
 
 
 def test_what_is_said_about_putting_inline_is_said_about_functions_that_exist():

@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
+from scipy.integrate import RK45
 
+from gms_fsm import Chart, ChartModel, NotFiniteError, Prescribed, State, simulate
 from integrators import advance as kernel
 from integrators.hybrid import Buffers, Equations, LoopOptions, buffers
+from integrators.runners.scipy_arcs import SciPyStepper
 from integrators.sliding import Surfaces
 from integrators.step_size import LEAST_ROOT, memory_of, next_factor, root_of
 from integrators.steps import ArcMotion
@@ -302,3 +306,17 @@ def test_every_attempted_step_is_counted_once() -> None:
     flows = len(run.asked) // 6
     assert tried > kept
     assert flows in (tried, tried + 1)
+
+
+# --------------------------------------------------------------------------- solvers of SciPy
+def test_a_solver_of_scipy_is_a_class_of_it() -> None:
+    with pytest.raises(TypeError, match=r"is not a scipy\.integrate\.OdeSolver class"):
+        SciPyStepper(None, None, SimpleNamespace(method=RK4))  # type: ignore[arg-type]
+
+
+def test_a_solver_of_scipy_ends_where_the_flow_is_not_finite() -> None:
+    flow = {"z": "exp(1e9*v - 1e8)"}
+    chart = Chart("a", ("v",), ("z",), (), (State("only", flow),), (), {"F": "z"})
+    with pytest.raises(NotFiniteError) as caught:
+        simulate(ChartModel(chart, {}), Prescribed("t"), 2.0, method=RK45, atol=1e-9)
+    assert caught.value.trace.t[-1] <= 0.1

@@ -183,6 +183,10 @@ def test_a_formula_of_latex() -> None:
     )
 
 
+def test_a_formula_of_latex_has_pi() -> None:
+    assert spell(parse_value("pi * v", ["v"]), LATEX) == r"\pi \, v"
+
+
 def test_a_function_that_a_dialect_does_not_have_is_named() -> None:
     with pytest.raises(KeyError, match="asinh"):
         spell(parse_value("asinh(v)", ["v"]), MODELICA)

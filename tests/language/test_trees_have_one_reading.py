@@ -35,7 +35,8 @@ from gms_fsm.language import (
     states_in,
     substitute,
 )
-from gms_fsm.language._vectors import truths
+from gms_fsm.language._vectors import truths, values_of
+from gms_fsm.language.normal import renamed_in
 from gms_fsm.language.tree import walk
 
 
@@ -198,8 +199,16 @@ def test_states_are_compared_by_name() -> None:
     assert truths(own, columns, (2, 2)).tolist() == [[False, True], [True, True]]
     assert truths(first, columns, (2, 2)).tolist() == [[True, True], [False, False]]
     assert (own, first) == (InState(0, "slip"), Not(InState(1, "slip")))
+    assert renamed_in(first, {"v": Number(0.0)}) == first
+    with pytest.raises(TypeError, match="on values, not on states"):
+        split(own)
     assert (states_in(own), states_in(first)) == ({0}, {1})
     asked = {"state(1)": "slip", "state(2)": "stick"}
     assert evaluate(InState(1, "slip"), asked) is True
     assert evaluate(InState(2, "slip"), asked) is False
     assert evaluate(InState(1, "slip"), {"state(1)": "arrested"}) is False
+
+
+def test_an_empty_condition_and_a_zeroth_power_are_constants() -> None:
+    assert truths(Both(()), {}, (2,)).tolist() == [True, True]
+    assert values_of(parse_value("z**0", ["z"]), {"z": [0.0, 2.0]}).tolist() == [1.0, 1.0]

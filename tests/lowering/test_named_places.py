@@ -14,7 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.bodies import bodies
 from gms_fsm import Chart, ChartModel, Prescribed, Slider, State
+from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRecord
 from gms_fsm.lowering.places import ElementPlaces, Places
@@ -197,13 +199,25 @@ def test_texts_name_the_same_places(shared: tuple[str, ...], n: int, others: int
     for place, (name, i) in enumerate(places):
         assert eval(places.text(name), {**sizes, "i": i}) == place
         used = {size: sizes[size] for size in places.sizes(name)}
+        assert i is not None or places.start_text(name) == str(place)
         assert eval(places.text(name), {**used, "i": i}) == place
         if i is not None:
             first, end = (eval(places.start_text(name, k), dict(sizes)) for k in (0, 1))
             assert first + i == place
             assert first <= place < end
+    with pytest.raises(KeyError):
+        places.sizes("nowhere")
     assert eval(places.size_text(), dict(sizes)) == places.size
     assert eval(places.size_text(2), dict(sizes)) == places.size + 2
+
+
+def test_one_of_several_contacts_is_named() -> None:
+    layout = lower(bodies("chain", 2)).layout
+    assert layout.contact("c1").name == "c1"
+    with pytest.raises(
+        ParameterError, match=r"the contacts c0, c1; say which one: \.contact\('c0'\)"
+    ):
+        layout.contact()
 
 
 def test_machine_code_finds_what_it_writes_into_the_log() -> None:

@@ -6,6 +6,7 @@ on, until only arguments are left. Nothing is computed that nobody reads.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
@@ -50,7 +51,7 @@ def indented(lines: Iterable[CodeLine]) -> list[CodeLine]:
     return [line._replace(text="    " + line.text) for line in lines]
 
 
-class ProgramWriter:
+class ProgramWriter(ABC):
     """Writes values, loops over elements and functions of a plan.
 
     Parameters
@@ -291,14 +292,13 @@ class ProgramWriter:
         lines = [*head, *first, *lines] or [CodeLine("pass")]
         return [f"def {signature}:", f'    """{doc}"""', *(f"    {line.text}" for line in lines)]
 
+    @abstractmethod
     def followed(self) -> list[CodeLine]:
         """Write the velocities that locks determine."""
-        return []
 
+    @abstractmethod
     def rounded(self, name: str) -> list[CodeLine]:
         """Write that a value is zero if it is so but for rounding."""
-        del name
-        return []
 
     def head(
         self, reads: frozenset[str], signs: Signs, followed: list[CodeLine] | None = None

@@ -107,6 +107,8 @@ def plus(a: Expr, b: Expr) -> Expr:
     --------
     >>> plus(Const("i", 2), Const("i", 3)).value
     5
+    >>> plus(Const("i", 0), Local("i", "n")).name, plus(Local("i", "n"), Const("i", 0)).name
+    ('n', 'n')
     """
     if isinstance(a, Const) and isinstance(b, Const):
         return Const("i", a.value + b.value)
@@ -155,7 +157,10 @@ def substituted(part: Any, given: Mapping[Local, Expr]) -> Any:
 
     Examples
     --------
-    >>> substituted(NumberValue(Local("i", "n")), {Local("i", "n"): Const("i", 5)}).expr.value
+    >>> n = Local("i", "n")
+    >>> substituted(NumberValue(n), {n: Const("i", 5)}).expr.value
+    5
+    >>> substituted(Op("i", "+", (n, n)), {n: Const("i", 5)}).operands[1].value
     5
     """
     if not given:
