@@ -15,9 +15,11 @@ import pytest
 from gms_fsm import Body, Contact, System, simulate
 from gms_fsm.exporters import Subject
 from gms_fsm.exporters.fmi.model import FmuArguments, both_of
+from gms_fsm.lowering.adapting import adapt
+from integrators.loop import ARC, MACHINE_LIVELOCK, START
 from integrators.runners import exchange, stepping
 from tests.exporters.frictions import KARNOPP_MODEL, servo
-from tests.helpers import stick_slip
+from tests.helpers import banging, stick_slip
 
 PAPER = stick_slip("signed")
 OPEN_LOOP = System(
@@ -147,3 +149,45 @@ def test_another_start_moves_the_ticks() -> None:
     importer.settle()
     assert importer.x.next == 3.0 + 1e-3
     assert math.isclose(importer.b.now.t, 3.0)
+
+
+def test_the_slope_before_the_first_event_is_that_behind_it() -> None:
+    importer = Importer(both_of(Subject.of(SLIDING, "fmu2")))
+    y = np.array(importer.b.now.y)
+    before = importer.slope(0.0, y)
+    importer.settle()
+    assert before.tobytes() == importer.slope(0.0, y).tobytes()
+
+
+def test_switching_without_end_is_an_error_of_the_event() -> None:
+    importer = Importer(both_of(Subject.of(mass(banging(-0.5)), "fmu2")))
+    importer.go_to(0.0, [1.2] * len(importer.b.now.y))
+    x = importer.x
+    error = exchange.settle(importer.functions, importer.machines, importer.b, importer.clocks, x)
+    assert error == MACHINE_LIVELOCK
+
+
+# --------------------------------------------------------------------------- samples
+def test_a_sample_goes_over_ticks() -> None:
+    both = both_of(Subject.of(servo(), "fmu2"))
+    both.sample.end = 2.5e-3
+    assert stepping.step_to(both.functions, both.machines, both.buffers, both.sample) == 0
+    assert both.buffers.now.t == 2.5e-3
+    assert both.buffers.plan.jumps == [2e-3, 3e-3]
+    trace = simulate(servo(), 2.5e-3, engine="ifelse")
+    np.testing.assert_allclose(both.buffers.now.y, trace.rows.y[-1], rtol=1e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize("phase", [START, ARC])
+def test_all_that_follows_from_the_numbers_follows_again(phase: int) -> None:
+    """As source; exports call it as machine code. With the same numbers the same follows."""
+    both = both_of(Subject.of(mass(PAPER), "fmu2"))
+    b = both.buffers
+    b.memory.phase = phase
+    followed = (b.plan.control.atol, b.now.floor, b.plan.relaxing, b.memory.anchor)
+    right = [list(each) for each in followed]
+    for each in followed if phase == START else followed[:-1]:
+        each[:] = [0.5] * len(each)
+    scale = adapt(both.functions, b, both.sample.seen, b.sliding.live, both.adapting)
+    assert scale == b.plan.control.time_scale
+    assert [list(each) for each in followed] == right

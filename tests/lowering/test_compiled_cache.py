@@ -167,6 +167,18 @@ def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], boo
     return once
 
 
+def test_functions_in_memory_give_way_when_they_are_many(
+    observe: Callable[[], bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert observe()
+    monkeypatch.setattr(compiled, "_observers", {-1: None})
+    monkeypatch.setattr(compiled, "MOST_ENGINES", 1)
+    program = lower(stick_slip("signed"), Prescribed("0.1*t"))
+    rows = np.array([2.0]), np.zeros((1, 5)), np.zeros((1, 4), dtype=int)
+    compiled.observe_rows(program, *rows, range(14))
+    assert [*compiled._observers] == [id(program.functions)]
+
+
 def _flip(path: Path, source: random.Random) -> None:
     content = bytearray(path.read_bytes())
     bit = source.randrange(8 * len(content))
