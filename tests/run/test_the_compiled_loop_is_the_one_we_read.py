@@ -18,19 +18,19 @@ from hypothesis import strategies as st
 pytest.importorskip("llvmlite", reason="needs the extra fast")
 
 import integrators.runners.compiled
-from gms_fsm import Chart, ChartModel, Prescribed, State, Trace, simulate
+from gms_fsm import Chart, ChartModel, ElementMachines, Prescribed, State, Trace, simulate
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.observing import on_surfaces
 from gms_fsm.lowering.program import lower
 from gms_fsm.run.recording import compiled_run
 from gms_fsm.traces import observed
-from integrators.loop import Machines
+from integrators.loop import FIRING, Machines
 from integrators.machine_code.layout import BlockLayout
 from integrators.runners import columns
 from integrators.runners.observing import observe_rows as rows_observed
 from integrators.sliding import Functions
 from tests.corpus import outcome, run, trace
-from tests.helpers import CURVE, other_parts, pulled_mass, stick_slip
+from tests.helpers import CURVE, banging, other_parts, pulled_mass, stick_slip
 
 
 # --------------------------------------------------------------------------- as source
@@ -94,6 +94,22 @@ def test_failures_end_the_source_of_the_loop_at_the_same_point(read: list[int]) 
     assert said == too
     assert other_parts(ours, theirs) == []
     assert read
+
+
+def test_the_source_of_the_loop_makes_room_for_many_firings(read: list[int]) -> None:
+    what = banging(0.01), Prescribed("0"), 3.7
+    mine, theirs = (simulate(*what, engine=engine) for engine in ("compiled", "ifelse"))
+    assert len(mine.transitions) > 256  # so many have room at first
+    assert other_parts(mine, theirs) == []
+    assert read
+
+
+def test_the_source_of_the_loop_waits_for_machines_of_ones_own(read: list[int]) -> None:
+    what = stick_slip("signed"), Prescribed("0.2"), 3.0
+    machines = ElementMachines(what[0])
+    mine = simulate(*what, engine="compiled", machines=machines)
+    assert other_parts(mine, simulate(*what, engine="ifelse")) == []
+    assert FIRING in read
 
 
 # --------------------------------------------------------------------------- as machine code

@@ -302,3 +302,26 @@ def test_two_bearings_and_a_clutch_let_go_one_after_the_other() -> None:
     moving = trace.t > log.t[2]
     np.testing.assert_array_equal(trace.body("a").v[moving], trace.body("b").v[moving])
     assert trace.body("b").v[-1] > 0.0
+
+
+# --------------------------------------------------------------------------- velocities that jump
+def on_a_belt(velocity: str) -> System:
+    """Return a cart of 1 kg that stiction of 2 N holds on a belt."""
+    dry = {"F_c": 1.0, "F_s": 2.0, "b": 0.0}
+    bodies = Body("cart", inertia=1.0), Body("belt", velocity=velocity, x="x_b", v="v_b")
+    pads = (Contact("pad", CHARTS["stiction"], dry, v="v - v_b"),)
+    return System("belt", bodies=bodies, contacts=pads)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-10])
+def test_a_belt_that_turns_at_once_leaves_what_it_carries_behind(off: float) -> None:
+    """The cart then slides for a second: 1 N on 1 kg, 1 m/s between both. At the start it rests.
+
+    Also where it does so but for rounding.
+    """
+    belt = on_a_belt("0.5 * sgn(cos(2*t))")
+    found = run(belt, 3.9, initial={"v": 0.5 + off}, atol=1e-9).transitions
+    names = ["release_forward", "arrest_forward", "release_backward", "arrest_backward"]
+    assert found.edge.tolist() == names
+    times = np.array([0.25, 0.25, 0.75, 0.75]) * np.pi + [0.0, 1.0, 0.0, 1.0]
+    np.testing.assert_allclose(found.t, times, rtol=0.0, atol=1e-8)
