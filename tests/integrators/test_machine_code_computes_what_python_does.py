@@ -526,6 +526,25 @@ def test_a_column_may_change_between_calls():
     assert library
 
 
+def test_many_blocks_are_one_after_the_other():
+    layout = BlockLayout(given(0), callable, inside=True)
+    translator = Translator()
+    entry = translator.entry("entry", arithmetic, [layout.value])
+    translator.for_each("each", entry, layout.words)
+    library = in_llvm(translator.module)
+    blocks = [MemoryBlock(layout, given(seed)) for seed in (1, 2, 3)]
+    for block in blocks:
+        block.update(block.contents)
+    memory = np.concatenate([block.words for block in blocks])
+    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
+    assert call(library.address("each"))(memory.ctypes.data, len(blocks)) == 0
+    for seed, (block, words) in enumerate(zip(blocks, np.split(memory, len(blocks)), strict=True)):
+        block.words[:] = words
+        expected = given(seed + 1)
+        plainly(arithmetic, expected)
+        assert bits(block.contents) == bits(expected)
+
+
 def test_numbers_of_a_dataclass_are_words_of_the_block():
     layout, arguments = BlockLayout(given(0), callable), given(1)
     block = MemoryBlock(layout, arguments)

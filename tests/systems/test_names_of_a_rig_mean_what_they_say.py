@@ -7,7 +7,18 @@ from typing import Any
 
 import pytest
 
-from gms_fsm import GMS, GMSParameters, simulate
+from gms_fsm import (
+    GMS,
+    Body,
+    Chart,
+    ChartModel,
+    Contact,
+    GMSParameters,
+    State,
+    System,
+    Transition,
+    simulate,
+)
 from gms_fsm.systems.signals import as_signal
 from tests.helpers import same_bits
 
@@ -38,3 +49,15 @@ def test_a_free_name_changes_nothing(kind: str) -> None:
     one, other = (simulate(MODEL, pushed(names, kind), 3.0) for names in (FREE, plain))
     same_bits(one, other)
     assert abs(one.z).max() > 0.01
+
+
+def test_a_is_the_acceleration_along_the_velocity_of_the_contact() -> None:
+    """Of the cart (4 t - F) / 2, of what it stands on -1: 2 t + 0.75, which is 1 at t = 1/8."""
+    edges = (Transition("shake", "calm", "shaken", guard="a >= 1"),)
+    states = State("calm", {"z": "0"}), State("shaken", {"z": "0"})
+    chart = Chart("felt", ("v",), ("z",), (), states, edges, {"F": "0.5"})
+    cart = Body("cart", inertia="2", force="4*t")
+    base = Body("base", velocity="-t", x="x_b", v="v_b")
+    pad = Contact("pad", ChartModel(chart, {}), v="v - v_b")
+    trace = simulate(System("s", bodies=(cart, base), contacts=(pad,)), 1.0, atol=1e-9)
+    assert trace.transitions.t.tolist() == pytest.approx([0.125], abs=1e-12)
