@@ -560,7 +560,7 @@ def test_numbers_of_a_dataclass_are_words_of_the_block():
 
 
 def test_a_block_takes_over_arrays_that_are_outside():
-    layout = BlockLayout(given(0), callable)
+    layout = BlockLayout(given(0), callable, inside=False)
     block, other = MemoryBlock(layout, given(1)), MemoryBlock(layout, given(2))
     other.become(block)
     assert bits(other.contents) == bits(block.contents)
