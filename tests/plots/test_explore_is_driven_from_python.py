@@ -151,3 +151,9 @@ def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_branch_is_not_compared_with_itself(widget: Explorer) -> None:
     with pytest.raises(SessionError, match="give two branches"):
         widget.compare(0, 0)
+
+
+def test_an_empty_request_is_no_request(widget: Explorer) -> None:
+    before = ask(widget, do="goto", t=1.0)
+    widget.request = {}
+    assert widget.panel == before

@@ -110,6 +110,7 @@ def test_a_motion_of_ones_own_and_one_that_is_seen_without_a_length() -> None:
     assert ", A = 0.1 m, " in excited(clutch, None, None).about
 
 
+@pytest.mark.slow
 def test_the_force_of_a_whole_contact_is_written() -> None:
     chart = Chart(
         "own",

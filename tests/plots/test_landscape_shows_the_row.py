@@ -287,6 +287,7 @@ def texts_of_the_race(trace: Trace, row: int) -> list[str]:
     return [each.get_text() for each in drawn if hasattr(each, "get_text")]
 
 
+@pytest.mark.slow
 def test_a_race_says_what_precedes_and_what_cannot_be_computed() -> None:
     chart = Chart(
         "own",
@@ -312,6 +313,7 @@ def test_a_race_says_what_precedes_and_what_cannot_be_computed() -> None:
     assert figure.axes[0].get_title(loc="left") == "guards that leave b"
 
 
+@pytest.mark.slow
 def test_without_findings_and_without_the_signal(tmp_path: Path) -> None:
     pytest.importorskip("z3")
     trace = simulate(stick_slip("signed"), Prescribed(lambda t: 0.2), 3.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import Trace, simulate
+from gms_fsm import SimulationError, Trace, simulate
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
@@ -398,6 +398,7 @@ def test_every_figure_takes_a_contact() -> None:
         assert figure.get_suptitle().startswith("pad2: ")
 
 
+@pytest.mark.slow
 def test_what_is_crowded_is_counted(ax: Axes) -> None:
     many = simulate(bank(30), Prescribed("0.3"), 2.0)
     assert len(panels.marks(ax, many, labels=False)) == len(many.transitions) == 30
@@ -423,3 +424,11 @@ def test_what_stands_still_or_is_not_chosen_is_not_drawn(ax: Axes) -> None:
     one = len(panels.ribbons(ax, slid, elements=[1]))
     assert one < len(panels.ribbons(ax, slid, elements=[0, 1]))
     assert scaled(np.array([1e-20]), "m") == (1e9, "nm")
+
+
+def test_a_run_of_one_instant_has_no_axis_of_time(ax: Axes) -> None:
+    with pytest.raises(SimulationError) as stopped:
+        simulate(stick_slip("signed"), Prescribed("0.1*sqrt(-t)"), 5.0)
+    assert stopped.value.trace is not None
+    panels.velocity(ax, stopped.value.trace)
+    assert ax.get_xlabel() == "t [s]"

@@ -21,10 +21,12 @@ from gms_fsm import Prescribed, Stribeck, Trace, simulate
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError
+from gms_fsm.language import InState
 from gms_fsm.systems.models import ChartModel, LuGre
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.verification.prove import prove
 from plots.page import _rows, chart
+from plots.page._trees import tree_of
 from plots.page.replay import replay, replay_html, write_replay
 from tests.helpers import FASTEST, FIG4_SINE, bank, pulled_mass, stick_slip
 from tests.plots.stored import column, data_of, integers, log, modes, same
@@ -240,3 +242,4 @@ def test_powers_are_stored_and_charts_without_a_plane_and_runs_of_one_instant_ha
     with pytest.raises(SimulationError) as stopped:
         simulate(stick_slip("signed"), Prescribed("0.1*sqrt(-t)"), 5.0)
     assert run_of(stopped.value.trace)["rows"] == 1
+    assert tree_of(InState(0, "slip")) == ["state", 0, "slip"]
