@@ -244,7 +244,7 @@ def test_a_column_of_a_log_is_no_table_and_branches_are_one() -> None:
 def test_without_matplotlib_there_is_no_picture_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     trace = simulate(stick_slip("signed"), Prescribed("0.2"), 1.0)
     for name in [*sys.modules]:
-        if name.startswith(("plots.figures", "plots.panels", "plots.style", "matplotlib")):
+        if name.startswith(("plots.figures", "plots.style.matplotlib")):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert notebook.trace_png(trace) is None
