@@ -376,9 +376,6 @@ def _table_height(rows: Sequence[tuple[str, str, str, str]], wide: float) -> flo
 
 def _table(page: _Page, rows: Sequence[tuple[str, str, str, str]], top: float, wide: float) -> None:
     page.text(MARGIN, top, "Parameters", HEAD, fontweight="bold")
-    if not rows:
-        page.text(MARGIN, top - HEAD * LEAD - 4, "none")
-        return
     starts, cells = _table_lines(rows, wide)
     y = top - HEAD * LEAD - 4
     for x, head in zip(starts, HEADS, strict=True):

@@ -17,14 +17,18 @@ import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.charts import LUGRE
+from gms_fsm.charts.chart import Chart, State
 from gms_fsm.errors import ParameterError
+from gms_fsm.systems.models import ChartModel
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 import plots
 from plots import LiveChart, block_diagram, figures, live_statechart, panels, statechart
+from plots.handouts.page import handout_figure
 from plots.page.replay import replay_html
 from plots.panels.parts.selection import PartOptions
+from plots.style import ramp
 from plots.style.matplotlib import Axes, Figure
 from plots.style.presets import Preset
 from plots.systems import elements
@@ -149,6 +153,14 @@ def test_an_argument_is_refused_by_its_name_and_value(
     assert not list(tmp_path.iterdir())
 
 
+def sheet_of(force: str, rate: str = "v", states: int = 1) -> Figure:
+    """Return the handout of a chart without edges."""
+    every = [State(f"state_of_a_long_name_{i}", flow={"z": rate}) for i in range(states)]
+    chart = Chart("own", variables=("z",), states=every, outputs={"F": force})
+    given: Any = {"velocity": "0.1*cos(t)", "t_end": 7.0} if rate == "v" and force != "0*z" else {}
+    return handout_figure(ChartModel(chart, {}), **given)
+
+
 LATE = np.array([20.0, 30.0])
 
 
@@ -176,6 +188,15 @@ LATE = np.array([20.0, 30.0])
         (lambda: replay_html(run(), run(), names=["one"]), r"2 run\(s\) but names = \['one'\]"),
         (lambda: plots.handout(stick_slip("signed"), "a.pdf", velocity="0.1"),
          "velocity and t_end belong together"),
+        (lambda: handout_figure(1), "model is 1; give a model"),  # type: ignore[arg-type]
+        pytest.param(lambda: sheet_of("0*z"), "no sine between .* gives a loop of own; give",
+                     marks=pytest.mark.slow),
+        (lambda: sheet_of("z", "1/(z - z)"), "no sine between"),
+        pytest.param(lambda: sheet_of(" + ".join(f"{i} * z" for i in range(1000, 1050))),
+                     "an equation is wider than an A4 page", marks=pytest.mark.slow),
+        pytest.param(lambda: sheet_of("z", states=80), "own does not fit on one A4 page",
+                     marks=pytest.mark.slow),
+        (lambda: ramp("heat", 0), "count is 0; a ramp has at least one step"),
         (lambda: shifted(sliders={"q": (0.0, 1.0)}), "there is no number 'q'"),
         (lambda: shifted(sliders={"F_s": (1.0, math.inf)}), r"sliders\['F_s'\] is inf; it must be"),
         (lambda: plots.animate(run(), "a.gif", seconds=3.0, frames=60), "give only one of them"),

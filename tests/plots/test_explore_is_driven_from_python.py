@@ -19,6 +19,7 @@ from gms_fsm import (
 )
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import CHARTS
+from gms_fsm.errors import SessionError
 from tests.helpers import FIG4_SINE, stick_slip
 
 pytest.importorskip("anywidget", reason="the widget needs the extra 'jupyter'")
@@ -145,3 +146,14 @@ def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "anywidget", None)
     with pytest.raises(MissingExtraError, match=r"gms-fsm\[jupyter\]"):
         plots.explore(stick_slip("signed"), Prescribed("0.2"), 3.0, sliders={})
+
+
+def test_a_branch_is_not_compared_with_itself(widget: Explorer) -> None:
+    with pytest.raises(SessionError, match="give two branches"):
+        widget.compare(0, 0)
+
+
+def test_an_empty_request_is_no_request(widget: Explorer) -> None:
+    before = ask(widget, do="goto", t=1.0)
+    widget.request = {}
+    assert widget.panel == before

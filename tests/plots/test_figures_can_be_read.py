@@ -11,6 +11,7 @@ import itertools
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -402,3 +403,35 @@ def test_presets_have_the_sizes_of_the_journal_or_ones_own_and_end_with_their_co
     with pytest.raises(ZeroDivisionError), plots.preset("poster"):
         raise ZeroDivisionError
     assert presets.current() is PRESETS["screen"]
+
+
+def test_what_is_low_or_has_many_elements_is_drawn_otherwise() -> None:
+    trace = simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 20.0)
+    with presets.preset(Preset("low", None, 2.2, 9.0, 7.0, 1.0, 100.0)):
+        left, right = figures.cascade_figure(trace).axes[2:4]
+        assert left.get_xlabel() == right.get_xlabel() != ""
+        figures.landscape(trace, 0)
+    many = simulate(bank(8), Prescribed("0.3"), 2.0)
+    assert len(figures.overview(many).axes) > len(figures.overview(trace).axes)
+    assert any(
+        isinstance(each, QuadMesh) for each in figures.compare_laws({"": many}).axes[0].collections
+    )
+    plain = Chart("own", states=(State("only"),), outputs={"F": "v"})
+    assert figures.compare_laws({"": simulate(ChartModel(plain, {}), Prescribed("0.3"), 2.0)})
+
+
+def test_tables_of_phenomena_without_curves_and_with_narrow_cells() -> None:
+    found = table()
+    without = [
+        replace(cell, measured=replace(cell.measured, verdict="does not apply", curves=()))
+        for cell in found.cells
+    ]
+    assert figures.phenomenon_figure(replace(found, cells=tuple(without)), "lag") is None
+    first = next(i for i, cell in enumerate(found.cells) if cell.phenomenon.name == "lag")
+    cells = (*found.cells[:first], without[first], *found.cells[first + 1 :])
+    with presets.preset("ieee1"):
+        wide = replace(found, cells=cells, phenomena=found.phenomena * 3)
+        assert figures.phenomena_matrix(wide).get_figwidth() == pytest.approx(3.5)
+    figure = figures.phenomenon_figure(found, "lag")
+    assert figure is not None
+    assert len(figure.legends) == 1

@@ -201,3 +201,8 @@ def test_each_panel_of_held_outputs_shows_its_numbers() -> None:
     assert all("[" in text for ax in sheet.axes for text in (ax.get_xlabel(), ax.get_ylabel()))
     shown = [text.get_text() for text in sheet.legends[0].get_texts()]
     assert shown == ["h = 2 ms", "h = 1 ms", "h = 0.5 ms", "the paper's residual"]
+
+
+def test_one_record_is_chosen() -> None:
+    one, usual = fit_figure(small(), which=0), fit_figure(small())
+    assert [ax.get_title() for ax in one.axes] == [ax.get_title() for ax in usual.axes]

@@ -98,7 +98,7 @@ def test_frames_have_the_theme_one_layout_the_active_states_and_the_cursor(
     monkeypatch.setattr(_chart, "rendered", lambda *each: layouts.append(each) or draw(*each))
     told: list[tuple[int, int]] = []
     more = {"theme": "dark", "notation": "math", "progress": lambda *each: told.append(each)}
-    path = animate(cascade(), tmp_path / "run.gif", frames=3, fps=10, **more)
+    path = animate(cascade(), tmp_path / "run.gif", seconds=0.3, fps=10, **more)
     assert list(tmp_path.iterdir()) == [path]
     assert len(layouts) == 1
     assert told == [(k, 3) for k in range(1, 4)]

@@ -15,8 +15,9 @@ pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
 from matplotlib import rc_context
 
 import plots
+from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.registry import registered
-from gms_fsm.systems.models import Model, demonstration
+from gms_fsm.systems.models import ChartModel, Model, demonstration
 from plots.handouts.excitation import excited
 from plots.handouts.page import PAGE, SMALLEST, handout_figure
 from plots.output.svg_artists import EXACT
@@ -107,3 +108,18 @@ def test_a_motion_of_ones_own_and_one_that_is_seen_without_a_length() -> None:
     assert "v(t) = 0.1*cos(t) m/s" in [text.get_text() for text, _ in drawn_texts(figure)]
     clutch = demonstration(registered()["dog-clutch"], "")
     assert ", A = 0.1 m, " in excited(clutch, None, None).about
+
+
+@pytest.mark.slow
+def test_the_force_of_a_whole_contact_is_written() -> None:
+    chart = Chart(
+        "own",
+        variables=("z",),
+        states=(State("only", flow={"z": "v"}),),
+        outputs={"F": "z"},
+        contact_outputs={"F": "2*F"},
+    )
+    figure = handout_figure(ChartModel(chart, {}), velocity="0.1*cos(t)", t_end=7.0)
+    texts = [text.get_text() for text, _ in drawn_texts(figure)]
+    assert "contact" in texts
+    assert any(r"2" in text and r"\sum_i" not in text for text in texts if "F =" in text)

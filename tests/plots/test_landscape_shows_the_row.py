@@ -6,6 +6,7 @@ The region under the dot has the truth that the run saw, at random rows.
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -279,3 +280,43 @@ def test_elsewhere_named_expressions_and_s_are_computed_again() -> None:
     for v in (1e-3, 0.05, 1.0):
         s = model.weights[2] * (1 + 0.5 * math.exp(-((v / 0.05) ** 2)))
         assert plane.truths(guard, v, [0.999 * s, 1.001 * s]).tolist() == [False, True]
+
+
+def texts_of_the_race(trace: Trace, row: int) -> list[str]:
+    drawn = panels.race(Figure().subplots(), trace, 0, row=row)
+    return [each.get_text() for each in drawn if hasattr(each, "get_text")]
+
+
+@pytest.mark.slow
+def test_a_race_says_what_precedes_and_what_cannot_be_computed() -> None:
+    chart = Chart(
+        "own",
+        inputs=("v", "x"),
+        states=(State("a"), State("b"), State("c")),
+        transitions=(
+            Transition("first", "a", "b", guard="x >= 0.1 and v > 0"),
+            Transition("second", "a", "b", guard="x >= 0.1"),
+            Transition("third", "a", "b", guard="1 / x < -1e9"),
+            Transition("on", "b", "c", guard="v >= 0"),
+        ),
+        outputs={"F": "0*v"},
+    )
+    trace = simulate(ChartModel(chart, {}), Prescribed("0.2*cos(t)"), 3.0)
+    at = np.flatnonzero(trace.t == trace.transitions.t[0])
+    assert {"fires", "preceded by first"} <= {*texts_of_the_race(trace, int(at[0]))}
+    assert "cannot be computed" in texts_of_the_race(trace, 0)
+    assert texts_of_the_race(trace, -1) == ["no edge leaves c"]
+    # The row between the two firings has no second time.
+    figure = figures.landscape(trace, 0, row=int(at[1]))
+    assert figure.axes[0].get_title(loc="left") == "guards that leave a"
+    figure = figures.landscape(trace, 0, row=int(at[2]))
+    assert figure.axes[0].get_title(loc="left") == "guards that leave b"
+
+
+@pytest.mark.slow
+def test_without_findings_and_without_the_signal(tmp_path: Path) -> None:
+    pytest.importorskip("z3")
+    trace = simulate(stick_slip("signed"), Prescribed(lambda t: 0.2), 3.0)
+    loaded = Trace.load(trace.save(tmp_path / "run.npz"))
+    figure = figures.landscape(loaded, 0, checks=prove(trace.model.chart))
+    assert any("No finding of the checks" in text.get_text() for text in figure.texts)

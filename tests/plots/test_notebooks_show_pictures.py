@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import plots
-from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, simulate
+from gms_fsm import Chart, ChartModel, Prescribed, Session, State, Stribeck, simulate
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.errors import OutputError
 from plots.output import drawings, notebook
@@ -229,3 +229,23 @@ def test_charts_of_one_name_and_size_are_not_mixed_up() -> None:
         for chart in charts
     ]
     assert ends == pytest.approx([0.2, 0.4])
+
+
+def test_a_column_of_a_log_is_no_table_and_branches_are_one() -> None:
+    session = Session(stick_slip("signed"), Prescribed("0.2"), 3.0)
+    session.next_transition()
+    session.poke({"z": {0: 0.1}})
+    assert "branch 1 of 2" in session._repr_html_()
+    log = simulate(stick_slip("signed"), Prescribed("0.2"), 3.0).transitions
+    assert notebook.log_html(log) is not None
+    assert notebook.log_html(log["t"]) is None
+
+
+def test_without_matplotlib_there_is_no_picture_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    trace = simulate(stick_slip("signed"), Prescribed("0.2"), 1.0)
+    for name in [*sys.modules]:
+        if name.startswith(("plots.figures", "plots.style.matplotlib")):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert notebook.trace_png(trace) is None
+    assert notebook.fit_png(None) is None  # type: ignore[arg-type]

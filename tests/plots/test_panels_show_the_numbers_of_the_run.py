@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gms_fsm import Trace, simulate
+from gms_fsm import SimulationError, Trace, simulate
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
@@ -22,10 +22,13 @@ from matplotlib.text import Annotation
 from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, Transition
 from plots import figures, panels
 from plots.panels.micro_steps.cascades import RESOLVED
-from plots.panels.parts.selection import MOST_ROWS
+from plots.panels.parts.selection import MOST_ROWS, scaled
+from plots.systems.elements import elements_figure
+from tests.corpus import relay
 from tests.helpers import (
     FASTEST,
     FIG4_SINE,
+    bank,
     non_drifting,
     open_loop,
     pulled_mass,
@@ -393,3 +396,39 @@ def test_every_figure_takes_a_contact() -> None:
         figures.unfold(trace, float(t[0]), float(t[min(4, t.size - 1)])),
     ):
         assert figure.get_suptitle().startswith("pad2: ")
+
+
+@pytest.mark.slow
+def test_what_is_crowded_is_counted(ax: Axes) -> None:
+    many = simulate(bank(30), Prescribed("0.3"), 2.0)
+    assert len(panels.marks(ax, many, labels=False)) == len(many.transitions) == 30
+    narrow = Figure((1.0, 1.0)).subplots()
+    panels.marks(narrow, many)
+    assert any(text.get_text().endswith(" switches") for text in narrow.texts)
+    fast = simulate(bank(2), Prescribed("6*cos(20*t)"), 10.0)
+    assert np.bincount(fast.transitions.element).min() > 40
+    picture, *_ = panels.heat(ax, fast)
+    assert picture.get_array().shape[0] == 2
+
+
+def test_what_stands_still_or_is_not_chosen_is_not_drawn(ax: Axes) -> None:
+    chart = Chart(
+        "own", variables=("z",), states=(State("only", flow={"z": "v"}),), outputs={"F": "z"}
+    )
+    rest = simulate(ChartModel(chart, {}), Prescribed("0"), 2.0)
+    (lines,) = panels.portrait(ax, rest)
+    assert panels.arrows(ax, lines) == []
+    elements_figure(rest, -1, 1, "")
+    slid = simulate(relay(n=2), Prescribed("0"), 3.0)
+    assert len(slid.sliding) == 2
+    one = len(panels.ribbons(ax, slid, elements=[1]))
+    assert one < len(panels.ribbons(ax, slid, elements=[0, 1]))
+    assert scaled(np.array([1e-20]), "m") == (1e9, "nm")
+
+
+def test_a_run_of_one_instant_has_no_axis_of_time(ax: Axes) -> None:
+    with pytest.raises(SimulationError) as stopped:
+        simulate(stick_slip("signed"), Prescribed("0.1*sqrt(-t)"), 5.0)
+    assert stopped.value.trace is not None
+    panels.velocity(ax, stopped.value.trace)
+    assert ax.get_xlabel() == "t [s]"

@@ -19,11 +19,14 @@ import pytest
 
 from gms_fsm import Prescribed, Stribeck, Trace, simulate
 from gms_fsm.charts import GMS_ELEMENT
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError
-from gms_fsm.systems.models import LuGre
+from gms_fsm.language import InState
+from gms_fsm.systems.models import ChartModel, LuGre
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.verification.prove import prove
 from plots.page import _rows, chart
+from plots.page._trees import tree_of
 from plots.page.replay import replay, replay_html, write_replay
 from tests.helpers import FASTEST, FIG4_SINE, bank, pulled_mass, stick_slip
 from tests.plots.stored import column, data_of, integers, log, modes, same
@@ -226,3 +229,17 @@ def test_a_notebook_shows_it_in_a_sandbox(tmp_path: Path) -> None:
     assert html.unescape(inside[1]) == shown.html
     path = write_replay(tmp_path / "page.html", fig4("signed"))
     assert path.read_text(encoding="utf-8") == shown.html  # the same run gives the same page
+
+
+def test_powers_are_stored_and_charts_without_a_plane_and_runs_of_one_instant_have_pages() -> None:
+    edges = (Transition("go", "a", "b", guard="abs(v)**p >= exp(-v)"),)
+    states = State("a"), State("b")
+    chart = Chart("own", parameters=("p",), states=states, transitions=edges, outputs={"F": "v"})
+    (contact,) = run_of(simulate(ChartModel(chart, {"p": 1.5}), Prescribed("t"), 3.0))["contacts"]
+    assert contact["plane"] is None
+    (clause,) = contact["edges"][0]["clauses"]
+    assert [each[0] for each in clause["tree"][1:]] == ["stored", "stored"]
+    with pytest.raises(SimulationError) as stopped:
+        simulate(stick_slip("signed"), Prescribed("0.1*sqrt(-t)"), 5.0)
+    assert run_of(stopped.value.trace)["rows"] == 1
+    assert tree_of(InState(0, "slip")) == ["state", 0, "slip"]

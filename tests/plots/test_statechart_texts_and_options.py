@@ -362,3 +362,7 @@ def test_a_live_chart_and_a_page_are_always_graphs() -> None:
     assert f'id="element1-edge-{look.leaving[0]}-2"' in svg
     assert svg.count('class="mark ') == sum(map(len, look.marks.values()))
     assert 'data-edge="39"' in chart_svg(MANY_EDGES, 1)
+
+
+def test_a_name_longer_than_a_line_is_not_broken() -> None:
+    assert wrapped("a" * 30, 20) == ["a" * 30]

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import pytest
 
-from gms_fsm import GMS, Chart, GMSParameters, Prescribed, PulledSlider, State
+from gms_fsm import GMS, Chart, GMSParameters, Prescribed, PulledSlider, Sampled, State
 from gms_fsm.systems.system import Body, Contact, System, system_of
 from plots.systems.block_diagram import block_diagram
 from tests.plots.pictures import Box
@@ -199,3 +199,18 @@ def test_blocks_wires_and_texts_keep_apart_on_two_pages(name: str) -> None:
         near = Box(other.left - 4, other.top, other.right + 4, other.bottom)
         if one.left == one.right and other.left == other.right:  # upright
             assert not (one.meets(near) and min(one.bottom, other.bottom) > max(one.top, other.top))
+
+
+def test_functions_offsets_and_inputs_of_the_same_name_are_written() -> None:
+    loaded = Chart("loaded", ("v", "r"), states=(State("only"),), outputs={"F": "r * v"})
+    system = System(
+        "own",
+        bodies=(Body("mass", inertia=1.0, force="u"),),
+        contacts=(Contact("pad", loaded, {}),),
+        signals={"r": lambda t: 0.0 * t},
+        sampled=(Sampled("pid", period=0.1, offset=0.05, updates={"u": "-x"}),),
+    )
+    found = parts(system)
+    assert "r: a Python function" in found["signal-r"]
+    assert "every 100 ms, first after 50 ms" in found["sampled-pid"]
+    assert ("signal-r", "contact-pad", "r") in lines(system)

@@ -14,14 +14,15 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
-from gms_fsm import PulledSlider
+from gms_fsm import Body, Chart, Contact, PulledSlider, State, System
 from gms_fsm.language import MATLAB_LIKE, spell
-from gms_fsm.systems.system import System, system_of
+from gms_fsm.systems.system import system_of
 from plots import schematic
 from plots.systems.mechanical_layout import Item, arranged, force_of
+from plots.systems.mechanical_symbols import formula
 from tests.helpers import matrix
 from tests.plots.printed import problems
-from tests.plots.systems_to_draw import BLOCKS, GMS12, PULLED, systems
+from tests.plots.systems_to_draw import BLOCKS, GMS12, PLANAR, PLANE, PULLED, systems
 
 A4 = 8.27  # inches
 
@@ -134,3 +135,32 @@ def test_twelve_elements_are_one_contact_and_belts_are_below_what_rubs_on_them()
         block = boxes[f"body {name}"]
         assert belt.get_y() + belt.get_height() < block.get_y()
         assert belt.get_x() < block.get_x()
+
+
+def test_exponents_and_shares_are_formulas() -> None:
+    assert formula("a*x^((b + 1) / 2) + c") == r"$a\,x^{(b + 1) / 2} + c$"
+    values = dict.fromkeys(PLANAR.parameter_names, 1.0)
+    floor = Contact("floor", PLANAR, values, v=("-(r * v)", "r * w - v"))
+    layout = arranged(replace(PLANE, contacts=(floor,), numbers={"r": 1.0}))
+    touches = [slot.touch for column in layout.columns for slot in column.slots]
+    touches += [each.touch for gap in layout.gaps.values() for each in gap if each.touch]
+    touches += [each.touch for each in layout.over if each.touch]
+    signs = [{name: sign for name, (sign, _) in touch.shares.items()} for touch in touches]
+    assert signs == [{"east": -1, "north": 1}]
+
+
+def test_contacts_of_ones_own_charts_are_boxes() -> None:
+    loaded = Chart("loaded", ("v", "load"), states=(State("only"),), outputs={"F": "load * v"})
+    system = System(
+        "own",
+        bodies=(
+            Body("belt", velocity="V"),
+            Body("one", inertia=1.0, x="y", v="w"),
+            Body("two", inertia=1.0, x="y2", v="w2"),
+        ),
+        contacts=(Contact("pad", loaded, {}), Contact("between", loaded, {}, v="w - w2")),
+        numbers={"V": 0.1, "load": 1.0},
+    )
+    texts = [text.get_text() for text in schematic(system).axes[0].texts]
+    assert {"pad", "between", "belt"} <= {*texts}
+    assert any("V" in text for text in texts)

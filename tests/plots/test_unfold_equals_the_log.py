@@ -9,7 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, Trace, simulate
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    Prescribed,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    simulate,
+)
 from gms_fsm.errors import ParameterError
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
@@ -20,7 +31,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation
 
 from plots import figures, panels
-from tests.helpers import FASTEST, FIG4_SINE, pulled_mass, stick_slip
+from tests.helpers import FASTEST, FIG4_SINE, bank, pulled_mass, stick_slip
 from tests.plots.systems_to_draw import BLOCKS
 from tests.plots.systems_to_draw import run as of_system
 
@@ -139,3 +150,17 @@ def test_too_many_columns_name_a_window_that_works_or_say_to_choose_elements() -
     trace = simulate(stick_slip("signed"), Prescribed("0"), 1.0)
     with pytest.raises(ParameterError, match="the run has no transitions"):
         figures.unfold(trace, 0.0, 1.0)
+
+
+def test_elements_that_stay_and_short_names() -> None:
+    trace = simulate(bank(4), Prescribed("0.3"), 0.3)
+    assert len(trace.transitions) == 1
+    figures.unfold(trace, 0.0, 0.3)
+    edges = (
+        Transition("go", "a", "b", guard="x >= 0.1"),
+        Transition("on", "b", "a", guard="x < 0"),
+    )
+    chart = Chart("own", ("v", "x"), (), (), (State("a"), State("b")), edges, {"F": "0*v"})
+    run = simulate(ChartModel(chart, {}), Prescribed("0.2*cos(t)"), 5.0)
+    texts = {text.get_text() for ax in figures.unfold(run, 0.0, 5.0).axes for text in ax.texts}
+    assert {"go", "on"} <= texts
