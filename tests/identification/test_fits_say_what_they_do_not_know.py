@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import pytest
 
-from gms_fsm import Fit, Record
+from gms_fsm import Chart, ChartModel, Fit, Record, State
 from tests.identification.records import bank, fitted, measured, plain, sine
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
@@ -80,6 +80,18 @@ def test_profiles_stay_within_bounds() -> None:
     profile = found.profile("k1", restarts=False)
     assert profile.low == profile.values.min() == 1.9998e4
     assert profile.rise.min() == 0.0
+
+
+def test_a_parameter_of_either_sign_has_a_profile() -> None:
+    on = State("on", flow={"z": "v"}, outputs={"F": "k * z + b * v"})
+    model = ChartModel(Chart("spring", ("v",), ("z",), ("k", "b"), (on,)), {"k": -1e4, "b": 0.0})
+    found = fitted(measured(model, sine(2e-4, 2.0, 3.0)), model, ["k", "b"])
+    assert found.never_slipped == ()
+    for name in ("k", "b"):
+        profile = found.profile(name, restarts=False)
+        assert found[name].low < found[name].value < found[name].high
+        assert profile.low == pytest.approx(found[name].low, rel=0.1, abs=0.2)
+        assert profile.high == pytest.approx(found[name].high, rel=0.1, abs=0.2)
 
 
 def test_the_stribeck_exponent_is_searched_across_two() -> None:

@@ -254,6 +254,13 @@ def test_banks_that_share_a_snapshot_keep_their_own_switches(engine: str) -> Non
     assert other.switches == ((), ())
 
 
+def test_it_says_of_what_and_where_it_is() -> None:
+    model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    one, two = FrictionState(model, t=0.5), FrictionBank([model, model], t=0.25)
+    assert repr(one) == f"<FrictionState of {model!r} at t = 0.5 s>"
+    assert repr(two) == "<FrictionBank of 2 joints at t = 0.25 s>"
+
+
 def test_a_stage_may_be_closer_than_the_clock_resolves() -> None:
     friction = FrictionState(GIVEN, t=1e8)
     assert friction.peek(0.1, 0.1, 1e-9) == friction.peek(0.1, 0.1, 0.0)

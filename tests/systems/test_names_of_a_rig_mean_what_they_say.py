@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gms_fsm import GMS, GMSParameters, simulate
+from gms_fsm import GMS, Body, Contact, GMSParameters, System, simulate
 from gms_fsm.systems.signals import as_signal
 from tests.helpers import same_bits
 
@@ -38,3 +38,38 @@ def test_a_free_name_changes_nothing(kind: str) -> None:
     one, other = (simulate(MODEL, pushed(names, kind), 3.0) for names in (FREE, plain))
     same_bits(one, other)
     assert abs(one.z).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    "acceleration",
+    [
+        "2 * (u - F)",
+        "(2 * u - 2 * F) / 1",
+        "(1 + (u - 1 - F)) / m",
+        "2 * u - F / m",
+        "(F - u) / -m",
+    ],
+)
+def test_an_acceleration_may_be_written_in_many_ways(acceleration: str) -> None:
+    def rig(text: str) -> Any:
+        given = {"numbers": {"m": 0.5}, "signals": {"u": as_signal("sin(t)")}}
+        return SimpleNamespace(title="own", acceleration=text, **given)
+
+    one, other = (
+        simulate(MODEL, rig(text), 0.1, rtol=1e-10) for text in ("(u - F) / m", acceleration)
+    )
+    assert one.x[-1] > 1e-6
+    assert other.x[-1] == pytest.approx(one.x[-1], rel=1e-5)
+
+
+def test_a_system_stands_where_a_run_has_a_model_and_a_rig() -> None:
+    pads = (Contact("one", MODEL, v="v"), Contact("two", MODEL, v="v"))
+    mass = Body("mass", inertia=2.0, force="u - m * x")
+    given = {"signals": {"u": 1.0, "w": "2 * m"}, "numbers": {"m": 3.0}}
+    trace = simulate(System("both", bodies=(mass,), contacts=pads, **given), 1e-3)
+    assert repr(trace.model).startswith("<2 contacts of <System 'both'")
+    assert trace.rig.acceleration == "(u - m * x - F) / (2.0)"
+    assert [*trace.rig.signals] == ["u"]
+    belt = Body("belt", velocity="u")
+    trace = simulate(System("driven", bodies=(belt,), contacts=pads, signals={"u": 1.0}), 1e-3)
+    assert trace.rig.acceleration is None
