@@ -82,7 +82,9 @@ from gms_fsm.identification.certainty.intervals import Bootstrap
 from gms_fsm.phenomena.results import PhenomenaTable, PhenomenonResult
 from gms_fsm.records import damper, tribometer
 from gms_fsm.records.units import factor
+from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.signals import as_signal
+from gms_fsm.systems.system import with_model
 from gms_fsm.traces.monitors import Chattering, Coverage, Passivity
 from tests import older_files, own_files, systems_cases
 from tests.corpus import run, trace
@@ -2385,6 +2387,16 @@ def accelerated(acceleration: str) -> None:
     simulate(stick_slip("signed"), rig, 1.0)  # type: ignore[arg-type]
 
 
+def other_number() -> None:
+    """Give a rig that was read a number that is infinite."""
+    rigs = [
+        SimpleNamespace(title="own", acceleration="(t - F) / m", numbers={"m": m}, signals={})
+        for m in (1.0, INF)
+    ]
+    model = stick_slip("signed")
+    with_model(mounted(model, rigs[0]).system, model, rigs[1])  # type: ignore[arg-type]
+
+
 TWICE = Contact("a", WELD), Contact("b", WELD)
 DAHL = Contact("p", CHARTS["dahl"], {"sigma_0": 1.0, "F_c": 1.0}, inputs={"N": "5"})
 DIFFERENCE = {"inertia": "a - b"}
@@ -2415,6 +2427,7 @@ rows = {
         "contact 'pad'", ..., lambda: Contact("pad", stick_slip("signed"), DRY)),
     "start of what is not updated": (
         "sampled 'pid'", ..., partial(Sampled, "pid", period=1, updates={"u": "1"}, initial=DRY)),
+    "number of another rig of the same shape": ("system 'own': m", INF, other_number),
     **{
         f"acceleration {text}": ("rig 'own'", ..., partial(accelerated, text))
         for text in ("t", "F * F", "sin(F)")

@@ -29,7 +29,8 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.identification import _saved
+from gms_fsm.errors import MissingExtraError
+from gms_fsm.identification import _saved, result
 from gms_fsm.identification.candidates import STIFFER_ONE_WAY
 from gms_fsm.identification.certainty.compared import Choice, ChoiceRow
 from gms_fsm.identification.problem.runs import ComparedColumn
@@ -278,6 +279,12 @@ def test_a_choice_says_among_how_many_and_what_failed() -> None:
     good = ChoiceRow("a", "", 1, 0.1, 0.9, -3.0, 0.1)
     chosen = plain().with_choice(Choice((good, replace(good, name="b", note="lost")), "a"), 0.2)
     assert str(chosen).endswith("chosen among 2 candidates: a\nb failed: lost")
+
+
+def test_a_report_needs_what_makes_reports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(result, "asked", lambda _: None)
+    with pytest.raises(MissingExtraError, match="plots"):
+        plain().report(tmp_path)
 
 
 def test_a_thinned_course_is_the_same_motion() -> None:

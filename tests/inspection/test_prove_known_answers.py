@@ -8,6 +8,7 @@ from __future__ import annotations
 import doctest
 import functools
 import inspect
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,7 +19,7 @@ pytest.importorskip("z3", reason="needs z3 (extra: check)")
 from gms_fsm import Chart, Finding, Parameter, Report, State, Transition, prove
 from gms_fsm.charts import LAWS, LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
-from gms_fsm.language import evaluate
+from gms_fsm.language import evaluate, parse_condition
 from gms_fsm.verification import _checks, _prover
 from gms_fsm.verification.prove import CHECKS, Check, default_domain
 
@@ -226,6 +227,28 @@ def test_a_high_power_is_not_attempted_whatever_its_sign() -> None:
         (found, *_) = prove(chart(go=f"z**{power} > s")).of("livelock")
         assert found.status == "undecided"
         assert found.text.startswith("a polynomial of degree 99 is not attempted")
+
+
+@pytest.mark.parametrize("after", range(0, 40, 3))
+def test_what_is_given_up_is_left_undecided(after: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many questions were answered before, no answer changes into another one."""
+    own, asked = _prover.Prover.find, itertools.count()
+
+    def find(self: Any, *formulas: Any) -> Any:
+        if next(asked) >= after:
+            raise _prover.GaveUp("z3 gave up")
+        return own(self, *formulas)
+
+    answers = {(f.check, f.where): f.status for f in proved("published").findings}
+    monkeypatch.setattr(_prover.Prover, "find", find)
+    for each in prove(gms_element("published")).findings:
+        assert each.status in (answers.get((each.check, each.where)), "undecided"), each
+
+
+def test_a_guard_without_a_value_is_not_enabled() -> None:
+    guard = parse_condition("1 / z > 0", ["z"])
+    assert _prover.enabled([guard], {"z": 1.0})
+    assert not _prover.enabled([guard], {"z": 0.0})
 
 
 def on(surface: str, one: str, two: str, rest: str = "") -> Chart:

@@ -7,10 +7,11 @@ import pytest
 from gms_fsm import Chart, ChartModel, Contact, State, measure_phenomena
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import GMSError
+from gms_fsm.phenomena import _bench
 from gms_fsm.phenomena.measure import Bench
 from gms_fsm.phenomena.results import PhenomenonResult
 from gms_fsm.phenomena.specimens import specimens_of
-from tests.phenomena.cases import BENCH, DRY
+from tests.phenomena.cases import BENCH, DRY, LUGRE
 
 LOADED = Chart(
     "loaded",
@@ -81,6 +82,19 @@ def test_what_is_hardly_friction_is_told_apart() -> None:
     for given, expected in said.items():
         found = _on_bench(*given)
         assert (found.verdict, found.said) == expected
+
+
+def test_a_model_with_too_many_steps_is_run_with_an_implicit_method(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fall = []
+    for steps in (_bench.MOST_STEPS, 30):
+        monkeypatch.setattr(_bench, "MOST_STEPS", steps)
+        found = measure_phenomena({"lugre": LUGRE}, ["stribeck"]).cell("lugre", "stribeck")
+        assert found.verdict == "shows"
+        fall.append(found.number("fall of the friction"))
+    assert fall[1] == pytest.approx(fall[0], rel=1e-6)
+    assert fall[1] != fall[0], "both were run in the same way"
 
 
 @pytest.mark.slow
