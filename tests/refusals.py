@@ -80,7 +80,7 @@ from gms_fsm.errors import (
 )
 from gms_fsm.identification.certainty.intervals import Bootstrap
 from gms_fsm.phenomena.results import PhenomenaTable, PhenomenonResult
-from gms_fsm.records import damper, tribometer
+from gms_fsm.records import _table, damper, tribometer
 from gms_fsm.records.units import factor
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.signals import as_signal
@@ -683,6 +683,15 @@ rows = {
     "unit beside a number": (from_csv(INSTRUMENT.replace("0.0;0;0.0", "s;0;0.0", 1)),),
 }
 group("Record.from_csv", RecordError, lambda given: read(**given), rows, "own.csv")
+
+
+def with_at_most(rows: int) -> None:
+    """Read a table while files may have this many rows."""
+    with mock.patch.object(_table, "LONGEST_FILE", rows):
+        read(INSTRUMENT)
+
+
+group("long table", RecordError, with_at_most, {"ten rows": (10,)}, "own.csv")
 rows = {
     "encoding that is none": ("encoding", "klingon", from_csv(encoding="klingon")),
     "encoding of bytes": ("encoding", "base64", from_csv(encoding="base64")),

@@ -372,7 +372,8 @@ def test_a_driven_system_is_the_model_on_the_record_and_asks_which_signal_drives
     bodies = (Body("a", velocity="w", x="x_a", v="v_a"), Body("b", velocity="u", x="x_b", v="v_b"))
     pad = Contact("pad", START, v="v_a - v_b")
     two = System("two", bodies=bodies, contacts=(pad,), signals={"w": 0.0, "u": 0.0})
-    inside = fitted(rubbed(), two, ("pad.k", "pad.weights"), drive="w", train=(0, 8), test=(8, 12))
+    free, more = ("pad.k", "pad.weights"), {"train": (0, 8), "test": (8, 12)}
+    inside = fitted(rubbed(), two, free, drive="w", measured="pad.F", **more)
     for name in ("k1", "weights1", "k2", "weights2"):
         assert inside[f"pad.{name}"].value == pytest.approx(plain()[name].value, rel=1e-6)
     with pytest.raises(ParameterError, match=r"drive: it cannot be told which signal.*w, u"):

@@ -21,7 +21,6 @@ from gms_fsm import (
     System,
     simulate,
 )
-from gms_fsm.charts import CHARTS
 from gms_fsm.charts.registry import registered
 from gms_fsm.identification.candidates import BEHIND_BACKLASH, STIFFER_ONE_WAY
 from gms_fsm.identification.problem.linear import linear_names
@@ -108,12 +107,6 @@ def test_a_total_of_the_forces(total: str, linear: set[str]) -> None:
     chart = Chart("own", ("v",), ("z",), ("k", *shared), (state,), contact_outputs={"F": total})
     model = ChartModel(chart, {"k": 1.0, "b": 1.0, "c": 1.0})
     assert {*linear_names(mounted_alone(model))} - {"sigma_2"} == linear
-
-
-def test_a_lock_leaves_none() -> None:
-    pad = Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.0})
-    locked = System("locked", bodies=(Body("mass", inertia=1.0),), contacts=(pad,))
-    assert linear_names(mounted_alone(locked)) == ()
 
 
 def test_a_free_body_leaves_none() -> None:

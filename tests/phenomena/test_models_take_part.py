@@ -70,6 +70,7 @@ def test_what_is_hardly_friction_is_told_apart() -> None:
         ("hysteresis", "v"): ("shows wrongly", away),
         ("memory", "v"): ("does not show", away),
         ("stick-slip", "v"): ("does not show", "it slides steadily"),
+        ("stick-slip", "1e5 * z - 5 * v"): ("does not show", "it oscillates and never sticks"),
         ("vibration", "1e3 * z + v"): (
             "does not show",
             "it is not released, although the peak force is far above the break-away force",
