@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping
 from contextlib import chdir
 from functools import cache, partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -56,6 +57,7 @@ from gms_fsm import (
     excite,
     fit,
     initial_bank,
+    measure_phenomena,
     prove,
     simulate,
     sweep,
@@ -76,9 +78,13 @@ from gms_fsm.errors import (
     TraceFileError,
     UnitError,
 )
-from gms_fsm.records import damper, tribometer
+from gms_fsm.identification.certainty.intervals import Bootstrap
+from gms_fsm.phenomena.results import PhenomenaTable, PhenomenonResult
+from gms_fsm.records import _table, damper, tribometer
 from gms_fsm.records.units import factor
+from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.signals import as_signal
+from gms_fsm.systems.system import with_model
 from gms_fsm.traces.monitors import Chattering, Coverage, Passivity
 from tests import older_files, own_files, systems_cases
 from tests.corpus import run, trace
@@ -670,8 +676,22 @@ rows = {
     "wrong encoding": (from_csv(INSTRUMENT[:-1], encoding="utf-16"),),
     "not of the encoding": (from_csv(b"\x81" + INSTRUMENT.encode(), encoding="cp1252"),),
     "NaN": (from_csv(INSTRUMENT.replace(";4;2.0", ";4;nan")),),
+    "underscore in a number": (from_csv(INSTRUMENT.replace(";4;2.0", ";4;2_0")),),
+    "no row where it is asked, and words": (
+        from_csv(INSTRUMENT.replace(";4;2.0", ";4;off"), where="time > 1e3 s"),
+    ),
+    "unit beside a number": (from_csv(INSTRUMENT.replace("0.0;0;0.0", "s;0;0.0", 1)),),
 }
 group("Record.from_csv", RecordError, lambda given: read(**given), rows, "own.csv")
+
+
+def with_at_most(rows: int) -> None:
+    """Read a table while files may have this many rows."""
+    with mock.patch.object(_table, "LONGEST_FILE", rows):
+        read(INSTRUMENT)
+
+
+group("long table", RecordError, with_at_most, {"ten rows": (10,)}, "own.csv")
 rows = {
     "encoding that is none": ("encoding", "klingon", from_csv(encoding="klingon")),
     "encoding of bytes": ("encoding", "base64", from_csv(encoding="base64")),
@@ -821,6 +841,15 @@ rows = {"not a number": ("t0", NAN, NAN, None), "word": ("t0", "a", "a", None)}
 group("part of a record", ParameterError, part, rows)
 
 
+DRIVEN = System(
+    "driven",
+    bodies=(Body("one", inertia=1.0, force="k * (u - x)"),),
+    contacts=(Contact("pad", fitted()),),
+    signals={"u": 0.0},
+    numbers={"k": 1e4},
+)
+
+
 def fitting(given: dict[str, Any]) -> None:
     """Fit with other arguments."""
     fit(**({"records": arrays(), "model": fitted(), "free": ["k"]} | given))
@@ -841,6 +870,7 @@ rows = {
     "bounds and not free": ("bounds", ..., {"bounds": {"C": (0, 1)}}),
     "bounds reversed": ("bounds of 'k1'", ..., {"bounds": {"k": (2, 1)}}),
     "bound": ("bounds of 'k1'", 3, {"bounds": {"k": 3}}),
+    "bounds against the rule": ("bounds of 'k1'", ..., {"bounds": {"k": (-2, -1)}}),
     "nuisance": ("nuisance", "bias", {"nuisance": ["bias"]}),
     "search": ("search", "anneal", {"search": "anneal"}),
     "begin": ("begin", "warm", {"begin": "warm"}),
@@ -852,6 +882,11 @@ rows = {
     "model": ("model", 3, {"model": 3}),
     "no records": ("records", ..., {"records": []}),
     "no record": ("records", 3, {"records": [3]}),
+    "inertia in a position": (
+        "nuisance",
+        ...,
+        {"model": DRIVEN, "measured": "one.x", "free": ["pad.k"], "nuisance": ["inertia"]},
+    ),
 }
 group("fit", ParameterError, fitting, rows)
 rows = {
@@ -884,10 +919,12 @@ rows = {
     "no records": ("records", [], {"records": []}),
     "name for a record": ("records", "r", {"records": "rig"}),
     "one record for a fold of records": ("fold", "record", {"fold": "record"}),
+    "candidates that cannot be run": ("candidates", ..., {"cycles": 2.0, "most_steps": 1}),
 }
 group("choose", ParameterError, choosing, rows)
 rows = {
     "too few cycles": ({"cycles": 8.0},),
+    "too few cycles for our candidates": ({"cycles": 8.0, "candidates": None},),
     "interval outside": ({"train": (50.0, 60.0)},),
     "no force": ({"records": arrays(force=None)},),
     "motion that does not repeat": ({"records": arrays(position=T)},),
@@ -1042,6 +1079,18 @@ rows = {
 }
 group("path of a chart", ParameterError, Chart.load, rows)
 
+
+def document(text: str) -> None:
+    """Read a chart from a document."""
+    Path("own.toml").write_text(text, encoding="utf-8")
+    Chart.from_scxml("own.toml")
+
+
+rows = {
+    "type definition": ('<!DOCTYPE scxml><scxml xmlns="http://www.w3.org/2005/07/scxml"/>',),
+    "larger than a chart": (" " * 11_000_000,),
+}
+group("document", ChartError, document, rows, "own.toml")
 STICK = State("stick", flow={"z": "v"})
 SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})
 GO = Transition("go", "stick", "slip", guard="z >= s and v > v_c")
@@ -1278,6 +1327,7 @@ rows = {
 group("parameter", ParameterError, lambda make, given: make(**given), rows)
 rows = {
     "curve with F_s = 0.5": (curve, {"F_s": 0.5}),
+    "bank replaced with q = 1": (lambda **new: bank().replaced(**new), {"q": 1.0}),
     "bank with k = []": (bank, {"k": []}),
     "bank with k = None": (bank, {"k": None}),
     "bank with sigma = 1": (bank, {"sigma": 1}),
@@ -1654,6 +1704,14 @@ def pressed() -> FrictionState:
     return FrictionState(placed(PUSHED, inputs={"N": "N_0"}))
 
 
+def two_times() -> None:
+    """Give a bank of two joints the state of one joint now and of the other one later."""
+    bank = FrictionBank([GIVEN, GIVEN])
+    now = bank.to_array()
+    bank.advance(np.zeros(2), np.full(2, 0.1), 0.1)
+    bank.from_array(np.concatenate([now[: now.size // 2], bank.to_array()[now.size // 2 :]]))
+
+
 locks = ("stiction", "karnopp", "modelica", "dog-clutch", "end-stop")
 rows = {
     "number": ("model_or_contact", 3, lambda: FrictionState(3)),
@@ -1682,6 +1740,8 @@ rows = {
     "period": ("contact 'pad'", ..., lambda: FrictionState(Contact("pad", GIVEN, period=0.1))),
     "mean before a sample": ("", ..., lambda: FrictionState(GIVEN).mean_force),
     "slope before a sample": ("", ..., lambda: FrictionState(GIVEN).dF_dv),
+    "look beyond the clock": ("t", 1e15, lambda: FrictionState(GIVEN).peek(0.0, 0.1, 1e15)),
+    "joints at different times": ("array", ..., two_times),
     "empty bank": ("models", ..., lambda: FrictionBank([])),
     "joint": ("models[1]: model_or_contact", 3, lambda: FrictionBank([GIVEN, 3])),
     "initial values of two": ("initial", ..., lambda: FrictionBank([GIVEN], initial=[{}, {}])),
@@ -1910,6 +1970,19 @@ rows = {
     "model": ("chart", FIG4[0], lambda: prove(FIG4[0])),
 }
 group("prove", ParameterError, lambda call: call(), rows)
+
+
+# --------------------------------------------------------------------------- tables of results
+NOTHING_SHOWN = PhenomenonResult("does not show", (), "")
+rows = {
+    "number": (lambda: NOTHING_SHOWN.number("loss"),),
+    "cell": (lambda: PhenomenaTable({}, (), ()).cell("lugre", "memory"),),
+    "draws": (lambda: Bootstrap(("k1",), np.zeros((3, 1))).interval("k2"),),
+    "two directions on a bench": (
+        lambda: measure_phenomena({"mine": placed("planar-coulomb", v=("v", "w"), inputs=PLANAR)}),
+    ),
+}
+group("result without it", ParameterError, lambda call: call(), rows, "")
 
 
 # --------------------------------------------------------------------------- trace files
@@ -2317,12 +2390,37 @@ def made(**parts: Any) -> None:
     simulate(system(**parts), 1.0)
 
 
+def accelerated(acceleration: str) -> None:
+    """Run a rig with an acceleration of its own."""
+    rig = SimpleNamespace(title="own", acceleration=acceleration, numbers={}, signals={})
+    simulate(stick_slip("signed"), rig, 1.0)  # type: ignore[arg-type]
+
+
+def other_number() -> None:
+    """Give a rig that was read a number that is infinite."""
+    rigs = [
+        SimpleNamespace(title="own", acceleration="(t - F) / m", numbers={"m": m}, signals={})
+        for m in (1.0, INF)
+    ]
+    model = stick_slip("signed")
+    with_model(mounted(model, rigs[0]).system, model, rigs[1])  # type: ignore[arg-type]
+
+
 TWICE = Contact("a", WELD), Contact("b", WELD)
 DAHL = Contact("p", CHARTS["dahl"], {"sigma_0": 1.0, "F_c": 1.0}, inputs={"N": "5"})
 DIFFERENCE = {"inertia": "a - b"}
 MOVING = Prescribed("0.1")
 rows = {
     "offset in v": ("contact 'pad'", ..., {"contacts": (Contact("pad", WELD, v="v + 1"),)}),
+    **{
+        f"{text} in v": (
+            "contact 'pad'",
+            ...,
+            {"contacts": (Contact("pad", WELD, v=f"v + {text}"),), "numbers": {"m": 1.0}},
+        )
+        for text in ("1 / m", "exp(m)")
+    },
+    "number among the bodies": ("bodies", 3, {"bodies": (Body("mass", inertia=1.0), 3)}),
     "negative": ("body 'mass'", ..., {"body": DIFFERENCE, "numbers": {"a": 1.0, "b": 2.0}}),
     "no number": ("body 'mass'", ..., {"body": {"inertia": "1 / m"}, "numbers": {"m": 0.0}}),
     "stiffness": ("k", "-a", {"springs": (Spring("s", "mass", k="-a"),), "numbers": {"a": 1.0}}),
@@ -2333,6 +2431,20 @@ rows = {
     "ticks without number": ("pid", ..., {"sampled": pid(1e-9, u="x")}),
 }
 group("system", ParameterError, lambda given: made(**given), rows)
+rows = {
+    "values beside a model": (
+        "contact 'pad'", ..., lambda: Contact("pad", stick_slip("signed"), DRY)),
+    "start of what is not updated": (
+        "sampled 'pid'", ..., partial(Sampled, "pid", period=1, updates={"u": "1"}, initial=DRY)),
+    "number of another rig of the same shape": ("system 'own': m", INF, other_number),
+    **{
+        f"acceleration {text}": ("rig 'own'", ..., partial(accelerated, text))
+        for text in ("t", "F * F", "sin(F)")
+    },
+}  # fmt: skip
+group("part of a system", ParameterError, lambda call: call(), rows)
+rows = {"pairs in a pair": ("signal", ..., ((0.0, 0.0), (1.0, 2.0)))}
+group("signal", SignalError, Prescribed, rows)
 rows = {
     "force of a contact": ("body 'mass', force, column 1", ..., {"body": {"force": "F"}}),
     "force in an update": ("sampled 'pid', 'u', column 5", ..., {"sampled": pid(u="2 * F")}),

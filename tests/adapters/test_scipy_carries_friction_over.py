@@ -69,6 +69,19 @@ def test_a_call_changes_nothing_of_an_earlier_one(options: dict[str, Any]) -> No
     assert np.array_equal(once.y, again.y)
 
 
+def test_two_of_one_model_are_it_twice() -> None:
+    model = pulled_mass()[0]
+
+    def both(t: float, y: Any, F: Any) -> list[float]:
+        return [*_mass(t, y[:2], F[0]), *_mass(t, y[2:], F[1])]
+
+    one = solve_ivp(_mass, (0.0, 2.0), [0.0, 0.0], model, 1)
+    two = solve_ivp(both, (0.0, 2.0), [0.0] * 4, [model, model], [1, 3])
+    assert [*two.friction.states] == ["friction1", "friction2"]
+    for part in (two.y[:2, -1], two.y[2:, -1]):
+        assert part == pytest.approx(one.y[:, -1], rel=1e-3)
+
+
 def test_the_way_of_stepping_stays() -> None:
     model, _ = pulled_mass()
     located = solve_ivp(_mass, (0.0, 1.0), [0.0, 0.0], model, 1)

@@ -46,6 +46,10 @@ def test_a_load_is_a_factor(stops: bool) -> None:
     assert value == pytest.approx(2**0.7 * (1.0 + 0.5 * np.exp(-(2**1.5))), rel=1e-14)
 
 
+def test_a_curve_that_falls_without_bound_is_nowhere_flat() -> None:
+    assert Stribeck(1e-300, 1e300, 1e-3).flat == np.inf
+
+
 def test_a_sweep_passes_the_gaussian() -> None:
     given, rig = [1.0, 2.0, 3.0], Prescribed("2e-3*sin(t)")
     swept = sweep(lugre(), rig, 6.0, {"delta": given}, engine=FASTEST)

@@ -17,7 +17,7 @@ from transitions import Machine
 from transitions import State as MachineState
 from transitions.extensions import HierarchicalMachine
 from transitions.extensions.asyncio import AsyncMachine
-from transitions.extensions.states import Timeout, add_state_features
+from transitions.extensions.states import Timeout, Volatile, add_state_features
 
 from gms_fsm import Chart, State, Transition, export
 from gms_fsm.charts import CHARTS
@@ -295,6 +295,11 @@ class Watching:
         """Do nothing."""
 
 
+@add_state_features(Volatile)
+class Passing(Machine):  # type: ignore[misc]
+    """A machine whose states make an object while they are active."""
+
+
 TIMEOUT = {"name": "b", "timeout": 2, "on_timeout": "x"}
 OF_MACHINES = "before_state_change after_state_change prepare_event finalize_event on_exception"
 BEYOND: list[tuple[Any, str]] = [
@@ -311,6 +316,7 @@ BEYOND: list[tuple[Any, str]] = [
     (state(final=True), "state 'slip': a final state"),
     (Timed(states=["a", TIMEOUT], initial="a"),
      r"state 'b': its timeout of 2 s has no counterpart.*after\(T\)"),
+    (Passing(states=["a"], initial="a"), "state 'a'.*a volatile state has no counterpart"),
     (row(unless="is_slow"), "trigger 'slips': unless has no counterpart"),
     *((row(**{each: "look"}), f"trigger 'slips': its callback {each} 'look'")
       for each in ("before", "after", "prepare")),

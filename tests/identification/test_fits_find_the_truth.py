@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,8 +29,11 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.identification import _saved
+from gms_fsm.errors import MissingExtraError
+from gms_fsm.identification import _saved, result
 from gms_fsm.identification.candidates import STIFFER_ONE_WAY
+from gms_fsm.identification.certainty.compared import Choice, ChoiceRow
+from gms_fsm.identification.problem.runs import ComparedColumn
 from gms_fsm.systems.models import with_values
 from tests.identification.fits_made import small
 from tests.identification.records import (
@@ -247,6 +251,60 @@ def test_what_a_record_cannot_be_asked_is_named(
         fit(record(), TRUTH, **{"free": ["k"]} | given)
 
 
+def test_a_fit_answers_by_number_of_record_and_by_name() -> None:
+    found = plain()
+    (rows,) = found.residuals()
+    assert found.residuals(0) == [rows]
+    assert found.smoothing is None
+    column = ComparedColumn.of("F", found.task.subject)
+    assert (column.column, column.contact) == ("force", found.task.measured.contact)
+    later = fitted(rubbed(), TRUTH, ["k"], train=(2, 8), test=(8, 12))
+    options = replace(found.task.options, test=(9, 12))
+    other = replace(found, task=replace(found.task, options=options))
+    silent = Record.from_arrays(**dict(rubbed().columns) | {"force": None}, name="silent")
+    asked: list[tuple[type[GMSError], str, Callable[[], Any]]] = [
+        (ParameterError, "there are 1 records, counted from 0", lambda: found.residuals(1)),
+        (ParameterError, "there is no parameter 'q'; there are k1", lambda: found["q"]),
+        (ParameterError, "there is no profile of 'q'", lambda: found.profile("q")),
+        (RecordError, "'silent': it has no force, with which", lambda: found.score(silent)),
+        (ParameterError, "was made from other rows", lambda: found.compare([later])),
+        (ParameterError, "other rows were held out of fit", lambda: found.compare([other])),
+    ]
+    for kind, words, call in asked:
+        with pytest.raises(kind, match=words):
+            call()
+
+
+def test_a_choice_says_among_how_many_and_what_failed() -> None:
+    good = ChoiceRow("a", "", 1, 0.1, 0.9, -3.0, 0.1)
+    chosen = plain().with_choice(Choice((good, replace(good, name="b", note="lost")), "a"), 0.2)
+    assert str(chosen).endswith("chosen among 2 candidates: a\nb failed: lost")
+
+
+def test_a_report_needs_what_makes_reports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(result, "asked", lambda _: None)
+    with pytest.raises(MissingExtraError, match="plots"):
+        plain().report(tmp_path)
+
+
+def test_a_thinned_course_is_the_same_motion() -> None:
+    course = plain().task.courses[0]
+    half = course.thinned(2)
+    assert course.thinned(1) is course
+    assert (half.t == course.t[::2]).all()
+    assert (half.measured == course.measured[::2]).all()
+    t = np.linspace(0.0, 8.0, 99)
+    one, other = (np.interp(t, each.signal.times, each.signal.values) for each in (half, course))
+    assert one == pytest.approx(other, abs=1e-6)
+
+
+@pytest.mark.parametrize("free", [("k",), ("k", "weights")])
+def test_differential_evolution_finds_it_too(free: tuple[str, ...]) -> None:
+    record = measured(bank([2e4], [5e-5]), sine(2e-4, 2.0, 2.0, 50.0))
+    found = fitted(record, bank([1e4], [5e-5]), free, search="de")
+    assert found["k1"].value == pytest.approx(2e4, rel=0.02)
+
+
 # --------------------------------------------------------------------------- saved
 @pytest.fixture
 def saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -314,7 +372,8 @@ def test_a_driven_system_is_the_model_on_the_record_and_asks_which_signal_drives
     bodies = (Body("a", velocity="w", x="x_a", v="v_a"), Body("b", velocity="u", x="x_b", v="v_b"))
     pad = Contact("pad", START, v="v_a - v_b")
     two = System("two", bodies=bodies, contacts=(pad,), signals={"w": 0.0, "u": 0.0})
-    inside = fitted(rubbed(), two, ("pad.k", "pad.weights"), drive="w", train=(0, 8), test=(8, 12))
+    free, more = ("pad.k", "pad.weights"), {"train": (0, 8), "test": (8, 12)}
+    inside = fitted(rubbed(), two, free, drive="w", measured="pad.F", **more)
     for name in ("k1", "weights1", "k2", "weights2"):
         assert inside[f"pad.{name}"].value == pytest.approx(plain()[name].value, rel=1e-6)
     with pytest.raises(ParameterError, match=r"drive: it cannot be told which signal.*w, u"):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import functools
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from gms_fsm import Fit, Record
+from gms_fsm import Chart, ChartModel, Fit, Record, State
+from gms_fsm.identification.certainty.assess import _searched_slopes
 from tests.identification.records import bank, fitted, measured, plain, sine
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
@@ -80,6 +83,45 @@ def test_profiles_stay_within_bounds() -> None:
     profile = found.profile("k1", restarts=False)
     assert profile.low == profile.values.min() == 1.9998e4
     assert profile.rise.min() == 0.0
+
+
+def test_a_parameter_of_either_sign_has_a_profile() -> None:
+    on = State("on", flow={"z": "v"}, outputs={"F": "k * z + b * v"})
+    model = ChartModel(Chart("spring", ("v",), ("z",), ("k", "b"), (on,)), {"k": -1e4, "b": 0.0})
+    found = fitted(measured(model, sine(2e-4, 2.0, 3.0)), model, ["k", "b"])
+    assert found.never_slipped == ()
+    for name in ("k", "b"):
+        profile = found.profile(name, restarts=False)
+        assert found[name].low < found[name].value < found[name].high
+        assert profile.low == pytest.approx(found[name].low, rel=0.1, abs=0.2)
+        assert profile.high == pytest.approx(found[name].high, rel=0.1, abs=0.2)
+
+
+def test_of_a_product_alone_nothing_is_told() -> None:
+    on = State("on", flow={"z": "v"}, outputs={"F": "k * b * z"})
+    model = ChartModel(Chart("spring", ("v",), ("z",), ("k", "b"), (on,)), {"k": 100.0, "b": 100.0})
+    found = fitted(measured(model, sine(2e-4, 2.0, 3.0)), model, ["k", "b"], nuisance=())
+    assert found.open == ("k", "b")
+    assert found.weakest.startswith("No parameter is determined by this record.")
+
+
+def test_a_slope_is_taken_on_the_side_that_runs() -> None:
+    found = plain()
+
+    def slopes(lost: int, step: float = 1e-4) -> Any:
+        sides = iter((1, 2))
+
+        def run(call: Any, given: Any) -> Any:
+            return [None if side == lost else call(u) for side in [next(sides)] for u in given]
+
+        steps = np.full(found.point.u.size, step)
+        pool: Any = SimpleNamespace(map=run)
+        return _searched_slopes(found.task.fine, found.point, steps, pool)
+
+    both = slopes(0)
+    for lost in (1, 2):
+        assert np.linalg.norm(slopes(lost) - both) < 1e-3 * np.linalg.norm(both)
+    assert not slopes(0, 1e3).any(), "no side runs, so nothing is known"
 
 
 def test_the_stribeck_exponent_is_searched_across_two() -> None:

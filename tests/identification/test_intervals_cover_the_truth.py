@@ -41,6 +41,10 @@ def test_correlation_time_is_that_of_the_process(correlation: float) -> None:
     assert correlation_time(parts) == pytest.approx(expected, rel=0.15)
 
 
+def test_residuals_of_zero_have_no_correlation() -> None:
+    assert correlation_time([np.zeros(100)]) == 1.0
+
+
 def test_a_direction_without_influence_is_open_and_spares_the_others() -> None:
     t = np.arange(2000) / 200.0
     both = np.sin(t)

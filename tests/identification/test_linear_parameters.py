@@ -10,7 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Body, Chart, ChartModel, Contact, Prescribed, State, System, simulate
+from gms_fsm import (
+    Body,
+    Chart,
+    ChartModel,
+    Contact,
+    Parameter,
+    Prescribed,
+    State,
+    System,
+    simulate,
+)
 from gms_fsm.charts.registry import registered
 from gms_fsm.identification.candidates import BEHIND_BACKLASH, STIFFER_ONE_WAY
 from gms_fsm.identification.problem.linear import linear_names
@@ -86,6 +96,17 @@ def _own(force: str, flow: str = "v", let: dict[str, str] | None = None) -> Char
 )
 def test_own_charts(force: str, flow: str, let: dict[str, str], linear: set[str]) -> None:
     assert {*linear_names(mounted_alone(_own(force, flow, let)))} - {"sigma_2"} == linear
+
+
+@pytest.mark.parametrize(
+    ("total", "linear"), [("b * F + c", {"k"}), ("F + v", {"k", "b", "c"}), ("F * F", set())]
+)
+def test_a_total_of_the_forces(total: str, linear: set[str]) -> None:
+    state = State("stick", flow={"z": "v"}, outputs={"F": "k * z + b + c"})
+    shared = [Parameter(name, per_element=False) for name in "bc"]
+    chart = Chart("own", ("v",), ("z",), ("k", *shared), (state,), contact_outputs={"F": total})
+    model = ChartModel(chart, {"k": 1.0, "b": 1.0, "c": 1.0})
+    assert {*linear_names(mounted_alone(model))} - {"sigma_2"} == linear
 
 
 def test_a_free_body_leaves_none() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import doctest
 import functools
 import inspect
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,8 +19,8 @@ pytest.importorskip("z3", reason="needs z3 (extra: check)")
 from gms_fsm import Chart, Finding, Parameter, Report, State, Transition, prove
 from gms_fsm.charts import LAWS, LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
-from gms_fsm.language import evaluate
-from gms_fsm.verification import _prover
+from gms_fsm.language import evaluate, parse_condition
+from gms_fsm.verification import _checks, _prover
 from gms_fsm.verification.prove import CHECKS, Check, default_domain
 
 STEP = 2.0**-20  # s; exact in floats
@@ -209,6 +210,45 @@ def test_a_guard_that_is_not_encoded_leaves_dependent_statements_undecided() -> 
         ("reachability", ("one",)),
         ("reachability", ("two",)),
     }
+
+
+def test_what_is_too_much_is_left_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_checks, "MOST_CYCLES", 0)
+    monkeypatch.setattr(_checks, "MOST_WAYS", 3)
+    wide = "(z > s or z < -s) and (v > 0 or v < 0)"
+    found = prove(chart(go=wide, back="z < s"))
+    told = {f.check: f.text for f in found.findings if f.status == "undecided"}
+    assert told["livelock"] == "more than 0 cycles; the others were not checked"
+    assert told["chattering"] == "a guard has more than 3 alternatives"
+
+
+def test_a_high_power_is_not_attempted_whatever_its_sign() -> None:
+    for power in ("99", "(-99)"):
+        (found, *_) = prove(chart(go=f"z**{power} > s")).of("livelock")
+        assert found.status == "undecided"
+        assert found.text.startswith("a polynomial of degree 99 is not attempted")
+
+
+@pytest.mark.parametrize("after", range(0, 40, 3))
+def test_what_is_given_up_is_left_undecided(after: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many questions were answered before, no answer changes into another one."""
+    own, asked = _prover.Prover.find, itertools.count()
+
+    def find(self: Any, *formulas: Any) -> Any:
+        if next(asked) >= after:
+            raise _prover.GaveUp("z3 gave up")
+        return own(self, *formulas)
+
+    answers = {(f.check, f.where): f.status for f in proved("published").findings}
+    monkeypatch.setattr(_prover.Prover, "find", find)
+    for each in prove(gms_element("published")).findings:
+        assert each.status in (answers.get((each.check, each.where)), "undecided"), each
+
+
+def test_a_guard_without_a_value_is_not_enabled() -> None:
+    guard = parse_condition("1 / z > 0", ["z"])
+    assert _prover.enabled([guard], {"z": 1.0})
+    assert not _prover.enabled([guard], {"z": 0.0})
 
 
 def on(surface: str, one: str, two: str, rest: str = "") -> Chart:

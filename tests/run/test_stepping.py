@@ -34,6 +34,7 @@ from gms_fsm import (
     System,
     simulate,
 )
+from gms_fsm.lowering import compiling
 from gms_fsm.traces.failures import SimulationError
 from tests.helpers import FASTEST, pulled_mass, stick_slip
 from tests.run.stepping_cases import bank, friction
@@ -252,6 +253,22 @@ def test_banks_that_share_a_snapshot_keep_their_own_switches(engine: str) -> Non
     other.advance([0.5, 0.5], [0.5, 0.5], 0.1)
     assert [len(each) for each in one.switches] == [100, 100]
     assert other.switches == ((), ())
+
+
+@pytest.mark.skipif(FASTEST != "compiled", reason="needs llvmlite")
+def test_many_programs_are_forgotten_and_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiling, "MOST_ENGINES", 1)
+    forces = [
+        FrictionState(each, engine=FASTEST).peek(0.0, 0.1, 0.01) for each in (GIVEN, ROOT, GIVEN)
+    ]
+    assert forces[0] == forces[2] != forces[1]
+
+
+def test_it_says_of_what_and_where_it_is() -> None:
+    model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    one, two = FrictionState(model, t=0.5), FrictionBank([model, model], t=0.25)
+    assert repr(one) == f"<FrictionState of {model!r} at t = 0.5 s>"
+    assert repr(two) == "<FrictionBank of 2 joints at t = 0.25 s>"
 
 
 def test_a_stage_may_be_closer_than_the_clock_resolves() -> None:

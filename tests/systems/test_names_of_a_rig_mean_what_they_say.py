@@ -61,3 +61,38 @@ def test_a_is_the_acceleration_along_the_velocity_of_the_contact() -> None:
     pad = Contact("pad", ChartModel(chart, {}), v="v - v_b")
     trace = simulate(System("s", bodies=(cart, base), contacts=(pad,)), 1.0, atol=1e-9)
     assert trace.transitions.t.tolist() == pytest.approx([0.125], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "acceleration",
+    [
+        "2 * (u - F)",
+        "(2 * u - 2 * F) / 1",
+        "(1 + (u - 1 - F)) / m",
+        "2 * u - F / m",
+        "(F - u) / -m",
+    ],
+)
+def test_an_acceleration_may_be_written_in_many_ways(acceleration: str) -> None:
+    def rig(text: str) -> Any:
+        given = {"numbers": {"m": 0.5}, "signals": {"u": as_signal("sin(t)")}}
+        return SimpleNamespace(title="own", acceleration=text, **given)
+
+    one, other = (
+        simulate(MODEL, rig(text), 0.1, rtol=1e-10) for text in ("(u - F) / m", acceleration)
+    )
+    assert one.x[-1] > 1e-6
+    assert other.x[-1] == pytest.approx(one.x[-1], rel=1e-5)
+
+
+def test_a_system_stands_where_a_run_has_a_model_and_a_rig() -> None:
+    pads = (Contact("one", MODEL, v="v"), Contact("two", MODEL, v="v"))
+    mass = Body("mass", inertia=2.0, force="u - m * x")
+    given = {"signals": {"u": 1.0, "w": "2 * m"}, "numbers": {"m": 3.0}}
+    trace = simulate(System("both", bodies=(mass,), contacts=pads, **given), 1e-3)
+    assert repr(trace.model).startswith("<2 contacts of <System 'both'")
+    assert trace.rig.acceleration == "(u - m * x - F) / (2.0)"
+    assert [*trace.rig.signals] == ["u"]
+    belt = Body("belt", velocity="u")
+    trace = simulate(System("driven", bodies=(belt,), contacts=pads, signals={"u": 1.0}), 1e-3)
+    assert trace.rig.acceleration is None

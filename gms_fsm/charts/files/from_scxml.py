@@ -92,10 +92,10 @@ def _root(path: Path, here: str) -> ET.Element:
         root = ET.fromstring(data, ET.XMLParser(target=_Plain()))
     except OSError as error:
         raise ChartError(f"it cannot be read: {why(error)}", place=here) from None
+    except ChartError as error:  # which is a ValueError, too
+        raise error.replaced(place=here) from None
     except (ET.ParseError, LookupError, ValueError) as error:
         raise ChartError(f"it is not XML: {error}", place=here) from None
-    except ChartError as error:
-        raise error.replaced(place=here) from None
     if _tag(root) != "scxml":
         raise ChartError(f"its root is <{_tag(root)}>, not <scxml xmlns={SCXML!r}>", place=here)
     return root

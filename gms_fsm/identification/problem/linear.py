@@ -42,8 +42,6 @@ def linear_names(subject: Mounted) -> tuple[str, ...]:
 
 def _linear_in(chart: Chart) -> tuple[str, ...]:
     """Return the parameters of a chart that only its force reads, and that linearly."""
-    if chart.locks:
-        return ()
     moving = {name for tree in _of_motion(chart) for name in names_in(tree)}
     for name in reversed(list(chart.lets)):  # a let reads only those before it
         if name in moving:

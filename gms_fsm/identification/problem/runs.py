@@ -229,8 +229,6 @@ def _run_in(t: FloatArray, x: FloatArray, v: FloatArray) -> tuple[FloatArray, Fl
     # The nearest of the first passage.
     passage = found[found < found[0] + max(2, t.size // 20)]
     last = int(passage[np.argmin(np.abs(x[passage] - x[0]))])
-    if last < 2:
-        return None
     return t[:last] - t[last] + t[0], v[:last]
 
 

@@ -192,9 +192,6 @@ class Coordinates:
     subject: Mounted
     unknowns: tuple[Unknown, ...]
 
-    def __len__(self) -> int:
-        return len(self.unknowns)
-
     @property
     def start(self) -> FloatArray:
         """The coordinates of the start, within the bounds."""
@@ -256,20 +253,6 @@ class Coordinates:
                 value = min(base * (1.0 + math.exp(u[i])), each.high)
                 found[i] = max(value, each.low, base * (1.0 + LEAST_EXCESS))
         return found
-
-    def coordinates(self, numbers: FloatArray) -> FloatArray:
-        """Return the coordinates of some values, within the bounds."""
-        plain = {each.key: x for each, x in zip(self.unknowns, numbers, strict=True)}
-        found = []
-        for each, value in zip(self.unknowns, numbers, strict=True):
-            if each.kind == "excess":
-                base = plain.get(each.other, self._base(each))
-                found.append(math.log(max(value / base - 1.0, LEAST_EXCESS)))
-            else:
-                found.append(self._coordinate(each, float(value)))
-        low, high = self.limits
-        inside: FloatArray = np.clip(np.array(found, dtype=float), low, high)
-        return inside
 
     def slopes(self, u: FloatArray) -> FloatArray:
         """Return d(value)/d(coordinate), shape (unknowns,)."""
