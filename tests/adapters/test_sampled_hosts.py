@@ -226,3 +226,8 @@ def test_a_checkpoint_holds_the_friction(tmp_path: Path) -> None:
     assert here.outputs["F"] == there.outputs["F"]
     assert here.friction.t == there.friction.t == 10.0
     assert here.switches == [each for each in there.switches if each.t > 5.0]
+
+
+def test_a_sample_time_that_python_control_does_not_know_is_refused() -> None:
+    with pytest.raises(ParameterError, match="dt is True; the friction needs a sample time"):
+        friction_system(MODEL, True)
