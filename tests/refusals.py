@@ -222,6 +222,7 @@ rows = {
     "no law": ('law = "signed"\n', ""),
     "no end": (END, ""),
     "no v_s": (", v_s = 1e-3", ""),
+    "no kind of rig": ('kind = "prescribed"\n', ""),
     "no stiffness": ("k = [100.0, 50.0]\n", ""),
     "very long": ('title = "open loop"', f'"{LONG}" = 1'),
     "very long value": (END, f"{END}\nend = '{LONG}'"),
@@ -343,6 +344,7 @@ rows = {
     "key of a number": ("--set run.t_end.x=3", ..., OPEN_LOOP, "run.t_end.x=3"),
     "two lines": ("--set run.t_end=2", ..., OPEN_LOOP, "run.t_end=2\nrun.rtol = 1e-3"),
     "endless list": ("", ..., OPEN_LOOP, "model.k=" + "[" * 5000),
+    "key with very many points": ("", ..., OPEN_LOOP, "a." * 5000 + "a=1"),
 }
 group("override", ScenarioError, scenario, rows)
 
@@ -497,6 +499,8 @@ rows = {
     "system of several contacts": ("pair.toml", ..., "phenomena pair.toml -o o"),
     "model that is no file": ("", ..., "phenomena lugre -o o"),
     "data set that is missing": ("dataset", "skates", "benchmark --only skates -o out"),
+    "export without a format": ("--to", ..., "export own.toml"),
+    "handout of a chart file": ("own.toml", ..., "handout own.toml"),
 }
 group("command", ParameterError, command, rows)
 rows = {
@@ -505,6 +509,7 @@ rows = {
     "debug of a trace": ("", ..., "debug t.CSV"),
     "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),
     "fit of a missing scenario": ("none.toml", ..., "fit none.toml"),
+    "debug of a run that cannot be": ("pulled.toml", ..., "debug pulled.toml --set run.t_end=-1"),
 }
 group("command", ScenarioError, command, rows)
 rows = {
@@ -750,6 +755,7 @@ rows = {
     "wrong name": ("[fit]: free", ..., "fit.free=['kk']"),
     "near key": ("a.toml", ..., "fit.fre=['k']"),
     "nothing free": ("a.toml", ..., "fit.free=[]"),
+    "times reversed": ("a.toml", ..., "fit.train=[2.0, 1.0]"),
     "bounds reversed": ("[fit]: bounds of 'k1'", ..., "fit.bounds.k=[2.0, 1.0]"),
     "three bounds": ("a.toml", ..., "fit.bounds.k=[1.0, 2.0, 3.0]"),
     "bounds and not free": ("[fit]: bounds", ..., "fit.bounds.C=[1.0, 2.0]"),
@@ -1432,6 +1438,7 @@ group("argument of simulate", ParameterError, running, rows)
 OWN, OTHERS = ElementMachines(GIVEN), ElementMachines(stick_slip("published"))
 rows = {
     "no time at all": ({"t_end": 0.0},),
+    "end beyond the clock": ({"t_end": 1e10},),
     "end before the start": ({"t_start": 1.0},),
     "no step": ({"method": "rk4"},),
     "no step for ticks": ({"events": "held"},),
@@ -1703,6 +1710,12 @@ group("stepping", ParameterError, lambda make: make(), rows)
 FIG4 = stick_slip("published"), Prescribed(FIG4_SINE)
 
 
+def on_a_belt() -> Session:
+    """Return a session of a contact with a body whose velocity is given."""
+    belt = Body("belt", velocity="0.1", x="x", v="w")
+    return Session(System("belt", bodies=(belt,), contacts=(Contact("pad", GIVEN, v="w"),)), 1.0)
+
+
 def unmoved(move: Callable[[Session], object], made: Callable[[], Session] = fig4) -> None:
     """Ask a session for a move; it stays where it is, with its branches and breakpoints."""
     session = made()
@@ -1799,6 +1812,8 @@ group("session", ExpressionError, unmoved, rows, "column 1")
 rows = {
     "poke of a number": (lambda s: s.poke({"m": 2.0}), a_system),
     "poke of a signal": (lambda s: s.poke({"r": 2.0}), a_system),
+    "poke of a given velocity": (lambda s: s.poke({"belt.v": 1.0}), on_a_belt),
+    "why of an element too many of a contact": (lambda s: s.why("bank 9"), a_system),
     "poke of a parameter of a contact": (lambda s: s.poke({"pad.F_c": 2.0}), a_system),
     "poke of a missing body": (lambda s: s.poke({"load.x": 2.0}), a_system),
     "poke of an element too many of a contact": (
@@ -2055,6 +2070,10 @@ rows = {
 }
 group("archive", TraceFileError, archive, rows, "run.npz")
 rows = {
+    "slide flag": (lambda a: a["rows_mode"].__setitem__((0, -1), 2), "run.npz", BELT),
+}
+group("archive", TraceFileError, archive, rows, "run.npz")
+rows = {
     "another ending": ("run.txt", ..., lambda a: None, "run.txt"),
     "no ending": (".npz", ..., lambda a: None, ".npz"),
 }
@@ -2144,6 +2163,7 @@ rows = {
 }
 group("lines of a CSV trace", TraceFileError, lines, rows)
 rows = {
+    "log for the trace": ("run.csv", ..., lambda: {"run.csv": saved(".csv")[LOG]}),
     "no log": ("run.transitions.csv", ..., lambda: {"run.csv": saved(".csv")["run.csv"]}),
     "empty log": ("run.transitions.csv", ..., lambda: {**saved(".csv"), LOG: b""}),
     "no text": ("run.csv", ..., lambda: {**saved(".csv"), "run.csv": b"# {\xff\xfe\x00}"}),

@@ -115,21 +115,20 @@ def test_a_velocity_that_is_not_finite_ends_the_run() -> None:
     assert "gives NaN or infinity there" in found.message
 
 
-@pytest.mark.parametrize("sample", [None, 0.01])
-def test_states_that_switch_without_progress_end_the_run(sample: float | None) -> None:
+def test_states_that_switch_without_progress_end_the_run() -> None:
     edges = [
         Transition("go", "a", "b", guard="v > 1e-3"),
         Transition("back", "b", "a", guard="v > 1e-4"),
     ]
     states = State("a"), State("b")
     chart = Chart("loop", ("v",), states=states, transitions=edges, outputs={"F": "v"})
-    found = solve_ivp(**{**RIGHT, "friction": ChartModel(chart, {})}, atol=1e-9, sample=sample)
+    found = solve_ivp(**{**RIGHT, "friction": ChartModel(chart, {})}, atol=1e-9)
     assert not found.success
-    assert "it stopped at t = " in found.message
-    assert sample or "prove() finds such guards" in found.message
+    assert "prove() finds such guards" in found.message
 
 
 def test_a_step_that_becomes_too_small_ends_the_run() -> None:
-    found = solve_ivp(**{**RIGHT, "fun": lambda t, y, F: [math.nan * (t > 0.05), 0.0]}, sample=0.1)
+    lost = {**RIGHT, "fun": lambda t, y, F: [math.nan * (t > 0.05), 0.0]}
+    found = solve_ivp(**lost, method="RK45", sample=0.1)
     assert not found.success
-    assert "the step size became too small" in found.message
+    assert "it stopped at t = 0.0 s: the step size" in found.message
