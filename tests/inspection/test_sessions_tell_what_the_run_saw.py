@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
 
 from gms_fsm import (
@@ -17,6 +19,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import CHARTS
+from gms_fsm.debugger import Debugger
 from gms_fsm.errors import SessionError
 from gms_fsm.session.explain import Clause, explain
 from gms_fsm.session.session import Fired
@@ -215,3 +218,24 @@ def test_answers_on_what_is_not_there() -> None:
     session = fig4()
     session.watches.append("1 / z1")
     assert "watch 1: 1 / z1 = " in debugger(session).reply("watch")
+
+
+def test_a_breakpoint_on_an_edge_looks_at_the_contacts_that_have_it() -> None:
+    session = a_system()
+    session.break_on("valid", "arrest")  # of the bank only
+    assert debugger(session).reply("continue").startswith("no breakpoint was hit")
+
+
+def test_an_interrupt_at_the_prompt_ends_nothing() -> None:
+    class Script(io.StringIO):
+        pressed = False
+
+        def readline(self, *_: object) -> str:
+            if self.pressed:
+                return "quit\n"
+            self.pressed = True
+            raise KeyboardInterrupt
+
+    out = io.StringIO()
+    assert Debugger(fig4(), "", Script(), out).run() == 0
+    assert "quit exits\n" in out.getvalue()

@@ -381,6 +381,8 @@ def test_edges_and_columns_have_the_contact_s_name(tmp_path: Path) -> None:
     np.savez(tmp_path / "wrong.npz", **(arrays | {"owners": arrays["owners"][:1]}))
     with pytest.raises(TraceFileError, match="owners"):
         Sweep.load(tmp_path / "wrong.npz")
+    pytest.importorskip("xarray", reason="needs the extra sweep")
+    assert found.to_xarray()["owner"].values.tolist() == list(found.owners)
     wrong = {"numbers.m1": [0.0, 1.0], "pad1.F_s": [20.0, 0.5]}
     result = sweep(case.system, 0.1, wrong, **how)
     assert result.outcome.tolist() == ["ParameterError", "ParameterError"]
