@@ -2262,9 +2262,9 @@ def pad(**inputs: str) -> Contact:
     return Contact("pad", stick_slip("signed"), inputs=inputs)
 
 
-def saved_system(path: str) -> None:
-    """Save a system with a Python function."""
-    system(signals={"r": abs}).save(path)
+def saved_system(signal: Any) -> None:
+    """Save a system with a signal."""
+    system(signals={"r": signal}).save("own.toml")
 
 
 def named(name: str, kind: str) -> None:
@@ -2350,6 +2350,11 @@ rows = {
     "load without a curve": ("system 'one', contact 'p'", ..., {"contacts": (DAHL,)}),
     "period": ("system 'one'", ..., {"sampled": pid(u="period"), "numbers": {"period": 2.0}}),
     "driven body alone": ("contact 'pad'", ..., {"body": {"inertia": None, "velocity": "1"}}),
+    "samplers without number": (
+        "",
+        ...,
+        {"sampled": [Sampled(f"s{i}", 0.1, {f"u{i}": "1"}) for i in range(63)]},
+    ),
     "ticks without number": ("pid", ..., {"sampled": pid(1e-9, u="x")}),
 }
 group("system", ParameterError, lambda given: made(**given), rows)
@@ -2372,7 +2377,7 @@ rows = {name: ("contact 'pad'", ..., name) for name in "svt"}
 group("input of a contact", ParameterError, lambda name: pad(**{name: "5"}), rows)
 rows = {"state that gives way": (edge(impulse=True),)}
 group("impulse", ChartError, chart, rows, "chart 'rubber', edge 'go'")
-rows = {"function": ("own.toml",)}
+rows = {"function": (abs,), "very long record": ((TIMES := np.arange(60_000) / 7.0, TIMES),)}
 group("saved system", OutputError, saved_system, rows, "own.toml")
 
 CALLED = dict.fromkeys("xvtF", "'pushed'") | dict.fromkeys(("exp", "pi"), "system 'pushed', KIND")
