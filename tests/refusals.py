@@ -2353,7 +2353,7 @@ rows = {
     "samplers without number": (
         "",
         ...,
-        {"sampled": [Sampled(f"s{i}", 0.1, {f"u{i}": "1"}) for i in range(63)]},
+        {"sampled": [Sampled(f"s{i}", period=0.1, updates={f"u{i}": "1"}) for i in range(63)]},
     ),
     "ticks without number": ("pid", ..., {"sampled": pid(1e-9, u="x")}),
 }
