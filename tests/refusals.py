@@ -228,6 +228,7 @@ rows = {
     "no law": ('law = "signed"\n', ""),
     "no end": (END, ""),
     "no v_s": (", v_s = 1e-3", ""),
+    "no kind of rig": ('kind = "prescribed"\n', ""),
     "no stiffness": ("k = [100.0, 50.0]\n", ""),
     "very long": ('title = "open loop"', f'"{LONG}" = 1'),
     "very long value": (END, f"{END}\nend = '{LONG}'"),
@@ -349,6 +350,7 @@ rows = {
     "key of a number": ("--set run.t_end.x=3", ..., OPEN_LOOP, "run.t_end.x=3"),
     "two lines": ("--set run.t_end=2", ..., OPEN_LOOP, "run.t_end=2\nrun.rtol = 1e-3"),
     "endless list": ("", ..., OPEN_LOOP, "model.k=" + "[" * 5000),
+    "key with very many points": ("", ..., OPEN_LOOP, "a." * 5000 + "a=1"),
 }
 group("override", ScenarioError, scenario, rows)
 
@@ -503,6 +505,8 @@ rows = {
     "system of several contacts": ("pair.toml", ..., "phenomena pair.toml -o o"),
     "model that is no file": ("", ..., "phenomena lugre -o o"),
     "data set that is missing": ("dataset", "skates", "benchmark --only skates -o out"),
+    "export without a format": ("--to", ..., "export own.toml"),
+    "handout of a chart file": ("own.toml", ..., "handout own.toml"),
 }
 group("command", ParameterError, command, rows)
 rows = {
@@ -511,6 +515,7 @@ rows = {
     "debug of a trace": ("", ..., "debug t.CSV"),
     "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),
     "fit of a missing scenario": ("none.toml", ..., "fit none.toml"),
+    "debug of a run that cannot be": ("pulled.toml", ..., "debug pulled.toml --set run.t_end=-1"),
 }
 group("command", ScenarioError, command, rows)
 rows = {
@@ -770,6 +775,7 @@ rows = {
     "wrong name": ("[fit]: free", ..., "fit.free=['kk']"),
     "near key": ("a.toml", ..., "fit.fre=['k']"),
     "nothing free": ("a.toml", ..., "fit.free=[]"),
+    "times reversed": ("a.toml", ..., "fit.train=[2.0, 1.0]"),
     "bounds reversed": ("[fit]: bounds of 'k1'", ..., "fit.bounds.k=[2.0, 1.0]"),
     "three bounds": ("a.toml", ..., "fit.bounds.k=[1.0, 2.0, 3.0]"),
     "bounds and not free": ("[fit]: bounds", ..., "fit.bounds.C=[1.0, 2.0]"),
@@ -1482,6 +1488,7 @@ group("argument of simulate", ParameterError, running, rows)
 OWN, OTHERS = ElementMachines(GIVEN), ElementMachines(stick_slip("published"))
 rows = {
     "no time at all": ({"t_end": 0.0},),
+    "end beyond the clock": ({"t_end": 1e10},),
     "end before the start": ({"t_start": 1.0},),
     "no step": ({"method": "rk4"},),
     "no step for ticks": ({"events": "held"},),
@@ -1763,6 +1770,12 @@ group("stepping", ParameterError, lambda make: make(), rows)
 FIG4 = stick_slip("published"), Prescribed(FIG4_SINE)
 
 
+def on_a_belt() -> Session:
+    """Return a session of a contact with a body whose velocity is given."""
+    belt = Body("belt", velocity="0.1", x="x", v="w")
+    return Session(System("belt", bodies=(belt,), contacts=(Contact("pad", GIVEN, v="w"),)), 1.0)
+
+
 def unmoved(move: Callable[[Session], object], made: Callable[[], Session] = fig4) -> None:
     """Ask a session for a move; it stays where it is, with its branches and breakpoints."""
     session = made()
@@ -1859,6 +1872,8 @@ group("session", ExpressionError, unmoved, rows, "column 1")
 rows = {
     "poke of a number": (lambda s: s.poke({"m": 2.0}), a_system),
     "poke of a signal": (lambda s: s.poke({"r": 2.0}), a_system),
+    "poke of a given velocity": (lambda s: s.poke({"belt.v": 1.0}), on_a_belt),
+    "why of an element too many of a contact": (lambda s: s.why("bank 9"), a_system),
     "poke of a parameter of a contact": (lambda s: s.poke({"pad.F_c": 2.0}), a_system),
     "poke of a missing body": (lambda s: s.poke({"load.x": 2.0}), a_system),
     "poke of an element too many of a contact": (
@@ -2128,6 +2143,10 @@ rows = {
 }
 group("archive", TraceFileError, archive, rows, "run.npz")
 rows = {
+    "slide flag": (lambda a: a["rows_mode"].__setitem__((0, -1), 2), "run.npz", BELT),
+}
+group("archive", TraceFileError, archive, rows, "run.npz")
+rows = {
     "another ending": ("run.txt", ..., lambda a: None, "run.txt"),
     "no ending": (".npz", ..., lambda a: None, ".npz"),
 }
@@ -2217,6 +2236,7 @@ rows = {
 }
 group("lines of a CSV trace", TraceFileError, lines, rows)
 rows = {
+    "log for the trace": ("run.csv", ..., lambda: {"run.csv": saved(".csv")[LOG]}),
     "no log": ("run.transitions.csv", ..., lambda: {"run.csv": saved(".csv")["run.csv"]}),
     "empty log": ("run.transitions.csv", ..., lambda: {**saved(".csv"), LOG: b""}),
     "no text": ("run.csv", ..., lambda: {**saved(".csv"), "run.csv": b"# {\xff\xfe\x00}"}),
@@ -2315,9 +2335,9 @@ def pad(**inputs: str) -> Contact:
     return Contact("pad", stick_slip("signed"), inputs=inputs)
 
 
-def saved_system(path: str) -> None:
-    """Save a system with a Python function."""
-    system(signals={"r": abs}).save(path)
+def saved_system(signal: Any) -> None:
+    """Save a system with a signal."""
+    system(signals={"r": signal}).save("own.toml")
 
 
 def named(name: str, kind: str) -> None:
@@ -2428,6 +2448,11 @@ rows = {
     "load without a curve": ("system 'one', contact 'p'", ..., {"contacts": (DAHL,)}),
     "period": ("system 'one'", ..., {"sampled": pid(u="period"), "numbers": {"period": 2.0}}),
     "driven body alone": ("contact 'pad'", ..., {"body": {"inertia": None, "velocity": "1"}}),
+    "samplers without number": (
+        "",
+        ...,
+        {"sampled": [Sampled(f"s{i}", period=0.1, updates={f"u{i}": "1"}) for i in range(63)]},
+    ),
     "ticks without number": ("pid", ..., {"sampled": pid(1e-9, u="x")}),
 }
 group("system", ParameterError, lambda given: made(**given), rows)
@@ -2464,7 +2489,7 @@ rows = {name: ("contact 'pad'", ..., name) for name in "svt"}
 group("input of a contact", ParameterError, lambda name: pad(**{name: "5"}), rows)
 rows = {"state that gives way": (edge(impulse=True),)}
 group("impulse", ChartError, chart, rows, "chart 'rubber', edge 'go'")
-rows = {"function": ("own.toml",)}
+rows = {"function": (abs,), "very long record": ((TIMES := np.arange(60_000) / 7.0, TIMES),)}
 group("saved system", OutputError, saved_system, rows, "own.toml")
 
 CALLED = dict.fromkeys("xvtF", "'pushed'") | dict.fromkeys(("exp", "pi"), "system 'pushed', KIND")

@@ -10,6 +10,7 @@ import pytest
 
 from gms_fsm import Slider, simulate
 from gms_fsm.errors import ParameterError
+from tests.adapters.loops import loaded_pad
 from tests.helpers import pulled_mass
 
 gymnasium = pytest.importorskip("gymnasium", reason="the environment is extra gymnasium")
@@ -95,3 +96,8 @@ def test_wrong_actions_and_targets_change_nothing() -> None:
     with pytest.raises(ParameterError, match=r"target is 2\.0; it is outside the travel"):
         env.reset(options={"target": 2.0})
     assert env.step(np.ones(1))[0].tolist() == other.step(np.ones(1))[0].tolist()
+
+
+def test_a_friction_with_further_inputs_is_refused() -> None:
+    with pytest.raises(ParameterError, match="it needs the inputs load; write them as numbers"):
+        FrictionPositioning(loaded_pad(), **SIZES)

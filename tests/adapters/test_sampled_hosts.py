@@ -226,3 +226,16 @@ def test_a_checkpoint_holds_the_friction(tmp_path: Path) -> None:
     assert here.outputs["F"] == there.outputs["F"]
     assert here.friction.t == there.friction.t == 10.0
     assert here.switches == [each for each in there.switches if each.t > 5.0]
+
+
+def test_a_sample_time_that_python_control_does_not_know_is_refused() -> None:
+    with pytest.raises(ParameterError, match="dt is True; the friction needs a sample time"):
+        friction_system(MODEL, True)
+
+
+def test_a_block_that_is_first_asked_later_begins_then() -> None:
+    block = friction_block(MODEL, DT)
+    block.update(2.0)
+    (samples,) = block.events
+    samples.func_act(2.0)
+    assert block.friction.t == 2.0

@@ -7,8 +7,9 @@ import pickle
 from typing import Any
 
 import pytest
+from scipy.integrate import RK45
 
-from gms_fsm import Chart, ChartModel, Contact, ParameterError, State
+from gms_fsm import Chart, ChartModel, Contact, ParameterError, State, Transition
 from gms_fsm.adapters.scipy import solve_ivp
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.registry import entry
@@ -97,3 +98,37 @@ def test_a_failed_run_keeps_its_rows(options: dict[str, Any]) -> None:
     again = pickle.loads(pickle.dumps(found))
     assert again.message == found.message
     assert again.friction.states == found.friction.states
+
+
+def test_a_friction_that_goes_on_has_its_state() -> None:
+    found = solve_ivp(**RIGHT, method=RK45, atol=[1e-6, 1e-9])
+    assert found.success
+    begun = {**RIGHT, "t_span": (1.0, 2.0), "friction": found.friction}
+    with pytest.raises(ParameterError, match=r"leave out initial=\.\.\."):
+        solve_ivp(**begun, initial={"z": [0.0] * MODEL.n})
+
+
+def test_a_velocity_that_is_not_finite_ends_the_run() -> None:
+    found = solve_ivp(**{**RIGHT, "velocity": lambda y: math.nan if y[1] > 1e-3 else y[1]})
+    assert not found.success
+    assert "it stopped at t = " in found.message
+    assert "gives NaN or infinity there" in found.message
+
+
+def test_states_that_switch_without_progress_end_the_run() -> None:
+    edges = [
+        Transition("go", "a", "b", guard="v > 1e-3"),
+        Transition("back", "b", "a", guard="v > 1e-4"),
+    ]
+    states = State("a"), State("b")
+    chart = Chart("loop", ("v",), states=states, transitions=edges, outputs={"F": "v"})
+    found = solve_ivp(**{**RIGHT, "friction": ChartModel(chart, {})}, atol=1e-9)
+    assert not found.success
+    assert "prove() finds such guards" in found.message
+
+
+def test_a_step_that_becomes_too_small_ends_the_run() -> None:
+    lost = {**RIGHT, "fun": lambda t, y, F: [math.nan * (t > 0.05), 0.0]}
+    found = solve_ivp(**lost, method="RK45", sample=0.1)
+    assert not found.success
+    assert "it stopped at t = 0.0 s: the step size" in found.message

@@ -9,20 +9,23 @@ import json
 import runpy
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from gms_fsm import GMSError, ParameterError, Record, RecordError
-from gms_fsm.app.benchmark import datasets, make, page, write
+from gms_fsm.app.benchmark import datasets, make, methods, page, write
 from gms_fsm.app.benchmark.datasets import DataSet, Split, data_set
 from gms_fsm.app.benchmark.methods import METHODS, Method, Predictor
 from gms_fsm.identification.bank import stop_operators
-from gms_fsm.identification.fit import fitted
+from gms_fsm.identification.fit import fitted, task_of
+from gms_fsm.identification.problem.task import FitOptions
 from tests.helpers import ROOT
-from tests.scenario_files import data_folder
+from tests.scenario_files import CommandLine, data_folder
 
 pytest.importorskip("llvmlite", reason="fits take long without machine code")
 
@@ -103,6 +106,84 @@ def test_interrupted_it_keeps_what_is_complete(tmp_path: Path) -> None:
     assert "interrupted" in files[0].read_text()
     written = json.loads(files[1].read_text())
     assert written["sections"][0]["rows"][1]["rmse"] == card.sections[0].rows[1].rmse
+
+
+def in_turn(records: tuple[Record, ...]) -> tuple[Split, ...]:
+    """Split as the damper is split, whose files are not there."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(datasets, "damper", lambda _: iter(records))
+        return data_set("damper").splits(Path())
+
+
+OTHERS = tuple(
+    replace(
+        Record.from_arrays(time=T[::4], position=a * X[::4], force=F[::4], name=f"test{a:g}"),
+        licence="free",
+    )
+    for a in (1.0, 1.1, 1.2)
+)
+TESTS = replace(SMALL, name="damper", splits=lambda _: in_turn(OTHERS), published={})
+
+
+@pytest.mark.parametrize("name", ["Dahl", "LuGre", "Bouc-Wen", "choose"])
+def test_fits_of_later_splits_begin_at_the_first_one(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tasks: list[Any] = []
+
+    def near(task: Any, **_: Any) -> Any:
+        """Return the start of a fit as its result."""
+        tasks.append(task)
+        return SimpleNamespace(
+            stopped="",
+            table=task.options.free,
+            predict=lambda record: np.zeros(len(record)),
+            task=task,
+            model=task.subject.model,
+            begin="relaxed",
+            choice=SimpleNamespace(chosen="GMS 1"),
+        )
+
+    def of_one_kind(records: Any, smoothing: float | None) -> Any:
+        start = methods.gms(records, smoothing, n=1)
+        options = FitOptions(free=start.free, tied=start.tied, bounds=start.bounds)
+        return near(task_of(records, start.model, {}, options))
+
+    monkeypatch.setattr(methods, "fitted", near)
+    monkeypatch.setattr(methods, "choose", of_one_kind)
+    card = make(Path(), data=[TESTS], methods=[replace(of_card(name), on=("damper",))])
+    (row,) = card.sections[0].rows
+    assert row.note == ("GMS 1" if name == "choose" else "")
+    options = [task.options for task in tasks]
+    assert [each.search for each in options] == ["hops", "local", "local"]
+    assert [each.begin for each in options] == [None, "relaxed", "relaxed"]
+    assert len({each.free for each in options}) == 1
+    assert row.free == len(options[0].free)
+    assert [*row.by_record] == ["test1", "test1.1", "test1.2"]
+    text = page(card)
+    assert "| model | test1 | test1.1 | test1.2 |" in text
+    assert "later ones are refined from it" in text
+
+
+def test_the_verb_writes_what_is_complete(
+    gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stops(*_: Any) -> Predictor:
+        raise KeyboardInterrupt
+
+    mine = [constant(0.0), Method("endless", stops, ("rig",))]
+    for tried, code, said in ((mine[:1], 0, ""), (mine, 130, "interrupted; what was complete")):
+        some = partial(make, data=[SMALL], methods=tried)
+        monkeypatch.setattr("gms_fsm.app.benchmark.make", some)
+        answer = gms_fsm("benchmark", "-o", "out")
+        assert (answer.code, said in answer.err) == (code, True)
+        assert answer.out.startswith("2 files in out; start with ")
+    assert json.loads(Path("out/benchmark.json").read_text())["complete"] is False
+
+
+def test_a_prediction_of_too_few_rows_is_refused() -> None:
+    with pytest.raises(RecordError, match="1 forces for 601 held-out rows"):
+        datasets.score({"rig": RECORD}, {"rig": np.zeros(1)})
 
 
 @pytest.mark.slow

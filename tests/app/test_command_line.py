@@ -15,6 +15,7 @@ import pytest
 
 from gms_fsm import GMS, GMSParameters, Prescribed, __version__, simulate
 from gms_fsm.errors import ScenarioError, TraceFileError
+from gms_fsm.exporters import formats
 from gms_fsm.lowering.program import lower
 from tests.helpers import ROOT, matrix, stick_slip
 from tests.scenario_files import (
@@ -211,3 +212,8 @@ def test_an_exported_contact_has_the_tolerance_of_its_scenario(gms_fsm: CommandL
     readme = Path("out/README-bearing-c99.md").read_text()
     assert re.search(r"relative tolerance 0\.001\.", readme)
     said(gms_fsm(*bearing, "--to", "st"))  # which has no use for it
+
+
+def test_formats_of_export_are_listed(gms_fsm: CommandLine) -> None:
+    lines = said(gms_fsm("export", "--list")).splitlines()
+    assert [line.split()[0] for line in lines] == [*formats()]

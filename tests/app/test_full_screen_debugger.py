@@ -14,7 +14,7 @@ pytest.importorskip("textual", reason="needs the extra tui")
 
 from gms_fsm import Prescribed
 from gms_fsm.debugger import COMMANDS
-from gms_fsm.debugger.tui import run_tui
+from gms_fsm.debugger.tui import _app, run_tui
 from gms_fsm.debugger.tui._app import FullScreen
 from gms_fsm.debugger.tui._keys import KEYS
 from gms_fsm.debugger.tui._spans import DARK, LIGHT
@@ -34,6 +34,7 @@ from tests.app.full_screen import (
 )
 from tests.app.test_debugger_transcripts import answers
 from tests.helpers import FIG4_SINE, ROOT, stick_slip
+from tests.inspection.test_sessions_tell_what_the_run_saw import torn
 from tests.scenario_files import CommandLine, one_message
 
 pytestmark = pytest.mark.slow
@@ -292,3 +293,41 @@ def test_without_textual_the_extra_is_named(
         'pip install "gms-fsm[tui]"',
         "without --tui answers at a prompt",
     )
+
+
+def test_a_key_without_its_number_asks_and_old_answers_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_app, "TRANSCRIPT", 20)
+
+    async def action(app: FullScreen, pilot: Any) -> None:
+        await press(pilot, "g", *typed("25"), "enter", "escape")
+        assert "goto 25" in "".join(app.said)
+        await press(pilot, *"wnwnwn")
+        assert len(app.said) == 20
+
+    drive(action, LARGE)
+
+
+def test_a_guard_without_sides_and_a_run_that_fails_are_shown() -> None:
+    async def action(app: FullScreen, pilot: Any) -> None:
+        assert "z > 0.1 || v > 9" in app.panels["why"].shown
+        await press(pilot, "2", "g", "w")
+        assert "cannot be computed here" in app.panels["why"].shown
+
+    drive(action, LARGE, torn())
+
+    async def failing(app: FullScreen, pilot: Any) -> None:
+        await press(pilot, "end")
+        assert "the run cannot continue" in screen_text(app)
+
+    made = Session(stick_slip("published"), Prescribed(FIG4_SINE), 40.0, max_steps=60)
+    drive(failing, LARGE, made)
+
+
+def test_on_a_terminal_it_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("stdin", "stdout"):
+        file = io.StringIO()
+        monkeypatch.setattr(file, "isatty", lambda: True)
+        monkeypatch.setattr(sys, name, file)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(FullScreen, "run", lambda _: 3)
+    assert run_tui(session()) == 3

@@ -333,3 +333,14 @@ def test_three_threads_that_save_to_one_path_never_show_a_damaged_file(
     assert wrong == []
     assert not list(tmp_path.glob(".*"))
     np.testing.assert_equal(Trace.load(path).n, 4)
+
+
+def test_a_folder_that_takes_no_file_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("gms_fsm.foundation.files._part", full)
+    with pytest.raises(OutputError, match=r"cannot write into .*: No space left on device; choose"):
+        output_folder(tmp_path / "out", ["a.md"])

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scipy.integrate import Radau
 
 from gms_fsm import Prescribed
 from gms_fsm.app._tables import Scenario, SystemScenario
@@ -175,3 +176,7 @@ def test_a_signal_is_an_expression_or_corners_never_a_function(path: Path) -> No
     ramps = load_scenario(path, ["rig.velocity=[[0, 0], [1, 2]]"]).rig
     assert isinstance(ramps.signals["v"], Corners)
     assert ramps.signals["v"].held
+
+
+def test_a_solver_of_scipy_is_given_by_its_name(path: Path) -> None:
+    assert load_scenario(path, ["run.method=Radau"]).arguments["method"] is Radau

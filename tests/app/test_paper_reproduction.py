@@ -12,14 +12,15 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from gms_fsm import Trace, simulate
+from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.app import paper
+from gms_fsm.app.paper.claims import differing_numbers
 from gms_fsm.app.paper.experiments import PaperExperiment, experiments, run
 from gms_fsm.app.paper.held import lag_of
 from gms_fsm.app.paper.writing import claims_text, write
 from gms_fsm.errors import OutputError
 from gms_fsm.traces.failures import SimulationError
-from tests.helpers import FASTEST, ROOT, matrix, non_drifting
+from tests.helpers import FASTEST, ROOT, matrix, non_drifting, stick_slip
 from tests.page_blocks import Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow
@@ -216,3 +217,9 @@ def test_before_a_tick_the_force_is_that_of_the_tick_before() -> None:
     assert lag.largest_before > lag.median[0]
     with pytest.raises(TypeError, match="must have a sample time"):
         lag_of(inside, inside)
+
+
+def test_of_runs_of_different_lengths_all_numbers_differ() -> None:
+    short, long = (simulate(stick_slip("signed"), Prescribed("0.3"), end) for end in (0.5, 2.0))
+    differ, total = differing_numbers(short, long)
+    assert differ == total > 0

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from gms_fsm import Contact, System
-from gms_fsm.app.phenomena import write_table
+from gms_fsm.app import phenomena
+from gms_fsm.app.phenomena import own_models, write_table
 from gms_fsm.charts import CHARTS
+from gms_fsm.errors import MissingExtraError
 from gms_fsm.phenomena.measure import PHENOMENA
 from gms_fsm.phenomena.results import Cell, Curve, MeasuredNumber, PhenomenaTable, PhenomenonResult
 from gms_fsm.systems.system import Body
+from tests import own_files
 from tests.scenario_files import CommandLine
 
 DRAWN = {name: PHENOMENA[name] for name in ("break-away", "memory", "lag", "stick-slip")}
@@ -88,3 +91,21 @@ def test_a_chart_file_takes_values(gms_fsm: CommandLine) -> None:
     done = gms_fsm("phenomena", "own.toml", *given, "--phenomenon", "break-away", "-o", "o")
     assert done.code == 0, done.err
     assert "1.5 N" in Path("o/phenomena.md").read_text(encoding="utf-8")
+
+
+def test_a_contact_of_a_file_is_named_and_pictures_may_be_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own_files.write(tmp_path)
+    for name in ("pad1", "pad2"):
+        (found,) = own_models([str(tmp_path / "pair.toml")], name).values()
+        assert isinstance(found, Contact)
+        assert found.name == name
+    monkeypatch.setattr(phenomena, "_draw", refuses)
+    with pytest.warns(UserWarning, match="no figures were drawn: plots are away"):
+        files = write_table(small_table(), tmp_path)
+    assert [each.name for each in files] == ["phenomena.md", "phenomena.csv"]
+
+
+def refuses(*_: object) -> None:
+    raise MissingExtraError("plots are away")

@@ -21,6 +21,7 @@ from gms_fsm.app.report import (
     what_it_cannot_tell,
 )
 from gms_fsm.app.scenario import Loaded, load_scenario
+from gms_fsm.errors import MissingExtraError
 from gms_fsm.records.motion import Motion
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
@@ -270,3 +271,62 @@ def test_a_v_c_below_the_noise_is_reported_and_one_above_is_not() -> None:
     assert note in what_it_cannot_tell(trace, noisy)
     assert velocity_note(trace, ONE_SPEED) == ""
     assert velocity_note(over(LUGRE, noisy), noisy) == ""
+
+
+def test_without_motion_no_parameter_can_be_told() -> None:
+    still = motion(np.zeros_like(ONE_SPEED.velocity))
+    said = what_it_cannot_tell(over(MODEL, ONE_SPEED), still)
+    assert said == ["all parameters: there is no motion"]
+
+
+DRY_CHART = """\
+name = "dry friction"
+
+[[parameter]]
+name = "F_c"
+unit = "N"
+rule = "> 0"
+
+[[state]]
+name = "on"
+outputs.F = "F_c * sgn(v)"
+"""
+HELD = """\
+name = "held"
+
+[[body]]
+name = "mass"
+inertia = 1.0
+force = "0.2"
+x = "x"
+v = "w"
+
+[[contact]]
+name = "pad"
+chart = "dry.toml"
+values = { F_c = 1.0 }
+v = "w"
+
+[initial]
+w = 0.5
+
+[run]
+t_end = 2.0
+"""
+
+
+def test_a_summary_says_where_the_motion_was_held(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And pictures may be missing."""
+    (tmp_path / "dry.toml").write_text(DRY_CHART)
+    path = tmp_path / "held.toml"
+    path.write_text(HELD)
+
+    def refuses(*_: object) -> None:
+        raise MissingExtraError("plots are away")
+
+    monkeypatch.setattr("gms_fsm.app.report._draw", refuses)
+    with pytest.warns(UserWarning, match="no figure was drawn: plots are away"):
+        _, files = run_scenario(load_scenario(path), tmp_path / "out")
+    assert "- held on w = 0: 1 times, " in files[0].read_text()

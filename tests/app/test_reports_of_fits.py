@@ -71,6 +71,17 @@ def test_what_cannot_be_told_is_named(tmp_path: Path) -> None:
     assert ("never slipped: element" in doubts) == bool(small().never_slipped)
 
 
+@pytest.mark.usefixtures("undrawn")
+def test_elements_that_never_slipped_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Fit, "never_slipped", (2, 4))
+    monkeypatch.setattr(Fit, "open_profiles", ())
+    page = write_report(with_table(5), tmp_path).read_text(encoding="utf-8")
+    assert "- never slipped: element 2, 4; it acts as a spring" in page
+    assert "- fit as well" not in page
+
+
 @pytest.mark.slow
 def test_profiles_are_there_exactly_when_something_is_open(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")

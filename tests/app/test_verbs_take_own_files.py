@@ -7,8 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm import Sweep, System, Trace
-from gms_fsm.app.scenario import load_scenario, load_system, run_debugger, scenario_to_debug
+from gms_fsm import Chart, Parameter, State, Sweep, System, Trace
+from gms_fsm.app._own_files import OwnFile, any_model
+from gms_fsm.app.scenario import (
+    kind_of,
+    load_scenario,
+    load_system,
+    run_debugger,
+    scenario_to_debug,
+)
 from gms_fsm.lowering.program import lower
 from tests import own_files
 from tests.plots.stored import data_of
@@ -156,3 +163,24 @@ def test_debug_steps_through_a_system(verb: CommandLine) -> None:
     assert run_debugger(loaded, io.StringIO("next\nwhy pad1 1\nquit\n"), out) == 0
     assert "pad1 1: stuck -> forward by release_forward" in out.getvalue()
     assert "error" not in out.getvalue()
+
+
+def test_monitors_of_a_system_and_a_file_without_a_run(tmp_path: Path) -> None:
+    own_files.write(tmp_path)
+    loaded = load_scenario(tmp_path / "pair.toml", ["run.monitors=['coverage']"])
+    assert loaded.arguments["monitors"] == ("coverage",)
+    assert not OwnFile(tmp_path / "own.toml").run
+    assert kind_of({}) == ""
+
+
+def test_a_model_with_some_numbers_keeps_the_rules_of_its_chart() -> None:
+    chart = Chart(
+        "ruled",
+        ("v",),
+        parameters=(Parameter("a", rule="> 5"), Parameter("b", rule="< 0")),
+        states=(State("on"),),
+        outputs={"F": "a * b * v"},
+    )
+    values = any_model(chart).values
+    assert values["a"] > 5.0
+    assert values["b"] < 0.0

@@ -145,3 +145,18 @@ def test_it_steps_to_the_engine_s_bits_and_its_readme_is_a_program(
     trace = simulate(PAPER, Prescribed((t, t)), t[-1], t_eval=t)
     assert [float(at) for at, _ in rows] == pytest.approx(t[1:])
     assert [float(force) for _, force in rows] == pytest.approx(trace.F[1:], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("function", "found", "why"),
+    [
+        ("shutil.which", "/bin/false", "/bin/false .* failed: no message"),
+        ("platform.system", "Plan9", "FMI 2 has no name for Plan9 on "),
+    ],
+)
+def test_without_a_binary_it_says_why(function: str, found: str, why: str, tmp_path: Path) -> None:
+    with (
+        mock.patch(function, return_value=found),
+        pytest.warns(UserWarning, match=f"the FMU has no binary: {why}"),
+    ):
+        export(PAPER, "fmu2", tmp_path, name="gms")

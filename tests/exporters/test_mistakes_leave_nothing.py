@@ -255,3 +255,12 @@ def test_the_command_line_says_it_in_one_message(
     one_message(gms_fsm("export", *arguments.split()), said)
     assert there(here) == before
     assert not (here.parent / "x").exists()
+
+
+def test_quantities_that_a_program_would_call_the_same_are_refused(tmp_path: Path) -> None:
+    body = Body("one", inertia=1.0, force="1", x="x", v="w")
+    pad = Contact("p", stick_slip("signed"), v="w")
+    system = System("twice", bodies=(body,), contacts=(pad,), flow={"p_F": "1"})
+    with pytest.raises(ParameterError, match="two quantities would be called 'p_F'"):
+        export(system, "c99", tmp_path / "out")
+    assert not [*tmp_path.rglob("*.c")]

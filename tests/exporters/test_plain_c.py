@@ -13,7 +13,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Body, Chart, ChartModel, GMSParameters, State, System, Transition, simulate
+from gms_fsm import (
+    Body,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    State,
+    System,
+    Transition,
+    export,
+    simulate,
+)
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import plain_c
@@ -125,3 +135,10 @@ def test_one_state_needs_no_field(tmp_path: Path) -> None:
     step = plain_step(tmp_path, subject)
     assert [step(1.0, 1.0) for _ in range(5)] == [0.0, 1.0, 0.0, 1.0, 0.0]
     assert "state" not in plain_c(subject)["reset_plain.h"]
+
+
+def test_a_name_of_an_expression_that_c_has_is_refused(tmp_path: Path) -> None:
+    chart = Chart("named", inputs=("v",), let={"double": "2 * v"}, states=(State("on"),),
+                  outputs={"F": "double"})  # fmt: skip
+    with pytest.raises(ParameterError, match="let 'double'"):
+        export(ChartModel(chart, {}), "c99", tmp_path)

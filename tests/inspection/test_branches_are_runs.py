@@ -305,3 +305,20 @@ def test_names_and_deleting() -> None:
     assert (list(tree.forks), tree.current) == ([0], 0)
     assert tree.trace() is before
     assert tree.fork() == 3  # numbers are not used again
+
+
+def test_in_a_system_values_of_all_elements_are_a_list_and_that_of_the_only_one_a_number() -> None:
+    belts = [Body(name, velocity="0.1", x=f"x_{name}", v=f"v_{name}") for name in ("one", "two")]
+    spring = Contact("spring", CHARTS["maxwell-slip"], {"k": 10.0, "F_c": 1.0}, v="v_one")
+    system = System("belts", bodies=belts, contacts=(spring, Contact("bank", PUBLISHED, v="v_two")))
+    session = Session(system, 1.0)
+    session.poke({"spring.z": 0.05, "bank.z": [0.1, 0.2, 0.3, 0.4]})
+    assert session.here.contact("spring").z == (0.05,)
+    assert session.here.contact("bank").z == (0.1, 0.2, 0.3, 0.4)
+
+
+def test_a_file_of_a_branch_keeps_method_and_events(tmp_path: Path) -> None:
+    tree = tree_of(PUBLISHED, Prescribed("0.1"), 1.0, method="rk4", step=0.01, events="step")
+    loaded = load_scenario(tree.save_scenario(tmp_path / "one.toml"))
+    given = {name: loaded.arguments[name] for name in ("method", "step", "events")}
+    assert given == {"method": "rk4", "step": 0.01, "events": "step"}

@@ -6,7 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, simulate
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    Prescribed,
+    State,
+    Stribeck,
+    Transition,
+    simulate,
+)
 from gms_fsm.session.notes import notes_on
 from tests.helpers import ROOT, open_loop, pulled_mass, stick_slip
 
@@ -82,3 +92,17 @@ def test_the_command_line_prints_them_and_the_summary_shows_them(gms_fsm):
     note = "note: no transition: the speed stays below v_c"
     assert note in done.out
     assert f"- {note}" in Path("out/summary.md").read_text()
+
+
+@pytest.mark.parametrize("how", [{}, {"method": "rk4", "step": 0.1, "events": "step"}])
+def test_windows_that_depend_on_the_state_or_on_steps_are_not_searched(how: dict[str, object]):
+    chart = Chart(
+        "window",
+        inputs=("v",),
+        variables=("z",),
+        states=(State("on", {"z": "v"}), State("off", {"z": "0"})),
+        transitions=(Transition("rest", "on", "off", guard="abs(v) <= z - 9"),),
+        outputs={"F": "z"},
+    )
+    found = notes(ChartModel(chart, {}), "0.1*cos(t)", **how)  # type: ignore[arg-type]
+    assert "could not be detected" not in "".join(found)

@@ -10,7 +10,7 @@ import pytest
 from gms_fsm import Body, Contact, Prescribed, Session, Slider, System
 from gms_fsm.debugger import Debugger
 from tests.helpers import FASTEST, FIG4_SINE, same_bits, stick_slip
-from tests.inspection.sessions import a_system, pulled, warming
+from tests.inspection.sessions import a_system, fig4, pulled, warming
 
 
 def walked() -> Session:
@@ -123,3 +123,10 @@ def test_whole_branches_are_those_that_are_walked_and_the_debugger_lists_them() 
     assert "from branch 0 at t = 0 s: signed law, k2 = 0.8" in said
     assert "from branch 4 at t = 0 s: F_s = 1.6, z2 = 0" in said
     assert "no branch 3; there are 0, 1, 2, 4, 5, 6" in Debugger(session).reply("branch 3")
+
+
+def test_the_name_of_the_original_run_is_kept(tmp_path: Path) -> None:
+    session = fig4(1.0)
+    session.tree.rename(0, "first")
+    loaded = Session.load(session.save(tmp_path / "walk.json"))
+    assert [each.name for each in loaded.tree.forks.values()] == ["first"]

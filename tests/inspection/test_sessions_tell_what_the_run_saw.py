@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
 
-from gms_fsm import Body, Chart, Contact, Session, State, System, Transition, simulate
+from gms_fsm import (
+    Body,
+    Chart,
+    ChartModel,
+    Contact,
+    Prescribed,
+    Session,
+    State,
+    System,
+    Transition,
+    simulate,
+)
+from gms_fsm.charts import CHARTS
+from gms_fsm.debugger import Debugger
 from gms_fsm.errors import SessionError
-from gms_fsm.session.explain import explain
+from gms_fsm.session.explain import Clause, explain
 from gms_fsm.session.session import Fired
 from tests.helpers import pulled_mass
 from tests.inspection.sessions import a_system, debugger, fig4, locked, pulled, pushed, warming
@@ -138,3 +153,89 @@ def test_a_contact_with_a_period_says_when_it_is_asked() -> None:
     session.break_on("tested", "arrest_forward", "pad")
     here, _ = session.proceed()
     assert (here.t, session.why("pad").tick) == (0.1, None)
+
+
+def test_a_row_that_is_missing_has_no_explanation() -> None:
+    trace = fig4(1.0).tree.trace()
+    for row, element in ((len(trace), 0), (0, 4), (0, -1)):
+        with pytest.raises(IndexError, match=r"the trace has \d+ rows, 4 elements"):
+            explain(trace, row, element)
+
+
+def test_margins_are_relative_to_the_larger_side() -> None:
+    assert Clause("a > b", True, 4.0, 1.0, 3.0).relative == 0.75
+    assert Clause("a > b", False, 1.0, float("inf"), -float("inf")).relative == -1.0
+
+
+def torn() -> Session:
+    """Edges that are true together, of two comparisons, or of what cannot be computed."""
+    chart = Chart(
+        "torn",
+        inputs=("v",),
+        variables=("z",),
+        states=(State("on", {"z": "v"}), State("off", {"z": "0"}), State("out", {"z": "0"})),
+        transitions=(
+            Transition("leave", "on", "off", guard="z > 0.1 or v > 9"),
+            Transition("flee", "on", "out", guard="z > 0.1"),
+            Transition("back", "off", "on", guard="1 / (z - z) > 1"),
+        ),
+        outputs={"F": "z"},
+    )
+    return Session(ChartModel(chart, {}), Prescribed("0.1"), 2.0)
+
+
+def test_what_has_no_margin_is_said_in_words() -> None:
+    session = torn()
+    said = str(session.why(0))
+    assert "leave does not fire: z > 0.1 || v > 9 is false." in said
+    session.next_transition()
+    session.back()
+    said = one_line(str(session.why(0)))
+    assert "flee does not fire: its guard is true, but leave takes precedence." in said
+    session.goto(1.5)
+    assert "cannot be computed here" in str(session.why(0))
+    assert session.here.F_elements == (session.here.F,)
+
+
+def test_of_many_contacts_a_row_shows_the_one_that_fired() -> None:
+    names = "abcde"
+    bodies = [Body(f"body_{each}", inertia=1.0, force="1", x=f"x_{each}", v=f"v_{each}")
+              for each in names]  # fmt: skip
+    pads = [Contact(f"pad_{each}", CHARTS["stiction"], DRY, v=f"v_{each}") for each in names]
+    session = Session(System("many", bodies=bodies, contacts=pads), 1.0)
+    assert "pad_" not in str(session.here)
+    session.step(2)
+    assert str(session.here).count("\n") <= 2
+
+
+def test_answers_on_what_is_not_there() -> None:
+    asked = debugger(fig4())
+    assert "no contact 'pad'; the contacts are none" in asked.reply("poke pad.state1=slip")
+    assert "'1 2' is not an element" in asked.reply("element 1 2")
+    assert "F_s is a parameter; to change it" in asked.reply("poke F_s=2")
+    asked = debugger(a_system())
+    assert "no contact 'gear'; the contacts are pad, bank" in asked.reply("poke gear.state1=slip")
+    session = fig4()
+    session.watches.append("1 / z1")
+    assert "watch 1: 1 / z1 = " in debugger(session).reply("watch")
+
+
+def test_a_breakpoint_on_an_edge_looks_at_the_contacts_that_have_it() -> None:
+    session = a_system()
+    session.break_on("valid", "arrest")  # of the bank only
+    assert debugger(session).reply("continue").startswith("no breakpoint was hit")
+
+
+def test_an_interrupt_at_the_prompt_ends_nothing() -> None:
+    class Script(io.StringIO):
+        pressed = False
+
+        def readline(self, *_: object) -> str:
+            if self.pressed:
+                return "quit\n"
+            self.pressed = True
+            raise KeyboardInterrupt
+
+    out = io.StringIO()
+    assert Debugger(fig4(), "", Script(), out).run() == 0
+    assert "quit exits\n" in out.getvalue()

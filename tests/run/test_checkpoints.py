@@ -309,9 +309,10 @@ def test_a_damaged_checkpoint_is_refused(path: Path) -> None:
         path.write_bytes(content)
         with pytest.raises(CheckpointError, match="damaged"):
             goes_on(path)
-    _write(path, {"a": np.zeros(3)})
-    with pytest.raises(CheckpointError, match="damaged"):
-        goes_on(path)
+    for arrays in ({"a": np.zeros(3)}, {"format": np.array("another program's")}):
+        _write(path, arrays)
+        with pytest.raises(CheckpointError, match="damaged"):
+            goes_on(path)
 
 
 @pytest.mark.slow

@@ -300,6 +300,9 @@ CHANGES: list[Callable[[Any], Any]] = [
     lambda machine: machine.add_transition("arrest", "slip", "slip"),
     lambda machine: machine.add_transition("fly", "slip", "stick"),
     own_guard,
+    lambda machine: machine.add_transition(
+        "arrest", "stick", "stick", conditions=arrest(machine).conditions[0].func
+    ),
     lambda machine: machine.remove_transition("arrest", "slip", "stick"),
     lambda machine: arrest(machine).conditions.clear(),
     lambda machine: with_condition(machine, target=True),

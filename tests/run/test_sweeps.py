@@ -36,6 +36,7 @@ from gms_fsm import (
 )
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import SignalError, TraceFileError
+from gms_fsm.run.sweep import _interrupts_deferred
 from gms_fsm.systems.models import GMS, parameter_names, with_values
 from tests.corpus import ENGINES, LUGRE, RECORD
 from tests.helpers import FASTEST, pulled_mass, stick_slip
@@ -380,6 +381,8 @@ def test_edges_and_columns_have_the_contact_s_name(tmp_path: Path) -> None:
     np.savez(tmp_path / "wrong.npz", **(arrays | {"owners": arrays["owners"][:1]}))
     with pytest.raises(TraceFileError, match="owners"):
         Sweep.load(tmp_path / "wrong.npz")
+    pytest.importorskip("xarray", reason="needs the extra sweep")
+    assert found.to_xarray()["owner"].values.tolist() == list(found.owners)
     wrong = {"numbers.m1": [0.0, 1.0], "pad1.F_s": [20.0, 0.5]}
     result = sweep(case.system, 0.1, wrong, **how)
     assert result.outcome.tolist() == ["ParameterError", "ParameterError"]
@@ -454,3 +457,26 @@ def test_memory_grows_with_the_results_only() -> None:
     all_rows = 180 * steps * 8 * (2 + 6 + 4)
     allowed = 2 * (many_rows - few_rows) + 180 * 2000  # of bookkeeping, per run
     assert many - few < allowed < 0.1 * all_rows
+
+
+def test_an_interrupt_waits_where_it_may_not_come() -> None:
+    """In a thread nothing waits: interrupts come to the main thread only."""
+    done = []
+
+    def interrupted() -> None:
+        with _interrupts_deferred():
+            signal.raise_signal(signal.SIGINT)
+            done.append("main thread")
+
+    def enter() -> None:
+        before = signal.getsignal(signal.SIGINT)
+        with _interrupts_deferred():
+            assert signal.getsignal(signal.SIGINT) is before
+            done.append("thread")
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    thread = threading.Thread(target=enter)
+    thread.start()
+    thread.join()
+    assert done == ["main thread", "thread"]

@@ -10,6 +10,7 @@ import pytest
 
 import gms_fsm
 from gms_fsm import ExpressionError, GMSError, ParameterError, RecordError, simulate
+from gms_fsm.errors import shown
 from gms_fsm.traces.failures import SimulationError
 from tests.helpers import open_loop, stick_slip
 
@@ -74,3 +75,10 @@ def test_an_error_can_be_made_from_another() -> None:
     made = RecordError.of(error.inside("a.csv"))
     assert type(made) is RecordError
     assert str(made) == "a.csv: step is 0; it must be > 0; leave it out"
+
+
+def test_what_cannot_be_shown_is_left_out() -> None:
+    deep: list[object] = []
+    for _ in range(100_000):
+        deep = [deep]
+    assert shown(deep) == shown(10**5000) == "..."

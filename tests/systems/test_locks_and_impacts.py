@@ -148,6 +148,8 @@ def test_momentum_and_energy_of_every_impulse_are_accounted_for(
         assert lost == pytest.approx(sum(each.energy for each in here), abs=1e-11 * scale)
         assert lost >= -1e-12 * scale
         assert not any(each.carrier == "pad" for each in here), "stiction carries no impulse"
+    of_gear = [each for each in trace.impulses if "gear" in (each.contact, each.carrier)]
+    assert trace.contact("gear").impulses.tolist() == [each.tolist() for each in of_gear]
 
 
 def test_a_stuck_pad_beside_a_wall_carries_nothing_of_what_the_wall_takes() -> None:

@@ -26,6 +26,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.language import names_in, parse_value
+from gms_fsm.run.settings import Settings
 from gms_fsm.session.explain import values_at
 from gms_fsm.traces.scope import Scope, invariant_names, watch_names
 from tests.helpers import pulled_mass, stick_slip
@@ -173,3 +174,13 @@ def test_a_page_takes_the_same_names(case: str) -> None:
     assert found is not None
     (run,) = json.loads(found[1])["runs"]
     assert list(run["names"]) == watch_names(model)
+
+
+def test_names_that_a_run_does_not_have() -> None:
+    trace = simulate(*CASES["gms"], 1.0)
+    assert trace.value("F").tolist() == trace.F.tolist()
+    assert len(trace.seen) == len([*trace.seen])
+    with pytest.raises(KeyError, match="nothing"):
+        trace.seen["nothing"]
+    assert repr(trace.transitions[None]).startswith("array(")
+    assert Settings() != 3

@@ -20,12 +20,15 @@ from hypothesis import strategies as st
 
 from gms_fsm import (
     GMS,
+    Body,
     Chart,
     ChartModel,
+    Contact,
     GMSParameters,
     Prescribed,
     State,
     Stribeck,
+    System,
     Trace,
     simulate,
 )
@@ -285,3 +288,10 @@ def test_a_run_that_grows_without_bound_is_checked_while_it_is_finite() -> None:
     assert not found.ok
     assert "values are not finite after t = " in found.text
     assert all(math.isfinite(value) for value in (*found.taken, *found.made, *found.tolerance))
+
+
+def test_a_contact_that_is_always_locked_has_no_spring() -> None:
+    weld = Contact("weld", Chart("weld", ("v",), states=(State("on", locked=True),)), {})
+    body = Body("one", inertia=1.0, force="1")
+    trace = simulate(System("held", bodies=(body,), contacts=(weld,)), 1.0, monitors=["passivity"])
+    assert "F is what holds the contact, not a spring force" in trace.monitors["passivity"].text
