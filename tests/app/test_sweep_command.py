@@ -100,3 +100,16 @@ def test_both_ends_of_an_axis_are_exact() -> None:
         found = axis(text)
         assert found.name == "F_s"
         assert (found.values[0], found.values[-1], found.values.size) == (0.1, 0.7, 7)
+
+
+def test_an_interrupted_sweep_writes_nothing(
+    gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stops(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    Path("a.toml").write_text(OPEN_LOOP)
+    monkeypatch.setattr("gms_fsm.app.sweeps.sweep_scenario", stops)
+    answer = gms_fsm("sweep", "a.toml", "--over", "F_s=1.5:2:2", "-o", "out")
+    assert answer.code == 130
+    assert "interrupted; nothing was written" in answer.err
