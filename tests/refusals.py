@@ -105,7 +105,7 @@ VARYING = (
     r"(?<=must be one of )backlash,.*",
     r"(?<=there are )(backlash|break-away),.*",
     r"(?<=must end in )\.(svg|png),.*",
-    r"(?<=give one of )\.mmd,.*",
+    r"(?<=give one of )(\.mmd|c99),.*",
     r"(?<=choose one of)\n[\s\S]*",
 )
 LONG = "x" * 50_000
