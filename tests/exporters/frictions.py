@@ -29,6 +29,7 @@ from gms_fsm.charts.registry import entry
 from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
 from gms_fsm.systems.models import demonstration
 from tests.helpers import ROOT
+from tests.physics.test_sliding_follows_filippov import follower
 
 CHARTS = ("lugre", "elasto-plastic", "seven-parameter", "maxwell-slip", "reset-integrator")
 NAMES = ("gms-4-signed", "gms-4-published", "gms-16-signed", "gms-16-published", *CHARTS)
@@ -147,21 +148,8 @@ def _servo(random: np.random.Generator) -> Subject:
 
 def _between_states(random: np.random.Generator) -> Subject:
     """Return a deflection that is driven back to 0 from two states, and slides there."""
-    chart = Chart(
-        "follower",
-        variables=("z",),
-        parameters=("c",),
-        states=(
-            State("below", flow={"z": "v + c"}, outputs={"F": "-c"}),
-            State("above", flow={"z": "v - c"}, outputs={"F": "c"}),
-        ),
-        transitions=(
-            Transition("rise", "below", "above", guard="z > 0"),
-            Transition("fall", "above", "below", guard="z < 0"),
-        ),
-    )
     t = times(random, 20.0)
-    return ChartModel(chart, {"c": 1.0}), t, {"v": 1.5 * np.sin(3.0 * t) + walk(random, t, 0.3)}
+    return follower(), t, {"v": 1.5 * np.sin(3.0 * t) + walk(random, t, 0.3)}
 
 
 DENSE: Mapping[str, Callable[[np.random.Generator], Subject]] = {

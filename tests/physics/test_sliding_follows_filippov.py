@@ -497,20 +497,3 @@ def test_an_impact_moves_a_mass_that_friction_held(switching: bool) -> None:
     assert trace.body("b").v[-1] == pytest.approx(0.0, abs=1e-15)
     assert trace.body("b").x[-1] == pytest.approx(0.32, abs=1e-12)  # v^2 / 2 a
     assert trace.sliding[-1].t_start == pytest.approx(1.3, abs=1e-9)
-
-
-def test_an_edge_at_the_beginning_of_a_slide_is_shown_as_the_log_has_it() -> None:
-    """Its row is of neither the arc before nor of the slide."""
-    chart = Chart(
-        "dry friction that remembers a rest",
-        inputs=("v",),
-        parameters=("F_c",),
-        states=(State("moving"), State("stopped")),
-        transitions=(Transition("stop", "moving", "stopped", guard="v <= 0"),),
-        outputs={"F": "F_c * sgn(v)"},
-    )
-    trace = simulate(ChartModel(chart, {"F_c": 1.0}), Slider(1.0, "0.2"), 3.0, initial={"v": 1.0})
-    (record,) = trace.transitions
-    row = int(np.argmax(trace.states[:, 0] == "stopped"))
-    assert trace.t[row] == record.t == trace.sliding.t_start[0]
-    assert (record.F_before, record.F_after) == (trace.F[row - 1], trace.F[row])
