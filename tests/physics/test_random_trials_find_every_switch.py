@@ -30,7 +30,7 @@ pytestmark = pytest.mark.slow
 
 pytest.importorskip("llvmlite", reason="needs the extra fast: the machines take too long for this")
 
-COUNT = 5  # make soak takes 500 of each family
+COUNT = 3  # make soak takes 500 of each family
 # Family, seed, index: an element slips close to z = s, less than 1e-6 of s below it, until v is in
 # the window. Steps at the edge of stability put some of these z above s.
 CLOSE_TO_S = (("literature", 202, 41), ("literature", 206, 20), ("literature", 306, 84))
@@ -110,7 +110,9 @@ def test_the_witness_agrees_about_the_pulled_mass() -> None:
     agrees(Trial("pulled mass", 0, 0, *pulled_mass(), 20.0))
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_the_witness_agrees_about_a_trial_of_each_family(family: str) -> None:
-    sample = (trial(family, 14, index) for index in range(100))
-    agrees(next(one for one in sample if 6 <= len(reference(one).sequence) <= 20))
+@pytest.mark.parametrize(("family", "index"), [*zip(FAMILIES, (4, 4, 0, 17), strict=True)])
+def test_the_witness_agrees_about_a_trial_of_each_family(family: str, index: int) -> None:
+    """The first of each that has 6 to 20 switches."""
+    one = trial(family, 14, index)
+    assert 6 <= len(reference(one).sequence) <= 20
+    agrees(one)
