@@ -47,12 +47,12 @@ class Debugger(cmd.Cmd):
     >>> session = Session(GMS(GMSParameters.paper("stick-slip"), law="published"),
     ...                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
     >>> print(Debugger(session).reply("print s1"))
-    1.5
+    1.5 m
     >>> code = Debugger(session, stdin=io.StringIO("next\nquit\n")).run()
     GMS, 4 elements, published law; prescribed velocity, to t = 100 s
     help lists the commands, where shows everything, quit exits.
     (t=0.0000 s) next
-    row 12, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
+    row 12, t = 4.91276067 s, micro-step 1: v = 141.608 mm/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
     (t=4.9128 s) quit
     """
@@ -167,7 +167,7 @@ class Debugger(cmd.Cmd):
     def say(self, text: str) -> None:
         """Print lines, wrapped to the screen width."""
         width = self.width
-        for line in text.split("\n"):
+        for line in text.replace("µ", self.commands.marks.micro).split("\n"):
             for part in wrapped(line, width):
                 part = part.encode(self.encoding, "replace").decode(self.encoding)
                 self.stdout.write(f"{self._painted(part)}\n")

@@ -141,6 +141,8 @@ _ROLES = (
     ),
 )
 ROLES: Mapping[str, Role] = MappingProxyType({role.name: role for role in _ROLES})
+# Roles where the terminal chooses the colours: numbers 0 to 15 of ANSI. It has no orange.
+ANSI: Mapping[str, int] = MappingProxyType({"active": 4, "now": 3, "holds": 2, "fails": 8})
 
 
 def colour(name: str, theme: Theme = "light") -> str:

@@ -112,7 +112,7 @@ def test_a_terminal_gets_colour_without_extra_information(monkeypatch: pytest.Mo
     assert "\x1b" not in bare  # colours only: nothing is redrawn, the cursor never moves
     assert all(len(line) <= 80 for line in bare.splitlines())
     plain = talk(FIG_4, "goto 25", "why 1", "where", "list", "quit")
-    for drawn, mark in zip("✗✓░█─▓═│║┌┐└┘╔╗╚╝", "ny.#-#=||++++++++", strict=True):
+    for drawn, mark in zip("✗✓░█─▓═│║┌┐└┘╔╗╚╝µ", "ny.#-#=||++++++++u", strict=True):
         bare = bare.replace(drawn, mark)
     assert bare.replace("=", "-").replace("#", "-") == plain.replace("=", "-").replace("#", "-")
 

@@ -33,9 +33,7 @@ def status_lines(
     ]
     for contact in view.contacts:
         lead = f"{contact.name}: " if contact.name else ""
-        values = {"v": (contact.v, "m/s"), "F": (contact.F, "N")}
-        text = ", ".join(f"{name} = {quantity(*value)}" for name, value in values.items())
-        parts.append(Span(f"{lead}{text}"))
+        parts.append(Span(f"{lead}{contact.here.written('v', 'F')}"))
     if view.ending == "end":
         parts.append(Span("end of the run", "fired"))
     elif view.ending:
@@ -89,6 +87,7 @@ def element_rows(view: Screen, chosen: int, width: int) -> list[PanelLine]:
 def _table(contact: ContactView, chosen: int, width: int) -> list[PanelLine]:
     """Return the elements of a contact: columns as far as there is room, edges last."""
     chart, lead = contact.chart, f"{contact.name} " if contact.name else ""
+    scales = contact.scales
     names = [state.name for state in chart.states]
     heads = ["  el", "state", *chart.variables, "s", f"|{(*chart.variables, '')[0]}|/s", "F"]
     cells = [
@@ -96,12 +95,12 @@ def _table(contact: ContactView, chosen: int, width: int) -> list[PanelLine]:
             f"{'▶' if i == chosen else ' '} E{each.number}",
             each.state,
             *(
-                quantity(value, chart.unit(name))
+                scales[name].text(value)
                 for name, value in zip(chart.variables, each.variables, strict=True)
             ),
-            "" if each.s is None else quantity(each.s, "m"),
+            "" if each.s is None else scales["s"].text(each.s),
             "" if each.ratio is None else _ratio(each.ratio),
-            quantity(each.F, "N"),
+            scales["F"].text(each.F),
         ]
         for i, each in enumerate(contact.elements, start=contact.first)
     ]
