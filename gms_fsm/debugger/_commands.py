@@ -34,6 +34,8 @@ class Commands:
         Drawing characters.
     width : int
         Columns of tables and pictures.
+    follow : bool
+        Whether a step to a firing chooses the element that fired.
 
     Examples
     --------
@@ -49,7 +51,10 @@ class Commands:
         session: Session,
         marks: text_of.Marks = text_of.PLAIN,
         width: int = text_of.WIDTH,
+        *,
+        follow: bool = False,
     ) -> None:
+        self.follow = follow
         self.session, self.marks, self.width, self.element = session, marks, width, 0
         self.last_move = ""  # the line that moved last, which an empty line repeats
         self.left = False  # whether the last line was `quit`
@@ -83,6 +88,10 @@ class Commands:
             hint = f"did you mean {near[0]}? " if near else ""
             raise SessionError(f"unknown command {name!r}", advice=f"{hint}help lists all commands")
         yield from getattr(self, f"do_{name}")(arg)
+        fired = self.session.here.fired
+        if self.follow and name in MOVES and fired is not None:
+            bank = self.session.start.program.layout.contact(fired.contact)
+            self.element = bank.first + fired.element
 
     @property
     def prompt(self) -> str:

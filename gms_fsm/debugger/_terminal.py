@@ -19,10 +19,18 @@ from typing import TextIO
 from gms_fsm.debugger._commands import Commands
 from gms_fsm.debugger._text import DRAWN, PLAIN, WIDTH, wrapped
 from gms_fsm.session.session import Session
+from plots.style import ansi
 
 NARROWEST = 40  # columns; a narrower terminal breaks the lines itself
-COLOURS = ("34", "33", "35", "36", "32")  # for states
-WORDS = {"true": "32", "false": "31", "fired": "1", "FIRED": "1", "error:": "1;31", "ACTIVE": "1"}
+# Looks of words, in the colours that the terminal gives to the roles; bold where it changes.
+WORDS = {
+    "true": ansi("holds"),
+    "false": ansi("fails"),
+    "fired": ansi("now", bold=True),
+    "FIRED": ansi("now", bold=True),
+    "error:": ansi("error", bold=True),
+    "ACTIVE": ansi("active", bold=True),
+}
 
 
 class Debugger(cmd.Cmd):
@@ -176,7 +184,7 @@ class Debugger(cmd.Cmd):
         if not self.coloured:
             return line
         states = self.commands.states
-        codes = WORDS | {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(states)}
+        codes = WORDS | {name: ansi("active", bold=i > 0) for i, name in enumerate(states)}
         words = "|".join(re.escape(word) for word in codes)
         return re.sub(
             rf"(?<!\w)({words})(?!\w)", lambda m: f"\x1b[{codes[m[0]]}m{m[0]}\x1b[0m", line

@@ -10,7 +10,7 @@ from gms_fsm.foundation.quantities import Scale, scale_of
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.session.elements import chart_of
 from gms_fsm.session.here import why_at
-from gms_fsm.session.results import ContactHere
+from gms_fsm.session.results import ContactHere, Fired
 from gms_fsm.session.session import Session
 from gms_fsm.session.tree.branch import Branch
 
@@ -161,6 +161,8 @@ class Screen:
         Whether the position is between this row and the next.
     t : float
         Time, s.
+    fired : Fired or None
+        The firing that made this row.
     ending : str
         ``"end"`` at the end of the run, the reason at a failure, else empty.
     contacts : tuple of ContactView
@@ -176,6 +178,7 @@ class Screen:
     microstep: int
     located: bool
     t: float
+    fired: Fired | None
     ending: str
     contacts: tuple[ContactView, ...]
     bodies: tuple[BodyView, ...] = ()
@@ -289,6 +292,7 @@ def view(session: Session) -> Screen:
         here.microstep,
         here.located,
         here.t,
+        here.fired,
         ending(session),
         tuple(_contact(session, bank) for bank in start.program.layout.banks),
         bodies,

@@ -12,6 +12,7 @@ pytest.importorskip("textual", reason="needs the extra tui")
 from gms_fsm.debugger import Debugger, view
 from gms_fsm.debugger._text import DRAWN
 from gms_fsm.debugger.tui._app import FullScreen
+from gms_fsm.foundation.quantities import trimmed
 from tests.app.full_screen import LARGE, drive, session, settle
 from tests.app.test_debugger_is_plain_text import EVERYTHING
 
@@ -68,7 +69,7 @@ def test_panels_show_the_values_of_the_view_with_units() -> None:
     for each in why:
         assert each.verdict in _lines(text)
         for clause in each.clauses:
-            margin = clause.scale.text(clause.margin) if clause.relative else "0, rounding"
+            margin = trimmed(clause.scale.text(clause.margin)) if clause.relative else "0, rounding"
             pattern = (
                 rf"{'✓' if clause.holds else '✗'} {re.escape(clause.text)} .* {re.escape(margin)} "
             )

@@ -56,7 +56,7 @@ def error_line(text: str) -> None:
 
 def note(message: Warning | str, *_: object, **__: object) -> None:
     """Print a note; a replacement for `warnings.showwarning`."""
-    _line("[bold yellow]note:[/]", str(message))
+    _line("[bold]note:[/]", str(message))
 
 
 def _line(label: str, text: str) -> None:

@@ -29,21 +29,26 @@ def status_lines(
     parts = [
         Span(f"t = {view.t:.9g} s", "head"),
         Span(f"{place}{step}"),
-        *([Span(f"branch {view.branch}", "fired")] if several else []),
+        *([Span(f"branch {view.branch}", "head")] if several else []),
     ]
     for contact in view.contacts:
         lead = f"{contact.name}: " if contact.name else ""
         parts.append(Span(f"{lead}{contact.here.written('v', 'F')}"))
     if view.ending == "end":
-        parts.append(Span("end of the run", "fired"))
+        parts.append(Span("end of the run", "head"))
     elif view.ending:
-        parts.append(Span("the run cannot continue", "error"))
+        parts.append(Span("the run cannot continue", "head"))
     if busy:
         parts.append(Span("… working, Esc stops it", "now"))
     found = fitted(parts, width)
+    for text in _forms(view.fired) if view.fired else ():  # the chart says it too
+        more = fitted([*parts[:2], Span(f"FIRED {text}", "fired"), *parts[2:]], width)
+        if len(more) == len(found):
+            found = more
+            break
     left = width - sum(len(span.text) for span in found[0]) - 4
     if len(title) <= left:
-        found[0] = [Span(f"{title} ", "command"), *found[0]]
+        found[0] = [Span(f"{title} ", "head"), *found[0]]
     return found
 
 
@@ -205,7 +210,7 @@ def session_rows(
         rows += [PanelLine(line((part, "dim")), command) for part in wrapped(detail, width)]
     for number, point in enumerate(points, start=1):
         text = f"● {number} {breakpoint_text(point)}; hits: {point.seen}"
-        rows += [PanelLine(line((part, "false"))) for part in wrapped(text, width)]
+        rows += [PanelLine(line((part, "head"))) for part in wrapped(text, width)]
     rows += [PanelLine(line(part)) for text in watches for part in wrapped(text, width)]
     return rows
 
@@ -218,6 +223,6 @@ def answer_rows(lines: Sequence[str], width: int) -> list[PanelLine]:
     """Return lines of a transcript, wrapped; commands and errors stand out."""
     rows = []
     for each in lines:
-        role = "command" if each.startswith("(t=") else "error" if each.startswith("error:") else ""
+        role = "head" if each.startswith(("(t=", "error:")) else ""
         rows += [PanelLine(line((part, role))) for part in wrapped(each, width)]
     return rows

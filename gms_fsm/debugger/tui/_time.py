@@ -61,7 +61,7 @@ def ribbon_rows(
             "≠" if None not in (a, b) and a != b else " "
             for a, b in zip(ribbons.modes, parent.modes, strict=True)
         ]
-        rows.append(PanelLine(line((f"{' differs':<{lead}}", "dim"), ("".join(differs), "fired"))))
+        rows.append(PanelLine(line((f"{' differs':<{lead}}", "dim"), ("".join(differs), "head"))))
     return rows
 
 
