@@ -87,7 +87,7 @@ class Slider:
 
 # --------------------------------------------------------------------------- the pulled mass
 def pulled(F_s: float = 1.5, v_s: float = 0.05) -> Trace:
-    """Run the mass of scenarios/pulled_mass.toml with another Stribeck curve."""
+    """Run the mass of gms_fsm/scenarios/pulled_mass.toml with another Stribeck curve."""
     k = np.array([40.0, 30.0, 20.0, 10.0])
     parameters = GMSParameters(
         k,

@@ -44,7 +44,7 @@ from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY, ramp
 from plots.systems.mechanism import schematic_figure
 
 FOLDER = Path(__file__).parent / "images"
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
+SCENARIOS = Path(__file__).parents[1] / "gms_fsm" / "scenarios"
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ from gms_fsm.foundation.files import write_whole
 from gms_fsm.run.simulate import Moment
 
 FOLDER = Path(__file__).parent / "images"
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
+SCENARIOS = Path(__file__).parents[1] / "gms_fsm" / "scenarios"
 FONTS = "DejaVu Sans Mono, Menlo, Consolas, monospace"
 
 

@@ -1,4 +1,4 @@
-"""The servo of scenarios/servo.toml and the pulled mass, as users of other loops write them."""
+"""The servo of gms_fsm/scenarios/servo.toml and the pulled mass, as users of other loops write them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PULLED_END = 60.0  # s
 
 def servo_friction() -> Any:
     """Return the friction of the servo's load."""
-    (contact,) = load_system(ROOT / "scenarios/servo.toml").contacts
+    (contact,) = load_system(ROOT / "gms_fsm/scenarios/servo.toml").contacts
     return contact.model
 
 
@@ -191,7 +191,7 @@ def sequence(switches: Any) -> list[tuple[int, str]]:
 
 def exact_servo() -> Trace:
     """Return the servo by `simulate`."""
-    system = load_system(ROOT / "scenarios/servo.toml")
+    system = load_system(ROOT / "gms_fsm/scenarios/servo.toml")
     return simulate(system, T_END, engine=FASTEST, rtol=1e-9, atol=1e-12)
 
 

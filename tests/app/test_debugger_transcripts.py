@@ -20,7 +20,7 @@ from tests.helpers import ROOT
 from tests.inspection.sessions import a_system, both_ways, debugger, fig4, locked, warming
 
 APPROVED = Path(__file__).with_name("debugger.approved.txt")
-SCENARIOS = ROOT / "scenarios"
+SCENARIOS = ROOT / "gms_fsm/scenarios"
 FIG_4 = "paper_fig4_stick_slip"
 PROMPT = ">>> "
 

@@ -44,7 +44,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not shutil.which("node"), reason="there is no node"),
 ]
-SCENARIOS = ROOT / "scenarios"
+SCENARIOS = ROOT / "gms_fsm/scenarios"
 SEED = 11
 
 

@@ -45,7 +45,7 @@ def test_a_run_that_starts_later_ticks_from_its_start() -> None:
 
 def servo() -> System:
     """Two masses on a shaft, friction on the load, a PID controller on the motor's position."""
-    system = load_scenario(ROOT / "scenarios" / "servo.toml").system
+    system = load_scenario(ROOT / "gms_fsm/scenarios" / "servo.toml").system
     assert system is not None
     return system
 
