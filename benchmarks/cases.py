@@ -112,7 +112,7 @@ class Problem:
     Parameters
     ----------
     title : str
-        For headings; the part before the comma also for the README.
+        For headings; the part before the comma also for docs/performance.md.
     t_end : float
         s.
     transitions : int

@@ -38,7 +38,7 @@ def main() -> None:
         light=True,
     )
     screen("debugger_brake", "brake_squeal", (124, 42), "element pad 1", "goto 5.2", "next")
-    live("live", "pulled_mass", 17.0)
+    live("live", "pulled_mass", 0.29)
 
 
 def screen(

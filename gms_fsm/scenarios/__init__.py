@@ -36,4 +36,4 @@ def scenario_path(given: str | Path) -> Path:
     ('servo.toml', 'own.toml')
     """
     path = Path(given)
-    return path if path.exists() else shipped().get(str(given), path)
+    return path if path.is_file() else shipped().get(str(given), path)

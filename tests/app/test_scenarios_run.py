@@ -25,7 +25,7 @@ TRANSITIONS = {  # of the shipped scenarios, where a change would be one of the 
     "friction_damper": 278,
     "two_blocks_on_a_belt": 51,
     "paper_fig3_non_drifting": 0,
-    "pulled_mass": 72,
+    "pulled_mass": 28,
     "stribeck_sweep": 4,
 }
 SHIPPED = sorted(path.stem for path in (ROOT / "gms_fsm/scenarios").glob("*.toml"))

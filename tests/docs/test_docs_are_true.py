@@ -17,7 +17,8 @@ import pytest
 from gms_fsm.app.scenario import Scenario
 from gms_fsm.exporters import FORMATS, formats
 from tests.helpers import matrix
-from tests.page_blocks import ROOT, Page, agrees, blocks_of
+from tests.helpers import ROOT
+from tests.page_blocks import Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow
 

@@ -96,7 +96,7 @@ def test_what_has_not_settled_says_how_far_two_runs_differ(gms_fsm: CommandLine)
     path.write_text(text.replace("steps < 128000", "steps < 4000"), encoding="utf-8")
     *switches, last, _ = program(path)
     assert re.fullmatch(
-        rf"{len(switches)} switches in 4000 steps to t = 60 s; a run of 2000 steps has "
+        rf"{len(switches)} switches in 4000 steps to t = 0\.6 s; a run of 2000 steps has "
         r"(\d+, of which the first \d+ are the same"
         r"|the same switches, and its end differs by [\d.e+]+ % of the largest values)",
         last,

@@ -52,9 +52,9 @@ def servo() -> System:
 
 @pytest.mark.slow
 def test_the_servo_is_where_an_independent_loop_has_it() -> None:
-    """SciPy with a hand-written loop gave 1.32993 mm at 0.2 s."""
+    """A Runge-Kutta loop written by hand in C tends to 1.32149 mm at 0.2 s."""
     trace = simulate(servo(), 0.2, engine="ifelse")
-    assert trace.body("load").x[-1] == pytest.approx(1.32993e-3, abs=1e-8)
-    assert len(trace.transitions) == 24
+    assert trace.body("load").x[-1] == pytest.approx(1.32149e-3, abs=1e-8)
+    assert len(trace.transitions) == 30
     close = simulate(servo(), 0.2, engine="ifelse", rtol=1e-9)
     assert close.body("load").x[-1] == pytest.approx(trace.body("load").x[-1], rel=1e-6)
