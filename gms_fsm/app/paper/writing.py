@@ -30,8 +30,15 @@ if TYPE_CHECKING:
 __all__ = ["claims_text", "held_figure", "write"]
 
 CHARTS = ("fig2a", "fig2b", "chart_bank", "chart_lugre")
-FIGURES = tuple(
-    ["fig1", "fig2c", "fig3", "fig3_slipping", "fig4", "fig4_laws", "residual", "residual_held"]
+FIGURES = (
+    "fig1",
+    "fig2c",
+    "fig3",
+    "fig3_slipping",
+    "fig4",
+    "fig4_laws",
+    "residual",
+    "residual_held",
 )
 ELEMENTS = 3  # in Fig. 1 and 2a
 USED = "switch", "flow"  # shown of the if-else program
