@@ -15,6 +15,7 @@ from plots.figures._paper import (
     figure_3,
     figure_4,
     held_residuals,
+    listing,
     residuals,
 )
 from plots.figures._phase import phase
@@ -37,6 +38,7 @@ __all__ = [
     "fit_figure",
     "held_residuals",
     "landscape",
+    "listing",
     "overview",
     "phase",
     "phenomena_matrix",

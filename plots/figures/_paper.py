@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,6 +18,7 @@ from plots.panels.held_outputs import HeldLag
 from plots.panels.parts.axes import MANY, beside, first_variable
 from plots.panels.parts.selection import checked_elements, checked_window, scaled, shown
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
+from plots.style.fonts import MONO_EM
 from plots.style.matplotlib import Axes, Figure, rc_context
 from plots.style.presets import font, pt, settings, to_scale
 from plots.views.window import Window
@@ -91,7 +93,7 @@ def figure_3(
         names = ["applied force (chosen by us)", f"{chart.model.title}; chart"]
         letter_panels(axes, [*names, "the same; if-else", "LuGre"])
         if len(phases) > 1:
-            axes[1].legend(loc="lower right")
+            legend_below(figure, *axes[1].get_legend_handles_labels())
         figure.suptitle(title, x=0.01, ha="left")
     return fitted(figure)
 
@@ -118,26 +120,20 @@ def figure_4(
     Returns
     -------
     Figure
-        Panels a to f; b and c have the same axis. Insets show the first peak of F, and of z of
-        LuGre, except on a slide.
+        Panels a to f. Insets show the first peak of F, except on a slide.
     """
     chart, ifelse, lugre = (shown(trace, window) for trace in (chart, ifelse, lugre))
     with rc_context(settings()):
         figure = sheet(4.2, 10.0) if narrow() else sheet(10.5, 6.2)
         axes = figure.subplots(*(6, 1) if narrow() else (2, 3), sharex=True).ravel()
         panels.velocity(axes[0], chart)
-        scale = _common_scale(chart, lugre)
-        panels.deflections(axes[1], chart, elements=elements, scale=scale)
+        panels.deflections(axes[1], chart, elements=elements)
         element_legend(figure, axes[1])
-        panels.deflections(axes[2], lugre, scale=scale)
-        if scale is not None:
-            axes[2].sharey(axes[1])
-            z = scale[0] * lugre.z[:, 0]
-            _zoom(axes[2], lugre, z, scale[1].partition("[")[2].rstrip("]"), (0.4, 0.15))
+        panels.deflections(axes[2], lugre)
         for ax, trace in zip(axes[3:], (chart, ifelse, lugre), strict=True):
             panels.force(ax, trace)
             _make_room(ax)
-            _zoom(ax, trace, trace.F, "N", (0.5, 0.65))
+            _zoom(ax, trace)
         names = ["velocity (chosen by us)", "deflections, GMS", "deflection, LuGre"]
         kinds = ("chart", "if-else", "LuGre")
         letter_panels(axes, [*names, *(f"friction, {kind}" for kind in kinds)])
@@ -155,18 +151,18 @@ def _common_scale(*runs: Trace) -> tuple[float, str] | None:
     return first_variable(largest, largest.z)
 
 
-def _first_peak(trace: Trace, values: Floats) -> int:
-    """Return the row of the largest value up to the first reversal."""
+def _first_peak(trace: Trace) -> int:
+    """Return the row of the largest force up to the first reversal."""
     back = np.flatnonzero(trace.v < 0)
     last = int(back[0]) + 1 if back.size and back[0] > 0 else len(trace)
-    return int(np.nanargmax(np.abs(values[:last])))
+    return int(np.nanargmax(np.abs(trace.F[:last])))
 
 
-def _zoom(ax: Axes, trace: Trace, values: Floats, unit: str, place: tuple[float, float]) -> None:
-    """Show the first peak of the line of a panel in an inset, in the panel's unit."""
+def _zoom(ax: Axes, trace: Trace) -> None:
+    """Show the first peak of a force in an inset."""
     if low():
         return
-    peak = _first_peak(trace, values)
+    peak, values = _first_peak(trace), trace.F
     half = ZOOM * float(trace.t[-1] - trace.t[0])
     t0, t1 = max(trace.t[0], trace.t[peak] - half), min(trace.t[-1], trace.t[peak] + half)
     near = values[(trace.t >= t0) & (trace.t <= t1)]
@@ -174,16 +170,13 @@ def _zoom(ax: Axes, trace: Trace, values: Floats, unit: str, place: tuple[float,
     # A fall that is much larger than the rise to the peak leaves the inset.
     bottom = max(float(near.min()), high - 3 * float(high - near[0]))
     edge = 0.1 * (high - bottom) or 1.0
-    size = int(np.floor(np.log10(abs(high)))) if high else 0
-    power = size if size < -2 else 0
-    inset = ax.inset_axes((*place, 0.46, 0.28))
-    inset.plot(trace.t, values / 10.0**power, color=ax.lines[0].get_color(), linewidth=pt(1.0))
-    inset.set(xlim=(t0, t1), ylim=((bottom - edge) / 10.0**power, (high + edge) / 10.0**power))
+    inset = ax.inset_axes((0.5, 0.65, 0.46, 0.28))
+    inset.plot(trace.t, values, color=ax.lines[0].get_color(), linewidth=pt(1.0))
+    inset.set(xlim=(t0, t1), ylim=(bottom - edge, high + edge))
     inset.tick_params(labelsize=font(7), length=2)
     inset.locator_params(nbins=3, prune="both")
     inset.spines[:].set(visible=True, color=LINE_GREY)
-    scale = rf"$10^{{{power}}}$ " if power else ""
-    inset.set_title(f"first peak [{scale}{unit}]".replace("-", "−"), fontsize=font(7), pad=2)
+    inset.set_title("first peak [N]", fontsize=font(7), pad=2)
     bounds = (t0, bottom - edge, t1 - t0, high - bottom + 2 * edge)
     frame = ax.indicate_inset(bounds, inset, edgecolor=LINE_GREY, alpha=1.0)
     for line in frame.connectors or ():
@@ -194,6 +187,50 @@ def _make_room(ax: Axes) -> None:
     """Leave the upper part of a panel free for an inset."""
     bottom, top = ax.get_ylim()
     ax.set_ylim(bottom, bottom + (top - bottom) / 0.58)
+
+
+def listing(texts: Sequence[str], *, title: str) -> Figure:
+    r"""Draw program texts side by side, their comments in grey.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        The programs.
+    title : str
+        Of the figure.
+
+    Returns
+    -------
+    Figure
+        One column per text.
+
+    Examples
+    --------
+    >>> listing(["if v > 0:\n    F = 1.0  # N"], title="friction").get_suptitle()
+    'friction'
+    """
+    with rc_context(settings()):
+        size = font(7)
+        columns = [max(map(len, text.splitlines())) + 8 for text in texts]
+        tall = max(len(text.splitlines()) for text in texts)
+        em = size / 72
+        figure = sheet(MONO_EM * em * sum(columns), 1.35 * em * tall + 0.5)
+        panes = figure.subplots(1, len(texts), squeeze=False, width_ratios=columns)[0]
+        for ax, text in zip(panes, texts, strict=True):
+            ax.set_axis_off()
+            lines = [re.match(r"([^#]*)(.*)", line) for line in text.splitlines()]
+            code = "\n".join(each[1] for each in lines if each)
+            said = "\n".join(" " * len(each[1]) + each[2] for each in lines if each)
+            look: dict[str, Any] = {
+                "size": size,
+                "family": "monospace",
+                "va": "top",
+                "linespacing": 1.35,
+            }
+            ax.text(0, 1, code, color=INK, **look)
+            ax.text(0, 1, said, color=TEXT_GREY, **look)
+        figure.suptitle(title, x=0.01, ha="left")
+    return figure
 
 
 def compare_laws(

@@ -19,6 +19,7 @@ from gms_fsm.charts.zoo.bristles.lugre import BENCHMARK
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.foundation.files import output_folder, write_text
 from gms_fsm.language import evaluate
+from gms_fsm.lowering.program import lower
 from gms_fsm.systems.signals import Formula
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace
@@ -28,8 +29,19 @@ if TYPE_CHECKING:
 
 __all__ = ["claims_text", "held_figure", "write"]
 
-CHARTS = ("chart_element", "chart_bank", "chart_lugre", "block_diagram")
-FIGURES = ("fig3", "fig3_slipping", "fig4", "fig4_laws", "residual", "residual_held")
+CHARTS = ("fig2a", "fig2b", "chart_bank", "chart_lugre")
+FIGURES = (
+    "fig1",
+    "fig2c",
+    "fig3",
+    "fig3_slipping",
+    "fig4",
+    "fig4_laws",
+    "residual",
+    "residual_held",
+)
+ELEMENTS = 3  # in Fig. 1 and 2a
+USED = "switch", "flow"  # shown of the if-else program
 
 
 def write(
@@ -47,7 +59,7 @@ def write(
     force, velocity : str
         The signals that the paper does not print, in the expression language.
     progress : callable, optional
-        ``progress(name, done)``.
+        ``progress(name, done)``, with the share of everything done.
 
     Returns
     -------
@@ -71,20 +83,28 @@ def write(
     output_folder(folder / "transitions", [f"{experiment.name}.csv" for experiment in chosen])
     traces: dict[str, Trace] = {}
     files: list[Path] = []
+    stages = len(chosen) + 1
+
+    def reached(name: str, done: float) -> None:
+        if progress is not None:
+            progress(name, (len(traces) + done) / stages)
+
     for experiment in chosen:
         name = experiment.name
         try:
-            traces[name] = run_one(experiment, progress)
+            traces[name] = run_one(experiment, reached)
         except SimulationError as error:
             kept = error.trace.save(folder / "partial.npz")
             raise error.replaced(kept=kept).inside(name) from error.__cause__
         files += _keep(folder, name, traces[name])
+    reached("claims and figures", 0.0)
     claims = write_text(folder / "claims.md", claims_text(traces, force, velocity))
     files += _draw_charts(folder)
     try:
         files += _draw_figures(folder, traces, force)
     except MissingExtraError as error:
         warnings.warn(f"no figures were drawn: {error}", stacklevel=2)
+    reached("claims and figures", 1.0)
     return [claims, *files]
 
 
@@ -99,10 +119,10 @@ def _draw_charts(folder: Path) -> list[Path]:
     from plots.output import formats
 
     pictures = {
-        "chart_element": plots.statechart(GMS_ELEMENT["published"]),
+        "fig2a": plots.block_diagram(ELEMENTS),
+        "fig2b": plots.statechart(GMS_ELEMENT["published"]),
         "chart_bank": plots.statechart(GMS_ELEMENT["published"], elements=4),
         "chart_lugre": plots.statechart(LUGRE),
-        "block_diagram": plots.block_diagram(4),
     }
     files = [
         plots.render(graph, folder / f"{name}{ending}")
@@ -115,6 +135,7 @@ def _draw_charts(folder: Path) -> list[Path]:
 def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list[Path]:
     from plots import figures
     from plots.output import formats
+    from plots.systems.mechanism import schematic_figure
 
     def applied(trace: Trace) -> NDArray[np.float64]:
         tree = Formula(force).tree
@@ -133,6 +154,11 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         )
 
     pictures = {
+        "fig1": schematic_figure(elements=ELEMENTS),
+        "fig2c": figures.listing(
+            ifelse_texts(traces["fig4_ifelse"]),
+            title="Fig. 2c: the switching as if-else code, generated from the chart of Fig. 2b",
+        ),
         "fig3": fig3("fig3", "Fig. 3, non-drifting: a force below break-away"),
         "fig3_slipping": fig3(
             "fig3_slipping",
@@ -164,6 +190,12 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         for name, figure in pictures.items()
         for file in formats.files(name, "figure")
     ]
+
+
+def ifelse_texts(trace: Trace) -> list[str]:
+    """Return the functions of the if-else program of a run that decide and that move z."""
+    functions = lower(trace.model, trace.rig).source.split("\n\n\n")
+    return [next(each for each in functions if f"def {name}(" in each) for name in USED]
 
 
 def held_figure(traces: Mapping[str, Trace], force: str) -> Figure:
