@@ -118,8 +118,8 @@ class Explanation:
     >>> print(forward)
     break_away_forward does not fire: z >= s is false by 0.5 m.
       1 break_away_forward: stick -> slip
-        false  z >= s   left 0.5         right 1           margin -0.5 m
-        true   v > v_c  left 200         right 0.001       margin +200 mm/s
+        false  z >= s   left 0.5        right 1          margin -0.5 m
+        true   v > v_c  left 200        right 0.001      margin +200 mm/s
     """
 
     edge: Transition
@@ -428,7 +428,7 @@ def _sides(clause: Clause) -> str:
     if math.isnan(clause.margin):  # compound: no two sides
         return ""
     left, right = (trimmed(clause.scale.number(u, 5)) for u in (clause.left, clause.right))
-    return f"  left {left:<11} right {right:<11} margin {_amount(clause, signed=True)}"
+    return f"  left {left:<10} right {right:<10} margin {_amount(clause, signed=True)}"
 
 
 def _amount(clause: Clause, *, signed: bool) -> str:

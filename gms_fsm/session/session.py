@@ -412,8 +412,8 @@ class Session:
         element 1 is in slip at t = 24.9999735 s
         arrest does not fire: |z| < s is false by 0.776 m.
           1 arrest: slip -> stick
-            true   |v| <= v_c  left 1           right 1           margin 0 µm/s (rounding)
-            false  |z| < s     left 2.2762      right 1.5         margin -0.776 m
+            true   |v| <= v_c  left 1          right 1          margin 0 µm/s (rounding)
+            false  |z| < s     left 2.2762     right 1.5        margin -0.776 m
         >>> session.why()[0].clauses[1].holds
         False
         """
