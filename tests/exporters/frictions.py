@@ -38,7 +38,7 @@ KARNOPP_MODEL = ChartModel(KARNOPP, {"F_c": 1.0, "F_s": 1.5, "sigma_2": 0.4, "D"
 
 def servo() -> System:
     """Return the servo of the scenarios, whose controller is sampled."""
-    return load_system(ROOT / "scenarios" / "servo.toml")
+    return load_system(ROOT / "gms_fsm/scenarios" / "servo.toml")
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ SERVO = System(
 )
 
 
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SCENARIOS = Path(__file__).parents[2] / "gms_fsm" / "scenarios"
 
 NUMBERS = dict.fromkeys(("m", "k", "k_c", "k_l", "P", "w", "d", "J", "r", "k_f"), 1.0)
 TRAIN = System(

@@ -37,7 +37,7 @@ def test_the_damper_has_thirteen_tests() -> None:
 def test_the_tribometer_is_read_as_the_scenario_reads_it(monkeypatch: pytest.MonkeyPatch) -> None:
     folder = data_folder()
     monkeypatch.setenv("GMS_FSM_DATA", str(folder))
-    loaded = load_scenario(ROOT / "scenarios" / "tribometer.toml")
+    loaded = load_scenario(ROOT / "gms_fsm/scenarios" / "tribometer.toml")
     record = tribometer(folder)
     assert loaded.record is not None
     for name, value in loaded.record.columns.items():

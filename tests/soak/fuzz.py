@@ -418,7 +418,7 @@ CELLS = [
 
 @functools.cache
 def _valid_scenarios() -> list[str]:
-    shipped = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "scenarios").iterdir())]
+    shipped = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "gms_fsm/scenarios").glob("*.toml"))]
     return [OPEN_LOOP, MEASURED, CLOSED_LOOP, BENCH, *shipped]
 
 

@@ -260,7 +260,7 @@ SIGNS = {"stuck": 0.0, "forward": 1.0, "backward": -1.0}
 
 def drill_string() -> Trace:
     """Run the scenario."""
-    loaded = load_scenario(ROOT / "scenarios" / "drill_string.toml", ["run.rtol=1e-10"])
+    loaded = load_scenario(ROOT / "gms_fsm/scenarios" / "drill_string.toml", ["run.rtol=1e-10"])
     return loaded.simulate(engine="ifelse")
 
 
