@@ -295,9 +295,9 @@ class SystemPane extends TimePlots {
         act(name, found.find(Boolean), (part) => ({ place }) => found[place] && runs[place].column(found[place][part]));
       }
     };
-    every("bodies", (name, _, column) => {
-      this.compare(`${name}: x`, "m", column("x"));
-      this.compare(`${name}: v`, "m/s", column("v"));
+    every("bodies", (name, { unit }, column) => {
+      this.compare(`${name}: x`, unit, column("x"));
+      this.compare(`${name}: v`, `${unit}/s`, column("v"));
     });
     every("values", (name, { kind }, column) => {
       const step = kind !== "signal" && kind !== "state";
