@@ -143,7 +143,7 @@ def replay(
     trace : Trace
         The run.
     other : Trace, optional
-        A second run, shown next to it on the same time axis.
+        A second run, drawn in the same plots over time.
     title : str, optional
         Title of the page; by default the names of the models.
     names : sequence of str, optional

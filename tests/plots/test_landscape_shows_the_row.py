@@ -183,6 +183,23 @@ def test_names_of_one_line_stand_side_by_side_and_those_without_a_place_are_left
     assert not any(b.overlaps(a) for k, b in enumerate(boxes) for a in boxes[:k])
 
 
+def test_names_are_off_all_lines() -> None:
+    figure = Figure()
+    ax = figure.subplots()
+    names, even = LineNames(ax), np.linspace(0.0, 1.0, 2000)
+    level, upright = (
+        np.column_stack(each) for each in ((even, 0.3 + 0 * even), (0.6 + 0 * even, even))
+    )
+    wave = np.column_stack((even, 0.7 + 0.2 * np.sin(9.0 * even)))
+    lines = {"level": level, "upright": upright, "wave": wave}
+    names.lines += [NamedLine(name, "black", (line,)) for name, line in lines.items()]
+    placed = names.placed(FigureCanvasAgg(figure).get_renderer())
+    assert [text.get_text() for text in placed] == [*lines]
+    for text in placed:
+        box = text.get_window_extent()
+        assert not any(box.count_contains(ax.transData.transform(each)) for each in lines.values())
+
+
 @pytest.mark.slow
 def test_counterexamples_are_pins() -> None:
     pytest.importorskip("z3", reason="needs z3 (extra: proof)")

@@ -40,6 +40,7 @@ function chooseElement(element) {
 
 function openPane(side, key) {
   for (const view of views) view.openPane(side, key);
+  for (const view of views) view.fit(); // once all are in place
 }
 
 function nextPane(side) {

@@ -143,6 +143,7 @@ from gms_fsm.app.lessons.basics.l6_stick_slip import SIGMA_2, F_c, F_s, bank
 from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.systems.parts import Motion
 from plots.style import INK, LINE_GREY
 
 MASS, STIFFNESS, SPEED = 1.0, 2.0, 0.1  # kg, N/m, m/s: the pulled mass
@@ -185,8 +186,10 @@ def gear(gap: float = FLANK["gap"]) -> System:
     return System(
         "gear with backlash",
         bodies=(
-            Body("motor", velocity="V * sgn(sin(2 * pi * t / T))", x="q_m", v="w_m"),
-            Body("load", inertia="J", x="q_l", v="w_l"),
+            Body(
+                "motor", velocity="V * sgn(sin(2 * pi * t / T))", x="q_m", v="w_m", motion="turning"
+            ),
+            Body("load", inertia="J", x="q_l", v="w_l", motion="turning"),
         ),
         contacts=(
             Contact("gear", CHARTS["backlash"], {**FLANK, "gap": gap}, v="w_m - w_l"),
@@ -204,7 +207,8 @@ def impact(e: float = STOP["e"]) -> System:
     >>> impact().contacts[0].v
     ('v_1 - v_2',)
     """
-    return _pair(Contact("stop", CHARTS["end-stop"], {**STOP, "e": e}, v="v_1 - v_2"), MASSES)
+    stop = Contact("stop", CHARTS["end-stop"], {**STOP, "e": e}, v="v_1 - v_2")
+    return _pair(stop, MASSES, "along")
 
 
 def clutch() -> System:
@@ -215,12 +219,13 @@ def clutch() -> System:
     >>> clutch().contacts[0].chart.locks
     True
     """
-    return _pair(Contact("dog", CHARTS["dog-clutch"], DOG, v="v_1 - v_2"), INERTIAS)
+    dog = Contact("dog", CHARTS["dog-clutch"], DOG, v="v_1 - v_2")
+    return _pair(dog, INERTIAS, "turning")
 
 
-def _pair(contact: Contact, inertias: tuple[float, float]) -> System:
+def _pair(contact: Contact, inertias: tuple[float, float], motion: Motion) -> System:
     bodies = (
-        Body(name, inertia=f"m_{i}", x=f"x_{i}", v=f"v_{i}")
+        Body(name, inertia=f"m_{i}", x=f"x_{i}", v=f"v_{i}", motion=motion)
         for i, name in enumerate(("one", "two"), 1)
     )
     numbers = dict(zip(("m_1", "m_2"), inertias, strict=True))
