@@ -2,8 +2,11 @@
 // The `until` box: a condition on stored values, in the expression language of gms-fsm. It is the only text that
 // Python has not seen. It becomes a tree like those that Python stores, so both are evaluated by the same function.
 // Precedence, functions and constants come from Python; nothing is ever passed to `eval`.
-function parse(text, { levels, negation, sign, functions, constants }, names, owners) {
-  const pattern = /\s*(?:(?<digits>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?!\w)|(?<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)|\*\*|[<>=!]=|[-+*/()<>,])/y;
+function parse(text, { levels, negation, sign, functions, constants, units }, names, owners) {
+  const known = Object.keys(units).sort((a, b) => b.length - a.length).join("|"); // mm/s before m
+  const number = `(?<digits>(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][+-]?\\d+)?)(?:\\s*(?<unit>${known}))?(?!\\w)`;
+  const pattern = new RegExp(`\\s*(?:${number}|(?<name>[A-Za-z_]\\w*(?:\\.[A-Za-z_]\\w*)*)|\\*\\*|[<>=!]=|[-+*/()<>,])`, "y");
+  text = text.replace(/[µμ]/g, "u");
   const fail = (at, reason) => { throw new SyntaxError(`until, column ${at + 1}: ${reason}`); };
   const end = text.trimEnd().length, tokens = [];
   while (pattern.lastIndex < end) {
@@ -34,9 +37,9 @@ function parse(text, { levels, negation, sign, functions, constants }, names, ow
   }
 
   function prefix() {
-    const { word, digits, name, at } = here();
+    const { word, digits, unit, name, at } = here();
     next += 1;
-    if (digits) return { at, tree: Number(digits) };
+    if (digits) return { at, tree: Number(digits) * (unit ? units[unit] : 1) };
     if (word === "-" || word === "+") {
       const tree = as(false, expression(sign));
       return { at, tree: word === "-" ? ["-", tree] : tree };

@@ -109,10 +109,9 @@ class BristlesPane {
     if (!this.elements) return;
     const { view } = this, { contact, row, run } = view, v = contact.value(contact.velocity, 0, row), F = contact.value("F", 0, row);
     const fired = run.fired.get(row), shift = (-this.scale * contact.value("x", 0, row)) % BRISTLE.period;
-    this.arrow(this.speed, `${contact.velocity} = ${eng(v, "m/s", 4)}`, v, this.largest.v);
-    this.arrow(this.push, `F = ${eng(F, "N", 4)}`, -F, this.largest.F); // positive friction pulls the slider back
+    this.arrow(this.speed, `${contact.velocity} = ${contact.tell(contact.velocity, v)}`, v, this.largest.v);
+    this.arrow(this.push, `F = ${contact.tell("F", F)}`, -F, this.largest.F); // positive friction pulls the slider back
     if (Number.isFinite(shift)) place(this.pattern, { patternTransform: `translate(${shift.toFixed(2)} 0)` });
-    const unit = contact.units[this.z] ?? "";
     this.elements.forEach((each, i) => {
       const mode = contact.modes[i][row], now = fired && fired.contact === contact && fired.element === i;
       const look = `${mode}/${Boolean(now)}/${i === view.element}/${Math.sign(v)}`;
@@ -125,8 +124,8 @@ class BristlesPane {
         each.contact.setAttribute("transform", `translate(${at.toFixed(2)} 0)`);
         each.link.setAttribute("transform", `translate(${from.toFixed(2)} ${each.y}) scale(${((this.wall - from) / 100).toFixed(5)} ${each.tall})`);
       }
-      if (each.value) say(each.value, `${this.z} ${eng(z, unit, 4)}`);
-      if (each.force) say(each.force, eng(contact.forces[i](row), "N", 4));
+      if (each.value) say(each.value, `${this.z} ${contact.tell(this.z, z)}`);
+      if (each.force) say(each.force, contact.tell("F", contact.forces[i](row)));
     });
     this.reveal(fired?.contact === contact ? fired.element : view.element);
   }
