@@ -287,7 +287,7 @@ def test_breakpoints_and_conditions_stop_where_they_become_true(open_page: Open)
     assert page.evaluate("runs[0].names.F(frame) > 1 && runs[0].names.F(frame - 1) <= 1")
     assert "F > 1 became true" in said(page)
     here = frame(page)
-    press(page, "Home")
+    page.click("#start")
     until(page, "F > 1000 mN")
     assert frame(page) == here
     page.fill("#until", "state(2) == slip and not z1 < 0")
