@@ -7,7 +7,7 @@ import re
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.records.units import FACTORS, convert_numbers
 from gms_fsm.run.problem import Problem
-from gms_fsm.traces.scope import watch_names
+from gms_fsm.traces.scope import unit_of, watch_names
 from gms_fsm.traces.system_scope import system_names
 
 # What the units of SI measure; a force is a force, also where it is a normal force.
@@ -29,13 +29,12 @@ def units_of(start: Problem) -> dict[str, str]:
     found: dict[str, str] = {}
     for contact in start.system.contacts:
         chart = contact.chart
-        own = {"t": "s", "x": "m"} | dict.fromkeys(chart.force_names, "N")
         for name in names_of(start):
             owner, _, last = name.rpartition(".")
             if start.what.named and (owner != contact.name or name in start.system.names):
                 continue
             bare = re.sub(r"\d+$", "", last)
-            if unit := own.get(bare) or chart.unit(last) or chart.unit(bare):
+            if unit := unit_of(chart, last) or unit_of(chart, bare):
                 found[name] = unit
     return found | {"t": "s"}
 
