@@ -269,6 +269,7 @@ def page_data(
             "prefixed": TAKES_PREFIX.pattern,
             "smallest": SMALLEST,
         },
+        "hatches": HATCH_ANGLES,
         "rounding": ROUNDING,
     }
     return data, charts

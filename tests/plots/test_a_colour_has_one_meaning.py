@@ -15,6 +15,7 @@ import plots
 from plots import style
 from plots.style import CHART_THEMES, PAGE_THEMES, ROLES, THEMES, Theme, ramp
 from tests.helpers import open_loop, stick_slip
+from tests.page_blocks import blocks_of
 from tests.plots.vision import contrast, deuteranopia, luminance
 
 PACKAGE = Path(plots.__file__).parent
@@ -65,6 +66,17 @@ def test_faces_in_a_terminal_have_no_colours_of_their_own() -> None:
     assert not found
     assert IN_A_TERMINAL.search('style="bold dark_orange3"')
     assert IN_A_TERMINAL.search('{"fired": "1;33"}')
+
+
+def test_code_in_the_docs_draws_in_these_colours() -> None:
+    drawing = [
+        block.body
+        for path in DOCS.parent.rglob("*.md")
+        for block in blocks_of(path.read_text(encoding="utf-8"))
+        if block.kind == "python" and ".plot(" in block.body
+    ]
+    assert drawing
+    assert all("rc_context(RC)" in code for code in drawing)
 
 
 @pytest.mark.parametrize("theme", THEMES)

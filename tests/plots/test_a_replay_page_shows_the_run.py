@@ -394,6 +394,7 @@ DRAWN = """() => [
             x: element.querySelector(".foot").getCTM().e, peg: seen(".peg"), arrow: seen(".way"),
             way: element.querySelector(".way").getAttribute("transform") ? -1 : 1,
             springs: element.querySelectorAll(".link path").length,
+            ground: element.querySelector(".block").style.fill,
             end: element.querySelector(".link").getBoundingClientRect().right,
             texts: [...element.querySelectorAll("text")].map((node) => node.textContent),
         };
@@ -428,6 +429,7 @@ def test_bristles_are_where_z_puts_them_and_move_with_the_ground_while_they_stic
             held = bool(state == "stick")
             counts[held] += 1
             assert element["peg"] == held
+            assert f"-state{int(not held)}" in element["ground"]  # plain and pale, or hatched
             assert element["arrow"] == (not held and v != 0)
             assert element["texts"][0].split()[1] == state
             assert not element["arrow"] or element["way"] == np.sign(v)
