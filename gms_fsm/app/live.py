@@ -63,7 +63,7 @@ class LiveView:
         self.behind = False  # whether computing takes longer than the pace allows
         self.read = 0  # transitions read
         self.last: list[LogRecord] = []  # the last of them
-        self.t_start, self.time = t_start, scale_of((t_start, t_end), "s")
+        self.t_start, self.time = t_start, Scale(0, "s")  # as in the log
         self.bar = Progress(
             TextColumn("t = {task.fields[t]}"),
             BarColumn(),

@@ -98,7 +98,7 @@ class ContactView:
     def scales(self) -> Mapping[str, Scale]:
         """The units in which a table of its elements is written, one for each column.
 
-        A threshold has that of the variable it is compared with.
+        A threshold has that of the variable it is compared with, F_i that of F.
         """
         found: dict[str, Scale] = {}
         columns = zip(*(each.variables for each in self.elements), strict=True)
@@ -106,8 +106,7 @@ class ContactView:
             bounds = () if found else [each.s for each in self.elements if each.s is not None]
             found[name] = scale_of((*values, *bounds), self.chart.unit(name))
         length = next(iter(found.values()), Scale(0, "m"))
-        force = scale_of([each.F for each in self.elements], "N")
-        return found | {"s": length, "F": force}
+        return found | {"s": length, "F": self.here.scales["F"]}
 
 
 @dataclass(frozen=True)

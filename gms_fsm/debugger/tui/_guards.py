@@ -107,7 +107,7 @@ class ClauseTable(NamedTuple):
                 value += [Span(f" {side:>{VALUE - 1}}") for side in both]
             margin = trimmed(clause.scale.text(clause.margin)) if clause.relative else "0, rounding"
             bar = margin_bar(clause.relative, self.half)
-            value += [Span(f"{margin:>{VALUE}} "), Span(bar, role)]
+            value += [Span(f" {margin:>{VALUE - 1}} "), Span(bar, role)]
         if not self.apart:
             return [[Span(f"{mark} ", role), Span(f"{clause.text:<{self.wide}}"), *value]]
         texts = textwrap.wrap(clause.text, self.wide)
