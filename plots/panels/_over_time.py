@@ -57,7 +57,7 @@ def velocity(ax: Axes, trace: Trace, *, window: Window | None = None, log: bool 
     rows = shown(trace, window)
     factor, unit = scaled(rows.v, "m/s")
     v = factor * (np.abs(rows.v) if log else rows.v)
-    ax.set_ylabel(f"{'|v|' if log else 'v'} [{unit}]")
+    ax.set_ylabel(f"{'$|v|$' if log else '$v$'} [{unit}]")
     lines = draw_curve(ax, rows.t, v, color=INK)
     if log:
         log_axis(ax, v, "y")
@@ -84,11 +84,11 @@ def force(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     """
     this = selected(trace, **part)
     rows = this.rows
-    lines = draw_curve(ax, rows.t, rows.F, color=INK, label="F")
+    lines = draw_curve(ax, rows.t, rows.F, color=INK, label="$F$")
     for i in this.elements if part.get("elements") is not None else ():
         look = element_look(i, trace.n)
         lines += draw_curve(ax, rows.t, rows.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **look)
-    ax.set_ylabel("F [N]")
+    ax.set_ylabel("$F$ [N]")
     time_axis(ax, *this.window)
     return lines
 

@@ -19,6 +19,7 @@ from gms_fsm.language import (
     Value,
     clauses,
     comparisons,
+    latex_name,
     raised,
     spell,
     split,
@@ -201,7 +202,7 @@ def landscape(
     ax.set(
         xlim=(-view.speed, view.speed),
         ylim=(view.factor * view.low, view.factor * view.high),
-        xlabel=f"{plane.names[0]} [m/s], linear below {_power(view.linear)}",
+        xlabel=f"${latex_name(plane.names[0])}$ [m/s], linear below {_power(view.linear)}",
         ylabel=view.title,
     )
     ax.grid(visible=False)
