@@ -6,6 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
+from gms_fsm.language import latex_name
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import (
     Artists,
@@ -158,7 +159,7 @@ def ratio(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     if "s" in trace.model.chart.inputs:
         values = this.rows.z / this.rows.s
         factor, unit = (1.0, "–") if threshold else scaled(values, "m/N")
-        title = f"{trace.model.chart.variables[0]} / s(v) [{unit}]"
+        title = f"${latex_name(trace.model.chart.variables[0])} / s(v)$ [{unit}]"
     else:
         factor, title = first_variable(trace, values)
     lines = element_curves(ax, this, factor * values, "E{}")

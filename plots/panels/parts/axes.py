@@ -23,12 +23,17 @@ VECTOR_ROWS = 6_000  # longer curves are rasterized in an SVG or PDF, which keep
 
 def first_variable(trace: Trace, values: NDArray[np.float64]) -> tuple[float, str]:
     """Return factor and title of the chart's first variable, with its unit if it is known."""
-    name = trace.model.chart.variables[0]
-    symbol, known = f"${latex_name(name)}$", trace.model.chart.unit(name)
-    if not known:
+    chart = trace.model.chart
+    return axis_title(chart.variables[0], chart.unit(chart.variables[0]), values)
+
+
+def axis_title(name: str, unit: str | None, values: NDArray[np.float64]) -> tuple[float, str]:
+    """Return factor and title of a quantity: its symbol, and a unit in which its values fit."""
+    symbol = f"${latex_name(name)}$"
+    if not unit:
         return 1.0, symbol
-    factor, unit = scaled(values, known)
-    return factor, f"{symbol} [{unit}]"
+    factor, prefixed = scaled(values, unit)
+    return factor, f"{symbol} [{prefixed}]"
 
 
 def element_look(i: int, n: int) -> dict[str, Any]:
