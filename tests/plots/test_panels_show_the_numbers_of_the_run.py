@@ -102,7 +102,7 @@ def test_charts_without_edges_variables_or_s_have_no_threshold_and_say_so(ax: Ax
     model = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))
     lugre = simulate(model, non_drifting("signed")[1], 5.0)
     assert len(panels.ratio(ax, lugre)) == 1
-    assert ax.get_ylabel() == "z / s(v) [mm/N]"
+    assert ax.get_ylabel() == "$z / s(v)$ [mm/N]"
     (note,) = panels.margins(ax, lugre)
     assert "no threshold:\nthis chart has no edges" in note.get_text()
     for panel in (panels.deflections, panels.ratio):
