@@ -15,7 +15,6 @@ from plots.figures._paper import (
     figure_3,
     figure_4,
     held_residuals,
-    listing,
     residuals,
 )
 from plots.figures._phase import phase
@@ -38,7 +37,6 @@ __all__ = [
     "fit_figure",
     "held_residuals",
     "landscape",
-    "listing",
     "overview",
     "phase",
     "phenomena_matrix",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -18,7 +17,6 @@ from plots.panels.held_outputs import HeldLag
 from plots.panels.parts.axes import MANY, beside, first_variable
 from plots.panels.parts.selection import checked_elements, checked_window, scaled, shown
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
-from plots.style.fonts import MONO_EM
 from plots.style.matplotlib import Axes, Figure, rc_context
 from plots.style.presets import font, pt, settings, to_scale
 from plots.views.window import Window
@@ -77,7 +75,7 @@ def figure_3(
         axes = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
         axes[0].plot(chart.t, force, color=INK, linewidth=pt(0.9))
         axes[0].set_xlim(*checked_window(chart, window))
-        axes[0].set(xlabel="t [s]", ylabel=r"$F_a$ [N]")
+        axes[0].set(xlabel="$t$ [s]", ylabel=r"$F_a$ [N]")
         runs = chart, ifelse, lugre
         # Drift is compared: one unit and one range of x.
         scale = scaled(np.concatenate([trace.x - trace.x[0] for trace in runs]), "m")
@@ -187,50 +185,6 @@ def _make_room(ax: Axes) -> None:
     """Leave the upper part of a panel free for an inset."""
     bottom, top = ax.get_ylim()
     ax.set_ylim(bottom, bottom + (top - bottom) / 0.58)
-
-
-def listing(texts: Sequence[str], *, title: str) -> Figure:
-    r"""Draw program texts side by side, their comments in grey.
-
-    Parameters
-    ----------
-    texts : sequence of str
-        The programs.
-    title : str
-        Of the figure.
-
-    Returns
-    -------
-    Figure
-        One column per text.
-
-    Examples
-    --------
-    >>> listing(["if v > 0:\n    F = 1.0  # N"], title="friction").get_suptitle()
-    'friction'
-    """
-    with rc_context(settings()):
-        size = font(7)
-        columns = [max(map(len, text.splitlines())) + 8 for text in texts]
-        tall = max(len(text.splitlines()) for text in texts)
-        em = size / 72
-        figure = sheet(MONO_EM * em * sum(columns), 1.35 * em * tall + 0.5)
-        panes = figure.subplots(1, len(texts), squeeze=False, width_ratios=columns)[0]
-        for ax, text in zip(panes, texts, strict=True):
-            ax.set_axis_off()
-            lines = [re.match(r"([^#]*)(.*)", line) for line in text.splitlines()]
-            code = "\n".join(each[1] for each in lines if each)
-            said = "\n".join(" " * len(each[1]) + each[2] for each in lines if each)
-            look: dict[str, Any] = {
-                "size": size,
-                "family": "monospace",
-                "va": "top",
-                "linespacing": 1.35,
-            }
-            ax.text(0, 1, code, color=INK, **look)
-            ax.text(0, 1, said, color=TEXT_GREY, **look)
-        figure.suptitle(title, x=0.01, ha="left")
-    return figure
 
 
 def compare_laws(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,9 @@ FIGURES = (
     "residual_held",
 )
 ELEMENTS = 3  # in Fig. 1 and 2a
-USED = "switch", "flow"  # shown of the if-else program
+USED = "switch", "flow"  # in Fig. 2c
+LISTED = "Fig. 2c: the switching as if-else code, generated from the chart of Fig. 2b"
+LINE = 1.35  # distance of its lines, in sizes of the font
 
 
 def write(
@@ -155,10 +157,7 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
 
     pictures = {
         "fig1": schematic_figure(elements=ELEMENTS),
-        "fig2c": figures.listing(
-            ifelse_texts(traces["fig4_ifelse"]),
-            title="Fig. 2c: the switching as if-else code, generated from the chart of Fig. 2b",
-        ),
+        "fig2c": _listing(traces["fig4_ifelse"]),
         "fig3": fig3("fig3", "Fig. 3, non-drifting: a force below break-away"),
         "fig3_slipping": fig3(
             "fig3_slipping",
@@ -192,10 +191,28 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
     ]
 
 
-def ifelse_texts(trace: Trace) -> list[str]:
-    """Return the functions of the if-else program of a run that decide and that move z."""
+def _listing(trace: Trace) -> Figure:
+    """Draw the functions of the if-else program of a run that decide and that move z."""
+    from plots.style import INK, TEXT_GREY
+    from plots.style.fonts import MONO_EM
+    from plots.style.matplotlib import Figure
+
     functions = lower(trace.model, trace.rig).source.split("\n\n\n")
-    return [next(each for each in functions if f"def {name}(" in each) for name in USED]
+    texts = [next(each for each in functions if f"def {name}(" in each) for name in USED]
+    wide = [max(map(len, text.splitlines())) + 6 for text in texts]
+    tall = max(len(text.splitlines()) for text in texts) + 4
+    em = 7.0 / 72  # inches
+    figure = Figure(figsize=(MONO_EM * em * sum(wide), LINE * em * tall))
+    figure.suptitle(LISTED, x=0.01, y=1 - 0.6 / tall, ha="left", size=9.0)
+    look: dict[str, Any] = {"size": 7.0, "family": "monospace", "va": "top", "linespacing": LINE}
+    for text, x in zip(texts, (0.01, 0.01 + wide[0] / sum(wide)), strict=True):
+        code = [each.partition("#")[0] for each in text.splitlines()]
+        comments = [
+            " " * len(a) + b[len(a) :] for a, b in zip(code, text.splitlines(), strict=True)
+        ]
+        figure.text(x, 1 - 3 / tall, "\n".join(code), color=INK, **look)
+        figure.text(x, 1 - 3 / tall, "\n".join(comments), color=TEXT_GREY, **look)
+    return figure
 
 
 def held_figure(traces: Mapping[str, Trace], force: str) -> Figure:
