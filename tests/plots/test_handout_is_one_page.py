@@ -107,7 +107,7 @@ def test_a_motion_of_ones_own_and_one_that_is_seen_without_a_length() -> None:
     figure = handout_figure(stick_slip("signed"), velocity="0.1*cos(t)", t_end=7.0)
     assert "v(t) = 0.1*cos(t) m/s" in [text.get_text() for text, _ in drawn_texts(figure)]
     clutch = demonstration(registered()["dog-clutch"], "")
-    assert ", A = 0.1 m, " in excited(clutch, None, None).about
+    assert ", A = 100 mm, " in excited(clutch, None, None).about
 
 
 @pytest.mark.slow
