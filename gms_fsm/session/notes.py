@@ -78,8 +78,9 @@ def _sizes(trace: Trace) -> Iterator[str]:
     elif stroke > FAR * float(thresholds.max()):
         times = f"{stroke / float(thresholds.max()):.2g} times"
         yield (
-            f"the stroke of {in_words(stroke, 'm', 3)} is {times} the largest threshold: nearly all of it is gross sliding; if pre-sliding is intended, "
-            "check the unit of the motion (m)"
+            f"the stroke of {in_words(stroke, 'm', 3)} is {times} the largest threshold: nearly "
+            "all of it is gross sliding; if pre-sliding is intended, check the unit of the motion "
+            "(m)"
         )
 
 
