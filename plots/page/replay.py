@@ -312,7 +312,11 @@ def _language() -> dict[str, Any]:
         "sign": LEVELS["neg"],
         "functions": {name: "several" if name in SEVERAL else "one" for name in FUNCTIONS},
         "constants": dict(CONSTANTS),
-        "units": {unit: u for units in FACTORS.values() for unit, u in units.items()},
+        "units": {  # each with its factor, and the unit of SI for what it measures
+            unit: [factor, next(name for name, one in units.items() if one == 1.0)]
+            for units in FACTORS.values()
+            for unit, factor in units.items()
+        },
     }
 
 

@@ -239,6 +239,8 @@ CANNOT_BE_READ = [
     ("min(F) > 1", 1, "min got 1 arguments"),
     ("F > 1_000", 5, "cannot read"),  # formats that only Python has
     ("F > 0x10", 5, "cannot read"),
+    ("v > 3 mm", 5, "3 mm is not in m/s"),
+    ("F > 1 N and z1 > 3 mm/s", 18, "3 mm/s is not in m"),
 ]
 
 
