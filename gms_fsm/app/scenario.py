@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -123,7 +123,7 @@ class Loaded:
         """
         given: Any = {**self.arguments, **options}
         what: Any = (*self.subject[:-1], given.pop("t_end"))
-        return simulate(*what, **given)
+        return replace(simulate(*what, **given), heading=self.scenario.title)
 
 
 def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
