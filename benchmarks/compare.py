@@ -5,7 +5,7 @@ and its time is divided by that of the C loop in the same round. The error is th
 run of gms-fsm at rtol 1e-12, atol 1e-15. Run it with ``make bench``, or
 
     python benchmarks/compare.py [--quick] [--markdown] [--rounds 15] [section ...]
-    python benchmarks/compare.py --write        the tables in docs/performance.md and docs/numerics.md
+    python benchmarks/compare.py --write        the tables in docs/{performance,numerics}.md
 """
 
 from __future__ import annotations
@@ -630,7 +630,9 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="3 rounds, no bank of 10,000")
     parser.add_argument("--markdown", action="store_true", help="tables as Markdown")
     parser.add_argument(
-        "--write", action="store_true", help="replace the tables in docs/performance.md and docs/numerics.md"
+        "--write",
+        action="store_true",
+        help="replace the tables in docs",
     )
     parser.add_argument("--task", choices=TASKS, help=argparse.SUPPRESS)
     options = parser.parse_args()

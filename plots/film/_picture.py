@@ -113,7 +113,7 @@ class FilmPicture:
         ax = self._axes(self.left + 0.75, self.said, RIGHT - 0.95, height)
         ax.plot(curve.t, curve.F, color=self.colours.ink, linewidth=1.2)
         ax.set_xlim(*window)
-        ax.set_ylabel("F [N]", fontsize=SIZE)
+        ax.set_ylabel("$F$ [N]", fontsize=SIZE)
         ax.tick_params(labelbottom=False)
         self._paint_axes(ax)
         self.cursors = [ax.axvline(window[0])]
@@ -144,7 +144,7 @@ class FilmPicture:
             yticks=range(1, len(elements) + 1),
             yticklabels=[f"E{i + 1}" for i in elements],
         )
-        ax.set_xlabel("t [s]", fontsize=SIZE)
+        ax.set_xlabel("$t$ [s]", fontsize=SIZE)
         self._paint_axes(ax)
         ax.tick_params(axis="y", length=0)
         self.cursors.append(ax.axvline(window[0]))

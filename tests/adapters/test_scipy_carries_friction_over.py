@@ -1,6 +1,6 @@
 """Calls of `adapters.scipy.solve_ivp` go on where the last one ended: a controller between them.
 
-The servo of gms_fsm/scenarios/servo.toml with its PID controller in Python: the load is at 1.3215 mm.
+The scenario servo with its PID controller in Python: the load is at 1.3215 mm.
 """
 
 from __future__ import annotations

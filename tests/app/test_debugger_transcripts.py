@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition, simulate
-from gms_fsm.app.scenario import load_scenario, run_debugger, session_of
+from gms_fsm.app.scenario import load_scenario, run_debugger
 from gms_fsm.session.session import Session
 from tests.helpers import ROOT, pulled_mass
 from tests.inspection.sessions import a_system, both_ways, debugger, fig4, locked, warming

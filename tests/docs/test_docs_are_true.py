@@ -16,8 +16,7 @@ import pytest
 
 from gms_fsm.app.scenario import Scenario
 from gms_fsm.exporters import FORMATS, formats
-from tests.helpers import matrix
-from tests.helpers import ROOT
+from tests.helpers import ROOT, matrix
 from tests.page_blocks import Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow

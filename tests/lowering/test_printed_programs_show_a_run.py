@@ -85,7 +85,7 @@ def test_every_shipped_scenario(
             monkeypatch.setenv("GMS_FSM_DATA", NAMED)
         monkeypatch.setenv("GMS_FSM_DATA", str(data_folder()))
     path = printed(gms_fsm, str(ROOT / "gms_fsm/scenarios" / f"{name}.toml"))
-    end = load_scenario(ROOT / "gms_fsm/scenarios" / f"{name}.toml").arguments["t_end"]
+    end = load_scenario(name).arguments["t_end"]
     *switches, last, _ = program(path, repr(float(end)), "4000")
     assert last == f"{len(switches)} switches in 4000 steps to t = {end:.6g} s"
 
@@ -135,7 +135,7 @@ def test_the_switches_are_those_of_simulate(
 
 
 def test_a_servo_with_a_controller_and_two_contacts(gms_fsm: CommandLine) -> None:
-    loaded = load_scenario(ROOT / "gms_fsm/scenarios" / "servo.toml")
+    loaded = load_scenario("servo")
     path = printed(gms_fsm, str(ROOT / "gms_fsm/scenarios" / "servo.toml"))
     *lines, _, _ = program(path, "0.1", "20000")
     arguments = {"method": "euler", "step": 5e-6, "events": "step", "engine": "ifelse"}

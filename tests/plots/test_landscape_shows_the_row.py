@@ -86,7 +86,7 @@ def test_dot_path_ranges_and_arrows_are_those_of_the_row(run: Trace) -> None:
     here = run.v[row], MM * run.z[row, 2]
     (dot,) = (each for each in drawn if getattr(each, "get_marker", lambda: "")() == "o")
     assert dot.get_xydata()[0] == pytest.approx(here)  # type: ignore[attr-defined]
-    assert ax.get_ylabel() == "z [mm]"
+    assert ax.get_ylabel() == "$z$ [mm]"
     low, high = ax.get_ylim()
     assert low < -MM * run.s[:, 2].max() < MM * run.s[:, 2].max() < high
     assert ax.get_xlim()[1] > np.abs(run.v).max()
@@ -222,7 +222,7 @@ def test_forces_are_drawn_where_there_are_no_variables() -> None:
     row = int(np.flatnonzero((trace.states[:, 0] == "stuck") & (np.abs(trace.F) > 0.7))[0])
     ax = Figure().subplots()
     found = regions(panels.landscape(ax, trace, 0, row=row))
-    assert ax.get_ylabel() == "F [N]"
+    assert ax.get_ylabel() == "$F$ [N]"
     lowest = {name: min(p.vertices[:, 1].min() for p in c.get_paths()) for name, c in found.items()}
     assert lowest["release_forward"] == pytest.approx(1.5, abs=0.02)  # F_s
 

@@ -8,7 +8,7 @@ import pytest
 from gms_fsm import simulate
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.systems.system import Body, Contact, Sampled, System
-from tests.helpers import ROOT, stick_slip
+from tests.helpers import stick_slip
 
 
 def counting(period: float = 0.1) -> System:
@@ -45,7 +45,7 @@ def test_a_run_that_starts_later_ticks_from_its_start() -> None:
 
 def servo() -> System:
     """Two masses on a shaft, friction on the load, a PID controller on the motor's position."""
-    system = load_scenario(ROOT / "gms_fsm/scenarios" / "servo.toml").system
+    system = load_scenario("servo").system
     assert system is not None
     return system
 

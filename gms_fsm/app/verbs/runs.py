@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import messages, named_bars, note
+from gms_fsm.app.verbs.console import messages, named_bar, note
 from gms_fsm.app.verbs.options import (
     INTERRUPTED,
     ContactName,
@@ -49,7 +49,7 @@ def paper_command(
     import plots
     from gms_fsm.app.paper import writing
 
-    with plots.preset(preset), named_bars() as show:
+    with plots.preset(preset), named_bar() as show:
         files = writing.write(output, force, velocity, show)
     typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
 
@@ -230,7 +230,7 @@ def phenomena_command(
 
     own = room.own_models(files or (), contact, room.numbers_given("--value", value or []))
     models: dict[str, Any] | None = {**{name: name for name in model or ()}, **own} or None
-    with named_bars() as show:
+    with named_bar() as show:
         numbers = Bench.of(room.numbers_given("--set", bench or []))
         table, written = room.write(output, models, phenomenon, bench=numbers, progress=show)
     counts = collections.Counter(cell.measured.verdict for cell in table)

@@ -109,7 +109,7 @@ def with_gap(gap):
     ax = figure.subplots()
     ax.plot(trace.t, trace.body("motor").x, "--", color="0.3", label="motor")
     ax.plot(trace.t, trace.body("load").x, label="load")
-    ax.set(xlabel="t [s]", ylabel="angle [rad]")
+    ax.set(xlabel="$t$ [s]", ylabel="angle [rad]")
     measured = f"{(dead[:, 1] - dead[:, 0]).mean():.4f}"
     ax.set_title(f"dead time {measured} s; formula {dead_time(gap):.4f} s")
     ax.legend()
@@ -294,7 +294,7 @@ def _mass(ax: Any, r: Any, end: float, name: str, factor: float) -> None:
 
 def _moving(ax: Any, r: Any) -> str:
     _mass(ax, r, r.stiction.t[-1], "v", 1.0)
-    ax.set(xlabel="t [s]", ylabel="v [m/s]", xlim=(0, r.stiction.t[-1]))
+    ax.set(xlabel="$t$ [s]", ylabel="$v$ [m/s]", xlim=(0, r.stiction.t[-1]))
     return f"pulled mass; dashed: {r.title}"
 
 
@@ -308,7 +308,7 @@ def _before(ax: Any, r: Any) -> str:
     _mass(ax, r, r.released, "x", 1e3)
     note(ax, "bank: the bristles yield", (3.0, 600 * r.crept[1]))
     note(ax, "stiction: x = 0", (3.0, 1.0), color=INK)
-    ax.set(xlabel="t [s]", ylabel="x [mm]", xlim=(0, 8))
+    ax.set(xlabel="$t$ [s]", ylabel="$x$ [mm]", xlim=(0, 8))
     return "before stiction lets go"
 
 
@@ -321,7 +321,7 @@ def _gear(ax: Any, r: Any) -> str:
     begin, end = r.dead[0]
     note(ax, f"dead time {end - begin:.3f} s", (end, 0.005), (4, 0))
     ax.legend(loc="upper right")
-    ax.set(xlabel="t [s]", ylabel="angle [rad]", xlim=(0, 2 * PERIOD))
+    ax.set(xlabel="$t$ [s]", ylabel="angle [rad]", xlim=(0, 2 * PERIOD))
     return "gear with backlash; shaded: no contact"
 
 
@@ -334,7 +334,7 @@ def _both(ax: Any, r: Any, pair: tuple[str, ...]) -> str:
     total = r.values[kept] / sum(MASSES if name == "hit" else INERTIAS)
     ax.plot(trace.t, total, ":", color=LINE_GREY, linewidth=2, label=mean)
     ax.legend(loc="upper right")
-    ax.set(xlabel="t [s]", ylabel=unit, xlim=(0, trace.t[-1]))
+    ax.set(xlabel="$t$ [s]", ylabel=unit, xlim=(0, trace.t[-1]))
     return title
 
 
