@@ -13,6 +13,7 @@ class RunView {
     this.root = $("#run").content.cloneNode(true).firstElementChild;
     $("#runs").append(this.root);
     $("h2", this.root).textContent = (data.runs.length > 1 ? `Run ${this.place + 1}: ` : "") + run.title;
+    $(".of", this.root).textContent = `Run ${this.place + 1}`;
     const which = $(".contact", this.root);
     run.contacts.forEach(({ name }) => make("option", which, name));
     $(".which", this.root).hidden = run.contacts.length < 2;
@@ -49,6 +50,7 @@ class RunView {
     const each = this.panes[key];
     if (!each && !this.place) return;
     $(`.${side}`, this.root).hidden = !each; // shared, and shown by the first run
+    if (side === "right") $(".of", this.root).hidden = runs.length < 2 || Boolean(each?.Pane.shared);
     delete this.open[side];
     for (const { Pane, tab, box } of Object.values(this.panes)) {
       if (Pane.side !== side) continue;
@@ -338,9 +340,9 @@ class ChartPane {
   fit() {
     if (!this.svg) return;
     const least = SMALLEST / Math.min(...$$("text", this.svg).map((text) => Number(text.getAttribute("font-size"))));
-    const across = this.box.clientWidth, high = WIDE.matches ? this.box.clientHeight : SHARE * innerHeight;
+    const across = this.box.clientWidth, high = isWide() ? this.box.clientHeight : SHARE * innerHeight;
     const region = $(`.region[data-slot="${this.view.element}"]`, this.svg), [, , width, height] = this.whole.split(" ").map(Number);
-    const enough = region && WIDE.matches ? OVERVIEW : least;
+    const enough = region && isWide() ? OVERVIEW : least;
     let shown = this.whole;
     this.region = region && Math.min(across / width, high / height) < enough ? region.parentNode : null;
     if (this.region) {
