@@ -274,6 +274,7 @@ class ChartPane {
     this.svg = $("svg", box);
     this.svg?.setAttribute("aria-label", `Chart of ${contact.name || "an element"}`);
     this.whole = this.svg?.getAttribute("viewBox");
+    this.least = SMALLEST / Math.min(...$$("text", box).map((text) => Number(text.getAttribute("font-size")))); // scale
     this.parts = [];
     for (const node of $$("[data-slot]", box)) (this.parts[node.dataset.slot] ??= []).push(node);
     for (const guard of $$(".guard", box)) {
@@ -295,9 +296,7 @@ class ChartPane {
 
   show() {
     for (let slot = 0; slot < this.parts.length; slot++) this.light(slot);
-    if (this.box.scrollHeight > this.box.clientHeight || this.box.scrollWidth > this.box.clientWidth) {
-      for (const node of $$(".state.active, .guard.fired", this.region ?? this.box)) reveal(node, this.box);
-    }
+    if (this.scrolls) for (const node of $$(".state.active, .guard.fired", this.region ?? this.box)) reveal(node, this.box);
   }
 
   light(slot) {
@@ -339,8 +338,7 @@ class ChartPane {
   // scrolls, or on a narrow screen the page.
   fit() {
     if (!this.svg) return;
-    const least = SMALLEST / Math.min(...$$("text", this.svg).map((text) => Number(text.getAttribute("font-size"))));
-    const across = this.box.clientWidth, high = isWide() ? this.box.clientHeight : SHARE * innerHeight;
+    const { least } = this, across = this.box.clientWidth, high = isWide() ? this.box.clientHeight : SHARE * innerHeight;
     const region = $(`.region[data-slot="${this.view.element}"]`, this.svg), [, , width, height] = this.whole.split(" ").map(Number);
     const enough = region && isWide() ? OVERVIEW : least;
     let shown = this.whole;
@@ -352,6 +350,7 @@ class ChartPane {
     this.svg.setAttribute("viewBox", shown);
     const [, , w, h] = shown.split(" ").map(Number), scale = clamp(Math.min(across / w, high / h), this.region ? least : enough, LARGEST);
     place(this.svg, { width: w * scale, height: h * scale });
+    this.scrolls = w * scale > across + 1 || (isWide() && h * scale > high + 1);
   }
 }
 const SMALLEST = 11; // px of text
