@@ -313,6 +313,27 @@ rows = {
 }
 group("file that is no scenario", ScenarioError, scenario, rows, "a.toml")
 rows = {
+    "unit": (END, "t_end = 60 s"),
+    "unit that is a quotient": ("v_c = 1e-6", "v_c = 1e-3 mm/s"),
+    "decimal comma": (END, "t_end = 1,5"),
+    "list without brackets": ("[100.0, 50.0]", "100.0, 50.0"),
+    "list without commas": ("[100.0, 50.0]", "[100.0 50.0]"),
+    "colon": (END, "t_end: 1.0"),
+    "semicolon": (END, "t_end = 1.0;"),
+    "comment of another language": (END, "t_end = 1.0 // s"),
+    "word without quotes": ('"signed"', "signed"),
+    "formula without quotes": (QUOTED, SIN),
+    "truth of Python": ("[output]", "[output]\ncsv = True"),
+    "nothing of Python": (END, f"{END}\nstep = None"),
+    "one quote": ('"open loop"', '"open loop'),
+    "words behind a text": ('"open loop"', '"open loop" of mine'),
+    "quotes of a typesetter": ('"open loop"', "“open loop”"),
+    "path of Windows in double quotes": (QUOTED, SIGNAL % "C:\\Users\\me\\x.csv"),
+    "braces over two lines": ("stribeck = {", "stribeck = {\n"),
+    "table twice": ("[run]", "[rig]\n[run]"),
+}
+group("line that is no TOML", ScenarioError, edited, rows, "a.toml")
+rows = {
     "of another table": (OPEN_LOOP, "law=signed"),
     "typo": (OPEN_LOOP, "tend=3"),
     "in the wrong table": (OPEN_LOOP, "model.velocity=1"),

@@ -26,6 +26,7 @@ from gms_fsm.app._tables import (
 )
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
+from gms_fsm.foundation.arguments import no_file
 from gms_fsm.foundation.files import inside
 from gms_fsm.foundation.tables import explained, read_file
 from gms_fsm.foundation.toml import override, parsed
@@ -366,11 +367,12 @@ def find_file(scenario: Path, name: str) -> Path:
             )
         if found.is_file():
             return found
-    looked = " and ".join(str(folder) for folder in folders)
-    hint = "" if len(folders) > 1 else f" (set {DATA_VARIABLE} to name a data folder)"
-    raise ScenarioError(
-        f"file = {shown(name)}: no such file in {looked}{hint}", place=str(scenario)
-    )
+    missing = no_file(folders[0] / name, ScenarioError)
+    second = f"or in {folders[1]}, the" if len(folders) > 1 else f"or set {DATA_VARIABLE} to a"
+    raise missing.replaced(
+        place=f"file = {shown(name)}",
+        advice=f"{missing.advice}; put it beside the scenario, {second} data folder",
+    ).inside(scenario)
 
 
 def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:

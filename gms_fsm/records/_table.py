@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError, cut, shown
+from gms_fsm.foundation.arguments import no_file
 from gms_fsm.records._columns import Column
 from gms_fsm.records.units import FACTORS, plain
 
@@ -209,9 +210,7 @@ def _encoding_of(path: Path) -> str:
         with path.open("rb") as file:
             return MARKS.get(file.read(2), "utf-8-sig")
     except FileNotFoundError:
-        raise RecordError(
-            "no such file", place=str(path), advice="check the name and the folder"
-        ) from None
+        raise no_file(path, RecordError) from None
     except OSError as error:
         raise RecordError(f"cannot be read ({error.strerror})", place=str(path)) from None
     except ValueError:  # it has a null in it

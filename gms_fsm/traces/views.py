@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, why
+from gms_fsm.foundation.arguments import no_file
 from gms_fsm.foundation.display import short_repr
 from gms_fsm.foundation.logs import Log
 from gms_fsm.lowering.observing import armed, rate, sigmas
@@ -189,9 +190,7 @@ def read_parts(path: Path) -> Parts:
     except TraceFileError as error:
         raise (error if error.outer else error.inside(path)) from None
     except FileNotFoundError as error:
-        raise TraceFileError(
-            "no such file", place=error.filename, advice="check the name and the folder"
-        ) from None
+        raise no_file(error.filename, TraceFileError) from None
     except Exception as error:
         # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, each
         # with its own errors; in every case the file is at fault.

@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from gms_fsm.charts.chart import SUPPLIED
-from gms_fsm.charts.gms import PARAMETERS, Law
+from gms_fsm.charts.gms import LAWS, PARAMETERS, WHICH_LAW, Law
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, Parameter
 from gms_fsm.charts.registry import Entry, registered
 from gms_fsm.charts.zoo.bristles.lugre import LUGRE
@@ -55,7 +55,7 @@ class GMSTable(Table):
     """A GMS model: a column of Table I of the paper, or all parameters."""
 
     kind: Literal["GMS"]
-    law: Law = Field(description="slip law; there is no default")
+    law: Law = Field(description=WHICH_LAW)
     preset: Literal["non-drifting", "stick-slip"] | None = Field(
         None, description="column of Table I, instead of parameters"
     )
@@ -199,7 +199,7 @@ def _chart_table(entry: Entry) -> type[IncludedChartTable]:
     fields: dict[str, Any] = {"chart": (kind, Field(description=entry.title))}
     if entry.laws:
         law: Any = Literal[entry.laws]
-        fields["law"] = (law, Field(description="there is no default"))
+        fields["law"] = (law, Field(description=WHICH_LAW if entry.laws == LAWS else None))
     for each in entry.parameters:
         numbers: Any = Numbers if each.per_element else float
         description = each.described
