@@ -526,15 +526,15 @@ rows = {
     "chart without values": ("own.toml", ..., "phenomena own.toml -o o"),
     "system of several contacts": ("pair.toml", ..., "phenomena pair.toml -o o"),
     "model that is no file": ("", ..., "phenomena lugre -o o"),
-    "data set that is missing": ("dataset", "skates", "benchmark --only skates -o out"),
+    "data set that is missing": ("dataset", ..., "benchmark --only skates -o out"),
     "export without a format": ("--to", ..., "export own.toml"),
     "handout of a chart file": ("own.toml", ..., "handout own.toml"),
 }
 group("command", ParameterError, command, rows)
 rows = {
     "debug of a missing scenario": ("none.toml", ..., "debug none.toml"),
-    "debug of a program": ("", ..., "debug mine.py"),
-    "debug of a trace": ("", ..., "debug t.CSV"),
+    "debug of a program": ("mine.py", ..., "debug mine.py"),
+    "debug of a trace": ("t.CSV", ..., "debug t.CSV"),
     "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),
     "fit of a missing scenario": ("none.toml", ..., "fit none.toml"),
     "debug of a run that cannot be": ("pulled.toml", ..., "debug pulled.toml --set run.t_end=-1"),

@@ -48,7 +48,6 @@ __all__ = [
     "Scenario",
     "load_scenario",
     "load_system",
-    "scenario_to_debug",
 ]
 __all__ += ["schema", "session_of"]
 
@@ -150,6 +149,7 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         If a record is invalid; the message names file, row and column.
     """
     path = Path(path)
+    _check_ending(path)
     data = parsed(path)
     if not data:
         raise ScenarioError(
@@ -185,6 +185,25 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     except GMSError as error:
         place = f"[rig] {error.place}".rstrip()
         raise ScenarioError.of(error).replaced(place=place).inside(path) from None
+
+
+def _check_ending(path: Path) -> None:
+    """Refuse a file that is none of ours, or a run."""
+    match path.suffix.lower():
+        case ".py":
+            raise ScenarioError(
+                "it is a Python file, and a scenario (.toml) is wanted",
+                place=str(path),
+                advice="for a custom model use simulate(model, rig, t_end), or "
+                "Debugger(Session(model, rig, t_end)).run(), see docs/howto/debugging.md",
+            )
+        case ".npz" | ".csv":
+            raise ScenarioError(
+                "it is a trace or a table, and a scenario (.toml) is wanted",
+                place=str(path),
+                advice=f"`gms-fsm replay {path}` steps through a trace, `gms-fsm plot {path}` "
+                "draws it; a table is named in the [record] of a scenario",
+            )
 
 
 def kind_of(data: Mapping[str, Any]) -> str:
@@ -370,52 +389,10 @@ def find_file(scenario: Path, name: str) -> Path:
     missing = no_file(folders[0] / name, ScenarioError)
     second = f"or in {folders[1]}, the" if len(folders) > 1 else f"or set {DATA_VARIABLE} to a"
     raise missing.replaced(
-        place=f"file = {shown(name)}",
+        reason=f"file = {shown(name)}: {missing.reason}",
+        place=str(scenario),
         advice=f"{missing.advice}; put it beside the scenario, {second} data folder",
-    ).inside(scenario)
-
-
-def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
-    """Read the scenario for ``gms-fsm debug``; for other files, raise an error with advice.
-
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file.
-    overrides : sequence of str
-        See `load_scenario`.
-
-    Returns
-    -------
-    Loaded
-        The scenario, for `session_of`.
-
-    Raises
-    ------
-    ScenarioError
-        If it is a trace, a Python file, or not a valid scenario.
-
-    Examples
-    --------
-    >>> scenario_to_debug("t.npz")  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-    ...
-    gms_fsm.errors.ScenarioError: t.npz is a trace; `gms-fsm replay t.npz` steps through it; ...
-    """
-    match Path(path).suffix.lower():
-        case ".py":
-            raise ScenarioError(
-                f"{path} is a Python file",
-                advice="debug takes a scenario (.toml); for a custom model use "
-                "Debugger(Session(model, rig, t_end)).run(), see "
-                "docs/howto/debugging.md",
-            )
-        case ".npz" | ".csv":
-            raise ScenarioError(
-                f"{path} is a trace",
-                advice=f"`gms-fsm replay {path}` steps through it; debug takes a scenario (.toml)",
-            )
-    return load_scenario(path, overrides)
+    )
 
 
 def session_of(loaded: Loaded) -> Session:

@@ -138,12 +138,22 @@ def unknown(
     >>> print(unknown("parameter", "K", ["k", "sigma_2"]))
     there is no parameter 'K'; did you mean 'k'? there are k, sigma_2
     """
-    names = [*known]
+    return kind(f"there is no {noun} {shown(name)}", advice=there_are(name, known), **at)
+
+
+def there_are(name: object, known: Iterable[str]) -> str:
+    """Return the advice on a name that is not known.
+
+    Examples
+    --------
+    >>> there_are("K", ["k", "sigma_2"])
+    "did you mean 'k'? there are k, sigma_2"
+    """
+    names = [*dict.fromkeys(known)]
     hint = meant(name, names)
-    advice = f"{hint}there {'is' if len(names) == 1 else 'are'} {some_of(names)}"
     if hint and len(names) > MOST_NAMED + 1:  # a wall of names would hide the one that is meant
-        advice = f"{hint}there are {len(names)} in all"
-    return kind(f"there is no {noun} {shown(name)}", advice=advice, **at)
+        return f"{hint}there are {len(names)} in all"
+    return f"{hint}there {'is' if len(names) == 1 else 'are'} {some_of(names)}"
 
 
 def no_file(path: str | os.PathLike[str], kind: type[GMSError]) -> GMSError:

@@ -22,7 +22,7 @@ from gms_fsm.errors import (
     ParameterError,
     shown,
 )
-from gms_fsm.foundation.arguments import checked_integer, checked_path
+from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.extras import require
 from gms_fsm.lowering.layout import BankPlaces
@@ -256,9 +256,7 @@ class Trace:
         if isinstance(name, str) and name in names:
             return self.seen[names[name]]
         known = [*layout.y.shared, *(each for each in names if " " not in each)]
-        raise ParameterError(
-            f"there is no value {shown(name)}", advice=f"there are {', '.join(map(repr, known))}"
-        )
+        raise unknown("value", name, known)
 
     @property
     def x(self) -> FloatArray:

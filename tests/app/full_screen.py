@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
-from gms_fsm.app.scenario import scenario_to_debug, session_of
+from gms_fsm.app.scenario import load_scenario, session_of
 from gms_fsm.debugger.tui._app import FullScreen
 from gms_fsm.session.session import Session
 from tests.helpers import ROOT
@@ -23,7 +23,7 @@ WIDE = 12.2  # of a character in an exported picture
 
 def session(scenario: str = FIG_4) -> Session:
     """Return a new session of a scenario."""
-    return session_of(scenario_to_debug(ROOT / "scenarios" / f"{scenario}.toml"))
+    return session_of(load_scenario(ROOT / "scenarios" / f"{scenario}.toml"))
 
 
 async def settle(pilot: Pilot[Any]) -> None:

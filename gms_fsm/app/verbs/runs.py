@@ -221,12 +221,12 @@ def debug_command(
     ] = False,
 ) -> None:
     """Step through a scenario in the terminal: break, why, back, poke, compare."""
-    from gms_fsm.app.scenario import run_debugger, scenario_to_debug, session_of
+    from gms_fsm.app.scenario import load_scenario, run_debugger, session_of
     from gms_fsm.debugger.tui import run_tui
 
     if light and not tui:
         raise typer.BadParameter("it is an option of --tui", param_hint="--light")
-    loaded = scenario_to_debug(scenario, overrides or [])
+    loaded = load_scenario(scenario, overrides or [])
     if tui:
         raise typer.Exit(run_tui(session_of(loaded), loaded.title, light=light))
     raise typer.Exit(run_debugger(loaded))
