@@ -16,6 +16,7 @@ from gms_fsm.debugger._over_time import events, ribbons
 from gms_fsm.debugger._view import branches, chart_states, ending, view
 from gms_fsm.errors import GMSError, SessionError
 from gms_fsm.foundation.arguments import meant, there_are
+from gms_fsm.foundation.quantities import WIDTH
 from gms_fsm.language import evaluate
 from gms_fsm.session.explain import holds
 from gms_fsm.session.session import KINDS, Breakpoint, Session
@@ -46,7 +47,7 @@ class Commands:
         self,
         session: Session,
         marks: text_of.Marks = text_of.PLAIN,
-        width: int = text_of.WIDTH,
+        width: int = WIDTH,
     ) -> None:
         self.session, self.marks, self.width, self.element = session, marks, width, 0
         self.last_move = ""  # the line that moved last, which an empty line repeats

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gms_fsm.errors import GMSError, ScenarioError, cut, shown
+from gms_fsm.errors import GMSError, ScenarioError, cut, scene, shown
 from gms_fsm.foundation.arguments import no_file, unknown
 
 Key = tuple[str | int, ...]  # names of keys, and places in arrays from 0
@@ -121,9 +121,7 @@ def _refused(said: str, text: str) -> tuple[str, str]:
         advice = "the key, or its table, is given twice: join them"
     else:
         advice = _with_digits(line) or _usual(line) or cut(said.replace(at[0], ""))
-    start = max(0, column - 61)
-    scene = f"{line[start : start + 120]}\n    {' ' * (column - 1 - start)}^"
-    return f"line {number} is not valid TOML", f"{advice}\n    {scene}"
+    return f"line {number} is not valid TOML", f"{advice}\n{scene(line, column)}"
 
 
 def _usual(line: str) -> str:

@@ -64,6 +64,19 @@ def check_trace(trace: object) -> None:
     _ = trace.model.chart  # a system with several contacts refuses, and says to choose one
 
 
+_CALLED = {  # what other programs have, and what it is here
+    "time": "trace.t",
+    "position": "trace.x",
+    "velocity": "trace.v",
+    "force": "trace.F",
+    "deflection": "trace.z",
+    "state": "trace.states",
+    "events": "trace.transitions",
+    "plot": "plots.overview(trace)",
+    "to_csv": "trace.save('run.csv')",
+}
+
+
 @displayed("png", "html")
 @dataclass(frozen=True, eq=False)
 class Trace:
@@ -123,6 +136,15 @@ class Trace:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    if not TYPE_CHECKING:  # which knows all attributes there are
+
+        def __getattr__(self, name):
+            """Raise an error that says how the attribute is called here."""
+            said = f"a Trace has no {name!r}"
+            if name in _CALLED:
+                said += f"; write {_CALLED[name]}"
+            raise AttributeError(said, name=name, obj=self)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: generated functions cannot be, and are made again."""

@@ -180,6 +180,8 @@ def read_parts(path: Path) -> Parts:
     from gms_fsm.traces.files import csv_files, npz_files
 
     reader = {".npz": npz_files.read, ".csv": csv_files.read}.get(path.suffix)
+    if path.is_dir() and (inside := path / "trace.npz").is_file():
+        raise TraceFileError("it is a folder", place=str(path), advice=f"give {inside}")
     if reader is None:
         raise TraceFileError(
             f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",

@@ -36,6 +36,24 @@ def test_the_formats_are_named_from_one_table(tmp_path: Path, gms_fsm: CommandLi
 
 
 @pytest.mark.parametrize(
+    ("arguments", "cure"),
+    [
+        ("simulate a.toml", "Did you mean 'run'?"),
+        ("run a.toml t_end=10", "changed by --set t_end=10"),
+        ("run a.toml --law signed", "--set model.law=signed"),
+        ("chart gms signed", "chosen by --law signed"),
+        ("code lugre -o lugre.py", "gms-fsm code ... > FILE"),
+    ],
+)
+def test_arguments_that_are_not_taken_are_answered_with_what_is_meant(
+    arguments: str, cure: str, gms_fsm: CommandLine
+) -> None:
+    done = gms_fsm(*arguments.split())
+    assert done.code == 2
+    assert cure in done.err
+
+
+@pytest.mark.parametrize(
     "arguments",
     [
         ("paper", "--velocity", "1 +", "-o", "p"),

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import messages, named_bars, note
+from gms_fsm.app.verbs.console import messages, named_bars, note, say
 from gms_fsm.app.verbs.options import (
     INTERRUPTED,
     ContactName,
@@ -47,7 +47,7 @@ def paper_command(
 
     with plots.preset(preset), named_bars() as show:
         files = writing.write(output, force, velocity, show)
-    typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
+    say(f"{len(files)} files in {output}; start with {files[0]}")
 
 
 def run_command(
@@ -99,12 +99,12 @@ def run_command(
         raise typer.Exit(INTERRUPTED) from None
     if loaded.motion is not None and (text := velocity_note(trace, loaded.motion)):
         note(text)
-    typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
+    say(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
     for line in monitor_lines(trace):
-        typer.echo(line)
+        say(line)
     for each in note_lines(trace):
-        typer.echo(f"note: {each}")
-    typer.echo(f"start with {files[0]}")
+        say(f"note: {each}")
+    say(f"start with {files[0]}")
 
 
 def sweep_command(
@@ -141,13 +141,13 @@ def sweep_command(
         note("interrupted; nothing was written")
         raise typer.Exit(INTERRUPTED) from None
     bad = int((result.outcome != "ok").sum())
-    typer.echo(
+    say(
         f"{len(result)} runs, {bad} failed, {len(result.transitions)} transitions; "
         f"{len(files)} files in {folder}"
     )
     for run, message in failures(result, most=1):
-        typer.echo(f"first failure: run {run}: {message}")
-    typer.echo(f"start with {files[0]}")
+        say(f"first failure: run {run}: {message}")
+    say(f"start with {files[0]}")
 
 
 def phenomena_command(
@@ -199,8 +199,8 @@ def phenomena_command(
     models_said = "1 model" if len(table.models) == 1 else f"{len(table.models)} models"
     measured = len(table.phenomena)
     phenomena_said = "1 phenomenon" if measured == 1 else f"{measured} phenomena"
-    typer.echo(f"{models_said}, {phenomena_said}: {said}")
-    typer.echo(f"{len(written)} files in {output}; start with {written[0]}")
+    say(f"{models_said}, {phenomena_said}: {said}")
+    say(f"{len(written)} files in {output}; start with {written[0]}")
 
 
 def schema_command() -> None:
@@ -246,7 +246,7 @@ def lesson_command(
     from gms_fsm.app.lessons import LESSONS, listed, numbered, teach
 
     if not number and not notebook:
-        typer.echo(listed())
+        say(listed())
         return
     if notebook:
         from gms_fsm.app.lessons.engine.notebooks import write_notebook
@@ -258,7 +258,7 @@ def lesson_command(
     with messages().status(f"running lesson {chosen}"):
         taught = teach(chosen, output)
     for line in taught.lines:
-        typer.echo(line)
+        say(line)
     typer.echo()
     for path in taught.files:
         typer.echo(str(path))

@@ -39,8 +39,6 @@ def _loaded(path: Path) -> Trace:
             place=str(path),
             advice=f"run it first: `gms-fsm run {path}`, then give out/{path.stem}/trace.npz",
         )
-    if path.is_dir() and (inside := path / "trace.npz").is_file():
-        raise TraceFileError("it is a folder", place=str(path), advice=f"give {inside}")
     return Trace.load(path)
 
 
