@@ -38,6 +38,7 @@ __all__ = [
     "PARAMETERS",
     "SLIP_LAWS",
     "TABLE_I",
+    "WHICH_C",
     "WHICH_LAW",
     "Law",
     "check_law",
@@ -49,6 +50,10 @@ LAWS: tuple[Law, ...] = get_args(Law)
 WHICH_LAW = (
     "'signed' (Al-Bender et al. 2005) is for simulations; 'published', eq. (1) as printed, repeats "
     "the paper, and makes energy for v < 0"
+)
+WHICH_C = (
+    "while an element slips, its force follows s(v) in the time F_c / C: for 50 ms at F_c = 1 N give "
+    "C = 20 N/s with shares, or C_i = share * C / k_i in m/s, a list"
 )
 
 PARAMETERS = (

@@ -7,7 +7,6 @@ down, a line of units) is noted.
 from __future__ import annotations
 
 import codecs
-import contextlib
 import csv
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -289,13 +288,6 @@ def _readings(number: int, line: str, form: TextFormat) -> Iterator[_Head]:
             while names and not names[-1]:  # a separator at the end
                 names.pop()
             yield _Head(number, names, delimiter)
-
-
-def _is_number(cell: str) -> bool:
-    for mark in ".,":
-        with contextlib.suppress(ValueError):
-            return math.isfinite(_number(cell, mark))
-    return False
 
 
 def _places(path: Path, head: _Head, columns: Mapping[str, Column]) -> dict[str, int]:
