@@ -234,10 +234,17 @@ rows = {
     "very long": ('title = "open loop"', f'"{LONG}" = 1'),
     "very long value": (END, f"{END}\nend = '{LONG}'"),
     "3000 tables deep": ("[run]", f"{'a.' * 3000}b = 1\n[run]"),
+    "of a table within": ("v_c = 1e-6", "v_c = 1e-6\nF_c = 1.0"),
+    "of another program": (END, f"{END}\ndt = 1e-3"),
+    "no C": (f"{ONE_C}\n", ""),
 }
 group("key of a scenario", ScenarioError, edited, rows, "a.toml")
 rows = {
     "unknown model": ('"GMS"', '"GSM"'),
+    "model in other letters": ('"GMS"', '"gms"'),
+    "model with a hyphen": ('"GMS"', '"lu-gre"'),
+    "number with its unit": (END, 't_end = "60 s"'),
+    "numbers in a text": ("[100.0, 50.0]", '"100, 50"'),
     "unknown law": ('"signed"', '"singed"'),
     "unknown column of Table I": (MODEL, PAPER.replace("stick-slip", "stickslip")),
     "unknown method": (END, f'{END}\nmethod = "rk45"'),
@@ -277,6 +284,10 @@ rows = {
     "expression that ends early": ("signal, column 8", ..., "sin(t)", "sin(t"),
     "unknown name": ("signal, column 9", ..., "sin(t)", "sin(x)"),
     "name that is an emoji elsewhere": ("signal, column 1", ..., SIN, ":warning:"),
+    "product without a sign": ("signal, column 5", ..., SIN, "0.1 sin(2 pi t)"),
+    "function of a module": ("signal, column 5", ..., SIN, "0.1*math.sin(t)"),
+    "letter for pi": ("signal, column 9", ..., SIN, "0.1*sin(\u03c0*t)"),
+    "case": ("signal, column 1", ..., SIN, "0 if t < 1 else 0.1"),
     "program": ("signal, column 1", ..., QUOTED, """'__import__("os").mkdir("pwned")'"""),
     "one corner": ("a.toml: rig.velocity = [[0.0, 0.1]]: signal", ..., QUOTED, "[[0.0, 0.1]]"),
     "no corner": ("a.toml: rig.velocity = []: signal", ..., QUOTED, "[]"),
@@ -430,6 +441,8 @@ rows = {
     ),
 }
 group("own file", ScenarioError, own, rows, "pair.toml")
+rows = {"one bracket": ("pulled", "[[contact]]", "[contact]", "run pulled.toml")}
+group("own file", ScenarioError, own, rows, "pulled.toml")
 rows = {
     "guard": ("guard, column 5", ..., "own", TO_FORWARD, 'guard = "F > F_k"', "run pair.toml"),
     "missing chart": ("one.toml", ..., "pulled", '"own.toml"', '"one.toml"', "blocks pulled.toml"),
@@ -513,6 +526,10 @@ rows = {
     "elements of a system": ("--elements", ..., "blocks pair.toml --elements 3"),
     "blocks of a chart file": ("own.toml", ..., "blocks own.toml"),
     "check of a missing chart": ("", ..., "check nothing"),
+    "chart in other letters": ("", ..., "chart GMS"),
+    "chart with a hyphen": ("", ..., "handout lu-gre"),
+    "beginning of a model": ("", ..., "phenomena --model GMS -o o"),
+    "number of the rig in a sweep": ("--over", ..., "sweep pulled.toml --over rig.m=1:2:2"),
     "law of a broken chart": ("", ..., "check broken:arms --law signed"),
     "domain that is empty": ("", ..., "check gms --law signed --domain s>0 --domain s<0"),
     "domain that is not encoded": ("", ..., "check gms --law signed --domain exp(s)>1"),
@@ -533,6 +550,7 @@ rows = {
 group("command", ParameterError, command, rows)
 rows = {
     "debug of a missing scenario": ("none.toml", ..., "debug none.toml"),
+    "run of a trace": ("t.npz", ..., "run t.npz"),
     "debug of a program": ("mine.py", ..., "debug mine.py"),
     "debug of a trace": ("t.CSV", ..., "debug t.CSV"),
     "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),
@@ -548,6 +566,7 @@ group("command", ExpressionError, command, rows)
 rows = {
     "plot of a missing trace": ("none.npz", ..., "plot none.npz"),
     "plot of no trace": ("own.toml", ..., "plot own.toml"),
+    "replay of a scenario": ("pulled.toml", ..., "replay pulled.toml"),
 }
 group("command", TraceFileError, command, rows)
 rows = {"data that are missing": ("nowhere", ..., "benchmark --data nowhere -o out")}
@@ -707,6 +726,9 @@ rows = {
     "no row where it is asked, and words": (
         from_csv(INSTRUMENT.replace(";4;2.0", ";4;off"), where="time > 1e3 s"),
     ),
+    "name without its unit": (from_csv(INSTRUMENT.replace("F_N", "F [N]")),),
+    "no names": (from_csv(INSTRUMENT.partition("\n")[2]),),
+    "spreadsheet": (from_csv(b"PK\x03\x04" + bytes(range(256))),),
     "unit beside a number": (from_csv(INSTRUMENT.replace("0.0;0;0.0", "s;0;0.0", 1)),),
 }
 group("Record.from_csv", RecordError, lambda given: read(**given), rows, "own.csv")
@@ -1631,6 +1653,7 @@ rows = {
     "all rows": ("", ..., {"output": "all"}),
     "times that are missing": ("", ..., {"output": "t_eval"}),
     "typo": ("", ..., {"t_evil": [0.5]}),
+    "parameter that varies": ("", ..., {"F_s": [1.5, 2.0]}),
     "unknown engine": ("engine", "turbo", {"engine": "turbo"}),
     "negative tolerance": ("rtol", -1.0, {"rtol": -1}),
     "unknown initial value": ("", ..., {"initial": {"q": 1}}),

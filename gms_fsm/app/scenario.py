@@ -362,7 +362,9 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
             return as_signal([(t, value) for t, value in given])
         return as_signal(given)
     except GMSError as error:
-        raise ScenarioError.of(error).inside(f"{key} = {cut(shown(given), 40)}").inside(path) from None
+        raise (
+            ScenarioError.of(error).inside(f"{key} = {cut(shown(given), 40)}").inside(path)
+        ) from None
 
 
 def find_file(scenario: Path, name: str) -> Path:

@@ -52,8 +52,8 @@ WHICH_LAW = (
     "the paper, and makes energy for v < 0"
 )
 WHICH_C = (
-    "while an element slips, its force follows s(v) in the time F_c / C: for 50 ms at F_c = 1 N give "
-    "C = 20 N/s with shares, or C_i = share * C / k_i in m/s, a list"
+    "while an element slips, its force follows s(v) in the time F_c / C: for 50 ms at F_c = 1 N "
+    "give C = 20 N/s with shares, or C_i = share * C / k_i in m/s, a list"
 )
 
 PARAMETERS = (

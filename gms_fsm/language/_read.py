@@ -314,7 +314,7 @@ class _Reader:
             case ast.Call(func=ast.Attribute(attr=function)) if function in FUNCTIONS:
                 instead = f"{function}(...), without a module before it"
             case ast.IfExp():
-                instead = "min, max, abs, sgn; another case of a chart is another state"
+                instead = "min, max, abs, sgn; a case in a chart is a state of its own"
         raise self.refuse(f"{_plain(node)} is not part of the language", node, instead)
 
     def name(self, node: ast.expr, name: str) -> Value:

@@ -43,6 +43,7 @@ from gms_fsm.traces.views import (
     BodyTrace,
     driven_velocity,
     dwell_times,
+    no_attribute,
     read_parts,
     sigma_at,
     sliding_of,
@@ -62,19 +63,6 @@ def check_trace(trace: object) -> None:
             "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
         )
     _ = trace.model.chart  # a system with several contacts refuses, and says to choose one
-
-
-_CALLED = {  # what other programs have, and what it is here
-    "time": "trace.t",
-    "position": "trace.x",
-    "velocity": "trace.v",
-    "force": "trace.F",
-    "deflection": "trace.z",
-    "state": "trace.states",
-    "events": "trace.transitions",
-    "plot": "plots.overview(trace)",
-    "to_csv": "trace.save('run.csv')",
-}
 
 
 @displayed("png", "html")
@@ -141,10 +129,7 @@ class Trace:
 
         def __getattr__(self, name):
             """Raise an error that says how the attribute is called here."""
-            said = f"a Trace has no {name!r}"
-            if name in _CALLED:
-                said += f"; write {_CALLED[name]}"
-            raise AttributeError(said, name=name, obj=self)
+            raise AttributeError(no_attribute(name), name=name, obj=self)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: generated functions cannot be, and are made again."""

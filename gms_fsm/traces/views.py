@@ -201,3 +201,21 @@ def read_parts(path: Path) -> Parts:
             place=str(path),
             advice="write it again",
         ) from None
+
+
+_CALLED = {  # what other programs have, and what it is here
+    "time": "trace.t",
+    "position": "trace.x",
+    "velocity": "trace.v",
+    "force": "trace.F",
+    "deflection": "trace.z",
+    "state": "trace.states",
+    "events": "trace.transitions",
+    "plot": "plots.overview(trace)",
+    "to_csv": "trace.save('run.csv')",
+}
+
+
+def no_attribute(name: str) -> str:
+    """Return what is said of an attribute that a trace does not have."""
+    return f"a Trace has no {name!r}" + (f"; write {_CALLED[name]}" if name in _CALLED else "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import graphviz
 import numpy as np
 import pytest
 
+import gms_fsm as package
 from gms_fsm import Prescribed, simulate
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import ParameterError, shown
@@ -85,6 +87,20 @@ def test_no_bar_before_an_error(arguments: tuple[str, ...], gms_fsm: CommandLine
 )
 def test_numbers_are_shown_as_plain_numbers(value: object, text: str) -> None:
     assert shown(value) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "cure"), [("velocity", "write trace.v"), ("plot", "write plots.overview(trace)")]
+)
+def test_a_trace_says_what_is_called_otherwise(name: str, cure: str) -> None:
+    trace = simulate(stick_slip("signed"), Prescribed("0.2"), 0.1)
+    with pytest.raises(AttributeError, match=f"a Trace has no '{name}'; {re.escape(cure)}$"):
+        getattr(trace, name)
+
+
+def test_the_package_suggests_a_name() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'simulte'; did you mean 'simulate'"):
+        _ = package.simulte
 
 
 def test_a_moment_knows_where_the_slider_is() -> None:

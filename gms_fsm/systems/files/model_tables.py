@@ -102,9 +102,7 @@ class GMSTable(Table):
         sigma = [0.0] * n if self.sigma is None else self.sigma
         if self.shares is not None:
             if isinstance(self.C, list) or self.weights is not None:
-                raise ValueError(
-                    f"shares need C as one number [N/s], and no weights; {WHICH_C}"
-                )
+                raise ValueError(f"shares need C as one number [N/s], and no weights; {WHICH_C}")
             assert self.C is not None
             try:
                 parameters = GMSParameters.from_shares(
