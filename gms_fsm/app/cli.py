@@ -92,7 +92,10 @@ class _Verb(TyperCommand):
         try:
             return super().parse_args(ctx, args)
         except _UsageError as error:
-            error.message = ". ".join([error.message.rstrip("."), *self.cures(given)])
+            param = getattr(error, "param", None)  # the missing one
+            help_ = "" if error.message or param is None else str(getattr(param, "help", ""))
+            said = [error.message.rstrip("."), help_.rstrip("."), *self.cures(given)]
+            error.message = ". ".join(filter(None, said))
             raise
 
     def cures(self, args: list[str]) -> Iterator[str]:

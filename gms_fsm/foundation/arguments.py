@@ -153,7 +153,7 @@ def there_are(name: object, known: Iterable[str]) -> str:
     hint = meant(name, names)
     if hint and len(names) > MOST_NAMED + 1:  # a wall of names would hide the one that is meant
         return f"{hint}there are {len(names)} in all"
-    return f"{hint}there {'is' if len(names) == 1 else 'are'} {some_of(names)}"
+    return f"{hint}there {'is only' if len(names) == 1 else 'are'} {some_of(names)}"
 
 
 def no_file(path: str | os.PathLike[str], kind: type[GMSError]) -> GMSError:
