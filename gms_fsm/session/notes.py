@@ -89,7 +89,7 @@ def _sizes(trace: Trace) -> Iterator[str]:
             yield (
                 f"no transition: an element breaks away at its weight times the Stribeck curve, "
                 f"here {thresholds.min():.3g} m or more, because all weights are 1 m/N, as in "
-                "Table I of the paper; give `shares` of the friction, which sum to 1, or `weights`"
+                "Table I of the paper; give shares of the friction, which sum to 1, or weights"
             )
         elif 0.0 < deflected < NEAR:
             yield (

@@ -85,7 +85,7 @@ def test_weights_that_nobody_gave_are_named():
     p = GMSParameters([4e5, 2e5], [0, 0], [1e-3, 1e-3], sigma_2=0.0, v_c=1e-6, stribeck=curve)
     (note,) = notes(GMS(p, law="signed"), "1e-4*sin(t)")
     assert "all weights are 1 m/N" in note
-    assert "give `shares`" in note
+    assert "give shares of the friction" in note
 
 
 @pytest.mark.parametrize("output", [{}, {"t_eval": np.linspace(0.0, 10.0, 11)}])
