@@ -22,7 +22,7 @@ from gms_fsm.errors import (
     ParameterError,
     shown,
 )
-from gms_fsm.foundation.arguments import checked_integer, checked_path
+from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.extras import require
 from gms_fsm.lowering.layout import BankPlaces
@@ -43,6 +43,7 @@ from gms_fsm.traces.views import (
     BodyTrace,
     driven_velocity,
     dwell_times,
+    no_attribute,
     read_parts,
     sigma_at,
     sliding_of,
@@ -91,6 +92,8 @@ class Trace:
         Method, tolerances, engine and other settings.
     monitors : mapping of str to Verdict
         Verdicts of the monitors, by name; empty if the run had none.
+    heading : str
+        Title of the scenario that was run; empty if there is none.
 
     Examples
     --------
@@ -108,6 +111,7 @@ class Trace:
     settings: Mapping[str, Setting]
     stored: Mapping[str, FloatArray] = field(default_factory=dict, repr=False)
     monitors: Mapping[str, Verdict] = field(default_factory=dict, repr=False)
+    heading: str = field(default="", repr=False)
     which: str = field(default="", repr=False)  # the contact, of a system with several
     every: Firings | None = field(default=None, repr=False)  # of all contacts, where one is chosen
 
@@ -123,6 +127,12 @@ class Trace:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    if not TYPE_CHECKING:  # which knows all attributes there are
+
+        def __getattr__(self, name):
+            """Raise an error that says how the attribute is called here."""
+            raise AttributeError(no_attribute(name), name=name, obj=self)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: generated functions cannot be, and are made again."""
@@ -256,9 +266,7 @@ class Trace:
         if isinstance(name, str) and name in names:
             return self.seen[names[name]]
         known = [*layout.y.shared, *(each for each in names if " " not in each)]
-        raise ParameterError(
-            f"there is no value {shown(name)}", advice=f"there are {', '.join(map(repr, known))}"
-        )
+        raise unknown("value", name, known)
 
     @property
     def x(self) -> FloatArray:
@@ -538,6 +546,7 @@ class Trace:
             parts.header.settings,
             parts.stored,
             parts.header.monitors,
+            parts.header.heading,
         )
 
     # ------------------------------------------------------------------ tables

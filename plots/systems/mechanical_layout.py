@@ -15,7 +15,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import permutations
 
-from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.registry import charts
 from gms_fsm.language import (
     MATLAB_LIKE,
@@ -63,6 +62,7 @@ class Touch:
     contact: Contact
     symbol: str
     shares: Mapping[str, tuple[int, str]]
+    unit: str  # of its position
 
 
 @dataclass(frozen=True)
@@ -259,7 +259,7 @@ def label_of(touch: Touch) -> list[str]:
     if _of_many(touch):
         lines += [formula(v) for v in contact.v]
     for name in SHOWN.get(touch.symbol, ()):
-        lines.append(_number(contact.chart, name, contact.values[name]))
+        lines.append(_number(touch, name))
     return lines
 
 
@@ -268,14 +268,11 @@ def _of_many(touch: Touch) -> bool:
     return len(touch.shares) > 2 or len(touch.contact.v) > 1
 
 
-def _number(chart: Chart, name: str, value: object) -> str:
+def _number(touch: Touch, name: str) -> str:
+    """Return a number of a contact, which is a length or an angle."""
+    value = touch.contact.values[name]
     shown = f"{value:.4g}" if isinstance(value, int | float) else "…"
-    unit = chart.unit(name)
-    return (
-        f"{formula(name)} = {shown} {unit}".rstrip()
-        if unit not in ("", "?")
-        else f"{formula(name)} = {shown}"
-    )
+    return f"{formula(name)} = {shown} {touch.unit}"
 
 
 def _wrapped(text: str) -> list[str]:
@@ -303,7 +300,9 @@ def _touch(system: System, contact: Contact) -> Touch:
             if share is not None and share != Number(0.0):
                 shares.setdefault(body.name, _share(share))
     many = len(shares) > 2 or len(contact.v) > 1
-    return Touch(contact, "box" if many else _symbol(contact), shares)
+    units = {system.body(name).unit for name in shares}
+    symbol = "box" if many else _symbol(contact)
+    return Touch(contact, symbol, shares, units.pop() if len(units) == 1 else "m")
 
 
 def _share(tree: Value) -> tuple[int, str]:

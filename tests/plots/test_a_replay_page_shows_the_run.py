@@ -263,6 +263,14 @@ def test_two_runs_are_drawn_in_the_same_plots(open_page: Open) -> None:
     open_tab(page, "Landscape")
     one, other = (box_of(page, f".run:nth-child({k}) .pane.landscape") for k in (1, 2))
     assert one["y"] + one["height"] <= other["y"]
+    names = page.locator(".right .of")
+    assert names.all_inner_texts() == ["Run 1", "Run 2"]
+    open_tab(page, "Time")
+    assert names.first.is_hidden()
+    page.set_viewport_size({"width": 1100, "height": 700})  # no room for three columns
+    first, second = (box_of(page, f".run:nth-child({k}) .left") for k in (1, 2))
+    assert first["y"] + first["height"] <= second["y"]
+    assert page.evaluate(CUT_OFF, [".chart.pane", "svg"]) == []
 
 
 def test_on_a_phone_chart_texts_are_11_px_high_and_guards_are_cards(open_page: Open) -> None:

@@ -144,6 +144,15 @@ def test_what_turns_has_round_corners_and_bent_arrows() -> None:
         assert (y1 - y0 > 0.1 * abs(x1 - x0)) == (name in screw), name
 
 
+def test_a_play_between_what_turns_is_an_angle() -> None:
+    texts = {
+        name: " ".join(text.get_text() for text in schematic(systems()[name]).axes[0].texts)
+        for name in ("two-mass servo", "friction_damper")
+    }
+    assert "= 0.02 rad" in texts["two-mass servo"]
+    assert "= 0.002 m " in f"{texts['friction_damper']} "
+
+
 def test_what_moves_normal_to_the_ground_has_upright_arrows_and_springs() -> None:
     drawn = parts("brake_squeal")
     for name in ("position normal", "force normal"):

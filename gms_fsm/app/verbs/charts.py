@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
+from gms_fsm.app.verbs.console import say
 from gms_fsm.app.verbs.options import ChartName, ContactName, Law
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.files import output_folder, write_text
 
 if TYPE_CHECKING:
-    from gms_fsm import Model, Report, Rig
+    from gms_fsm import Model, Report, Rig, Trace
     from gms_fsm.app._own_files import OwnFile
     from gms_fsm.run.problem import Problem
 
@@ -104,20 +105,24 @@ def handout_command(
 ) -> None:
     """Print a model on one A4 page: chart, equations, parameters, a hysteresis loop.
 
-    An included chart has the numbers of its demonstration; a scenario file
-    has its own.
+    An included chart has the numbers of its demonstration; of a scenario
+    its numbers and its run.
     """
     import plots
     from gms_fsm.app._own_files import own_file
+    from gms_fsm.app.scenario import load_scenario
     from gms_fsm.app.verbs.catalogue import chosen
     from gms_fsm.systems.models import demonstration
 
     own = own_file(name, law)
     no_contact(contact, own)
     if own is None:
-        model: Model = demonstration(chosen("handout", name, law)[0], law)
+        model: Model | Trace = demonstration(chosen("handout", name, law)[0], law)
     else:
         model = own.only_model(contact)
+        if own.run:
+            trace = load_scenario(own.path).simulate()
+            model = trace.contact(contact or trace.contacts[0])
     typer.echo(str(plots.handout(model, output)))
 
 
@@ -151,7 +156,7 @@ def check_command(
     from gms_fsm.app.verbs.catalogue import checkable, chosen
 
     if names:
-        typer.echo(checkable())
+        say(checkable())
         return
     own = own_file(name, law)
     no_contact(contact, own)
@@ -162,7 +167,7 @@ def check_command(
     if own is not None and own.system is not None:
         texts = [f"contact {each}:\n{text}" for each, text in zip(reports, texts, strict=True)]
     text = "\n\n".join(texts)
-    typer.echo(text)
+    say(text)
     for path in [] if folder is None else _write_reports(text, [*reports.values()], folder):
         typer.echo(str(path))
     if any(report.refuted for report in reports.values()):

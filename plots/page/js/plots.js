@@ -7,7 +7,6 @@ const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
 const elementStep = (i, n) => (n > 1 ? Math.round((i * (COLOURS - 1)) / (n - 1)) : 0); // of the ramp from the first element to the last
 const RUNS = [{ stroke: "--ink" }, { stroke: "--soft", dash: [7, 4] }]; // lines of the first run and of the second
-const WIDE = matchMedia("(min-width: 1000px) and (min-height: 520px)"); // there the page fills the screen and does not scroll
 const MOST_POINTS = 60000; // of lines that are drawn again when another element is selected
 let pointed = null, pinned = null; // frames: under the mouse, and where two runs first differ
 
@@ -106,7 +105,7 @@ class TimePlots {
     if (!width || !this.plots.length) return;
     const heads = this.plots.reduce((sum, { value }) => sum + value.parentNode.offsetHeight, 0);
     const left = this.box.clientHeight - heads - (this.ribbons?.offsetHeight ?? 0) - TIME_AXIS - 2;
-    const height = WIDE.matches ? Math.max(Math.floor(left / this.plots.length), LEAST) : 92;
+    const height = isWide() ? Math.max(Math.floor(left / this.plots.length), LEAST) : 92;
     for (const each of this.plots) {
       const own = each === last ? height + TIME_AXIS : height;
       if (each.plot.width !== width || each.plot.height !== own) each.plot.setSize({ width, height: own });

@@ -13,6 +13,7 @@ class RunView {
     this.root = $("#run").content.cloneNode(true).firstElementChild;
     $("#runs").append(this.root);
     $("h2", this.root).textContent = (data.runs.length > 1 ? `Run ${this.place + 1}: ` : "") + run.title;
+    $(".of", this.root).textContent = `Run ${this.place + 1}`;
     const which = $(".contact", this.root);
     run.contacts.forEach(({ name }) => make("option", which, name));
     $(".which", this.root).hidden = run.contacts.length < 2;
@@ -49,6 +50,7 @@ class RunView {
     const each = this.panes[key];
     if (!each && !this.place) return;
     $(`.${side}`, this.root).hidden = !each; // shared, and shown by the first run
+    if (side === "right") $(".of", this.root).hidden = runs.length < 2 || Boolean(each?.Pane.shared);
     delete this.open[side];
     for (const { Pane, tab, box } of Object.values(this.panes)) {
       if (Pane.side !== side) continue;
@@ -253,7 +255,7 @@ function inClause({ left, right, unit }, u, digits) { return inUnit(u, unit, pow
 function heldBack(contact, leaving, scope) {
   const each = leaving.map((k) => ({ k, worst: worstClause(contact.clauses(k, scope)) })).sort((a, b) => relative(b.worst) - relative(a.worst));
   const { k, worst } = each[0], by = Number.isNaN(worst.margin) ? "" : ` by ${inClause(worst, Math.abs(worst.margin), 3)}`;
-  return `${contact.edges[k].name} is held back: ${worst.text} is ${worst.truth < 0 ? "not computable" : `false${by}`}`;
+  return `${contact.edges[k].name} does not fire: ${worst.text} is ${worst.truth < 0 ? "not computable" : `false${by}`}`;
 }
 
 // ------------------------------------------------------------------ the chart: its SVG is laid out once and restyled
@@ -274,6 +276,7 @@ class ChartPane {
     this.svg = $("svg", box);
     this.svg?.setAttribute("aria-label", `Chart of ${contact.name || "an element"}`);
     this.whole = this.svg?.getAttribute("viewBox");
+    this.least = SMALLEST / Math.min(...$$("text", box).map((text) => Number(text.getAttribute("font-size")))); // scale
     this.parts = [];
     for (const node of $$("[data-slot]", box)) (this.parts[node.dataset.slot] ??= []).push(node);
     for (const guard of $$(".guard", box)) {
@@ -295,9 +298,7 @@ class ChartPane {
 
   show() {
     for (let slot = 0; slot < this.parts.length; slot++) this.light(slot);
-    if (this.box.scrollHeight > this.box.clientHeight || this.box.scrollWidth > this.box.clientWidth) {
-      for (const node of $$(".state.active, .guard.fired", this.region ?? this.box)) reveal(node, this.box);
-    }
+    if (this.scrolls) for (const node of $$(".state.active, .guard.fired", this.region ?? this.box)) reveal(node, this.box);
   }
 
   light(slot) {
@@ -339,10 +340,9 @@ class ChartPane {
   // scrolls, or on a narrow screen the page.
   fit() {
     if (!this.svg) return;
-    const least = SMALLEST / Math.min(...$$("text", this.svg).map((text) => Number(text.getAttribute("font-size"))));
-    const across = this.box.clientWidth, high = WIDE.matches ? this.box.clientHeight : SHARE * innerHeight;
+    const { least } = this, across = this.box.clientWidth, high = isWide() ? this.box.clientHeight : SHARE * innerHeight;
     const region = $(`.region[data-slot="${this.view.element}"]`, this.svg), [, , width, height] = this.whole.split(" ").map(Number);
-    const enough = region && WIDE.matches ? OVERVIEW : least;
+    const enough = region && isWide() ? OVERVIEW : least;
     let shown = this.whole;
     this.region = region && Math.min(across / width, high / height) < enough ? region.parentNode : null;
     if (this.region) {
@@ -352,6 +352,7 @@ class ChartPane {
     this.svg.setAttribute("viewBox", shown);
     const [, , w, h] = shown.split(" ").map(Number), scale = clamp(Math.min(across / w, high / h), this.region ? least : enough, LARGEST);
     place(this.svg, { width: w * scale, height: h * scale });
+    this.scrolls = w * scale > across + 1 || (isWide() && h * scale > high + 1);
   }
 }
 const SMALLEST = 11; // px of text
