@@ -161,8 +161,8 @@ def test_the_tribometer_explains_the_measurement_and_shows_its_loops(
     model, data = panel.lines
     begin, end = first.get_xlim()
     assert len(data.get_xdata()) == ((times >= begin) & (times <= end)).sum() > 2000
-    for line in (model, data):  # 228 um to and fro, +-2.3 N, one on the other
-        assert np.ptp(line.get_xdata()) == pytest.approx(0.23, abs=0.01)
+    for line in (model, data):  # 228 µm to and fro, +-2.3 N, one on the other
+        assert np.ptp(line.get_xdata()) == pytest.approx(230, abs=10)
         assert np.ptp(line.get_ydata()) == pytest.approx(4.8, abs=0.4)
 
 

@@ -74,9 +74,9 @@ SHOWN = {
     "debugger_branches": ["≠≠≠", "branch 1", "first different transition at t =", "FIRED"],
     "debugger_brake": ["pad 1: friction under a varying load", "locked: v = 0", "face: one-sided"],
     "live": [
-        "t = 17.000 s",
+        "t = 0.29000 s",
         "last transitions (",
-        "over the last 6.000 s",
+        "over the last 0.2900 s",
         "simulated seconds per",
     ],
 }
