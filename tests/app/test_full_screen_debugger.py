@@ -13,8 +13,9 @@ import pytest
 pytest.importorskip("textual", reason="needs the extra tui")
 
 from gms_fsm import Prescribed
+from gms_fsm.app.verbs.console import CLEARED, opening
 from gms_fsm.debugger import COMMANDS
-from gms_fsm.debugger.tui import CLEARED, LOADING, _app, quiet, run_tui
+from gms_fsm.debugger.tui import _app, run_tui
 from gms_fsm.debugger.tui._app import FullScreen
 from gms_fsm.debugger.tui._keys import KEYS
 from gms_fsm.debugger.tui._spans import DARK, LIGHT
@@ -343,19 +344,26 @@ def test_on_a_terminal_it_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(FullScreen, "run", lambda _: 3)
     assert run_tui(session()) == 3
-    assert sys.stdout.getvalue() == f"{LOADING}{CLEARED}"  # type: ignore[attr-defined]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such terminal")
-def test_keys_typed_while_it_opens_are_not_echoed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_while_it_opens_a_line_says_so_and_keys_are_not_echoed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     import pty
     import termios
 
     outer, inner = pty.openpty()
+    shown = io.StringIO()
+    monkeypatch.setattr(shown, "isatty", lambda: True)
     with open(outer, "wb", buffering=0), open(inner) as terminal:
         monkeypatch.setattr(sys, "stdin", terminal)
+        monkeypatch.setattr(sys, "stdout", shown)
+        monkeypatch.setenv("TERM", "xterm")
         echo = [termios.tcgetattr(terminal)[3] & termios.ECHO]
-        with quiet():
+        with opening("the debugger"):
             echo.append(termios.tcgetattr(terminal)[3] & termios.ECHO)
+            assert shown.getvalue() == "opening the debugger ...\r"
         echo.append(termios.tcgetattr(terminal)[3] & termios.ECHO)
     assert echo == [termios.ECHO, 0, termios.ECHO]
+    assert shown.getvalue().endswith(CLEARED)

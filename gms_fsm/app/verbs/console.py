@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +16,8 @@ from gms_fsm.foundation.quantities import WIDTH, wrapped
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
+
+CLEARED = "\r\x1b[2K"  # the line
 
 
 def messages(**options: Any) -> Console:
@@ -81,3 +85,40 @@ def _parts(text: str) -> Iterator[str]:
     width = shutil.get_terminal_size((WIDTH, 24)).columns
     for line in text.split("\n"):
         yield from wrapped(line, width, whole=True)
+
+
+@contextlib.contextmanager
+def opening(what: str) -> Iterator[None]:
+    """Say that something opens on the whole terminal, and do not echo what is typed meanwhile."""
+    terminal = all(file is not None and file.isatty() for file in (sys.stdin, sys.stdout))
+    if not terminal or os.environ.get("TERM") == "dumb":
+        yield
+        return
+    with _without_echo():
+        sys.stdout.write(f"opening {what} ...\r")  # under the screen that will be drawn
+        sys.stdout.flush()
+        try:
+            yield
+        finally:
+            sys.stdout.write(CLEARED)
+            sys.stdout.flush()
+
+
+@contextlib.contextmanager
+def _without_echo() -> Iterator[None]:
+    if sys.platform == "win32":  # has no termios, and echoes nothing
+        yield
+        return
+    import termios
+
+    try:
+        before = termios.tcgetattr(sys.stdin)
+    except (OSError, termios.error):
+        yield
+        return
+    without = [*before[:3], before[3] & ~termios.ECHO, *before[4:]]
+    termios.tcsetattr(sys.stdin, termios.TCSADRAIN, without)
+    try:
+        yield
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)

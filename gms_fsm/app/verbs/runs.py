@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import enum
 import json
 import math
@@ -12,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import messages, named_bar, note, say
+from gms_fsm.app.verbs.console import messages, named_bar, note, opening, say
 from gms_fsm.app.verbs.options import (
     INTERRUPTED,
     ContactName,
@@ -262,14 +263,15 @@ def debug_command(
     ] = False,
 ) -> None:
     """Step through a scenario in the terminal: break, why, back, poke, compare."""
-    from gms_fsm.app.scenario import load_scenario, run_debugger, session_of
-    from gms_fsm.debugger.tui import run_tui
-
     if light and not tui:
         raise typer.BadParameter("it is an option of --tui", param_hint="--light")
-    loaded = load_scenario(scenario, overrides or [])
-    if tui:
-        raise typer.Exit(run_tui(session_of(loaded), loaded.title, light=light))
+    with opening("the debugger on the whole terminal") if tui else contextlib.nullcontext():
+        from gms_fsm.app.scenario import load_scenario, run_debugger, session_of
+        from gms_fsm.debugger.tui import run_tui
+
+        loaded = load_scenario(scenario, overrides or [])
+        if tui:
+            raise typer.Exit(run_tui(session_of(loaded), loaded.title, light=light))
     raise typer.Exit(run_debugger(loaded))
 
 
