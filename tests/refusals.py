@@ -1907,6 +1907,11 @@ rows = {
 }
 group("session", ExpressionError, unmoved, rows)
 rows = {
+    f"condition {text!r}": (lambda s, text=text: s.until(text),)
+    for text in ("v > 3 mm", "z1 > 3 mm/s", "F > 2 furlong", "abs(v) > 1 m")
+}
+group("session", UnitError, unmoved, rows, "")
+rows = {
     "element too many": (lambda s: s.until("state(9) == slip"),),
     "condition of a breakpoint": (lambda s: s.break_on("fires", "arrest", None, "z9 > 0"),),
     "name without its contact": (lambda s: s.parse("F > 1"), a_system),

@@ -126,7 +126,7 @@ def fit_figure(
         whole = begin <= part.t[0] and end >= part.t[-1]
         names = [
             "measurement and model" + ("" if whole else f", {begin:.4g} to {end:.4g} s"),
-            _score_name(chosen, fit.task.measured.unit),
+            _score_name(chosen, part),
             "loop",
             "residual",
         ]
@@ -176,11 +176,13 @@ def _title(fit: Fit, chosen: Residuals, count: int, which: int | None) -> str:
     return f"{fit.title}, fitted to {chosen.record.name}{others}"
 
 
-def _score_name(chosen: Residuals, unit: str) -> str:
+def _score_name(chosen: Residuals, part: _Compared) -> str:
     """Name the panel of the residual, with its size in the rows of this record."""
     parts = [("RMSE", chosen.rows), ("held out", chosen.held)]
-    sizes = [f"{name} {_size(chosen, rows):.3g}" for name, rows in parts if rows.any()]
-    return f"residual; {', '.join(sizes)} {unit}"
+    sizes = [
+        f"{name} {part.factor * _size(chosen, rows):.3g}" for name, rows in parts if rows.any()
+    ]
+    return f"residual; {', '.join(sizes)} {part.small}"
 
 
 def _size(each: Residuals, rows: NDArray[np.bool_]) -> float:

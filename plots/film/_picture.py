@@ -204,7 +204,7 @@ class FilmPicture:
             cursor.set_xdata([t, t])
         self.point.set_data([t], [force])
         slow = {1.0: "", np.inf: "    held"}.get(frame.slowed, f"    slowed ×{frame.slowed:g}")
-        self.clock.set_text(f"t = {t:.3f} s    F = {force:+.3f} N{slow}")
+        self.clock.set_text(f"t = {t:.3f} s    F = {self.bristles.told(1, force)}{slow}")
         self.happens.set_text(self._event(frame))
         self.bristles.show(frame)
 

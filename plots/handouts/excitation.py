@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.foundation.quantities import quantity
+from gms_fsm.foundation.quantities import in_words, quantity
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Prescribed, Rig, TextRig
@@ -118,7 +118,7 @@ def _run(model: Model, amplitude: float, cycles: float, *, pulled: bool) -> Trac
 
 
 def _about(amplitude: float, *, pulled: bool) -> str:
-    sine = f"A sin(2πt/T), A = {amplitude:.3g} m, T = {PERIOD:g} s"
+    sine = f"A sin(2πt/T), A = {in_words(amplitude, 'm', 3)}, T = {PERIOD:g} s"
     if not pulled:
         return f"x(t) = {sine}"
     return (

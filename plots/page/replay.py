@@ -27,6 +27,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, listed
 from gms_fsm.foundation.extras import missing
+from gms_fsm.foundation.quantities import PREFIXES, SMALLEST, TAKES_PREFIX
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
@@ -36,6 +37,7 @@ from gms_fsm.language import (
     OPERATIONS,
     SEVERAL,
 )
+from gms_fsm.records.units import FACTORS
 from gms_fsm.session.explain import ROUNDING
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.prove import Report
@@ -262,6 +264,12 @@ def page_data(
         "title": title or " and ".join(dict.fromkeys(map(_heading, traces))),
         "runs": runs,
         "language": _language(),
+        "quantities": {
+            "prefixes": PREFIXES,
+            "prefixed": TAKES_PREFIX.pattern,
+            "smallest": SMALLEST,
+        },
+        "hatches": HATCH_ANGLES,
         "rounding": ROUNDING,
     }
     return data, charts
@@ -304,6 +312,11 @@ def _language() -> dict[str, Any]:
         "sign": LEVELS["neg"],
         "functions": {name: "several" if name in SEVERAL else "one" for name in FUNCTIONS},
         "constants": dict(CONSTANTS),
+        "units": {  # each with its factor, and the unit of SI for what it measures
+            unit: [factor, next(name for name, one in units.items() if one == 1.0)]
+            for units in FACTORS.values()
+            for unit, factor in units.items()
+        },
     }
 
 

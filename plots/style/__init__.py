@@ -16,6 +16,7 @@ from typing import Any, Literal
 from gms_fsm.errors import ParameterError
 
 Theme = Literal["light", "dark"]
+THEMES: tuple[Theme, ...] = ("light", "dark")
 
 INK = "#1B1B1B"
 TEXT_GREY = "#62676F"
@@ -141,6 +142,22 @@ _ROLES = (
     ),
 )
 ROLES: Mapping[str, Role] = MappingProxyType({role.name: role for role in _ROLES})
+# Roles where the terminal chooses the colours: numbers 0 to 15 of ANSI. It has no orange.
+ANSI: Mapping[str, int] = MappingProxyType(
+    {"active": 4, "now": 3, "holds": 2, "fails": 8, "error": 1}
+)
+
+
+def ansi(name: str, *, bold: bool = False) -> str:
+    """Return the code with which a terminal writes in the colour of a role.
+
+    Examples
+    --------
+    >>> ansi("holds"), ansi("active", bold=True), ansi("fails")
+    ('32', '1;34', '90')
+    """
+    number = ANSI[name]
+    return f"{'1;' * bold}{30 + number if number < 8 else 82 + number}"
 
 
 def colour(name: str, theme: Theme = "light") -> str:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
+from gms_fsm.foundation.quantities import scale_of
 from gms_fsm.language import evaluate
 from gms_fsm.session.explain import explain, values_at
 from tests.plots.browser import (
@@ -401,6 +402,7 @@ DRAWN = """() => [
             x: element.querySelector(".foot").getCTM().e, peg: seen(".peg"), arrow: seen(".way"),
             way: element.querySelector(".way").getAttribute("transform") ? -1 : 1,
             springs: element.querySelectorAll(".link path").length,
+            ground: element.querySelector(".block").style.fill,
             end: element.querySelector(".link").getBoundingClientRect().right,
             texts: [...element.querySelectorAll("text")].map((node) => node.textContent),
         };
@@ -418,22 +420,28 @@ def test_bristles_are_where_z_puts_them_and_move_with_the_ground_while_they_stic
     rows = some_rows(page, 40)
     drawn = at_rows(page, [row for row, _ in rows], DRAWN)
     wanted: list[str] = []
+    # One unit for all rows of a quantity, as Python chooses it.
+    speed, force, place = (
+        scale_of(np.ravel(values).tolist(), unit)
+        for values, unit in ((trace.v, "m/s"), (trace.F, "N"), (trace.z, "m"))
+    )
     for (_, number), (elements, _, motion) in zip(rows, drawn, strict=True):
         places.append([element["x"] for element in elements])
         ends |= {round(element["end"]) for element in elements}
         z.append(trace.z[number])
         v, F = float(trace.v[number]), float(np.float32(trace.F[number]))
         texts += [*motion, *(element["texts"][1] for element in elements)]
-        wanted += [f"'v = ' + eng({v!r}, 'm/s', 4)", f"'F = ' + eng({F!r}, 'N', 4)"]
-        wanted += [f"'z ' + eng({float(each)!r}, 'm', 4)" for each in trace.z[number]]
+        wanted += [f"v = {speed.text(v)}", f"F = {force.text(F)}"]
+        wanted += [f"z {place.text(float(each))}" for each in trace.z[number]]
         for element, state in zip(elements, trace.states[number], strict=True):
             held = bool(state == "stick")
             counts[held] += 1
             assert element["peg"] == held
+            assert f"-state{int(not held)}" in element["ground"]  # plain and pale, or hatched
             assert element["arrow"] == (not held and v != 0)
             assert element["texts"][0].split()[1] == state
             assert not element["arrow"] or element["way"] == np.sign(v)
-    assert texts == page.evaluate(f"[{', '.join(wanted)}]")
+    assert texts == [each.replace("-", "−") for each in wanted]
     slope, rest = np.polyfit(np.ravel(z), np.ravel(places), 1)
     np.testing.assert_allclose(np.ravel(places), rest + slope * np.ravel(z), atol=0.05)
     assert slope < 0  # the slider moves to the right, away from its contacts

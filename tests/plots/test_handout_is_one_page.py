@@ -110,7 +110,7 @@ def test_a_motion_of_ones_own_and_one_that_is_seen_without_a_length() -> None:
     texts = [text.get_text() for text, _ in drawn_texts(figure)]
     assert "prescribed velocity: v = 0.1*cos(t)" in texts
     clutch = demonstration(registered()["dog-clutch"], "")
-    assert ", A = 0.1 m, " in excited(clutch).about
+    assert ", A = 100 mm, " in excited(clutch).about
 
 
 @pytest.mark.slow

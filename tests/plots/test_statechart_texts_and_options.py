@@ -260,7 +260,7 @@ def test_an_edge_with_several_sources_is_one_line_for_each() -> None:
     # counted and replayed.
     bodies, contacts = (Body("mass", inertia=1.0),), (Contact("pad", RESET),)
     trace = simulate(System("reset", bodies=bodies, contacts=contacts), 3.0)
-    svg = LiveChart(trace).frame(-1)
+    svg = LiveChart(trace).frame(int(np.flatnonzero(trace.microstep)[-1]))
     fired = [line.split('"')[1] for line in svg.split("<g ") if "fired" in line]
     assert sorted(fired) == [
         "element1-edge-stop-from-high-1",

@@ -59,7 +59,7 @@ def error_line(text: str) -> None:
 
 def note(message: Warning | str, *_: object, **__: object) -> None:
     """Print a note; a replacement for `warnings.showwarning`."""
-    _line("note:", "bold yellow", str(message))
+    _line("note:", "bold", str(message))
 
 
 def say(text: str) -> None:

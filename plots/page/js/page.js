@@ -14,7 +14,7 @@ function show(k, words = "") {
   const t = frames.t[frame], half = (span.max - span.min) / 2;
   if (t < span.min || t > span.max) zoomTo(t - half, t + half); // a zoomed window follows
   for (const view of views) view.show(frames.rows[view.place][frame]);
-  const place = `t = ${written(t, 9)} s`;
+  const place = `t = ${timeText(t, 9)}`;
   $("#now").textContent = place;
   const scrubber = $("#scrubber");
   scrubber.value = inTime ? t : frame;
@@ -230,7 +230,7 @@ function difference() {
   while (k < Math.min(a.length, b.length) && text(a[k]) === text(b[k])) k += 1;
   if (k === Math.max(a.length, b.length)) return { frame: null, told: "both runs make the same transitions in the same order" };
   const entries = [a[k], b[k]], at = entries.map((entry, i) => (entry ? frames.of[i][entry.row] : Infinity)), least = Math.min(...at);
-  const told = entries.map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${written(entry.t, 7)} s` : "no further transition"}`);
+  const told = entries.map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${timeText(entry.t, 7)}` : "no further transition"}`);
   // Why the later run did not do the same then; of two at one time, the one that was held back.
   const words = entries.map((entry, i) => (frames.t[at[i]] === frames.t[least] ? heldInOther(entry, i, at[i]) : ""));
   const why = words.find((each) => each && !each.endsWith("fires next")) ?? words.find(Boolean);
@@ -249,6 +249,9 @@ function firstDifference() {
 }
 
 // ------------------------------------------------------------------ start
+// A time, in the unit of the time axis.
+function timeText(t, digits) { return inUnit(t, "s", TIME_POWER, digits); }
+
 // Shows other data in the place of those shown, if any; time, zoom, selection, breakpoints and open tabs stay.
 function load(given) {
   const t = frames?.t[frame] ?? -Infinity, zoomed = frames && (span.min !== whole.min || span.max !== whole.max) && { ...span };

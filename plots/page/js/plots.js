@@ -43,7 +43,7 @@ class TimePlots {
   // A plot of a value of both runs: `of` finds it in a run, undefined where there is none.
   compare(title, unit, of, { band = false, ...options } = {}) {
     const lines = runs.map((run, k) => ({ ...RUNS[k], run, get: of(run) })).filter(({ get }) => get);
-    this.add({ title, unit, lines, band: band && lines.length > 1, at: () => readings(lines, unit), ...options });
+    this.add({ title, unit, lines, band: band && lines.length > 1, at: (power) => readings(lines, unit, power), ...options });
   }
 
   add(plot) { this.wanted.push(plot); }
@@ -80,7 +80,7 @@ class TimePlots {
       if (Math.abs(event.clientX - down) < 4) go(Math.max(lastAt(frames.t, plot.posToVal(event.offsetX, "x")), 0));
     });
     if (note) make("small", head, note);
-    return { plot, value, at };
+    return { plot, value, at: () => at(power) };
   }
 
   // The states of every element; of two runs both, one under the other.
@@ -201,14 +201,14 @@ function valueAt({ get, run }, frame, t) {
   return to > from && t > from ? get(row) + ((get(next) - get(row)) * (t - from)) / (to - from) : get(row);
 }
 
-// The value of each run at the row shown, and how far the second is from the first.
-function readings(lines, unit) {
-  const k = pointed ?? frame, t = frames.t[k], at = lines.map(({ get, run }) => eng(get(frames.rows[run.place][k]), unit, 5));
+// The value of each run at the row shown, in the unit of the plot, and how far the second is from the first.
+function readings(lines, unit, power) {
+  const k = pointed ?? frame, t = frames.t[k], at = lines.map(({ get, run }) => inUnit(get(frames.rows[run.place][k]), unit, power, 5));
   if (runs.length < 2) return at[0];
   const texts = at.map((text, i) => `${lines[i].run.place + 1}: ${text}`);
   if (lines.length < 2 || runs.some((each) => each.ended(t))) return texts.join("  ");
   const [one, two] = lines.map((line) => valueAt(line, k, t));
-  return `${texts.join("  ")}  Δ ${eng(two - one, unit, 3)}`;
+  return `${texts.join("  ")}  Δ ${inUnit(two - one, unit, power, 3)}`;
 }
 
 class TimePane extends TimePlots {
@@ -250,7 +250,7 @@ class TimePane extends TimePlots {
     const unit = over ? "" : contact.units[name] ?? "";
     this.add({
       title: over ? `${name} / s(v), lines at ±1` : name, unit, lines: [...bounds, ...lines],
-      at: () => `${contact.n > 1 ? `E${this.view.element + 1}: ` : ""}${readings(lines.filter(({ i }) => i === this.view.element), unit)}`,
+      at: (power) => `${contact.n > 1 ? `E${this.view.element + 1}: ` : ""}${readings(lines.filter(({ i }) => i === this.view.element), unit, power)}`,
     });
     this.innerLines = lines;
     return true;

@@ -87,10 +87,10 @@ class RunView {
     const { run } = this, fired = run.fired.get(row);
     if (fired && following) this.choose(fired.contact, fired.element);
     const { contact } = this;
-    const get = (name, unit) => eng(contact.value(name, 0, row), unit, 5);
-    const ended = run.ended(frames.t[frame]) && `ended at ${eng(run.t(row), "s", 5)}`;
+    const get = (name) => contact.tell(name, contact.value(name, 0, row), 5);
+    const ended = run.ended(frames.t[frame]) && `ended at ${timeText(run.t(row), 5)}`;
     $(".values", this.root).textContent = [
-      `F = ${get("F", "N")}`, `v = ${eng(contact.value(contact.velocity, 0, row), "m/s", 5)}`, `x = ${get("x", "m")}`,
+      `F = ${get("F")}`, `v = ${get(contact.velocity)}`, `x = ${get("x")}`,
       run.rowName(row) + (run.between[row] ? "" : ` of ${run.of}`),
       ended || (run.between[row] ? "" : `micro-step ${run.microstep[row]}`),
     ].filter(Boolean).join("   ");
@@ -199,7 +199,7 @@ class RunView {
         button.textContent = on ? "●" : "○";
         word.textContent = k === fired ? "FIRED" : asked ? "" : "not checked";
       }
-      const texts = [marginText(clause), eng(clause.left, clause.unit), eng(clause.right, clause.unit)];
+      const texts = [marginText(clause), inClause(clause, clause.left), inClause(clause, clause.right)];
       sides.forEach((cell, i) => { cell.textContent = edge.clauses[c].compares ? texts[i] : ""; });
       truth.textContent = { 1: "✓ true", 0: "✗ false" }[clause.truth] ?? "? unknown";
       truth.className = clause.truth === 1 ? "true" : "";
@@ -245,14 +245,16 @@ function relative(clause) {
 // A margin due to the clock and floats is zero, as in the debugger.
 function isZero({ left, right, margin }) { return Number.isFinite(margin) && Math.abs(margin) <= data.rounding * Math.max(Math.abs(left), Math.abs(right)); }
 function marginText(clause) {
-  const { margin, unit } = clause;
+  const { margin } = clause;
   if (isZero(clause)) return "0";
-  return `${margin > 0 ? "+" : ""}${eng(margin, unit)}`;
+  return `${margin > 0 ? "+" : ""}${inClause(clause, margin)}`;
 }
+// Both sides and the margin of a clause have one unit: that of the larger side, as in the debugger.
+function inClause({ left, right, unit }, u, digits) { return inUnit(u, unit, powerOf(Math.max(Math.abs(left), Math.abs(right)), unit), digits); }
 // In words, of the edge that is nearest to firing.
 function heldBack(contact, leaving, scope) {
   const each = leaving.map((k) => ({ k, worst: worstClause(contact.clauses(k, scope)) })).sort((a, b) => relative(b.worst) - relative(a.worst));
-  const { k, worst } = each[0], by = Number.isNaN(worst.margin) ? "" : ` by ${eng(Math.abs(worst.margin), worst.unit, 3)}`;
+  const { k, worst } = each[0], by = Number.isNaN(worst.margin) ? "" : ` by ${inClause(worst, Math.abs(worst.margin), 3)}`;
   return `${contact.edges[k].name} does not fire: ${worst.text} is ${worst.truth < 0 ? "not computable" : `false${by}`}`;
 }
 

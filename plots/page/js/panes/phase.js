@@ -51,7 +51,7 @@ class PhasePane {
   point() {
     const { contact, run, place: at } = this.view, row = pointed === null ? -1 : frames.rows[at][pointed];
     for (const plot of this.plots) plot.show();
-    say(this.told, row < 0 ? "" : `t = ${written(run.t(row), 6)} s, F = ${eng(contact.value("F", 0, row), "N")}`);
+    say(this.told, row < 0 ? "" : `t = ${timeText(run.t(row), 6)}, F = ${contact.tell("F", contact.value("F", 0, row))}`);
   }
 }
 PANES.push(PhasePane);
