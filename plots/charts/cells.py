@@ -1,7 +1,7 @@
 """Labels of Graphviz with fixed sizes: every piece of text has a cell of its own.
 
-The width of a cell comes from `plots.style.fonts`, not from the fonts that Graphviz finds, so that
-a picture has the same sizes wherever it is drawn. In the SVG a piece is one text, in this order.
+The width of a cell comes from `plots.style.fonts`, not from Graphviz, so that a picture has the
+same sizes wherever it is drawn. In the SVG a piece is one text, in this order.
 """
 
 from __future__ import annotations
@@ -144,8 +144,8 @@ class CellWriter:
     def _piece_width(self, piece: Piece) -> float:
         if piece.role == "pad":
             return SIDE - 1
-        face = _FACES.get(piece.role, _FORMULA)[1]
-        return width(printable(piece.text), self._points(piece), mono=face == MONO)
+        _, face, bold, _ = _FACES.get(piece.role, _FORMULA)
+        return width(printable(piece.text), self._points(piece), mono=face == MONO, bold=bold)
 
     def _points(self, piece: Piece) -> int:
         """Return the size of a text; Graphviz takes whole points only."""

@@ -192,9 +192,9 @@ def element_colour(i: int, n: int, theme: Theme = "light") -> str:
     return ramp("elements", n, theme)[i]
 
 
-# Lists of names; the first installed one is used.
-SANS = "Helvetica,Arial,Liberation Sans,DejaVu Sans,sans-serif"
-MONO = "DejaVu Sans Mono,Menlo,Consolas,Liberation Mono,monospace"
+# The shipped fonts, and for readers of an SVG fonts that are about as wide.
+SANS = "DejaVu Sans,Verdana,Arial,sans-serif"
+MONO = "DejaVu Sans Mono,Menlo,Consolas,monospace"
 
 ELEMENT_STEPS = 7  # of a page and a schematic; dashes repeat only after the colours
 ELEMENT_COLOURS = ramp("elements", ELEMENT_STEPS)
@@ -255,6 +255,8 @@ def compared_look(number: int) -> dict[str, Any]:
 
 RC: Any = {  # matplotlib types each key separately
     "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.monospace": ["DejaVu Sans Mono"],
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
