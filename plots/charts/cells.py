@@ -7,7 +7,8 @@ same sizes wherever it is drawn. In the SVG a piece is one text, in this order.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 from math import ceil
 
 from plots.charts.labels import Piece, Row, escape, printable
@@ -62,10 +63,13 @@ class CellWriter:
         The theme.
     scale : float
         Size of all texts, 1 for the usual one.
+    joined : bool
+        Whether pieces that look alike are one text; a picture of pixels rounds the width of each.
     """
 
     colours: ChartTheme
     scale: float = 1.0
+    joined: bool = False
 
     def text(self, rows: Sequence[Row]) -> Label:
         """Set lines of text below one another."""
@@ -92,27 +96,34 @@ class CellWriter:
     def state(
         self, rows: Sequence[Row], marked: bool = False, least: tuple[float, float] = (0, 0)
     ) -> Label:
-        """Set the box of a state: its title, a rule, the other rows."""
+        """Set the box of a state: its title, and below a rule the other rows, in its middle."""
         heights = [self._height(row) for row in rows]
-        wide = max(*map(self._width, rows), 36) + 2 * SIDE + 2
+        text = max(map(self._width, rows))
+        wide = max(text, 36) + 2 * SIDE + 2
         ink, border = self.colours.ink, 3 if marked else 1
         tall = sum(heights) + 4 + 2 * border
         wide += 2 * border - 2
         wide, tall = max(wide, ceil(least[0])), max(tall, ceil(least[1]))
         inner = wide - 2 * border
+        left = max((inner - text) // 2, SIDE - 1)
         title, *more = (
-            self._row([Piece("", "pad"), *row], height, inner)
+            self._row([Piece("", "pad"), *row], height, inner, left)
             for row, height in zip(rows, heights, strict=True)
         )
         look = f'BORDER="{border}" COLOR="{ink}" BGCOLOR="{self.colours.paper}" STYLE="ROUNDED" '
-        rest = f'<TR><TD HEIGHT="{tall - sum(heights) - 2 * border - 1}"></TD></TR>'
-        body = f"{title}<HR/>" + "".join(more) + rest
+        spare = tall - sum(heights) - 2 * border - bool(more)
+        above, below = (
+            f'<TR><TD HEIGHT="{room}"></TD></TR>' * bool(room)
+            for room in (spare // 2, spare - spare // 2)
+        )
+        texts = "".join(more)
+        body = f"{title}<HR/>{above}{texts}{below}" if more else f"{above}{title}{below}"
         return Label(f"<{_table(look, wide, tall, body)}>", wide, tall)
 
     def _row(self, row: Row, height: int, wide: int, first: int = 0) -> str:
         """Return one line as a row of a table; its pieces are a table in it."""
         cells, at = "", 0.0
-        for i, piece in enumerate(row):
+        for i, piece in enumerate(self._pieces(row)):
             end = at + self._piece_width(piece)
             if i == 0 and first:
                 end = first
@@ -122,6 +133,13 @@ class CellWriter:
         cells += f"<TD {_size(wide - round(at), height)}></TD>"
         inner = _table("", wide, height, f"<TR>{cells}</TR>")
         return f"<TR><TD {_size(wide, height)}>{inner}</TD></TR>"
+
+    def _pieces(self, row: Row) -> Row:
+        if not self.joined:
+            return row
+        alike = groupby(row, lambda piece: (_FACES.get(piece.role, _FORMULA), piece.lowered))
+        groups = (list(group) for _, group in alike)
+        return [replace(each[0], text="".join(piece.text for piece in each)) for each in groups]
 
     def _cell(self, piece: Piece, wide: int, height: int) -> str:
         size = _size(wide, height)

@@ -1,11 +1,12 @@
 """Layout of a chart in layers: states in rows, and the labels of edges in rows between them.
 
-Every edge runs through its label. Lines are vertical within a row, each at a place of its own, and
-curve only in the channels between two rows, where there are no boxes. So no line crosses a box, no
-label touches another or an arrowhead, and no two edges end at the same point of a state. The labels
-of the edges that leave a state are ordered by priority, from left to right.
+Every edge is one line, and its label is right of it. Lines are vertical within a row, each at a
+place of its own, and curve only in the channels between two rows, where there are no boxes. So no
+line crosses a box, no label touches another or an arrowhead, and no two edges end at the same point
+of a state. The labels of the edges that leave a state are ordered by priority, from left to right.
 
-A layout from left to right is the same with x and y exchanged. Lengths are points; y points down.
+A layout from left to right is the same with x and y exchanged, but labels are above their lines.
+Lengths are points; y points down.
 """
 
 from __future__ import annotations
@@ -27,9 +28,10 @@ WIDEST_PORT = 58.0
 CORNER = 10.0  # of a state, where no line ends
 STATES_APART, LABELS_APART, LINES_APART = 26.0, 12.0, 9.0
 LINE = 2.0  # room of a line in a row
+BESIDE = 5.0  # between a line and its label
 LONELY = 640.0  # width of a row of states without edges
 DEFAULT, DOT = 30.0, 4.0  # from the dot to the default state; radius of the dot
-LOOP_OUT, LOOP_UP = 28.0, 9.0  # from a state to the label of its loop; from the label to the line
+LOOP_OUT, LOOP = 26.0, 8.0  # from a state to the line of its loop; half of the loop's height
 SWEEPS = 12
 
 
@@ -62,9 +64,9 @@ class Laid:
         Centres.
     sizes : list of (float, float)
         Of the states; at least the given ones.
-    lines : list of (list, list)
-        For every edge the line to its label, and the one from it to the tip of the arrow: a point,
-        then three more for each Bezier curve.
+    lines : list of list
+        For every edge the line to the tip of the arrow: a point, then three more for each Bezier
+        curve.
     dot : (float, float)
         Centre of the dot at the default state.
     """
@@ -74,7 +76,7 @@ class Laid:
     states: list[Point] = field(default_factory=list)
     sizes: list[Size] = field(default_factory=list)
     labels: list[Point] = field(default_factory=list)
-    lines: list[tuple[list[Point], list[Point]]] = field(default_factory=list)
+    lines: list[list[Point]] = field(default_factory=list)
     dot: Point = (0.0, 0.0)
 
 
@@ -85,19 +87,19 @@ def layered(sizes: Sequence[Size], links: Sequence[LayerEdge], direction: str = 
     --------
     >>> laid = layered([(80, 40), (80, 40)], [LayerEdge(0, 1, (60, 20)), LayerEdge(1, 0, (60, 20))])
     >>> [x for x, _ in laid.states], [x for x, _ in laid.labels]
-    ([66.0, 66.0], [30.0, 102.0])
+    ([40.0, 40.0], [36.0, 114.0])
     """
     if direction == "TB":
-        return _Layers(sizes, links).laid()
+        return _Layers(sizes, links, 1).laid()
     turned = [LayerEdge(each.source, each.target, _turned(each.size)) for each in links]
-    laid = _Layers([_turned(size) for size in sizes], turned).laid()
+    laid = _Layers([_turned(size) for size in sizes], turned, -1).laid()
     return Laid(
         width=laid.height,
         height=laid.width,
         states=[_turned(each) for each in laid.states],
         sizes=[_turned(each) for each in laid.sizes],
         labels=[_turned(each) for each in laid.labels],
-        lines=[([_turned(p) for p in one], [_turned(p) for p in two]) for one, two in laid.lines],
+        lines=[[_turned(point) for point in line] for line in laid.lines],
         dot=_turned(laid.dot),
     )
 
@@ -108,19 +110,21 @@ def _turned(point: Point) -> Point:
 
 @dataclass(frozen=True)
 class _Loop:
-    """A self-loop: at which side of its state; its label and its ends, from the centre down."""
+    """A self-loop: at which side of its state, and how far below the centre."""
 
     link: int
     side: int
     below: float
-    port: float
 
 
 class _Layers:
-    """The steps of a layout from top to bottom; even rows have states, odd rows labels."""
+    """The steps of a layout from top to bottom; even rows have states, odd rows labels.
 
-    def __init__(self, sizes: Sequence[Size], links: Sequence[LayerEdge]) -> None:
-        self.links = links
+    The side of labels is 1 if they are right of their lines, -1 if left.
+    """
+
+    def __init__(self, sizes: Sequence[Size], links: Sequence[LayerEdge], side: int) -> None:
+        self.links, self.side = links, side
         self.crossing = [k for k, each in enumerate(links) if each.source != each.target]
         self.layer = _layer_of(sizes, [links[k] for k in self.crossing])
         self.sizes = list(sizes)
@@ -161,16 +165,16 @@ class _Layers:
             here = [
                 k for k in own if k not in others and (side < 0) == (k < min(others, default=-1))
             ]
-            levels = [self.links[k].size[1] + 2 * LOOP_UP + 6 for k in here]
+            levels = [max(self.links[k].size[1] + 6, 2 * PORT) for k in here]
             at = -sum(levels) / 2
-            for place, (k, level) in enumerate(zip(here, levels, strict=True)):
-                port = (place - (len(here) - 1) / 2) * 2 * PORT
-                loops.append(_Loop(k, side, at + level / 2, port))
+            for k, level in zip(here, levels, strict=True):
+                loops.append(_Loop(k, side, at + level / 2))
                 at += level
-            height = max(height, 2 * PORT * len(here) + 2 * CORNER * bool(here))
+            # The line of every loop ends within its own level.
+            height = max(height, sum(levels) + 2 * (CORNER + LOOP - PORT) * bool(here))
             tallest = max(tallest, sum(levels))
             if here:
-                room[side > 0] = LOOP_OUT + max(self.links[k].size[0] for k in here) + 4
+                room[side > 0] = LOOP_OUT + BESIDE + max(self.links[k].size[0] for k in here)
         self.sizes[state] = width, height
         self.block.append(tallest)
         self.loops.append(loops)
@@ -186,8 +190,9 @@ class _Layers:
             for row in range(2 * self.layer[upper] + 1, 2 * self.layer[lower]):
                 chain.append(len(self.row))
                 self.row.append(row)
-                half = self.links[k].size[0] / 2 if row == gap else LINE / 2
-                self.wide.append((half, half))
+                label = BESIDE + self.links[k].size[0] if row == gap else LINE / 2
+                right = self.side > 0
+                self.wide.append((LINE / 2, label) if right else (label, LINE / 2))
                 if row == gap:
                     self.label[k] = chain[-1]
             self.chain[k] = [*chain, lower]
@@ -263,7 +268,7 @@ class _Layers:
         """Return the least distance of the centres of two neighbours."""
         if left < len(self.sizes) and right < len(self.sizes):
             gap = STATES_APART
-        elif self.wide[left][1] > LINE and self.wide[right][0] > LINE:
+        elif max(self.wide[left][1], self.wide[right][0]) > LINE:
             gap = LABELS_APART
         else:
             gap = LINES_APART
@@ -342,40 +347,29 @@ class _Layers:
         loops = {loop.link: loop for own in self.loops for loop in own}
         for k in range(len(self.links)):
             if k in loops:
-                centre, lines = self._loop(laid.states[self.links[k].source], loops[k])
+                centre, line = self._loop(laid.states[self.links[k].source], loops[k])
             else:
-                centre = self.x[self.label[k]], middle[self.label[k]]
-                lines = self._lines(k)
+                item = self.label[k]
+                beside = self.side * (BESIDE + self.links[k].size[0] / 2)
+                centre = self.x[item] + beside, middle[item]
+                line = self._line(k)
             laid.labels.append(centre)
-            laid.lines.append(lines)
+            laid.lines.append(line)
         return laid
 
-    def _lines(self, k: int) -> tuple[list[Point], list[Point]]:
-        chain, label = self.chain[k], self.label[k]
-        cut = chain.index(label)
+    def _line(self, k: int) -> list[Point]:
+        """Return the line of an edge: straight in the rows and, for a stub, at the states."""
+        chain = self.chain[k]
         down = self.links[k].source == chain[0]
-        upper = self._half(chain[: cut + 1], STUB if down else STUB + ARROW)
-        lower = self._half(chain[cut:], STUB + ARROW if down else STUB)
-        if down:
-            return upper, lower
-        return lower[::-1], upper[::-1]
-
-    def _half(self, chain: Sequence[int], stub: float) -> list[Point]:
-        """Return the line from the lower end of the first item to the upper end of the last.
-
-        At a state it is straight for the length of the stub.
-        """
+        stubs = (STUB, STUB + ARROW) if down else (STUB + ARROW, STUB)
         spans = []
         for i, item in enumerate(chain):
             x, (top, bottom) = self.x[item], self.span[self.row[item]]
             middle, half = (top + bottom) / 2, self.tall.get(item, 0.0) / 2
-            state = item < len(self.sizes)
             if i == 0:
-                x += self.offset[item, chain[1]] if state else 0.0
-                spans.append((x, middle + half, bottom + stub * state))
+                spans.append((x + self.offset[item, chain[1]], middle + half, bottom + stubs[0]))
             elif i == len(chain) - 1:
-                x += self.offset[chain[-2], item] if state else 0.0
-                spans.append((x, top - stub * state, middle - half))
+                spans.append((x + self.offset[chain[-2], item], top - stubs[1], middle - half))
             else:
                 spans.append((x, top, bottom))
         points = [(spans[0][0], spans[0][1])]
@@ -384,29 +378,31 @@ class _Layers:
                 x_before, y_before = points[-1]
                 bend = (y_before + top) / 2
                 points += [(x_before, bend), (x, bend), (x, top)]
-            if bottom > top:
-                points += [(x, top + (bottom - top) * part) for part in (1 / 3, 2 / 3, 1)]
-        return points
+            points += straight((x, top), (x, bottom))[1:]
+        return points if down else points[::-1]
 
-    def _loop(self, state: Point, loop: _Loop) -> tuple[Point, tuple[list[Point], list[Point]]]:
-        """Return the centre of a loop's label, and its lines: out, and back."""
-        width, height = self.links[loop.link].size
+    def _loop(self, state: Point, loop: _Loop) -> tuple[Point, list[Point]]:
+        """Return the centre of a loop's label, and its line."""
+        width, _ = self.links[loop.link].size
         edge = state[0] + loop.side * self.sizes[self.links[loop.link].source][0] / 2
-        x, y = edge + loop.side * (LOOP_OUT + width / 2), state[1] + loop.below
-        high, low = y - height / 2 - LOOP_UP, y + height / 2 + LOOP_UP
-        leaves, enters = state[1] + loop.port - PORT / 2, state[1] + loop.port + PORT / 2
-        corner, stub = edge + loop.side * LOOP_OUT, edge + loop.side * (ARROW + STUB)
-        bend = (stub + corner) / 2
-        out = [(edge, leaves), (bend, leaves), (bend, high), (corner, high)]
-        out += [(x, high), (x, high), (x, y - height / 2)]
-        back = [(x, y + height / 2), (x, low), (x, low), (corner, low)]
-        back += [(bend, low), (bend, enters), (stub, enters)]
-        return (x, y), (out, back + _straight((stub, enters), (edge, enters))[1:])
+        y, corner = state[1] + loop.below, edge + loop.side * LOOP_OUT
+        leaves, enters = y - LOOP, y + LOOP
+        stub = edge + loop.side * (ARROW + STUB)
+        out = [(edge, leaves), (corner, leaves), (corner, leaves), (corner, y)]
+        back = [(corner, enters), (corner, enters), (stub, enters)]
+        at = corner + loop.side * (BESIDE + width / 2), y
+        return at, out + back + straight((stub, enters), (edge, enters))[1:]
 
 
-def _straight(a: Point, b: Point) -> list[Point]:
-    """Return a straight line as a curve."""
-    return [tuple(p + (q - p) * t / 3 for p, q in zip(a, b, strict=True)) for t in range(4)]  # type: ignore[misc]
+def straight(a: Point, b: Point) -> list[Point]:
+    """Return a straight line as a Bezier curve.
+
+    Examples
+    --------
+    >>> straight((0.0, 0.0), (3.0, 6.0))
+    [(0.0, 0.0), (1.0, 2.0), (2.0, 4.0), (3.0, 6.0)]
+    """
+    return [(a[0] + (b[0] - a[0]) * t / 3, a[1] + (b[1] - a[1]) * t / 3) for t in range(4)]
 
 
 def _layer_of(sizes: Sequence[Size], links: Sequence[LayerEdge]) -> list[int]:

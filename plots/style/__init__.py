@@ -194,7 +194,7 @@ def element_colour(i: int, n: int, theme: Theme = "light") -> str:
 
 # The shipped fonts, and for readers of an SVG fonts that are about as wide.
 SANS = "DejaVu Sans,Verdana,Arial,sans-serif"
-MONO = "DejaVu Sans Mono,Menlo,Consolas,monospace"
+MONO = "DejaVu Sans Mono,Menlo,Lucida Console,monospace"
 
 ELEMENT_STEPS = 7  # of a page and a schematic; dashes repeat only after the colours
 ELEMENT_COLOURS = ramp("elements", ELEMENT_STEPS)

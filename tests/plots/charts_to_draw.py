@@ -120,9 +120,14 @@ HOSTILE = Chart(
 def texts_of(chart: Chart, state: str) -> dict[str, list[str]]:
     """Return what the box of a state must say, by the word that stands before it."""
     alone = len(chart.states) < 3 or any(each.outputs or each.locked for each in chart.states)
+    shared = {
+        v
+        for v in chart.variables
+        if len(chart.states) > 2 and len({chart.flows[each.name, v] for each in chart.states}) == 1
+    }
     trees = {
         "entry": chart.assignments["entry", state],
-        "during": {f"d{v}": chart.flows[state, v] for v in chart.variables},
+        "during": {f"d{v}": chart.flows[state, v] for v in chart.variables if v not in shared},
         "force": {f: chart.forces[state, f] for f in chart.force_names if alone},
         "exit": chart.assignments["exit", state],
     }
