@@ -16,7 +16,7 @@ import graphviz
 from plots.charts.cells import Label
 from plots.charts.drawing import DOT_SIZE, Drawing, DrawnLine, Node, graph_drawing
 from plots.charts.labels import Piece, Row, element_id
-from plots.charts.layers import ARROW, Point, straight
+from plots.charts.layout.layers import ARROW, Point, straight
 from plots.charts.matrix import matrix_drawing
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from plots.charts.cells import Label
 from plots.charts.contents import edges_by_priority
 from plots.charts.labels import edge_id, element_id, part_id
-from plots.charts.layers import LayerEdge, Point, layered, straight
+from plots.charts.layout.layers import LayerEdge, Point, layered, straight
+from plots.charts.layout.placed import placed, ring
 
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
@@ -105,7 +106,13 @@ def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
         )
         for (edge, _), box in zip(edges, boxes, strict=True)
     ]
-    laid = layered([(box.width, box.height) for box in plain], links, sheet.direction)
+    sizes = [(float(box.width), float(box.height)) for box in plain]
+    centres = [chart.layout[each.name] for each in chart.states] if chart.layout else None
+    centres = centres or ring(sizes, links)
+    if centres is None:
+        laid = layered(sizes, links, sheet.direction)
+    else:
+        laid = placed(sizes, links, centres, sheet.direction)
     names = [part_id(element, "state", state.name) for state in chart.states]
     dot = f"{element}-default"
     nodes = [Node(dot, "default", laid.dot)]

@@ -1,7 +1,7 @@
 """Draw a friction chart in the style of Stateflow.
 
 Everything in the picture is read from the chart: states with their actions, edges with priority,
-guard and action. `plots.charts.layers` and `plots.charts.matrix` make the layout, and Graphviz only
+guard and action. `plots.charts.layout` and `plots.charts.matrix` make the layout, and Graphviz only
 draws, so every Graphviz gives the same picture. A guard is a node beside its edge. Ids and
 classes are stable, so that the SVG can be restyled without a new layout: class ``state``,
 ``guard``, ``edge``, ``default`` and ``region``, and ids such as ``element1-state-slip``.
@@ -110,8 +110,9 @@ def statechart(
     form : {"auto", "graph", "matrix"}
         Boxes and arrows; or a matrix with a row for each source and a column for each target, whose
         cells have the priority and the number of the guard. ``"auto"`` is a matrix above 20 edges,
-        or where a graph would be wider than two A4 pages. Long guards are numbered ``g1``, ``g2``,
-        ... and written below the picture.
+        or where a graph would be wider than two A4 pages; never if the chart has a layout, whose
+        places a graph keeps. Long guards are numbered ``g1``, ``g2``, ... and written below the
+        picture.
 
     Returns
     -------
@@ -137,10 +138,7 @@ def statechart(
     >>> "z ≥ s(v)" in statechart(GMS_ELEMENT["signed"], notation="math").source
     True
     """
-    if not hasattr(chart, "guards"):
-        raise ParameterError(
-            f"chart is {chart!r:.60}", advice="give a Chart, of a model its .chart"
-        )
+    _check_chart(chart)
     checked_kind("note", note, str, "a text")
     if counts is not None:
         checked_kind("counts", counts, Trace, "a Trace, a run of this chart")
@@ -169,6 +167,50 @@ def statechart(
     bare = elements == 1 and (counts is None or counts.n == 1)
     folded = counts is None and not isinstance(elements, Sequence)
     return sheet.graph(numbers, bare=bare, folded=folded, foot=note)
+
+
+def _check_chart(chart: object) -> None:
+    if not hasattr(chart, "guards"):
+        raise ParameterError(
+            f"chart is {chart!r:.60}", advice="give a Chart, of a model its .chart"
+        )
+
+
+def layout(chart: Chart, *, direction: str = "TB") -> dict[str, tuple[float, float]]:
+    """Return where a chart's states are in its picture, to move them by hand.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    direction : {"TB", "LR"}
+        States from top to bottom, or from left to right.
+
+    Returns
+    -------
+    dict of str to (float, float)
+        Centres in points, to the right and down. `Chart.placed` gives a chart other ones, and
+        `Chart.save` writes them into its file.
+
+    Raises
+    ------
+    ParameterError
+        If the chart is none, or the direction is not one of those above.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT
+    >>> places = layout(GMS_ELEMENT["signed"])
+    >>> places["stick"][1] < places["slip"][1]
+    True
+    >>> moved = GMS_ELEMENT["signed"].placed(places | {"slip": (400, 60)})
+    >>> statechart(moved).source.count("class=state")
+    2
+    """
+    _check_chart(chart)
+    drawing = graph_drawing(ChartSheet(chart, direction=direction, form="graph").fitted(), 0)
+    places = [node.at for node in drawing.nodes if node.kind == "state"]
+    return {state.name: at for state, at in zip(chart.states, places, strict=True)}
 
 
 def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ...]:
@@ -285,15 +327,16 @@ class ChartSheet:
         if self.scale < 1 or self.numbered:
             return self
         every = self._numbers(0)
-        many = self.form == "auto" and not self.live and len(self.chart.transitions) > MOST_EDGES
+        free = self.form == "auto" and not self.live and not self.chart.layout
+        many = free and len(self.chart.transitions) > MOST_EDGES
         if self.form == "matrix" or many:
             return replace(self, form="matrix", numbered=every)
         for longest, scale in NARROWER:
             numbered = self._numbers(longest)
             sheet = replace(self, form="graph", numbered=numbered, scale=scale)
-            if graph_drawing(sheet, 0).width <= WIDEST:
+            if self.chart.layout or graph_drawing(sheet, 0).width <= WIDEST:
                 return sheet
-        if self.form == "graph" or self.live:
+        if not free:
             return sheet
         return replace(self, form="matrix", numbered=every)
 

@@ -17,14 +17,17 @@ import pytest
 import gms_fsm.charts.chart
 from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
+from plots.charts.drawing import graph_drawing
 from plots.charts.labels import edge_id, part_id
-from plots.charts.layers import BESIDE
-from plots.charts.statechart import statechart
+from plots.charts.layout.layers import BESIDE
+from plots.charts.statechart import ChartSheet, layout, statechart
 from tests.helpers import matrix
 from tests.plots.charts_to_draw import (
     HOSTILE,
     LONG_GUARDS,
     MANY_EDGES,
+    RING,
+    THERE_AND_BACK,
     THREE_LOOPS,
     THREE_STATES,
     any_chart,
@@ -36,6 +39,8 @@ from tests.plots.pictures import Box, Picture, chart_picture, overlaps, squeezed
 pytestmark = pytest.mark.slow
 
 A4 = 595  # points
+PLACES = {"stick": (0, 0), "creep": (320, 20), "slip": (150, 240)}
+MOVED = THREE_STATES.placed(PLACES)
 AXIS = {"TB": 0, "LR": 1}
 # Chart, number of elements, options.
 OWN: dict[str, tuple[Chart, int | range, dict[str, Any]]] = {
@@ -43,6 +48,9 @@ OWN: dict[str, tuple[Chart, int | range, dict[str, Any]]] = {
     "LuGre": (LUGRE, 1, {}),
     "3 states": (THREE_STATES, 1, {}),
     "hostile": (HOSTILE, range(2), {}),
+    "ring": (RING, 1, {}),
+    "ring there and back": (THERE_AND_BACK, 1, {}),
+    "by hand": (MOVED, 1, {}),
 }
 HARD: dict[str, tuple[Chart, int | range, dict[str, Any]]] = {
     "12 elements": (GMS_ELEMENT["published"], 12, {}),
@@ -185,13 +193,18 @@ def places(drawn: Picture, chart: Chart, element: str, direction: str) -> dict[s
     return found
 
 
-GRAPHS = [name for name in CASES if name not in ("40 edges", "12 elements", *ZOO)]
+PLACED = ("ring", "ring there and back", "by hand")  # states where they are put
+GRAPHS = [name for name in CASES if name not in ("40 edges", "12 elements", *PLACED, *ZOO)]
 GRAPHS = [name for name in GRAPHS if "random" not in name or "form" in CASES[name][2]]
 GRAPHS += [name for name in ZOO if len(CHARTS[name].transitions) > 2]
 
 
 @pytest.mark.parametrize(
-    ("name", "direction"), matrix(BOTH, [each for each in KEPT if each[0] in GRAPHS])
+    ("name", "direction"),
+    matrix(
+        [each for each in BOTH if each[0] not in PLACED],
+        [each for each in KEPT if each[0] in GRAPHS],
+    ),
 )
 def test_edges_that_leave_a_state_are_in_the_order_of_priority(name: str, direction: str) -> None:
     """From left to right or from top to bottom; numbered graphs have no labels to compare."""
@@ -201,6 +214,39 @@ def test_edges_that_leave_a_state_are_in_the_order_of_priority(name: str, direct
     for element in drawn.of_class("region") or {"element1"}:
         for what, given in places(drawn, chart, element, direction).items():
             assert all(a < b for a, b in pairwise(given)), what
+
+
+# --------------------------------------------------------------------------- places of states
+def test_a_long_ring_goes_around_a_rectangle() -> None:
+    for name in ("ring", "ring there and back"):
+        for direction in ("TB", "LR"):
+            drawn = picture(name, direction)
+            assert max(drawn.width, drawn.height) < 850
+            assert not drawn.of_class("legend")
+
+
+def test_states_are_where_the_layout_of_the_chart_says() -> None:
+    for direction in ("TB", "LR"):
+        drawn = picture("by hand", direction)
+        found = {
+            name.rpartition("-")[2]: ((box.left + box.right) / 2, (box.top + box.bottom) / 2)
+            for name, box in drawn.states
+        }
+        left, top = (found["stick"][k] - PLACES["stick"][k] for k in (0, 1))
+        for state, (x, y) in PLACES.items():
+            assert found[state] == pytest.approx((x + left, y + top), abs=1.0)
+    live = ChartSheet(MOVED, live=True).fitted()
+    assert live.form == "graph"
+    assert graph_drawing(live, 0).nodes[1].at[0] < graph_drawing(live, 0).nodes[2].at[0] - 300
+
+
+def test_the_layout_of_a_picture_is_a_layout_to_begin_with() -> None:
+    found = layout(THREE_STATES)
+    assert [*found] == [state.name for state in THREE_STATES.states]
+    again = layout(THREE_STATES.placed(found))
+    (x, y), (to_x, to_y) = found["stick"], again["stick"]
+    for state, at in found.items():
+        assert again[state] == pytest.approx((at[0] - x + to_x, at[1] - y + to_y), abs=0.2)
 
 
 # --------------------------------------------------------------------------- several elements

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from plots.charts.places import Segment, places
+from plots.charts.layout.places import Segment, places
 
 Point = tuple[float, float]
 Size = tuple[float, float]
@@ -383,15 +383,19 @@ class _Layers:
 
     def _loop(self, state: Point, loop: _Loop) -> tuple[Point, list[Point]]:
         """Return the centre of a loop's label, and its line."""
-        width, _ = self.links[loop.link].size
         edge = state[0] + loop.side * self.sizes[self.links[loop.link].source][0] / 2
-        y, corner = state[1] + loop.below, edge + loop.side * LOOP_OUT
-        leaves, enters = y - LOOP, y + LOOP
-        stub = edge + loop.side * (ARROW + STUB)
-        out = [(edge, leaves), (corner, leaves), (corner, leaves), (corner, y)]
-        back = [(corner, enters), (corner, enters), (stub, enters)]
-        at = corner + loop.side * (BESIDE + width / 2), y
-        return at, out + back + straight((stub, enters), (edge, enters))[1:]
+        return loop_line((edge, state[1] + loop.below), loop.side, self.links[loop.link].size[0])
+
+
+def loop_line(at: Point, side: int, width: float) -> tuple[Point, list[Point]]:
+    """Return the centre of a label, and the line of its loop at a place on the side of a state."""
+    (edge, y), corner = at, at[0] + side * LOOP_OUT
+    leaves, enters = y - LOOP, y + LOOP
+    stub = edge + side * (ARROW + STUB)
+    out = [(edge, leaves), (corner, leaves), (corner, leaves), (corner, y)]
+    back = [(corner, enters), (corner, enters), (stub, enters)]
+    label = corner + side * (BESIDE + width / 2), y
+    return label, out + back + straight((stub, enters), (edge, enters))[1:]
 
 
 def straight(a: Point, b: Point) -> list[Point]:
