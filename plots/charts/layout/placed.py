@@ -41,6 +41,10 @@ class _Line:
     points: list[Point]
     side: int
 
+    def along(self) -> list[Point]:
+        """Return points on the curve."""
+        return [self.at(i / STEPS)[0] for i in range(STEPS + 1)]
+
     def at(self, t: float) -> tuple[Point, Point]:
         """Return a point of the curve, and the unit vector across."""
         a, b, c, d = self.points[:4]
@@ -91,7 +95,9 @@ def placed(
     labels = _labels(lines, links, boxes)
     laid.labels = [labels[k] if k in labels else loops[k][0] for k in range(len(links))]
     laid.lines = [lines[k].points if k in lines else loops[k][1] for k in range(len(links))]
-    return _moved(laid, links)
+    drawn = [point for line in lines.values() for point in line.along()]
+    drawn += [point for _, line in loops.values() for point in line]
+    return _moved(laid, links, drawn)
 
 
 def _bundle(
@@ -190,7 +196,7 @@ def _labels(
 ) -> dict[int, Point]:
     """Return the centres of labels beside their lines, where they cover least of all else."""
     taken = list(boxes)
-    on = {k: [line.at(i / STEPS)[0] for i in range(STEPS + 1)] for k, line in lines.items()}
+    on = {k: line.along() for k, line in lines.items()}
     found: dict[int, Point] = {}
     for k, line in lines.items():
         width, height = links[k].size
@@ -217,13 +223,13 @@ def _shared(one: Box, other: Box) -> float:
     return max(sides[0], 0.0) * max(sides[1], 0.0)
 
 
-def _moved(laid: Laid, links: Sequence[LayerEdge]) -> Laid:
+def _moved(laid: Laid, links: Sequence[LayerEdge], drawn: Sequence[Point]) -> Laid:
     """Move a layout so that its left upper corner is the origin, and measure it."""
     boxes = [
         *zip(laid.states, laid.sizes, strict=True),
         *zip(laid.labels, (link.size for link in links), strict=True),
         (laid.dot, (2 * DOT, 2 * DOT)),
-        *((point, (0.0, 0.0)) for line in laid.lines for point in line),
+        *((point, (0.0, 0.0)) for point in drawn),
     ]
     left, top = (min(at[k] - size[k] / 2 for at, size in boxes) for k in (0, 1))
     right, bottom = (max(at[k] + size[k] / 2 for at, size in boxes) for k in (0, 1))
