@@ -414,10 +414,10 @@ class ChartSheet:
     def state_rows(self, state: State, number: int) -> list[Row]:
         """Return the text in a state's box."""
         title = [Piece(state.name, "title")]
-        if self.live:
-            title.append(Piece(f" {DOT}", "dot"))
         if self.among:
             title += [Piece("  ", "note"), Piece(f"{self.among} of {self.among}", "among")]
+        if self.live:  # last: a hidden dot leaves no gap
+            title.append(Piece(f" {DOT}", "dot"))
         narrow = self.direction == "LR" or self.form == "matrix"
         limit = LONGEST_LABEL if narrow else LONGEST_LINE
         texts = _rows(state_texts(self.write, state), limit)
