@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
 
-MARGIN = 10.0  # around what is in a region
+MARGIN = 8.0  # around what is in a region
 APART = 12.0  # between regions
 # Type of 10 points is at least 7 points high if this width is printed on 170 mm.
 PRINTED = 688.0

@@ -26,7 +26,7 @@ STUB = 3.0  # straight part of a line at a state, between an arrowhead and the c
 PORT = 13.0  # least distance of two ends at a state
 WIDEST_PORT = 58.0
 CORNER = 10.0  # of a state, where no line ends
-STATES_APART, LABELS_APART, LINES_APART = 26.0, 12.0, 9.0
+STATES_APART, LABELS_APART, LINES_APART = 26.0, 10.0, 9.0
 LINE = 2.0  # room of a line in a row
 BESIDE = 5.0  # between a line and its label
 LONELY = 640.0  # width of a row of states without edges
@@ -87,7 +87,7 @@ def layered(sizes: Sequence[Size], links: Sequence[LayerEdge], direction: str = 
     --------
     >>> laid = layered([(80, 40), (80, 40)], [LayerEdge(0, 1, (60, 20)), LayerEdge(1, 0, (60, 20))])
     >>> [x for x, _ in laid.states], [x for x, _ in laid.labels]
-    ([40.0, 40.0], [36.0, 114.0])
+    ([40.0, 40.0], [37.0, 113.0])
     """
     if direction == "TB":
         return _Layers(sizes, links, 1).laid()
