@@ -56,7 +56,9 @@ _OTHERS = (
     "<dir>/System/Library/Fonts</dir>",
     "<dir>/Library/Fonts</dir>",
     "<dir>WINDOWSFONTDIR</dir>",
+    "<dir>~/Library/Fonts</dir>",
     '<dir prefix="xdg">fonts</dir>',
+    "<dir>~/.fonts</dir>",
 )
 
 

@@ -192,9 +192,10 @@ def element_colour(i: int, n: int, theme: Theme = "light") -> str:
     return ramp("elements", n, theme)[i]
 
 
-# The shipped fonts, and for readers of an SVG fonts that are about as wide.
-SANS = "DejaVu Sans,Verdana,Arial,sans-serif"
-MONO = "DejaVu Sans Mono,Menlo,Lucida Console,monospace"
+# The shipped fonts; for readers of an SVG there follow others that are about as wide.
+SANS_FONT, MONO_FONT = "DejaVu Sans", "DejaVu Sans Mono"
+SANS = f"{SANS_FONT},Verdana,Arial,sans-serif"
+MONO = f"{MONO_FONT},Menlo,Lucida Console,monospace"
 
 ELEMENT_STEPS = 7  # of a page and a schematic; dashes repeat only after the colours
 ELEMENT_COLOURS = ramp("elements", ELEMENT_STEPS)
@@ -255,8 +256,8 @@ def compared_look(number: int) -> dict[str, Any]:
 
 RC: Any = {  # matplotlib types each key separately
     "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.monospace": ["DejaVu Sans Mono"],
+    "font.sans-serif": [SANS_FONT],
+    "font.monospace": [MONO_FONT],
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
