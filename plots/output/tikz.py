@@ -1,9 +1,9 @@
 r"""Write a chart as a TikZ picture, which LaTeX sets in the fonts of a document.
 
-The result is one ``tikzpicture`` for ``\input``; its first lines name the packages. Without a layout
-of the chart the state with most edges is in the middle, and the others are around it. Edges between
-the same two states in the same direction are one arrow, whose label has a line for each: priority,
-guard and action.
+The result is one ``tikzpicture`` for ``\input``; its first lines name the packages. Without a
+layout of the chart the state with most edges is in the middle, and the others are around it. Edges
+between the same two states in the same direction are one arrow, whose label has a line for each:
+priority, guard and action.
 """
 
 from __future__ import annotations
