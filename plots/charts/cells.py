@@ -20,6 +20,7 @@ LEAST = 7  # points, of every text but an index
 SMALLER = 0.72  # a lowered index
 LINE, TITLE = 1.4, 1.5  # height of a line, in sizes of its font
 SIDE = 6  # left and right of the text of a state
+WIDER = 1.07  # the smallest texts in pictures of pixels: Graphviz puts letters at whole ones
 
 # Of a role: size, face, bold, secondary.
 _FACES = {
@@ -98,7 +99,8 @@ class CellWriter:
     ) -> Label:
         """Set the box of a state: its title, and below a rule the other rows, in its middle."""
         heights = [self._height(row) for row in rows]
-        text = max(map(self._width, rows))
+        small = PLAIN * self.scale <= LEAST
+        text = ceil(max(map(self._width, rows)) * (WIDER if small else 1))
         wide = max(text, 36) + 2 * SIDE + 2
         ink, border = self.colours.ink, 3 if marked else 1
         tall = sum(heights) + 4 + 2 * border

@@ -60,7 +60,8 @@ MOST_LINES = 6  # of a guard on an edge; a longer one is written below the pictu
 LONGEST_LABEL = 34  # characters of a line on an edge
 SMALLEST = 0.7  # smallest size of texts: 7 points instead of 10
 # How a graph that is too wide becomes narrower: characters of a line on an edge, size of texts.
-NARROWER = ((2 * LONGEST_LABEL, 1.0), (24, 1.0), (24, 0.85), (12, SMALLEST), (0, SMALLEST))
+# Not 8 points: in pictures of pixels, Graphviz draws these much narrower than in others.
+NARROWER = ((2 * LONGEST_LABEL, 1.0), (24, 1.0), (24, 0.9), (12, SMALLEST), (0, SMALLEST))
 
 
 class ChartGraph(DrawnGraph):

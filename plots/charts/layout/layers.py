@@ -24,8 +24,9 @@ Size = tuple[float, float]
 ARROW = 7.0  # length of an arrowhead
 STUB = 3.0  # straight part of a line at a state, between an arrowhead and the curve
 PORT = 13.0  # least distance of two ends at a state
-WIDEST_PORT = 58.0
-CORNER = 10.0  # of a state, where no line ends
+WIDEST_PORT = 90.0
+WIDER = 16.0  # how much a state may grow at its sides, to make lines straight
+CORNER = 14.0  # of a state, where no line ends
 STATES_APART, LABELS_APART, LINES_APART = 26.0, 10.0, 9.0
 LINE = 2.0  # room of a line in a row
 BESIDE = 5.0  # between a line and its label
@@ -87,7 +88,7 @@ def layered(sizes: Sequence[Size], links: Sequence[LayerEdge], direction: str = 
     --------
     >>> laid = layered([(80, 40), (80, 40)], [LayerEdge(0, 1, (60, 20)), LayerEdge(1, 0, (60, 20))])
     >>> [x for x, _ in laid.states], [x for x, _ in laid.labels]
-    ([40.0, 40.0], [37.0, 113.0])
+    ([52.0, 52.0], [49.0, 125.0])
     """
     if direction == "TB":
         return _Layers(sizes, links, 1).laid()
@@ -294,7 +295,7 @@ class _Layers:
         offset: dict[Segment, float] = {}  # of the ends at a state from its centre
         for state, (width, _) in enumerate(self.sizes):
             for others, lower in ((self.above[state], False), (self.below[state], True)):
-                step = min((width - 2 * CORNER) / max(len(others), 1), WIDEST_PORT)
+                step = min((width - 2 * CORNER) / max(len(others) - 1, 1), WIDEST_PORT)
                 for i, other in enumerate(sorted(others, key=place.__getitem__)):
                     segment = (state, other) if lower else (other, state)
                     offset[segment] = (i - (len(others) - 1) / 2) * step
@@ -310,9 +311,31 @@ class _Layers:
             if len(others) > 1
         ]
         self.x = places(self.wide, apart, self.segments, offset, sides, len(self.sizes))
-        self.offset = offset
+        self.offset = self._straightened({row[0] for row in rows if len(row) == 1})
         self._set_rows(rows)
         return self._drawn()
+
+    def _straightened(self, alone: set[int]) -> dict[Segment, float]:
+        """Return ends at the states that make lines straight where there is room for that.
+
+        A state that is alone in its row becomes a little wider for it.
+        """
+        offset: dict[Segment, float] = {}
+        for state, (width, height) in enumerate(self.sizes):
+            both = self.above[state], self.below[state]
+            wanted = [abs(self.x[other] - self.x[state]) + CORNER for own in both for other in own]
+            near = max((each for each in wanted if each <= width / 2 + WIDER), default=0.0)
+            if state in alone and near > width / 2:
+                left, right = self.beside[state]
+                self.sizes[state] = 2 * near, height
+                self.wide[state] = near + left, near + right
+            room = self.sizes[state][0] / 2 - CORNER
+            for others, lower in ((both[0], False), (both[1], True)):
+                others = sorted(others, key=self.x.__getitem__)
+                ends = _ends([self.x[other] - self.x[state] for other in others], room)
+                for other, end in zip(others, ends, strict=True):
+                    offset[(state, other) if lower else (other, state)] = end
+        return offset
 
     def _set_rows(self, rows: Sequence[Sequence[int]]) -> None:
         """Set the upper and lower end of every row; channels are higher where lines are flatter."""
@@ -385,6 +408,30 @@ class _Layers:
         """Return the centre of a loop's label, and its line."""
         edge = state[0] + loop.side * self.sizes[self.links[loop.link].source][0] / 2
         return loop_line((edge, state[1] + loop.below), loop.side, self.links[loop.link].size[0])
+
+
+def _ends(wanted: Sequence[float], room: float) -> list[float]:
+    """Return places of lines at a state, from its centre: as wanted, or else evenly spread.
+
+    Examples
+    --------
+    >>> _ends([-90.0, -70.0, 10.0, 30.0], 60.0)
+    [-60.0, -25.0, 10.0, 30.0]
+    """
+    before = sum(each < -room for each in wanted)
+    after = sum(each > room for each in wanted)
+    ends = list(wanted[before : len(wanted) - after])
+    low, high = -room + before * PORT, room - after * PORT
+    for i, end in enumerate(ends):
+        ends[i] = max(end, ends[i - 1] + PORT if i else low)
+    for i in reversed(range(len(ends))):
+        ends[i] = min(ends[i], ends[i + 1] - PORT if i + 1 < len(ends) else high)
+    if not ends:
+        step = 2 * room / max(before + after - 1, 1)
+        return [-room + i * step for i in range(before + after)]
+    left = [-room + i * (ends[0] + room) / before for i in range(before)]
+    right = [room - i * (room - ends[-1]) / after for i in range(after)]
+    return [*left, *ends, *reversed(right)]
 
 
 def loop_line(at: Point, side: int, width: float) -> tuple[Point, list[Point]]:
