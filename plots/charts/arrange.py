@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
 
-MARGIN = 8.0  # around what is in a region
-APART = 12.0  # between regions
+MARGIN = 7.0  # around what is in a region
+APART = 10.0  # between regions
 # Type of 10 points is at least 7 points high if this width is printed on 170 mm.
 PRINTED = 688.0
 SHOWN = 1200.0  # the same of a live chart, on a screen

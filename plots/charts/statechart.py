@@ -372,7 +372,7 @@ class ChartSheet:
             graph_attr={
                 "fontname": SANS,
                 "bgcolor": self.colours.paper,
-                "pad": "0.15",
+                "pad": "0.1",
                 "layout": "nop2",  # all positions are given, and the DOT text is self-contained
                 "outputorder": "edgesfirst",
             },
@@ -442,7 +442,7 @@ class ChartSheet:
     def _number_row(self, edge: Transition) -> list[Row]:
         marks = range(len(clauses(self.chart.guards[edge.name]))) if self.live else ()
         number = Piece(f"g{self.numbered[edge.name]}", "clause")
-        row = [Piece("[", "bracket"), number, Piece("] ", "bracket")]
+        row = [Piece("[", "bracket"), number, Piece("]", "bracket")]
         return [[*row, *(Piece(TRUE, "mark", c) for c in marks)]]
 
     def _guard_lines(self, edge: Transition) -> list[Row]:
@@ -462,7 +462,7 @@ class ChartSheet:
             if i + 1 == len(lines):
                 row.append(Piece("]", "bracket"))
             if last and self.live and clause >= 0:  # last: a hidden mark leaves no gap
-                row += [Piece(" ", "bracket"), Piece(TRUE, "mark", clause)]
+                row.append(Piece(TRUE, "mark", clause))
             rows.append(self._indexed(row))
         action = self.write.actions(self.chart.assignments["action", edge.name])
         lines_of_action = wrapped(action, LONGEST_LABEL)

@@ -170,11 +170,11 @@ def test_a_guard_has_no_gaps_for_marks_that_are_not_shown() -> None:
         sheet = ChartSheet(SIGNED, live=live)
         for edge in SIGNED.transitions:
             rows = plain(sheet.guard_rows(edge, 1, 0))
-            mark = " ✓" * live
+            mark = "✓" * live
             assert rows[0].endswith("&&" + mark)
             assert rows[-1].endswith("]" + mark)
     numbered = ChartSheet(SIGNED, live=True, numbered={"arrest": 3})
-    assert plain(numbered.guard_rows(SIGNED.transitions[-1], 1, 0)) == ["1[g3] ✓✓"]
+    assert plain(numbered.guard_rows(SIGNED.transitions[-1], 1, 0)) == ["1[g3]✓✓"]
     texts = chart_picture(SIGNED)["element1-guard-arrest"].texts
     assert texts == ["1", "[|v| <= v_c &&", "", "|z| < s]"]
 

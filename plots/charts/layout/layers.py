@@ -27,9 +27,9 @@ PORT = 13.0  # least distance of two ends at a state
 WIDEST_PORT = 90.0
 WIDER = 16.0  # how much a state may grow at its sides, to make lines straight
 CORNER = 14.0  # of a state, where no line ends
-STATES_APART, LABELS_APART, LINES_APART = 26.0, 10.0, 9.0
+STATES_APART, LABELS_APART, LINES_APART = 26.0, 9.0, 9.0
 LINE = 2.0  # room of a line in a row
-BESIDE = 5.0  # between a line and its label
+BESIDE = 4.0  # between a line and its label
 LONELY = 640.0  # width of a row of states without edges
 DEFAULT, DOT = 30.0, 4.0  # from the dot to the default state; radius of the dot
 LOOP_OUT, LOOP = 26.0, 8.0  # from a state to the line of its loop; half of the loop's height
@@ -88,7 +88,7 @@ def layered(sizes: Sequence[Size], links: Sequence[LayerEdge], direction: str = 
     --------
     >>> laid = layered([(80, 40), (80, 40)], [LayerEdge(0, 1, (60, 20)), LayerEdge(1, 0, (60, 20))])
     >>> [x for x, _ in laid.states], [x for x, _ in laid.labels]
-    ([52.0, 52.0], [49.0, 125.0])
+    ([51.0, 51.0], [48.0, 122.0])
     """
     if direction == "TB":
         return _Layers(sizes, links, 1).laid()

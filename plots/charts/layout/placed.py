@@ -72,7 +72,7 @@ def placed(
     --------
     >>> laid = placed([(80, 40)] * 2, [LayerEdge(0, 1, (60, 20))], [(0, 0), (0, 100)], "TB")
     >>> laid.labels[0], laid.lines[0][0], laid.lines[0][-1]
-    ((75.0, 102.8), (40.0, 74.0), (40.0, 134.0))
+    ((74.0, 102.8), (40.0, 74.0), (40.0, 134.0))
     """
     middle = [sum(each[k] for each in centres) / len(centres) for k in (0, 1)]
     laid = Laid(sizes=list(sizes), states=list(centres))
