@@ -2409,6 +2409,7 @@ rows = {
     "an unknown model": ('"GMS"', '"GMs"'),
     "a number": ("{ m = 1.0 }", '{ m = "1" }'),
     "an unknown key": ("inertia = 2", "inertia = 2\nmass = 1"),
+    "an unknown motion": ("inertia = 2", 'inertia = 2\nmotion = "rotary"'),
     "an unknown table": ("[[sampled]]", "[[sample]]"),
 }
 group("system file", ScenarioError, system_file, rows, "own.toml")
@@ -2462,6 +2463,7 @@ rows = {
     "number among the bodies": ("bodies", 3, {"bodies": (Body("mass", inertia=1.0), 3)}),
     "negative": ("body 'mass'", ..., {"body": DIFFERENCE, "numbers": {"a": 1.0, "b": 2.0}}),
     "no number": ("body 'mass'", ..., {"body": {"inertia": "1 / m"}, "numbers": {"m": 0.0}}),
+    "motion": ("body 'mass': motion", "rotary", {"body": {"motion": "rotary"}}),
     "stiffness": ("k", "-a", {"springs": (Spring("s", "mass", k="-a"),), "numbers": {"a": 1.0}}),
     "locks that repeat": ("system 'one'", ..., {"contacts": TWICE}),
     "load without a curve": ("system 'one', contact 'p'", ..., {"contacts": (DAHL,)}),

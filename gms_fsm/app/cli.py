@@ -27,6 +27,7 @@ from gms_fsm.app.verbs.console import error_line, note
 from gms_fsm.app.verbs.export import export_command
 from gms_fsm.app.verbs.fit import fit_command
 from gms_fsm.app.verbs.runs import (
+    copy_command,
     debug_command,
     lesson_command,
     paper_command,
@@ -113,6 +114,7 @@ def root(
 
 app.command("paper")(paper_command)
 app.command("run")(run_command)
+app.command("copy")(copy_command)
 app.command("sweep")(sweep_command)
 app.command("fit")(fit_command)
 app.command("phenomena")(phenomena_command)

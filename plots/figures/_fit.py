@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.language import latex_name
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import last_cycles, letter_panels
 from plots.panels.parts.axes import VECTOR_ROWS, draw_curve, time_axis
@@ -211,7 +212,7 @@ def _over_time(ax: Axes, part: _Compared, shown: Window, test: Window | None) ->
     measured: dict[str, Any] = {"color": LINE_GREY, "linewidth": pt(2.4), "label": "measured"}
     draw_curve(ax, t, part.measured[inside], **measured)
     draw_curve(ax, t, part.modelled[inside], color=INK, label="model")
-    ax.set_ylabel(f"{part.name} [{part.unit}]")
+    ax.set_ylabel(f"${latex_name(part.name)}$ [{part.unit}]")
     time_axis(ax, *shown)
     legend_above(ax)
 
@@ -243,7 +244,7 @@ def _shaded(ax: Axes, part: _Compared, test: Window | None, shown: Window, label
 def _loop(ax: Axes, part: _Compared) -> None:
     draw_curve(ax, part.x, part.measured, color=LINE_GREY, linewidth=pt(2.0), label="measured")
     draw_curve(ax, part.x, part.modelled, color=INK, linewidth=pt(0.7), label="model")
-    ax.set(xlabel=f"x [{part.place}]", ylabel=f"{part.name} [{part.unit}]")
+    ax.set(xlabel=f"$x$ [{part.place}]", ylabel=f"${latex_name(part.name)}$ [{part.unit}]")
 
 
 def _residual_over_x(ax: Axes, part: _Compared) -> None:
@@ -266,7 +267,7 @@ def _residual_over_x(ax: Axes, part: _Compared) -> None:
     for (x, mean), name, look in means:
         ax.plot(x, mean, color=colour("paper"), linewidth=pt(look["linewidth"] + 2.0))
         ax.plot(x, mean, label=name, **to_scale(look))
-    ax.set(xlabel=f"x [{part.place}]", ylabel=f"measured − model [{part.small}]")
+    ax.set(xlabel=f"$x$ [{part.place}]", ylabel=f"measured − model [{part.small}]")
     legend_above(ax)
 
 

@@ -143,9 +143,9 @@ def replay(
     trace : Trace
         The run.
     other : Trace, optional
-        A second run, shown next to it on the same time axis.
+        A second run, drawn in the same plots over time.
     title : str, optional
-        Title of the page; by default the names of the models.
+        Title of the page; by default those of the scenarios, or the names of the models.
     names : sequence of str, optional
         Names of the runs; the only distinction between two runs of one model on one rig.
     window : (float, float), optional
@@ -259,7 +259,7 @@ def page_data(
         head = [*names[i : i + 1], each.title]
         runs.append({"title": ": ".join(head), "of": len(each), **run})
     data = {
-        "title": title or " and ".join(dict.fromkeys(_short(each) for each in traces)),
+        "title": title or " and ".join(dict.fromkeys(map(_heading, traces))),
         "runs": runs,
         "language": _language(),
         "rounding": ROUNDING,
@@ -290,9 +290,9 @@ def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _part("template.html"))
 
 
-def _short(trace: Trace) -> str:
-    """Return the name of what runs."""
-    return trace.subject.title
+def _heading(trace: Trace) -> str:
+    """Return the title of the scenario, or else the name of what runs."""
+    return trace.heading or trace.subject.title
 
 
 def _language() -> dict[str, Any]:

@@ -23,7 +23,7 @@ WIDE = 12.2  # of a character in an exported picture
 
 def session(scenario: str = FIG_4) -> Session:
     """Return a new session of a scenario."""
-    return session_of(scenario_to_debug(ROOT / "scenarios" / f"{scenario}.toml"))
+    return session_of(scenario_to_debug(ROOT / "gms_fsm/scenarios" / f"{scenario}.toml"))
 
 
 async def settle(pilot: Pilot[Any]) -> None:

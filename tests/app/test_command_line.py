@@ -28,7 +28,7 @@ from tests.scenario_files import (
     table,
 )
 
-SERVO = ROOT / "scenarios" / "servo.toml"
+SERVO = ROOT / "gms_fsm/scenarios" / "servo.toml"
 
 
 def said(done: Answer) -> str:

@@ -142,7 +142,7 @@ def _piped(script: str, **environment: str) -> subprocess.CompletedProcess[bytes
     code = (
         "import sys; from gms_fsm.app.scenario import run_debugger; "
         "from gms_fsm.app.scenario import load_scenario; "
-        f"sys.exit(run_debugger(load_scenario('scenarios/{FIG_4}.toml')))"
+        f"sys.exit(run_debugger(load_scenario('{FIG_4}')))"
     )
     return subprocess.run(
         [sys.executable, "-c", code],

@@ -267,7 +267,7 @@ def test_every_colour_can_be_read_on_its_ground(palette: Any, grounds: tuple[str
 
 def test_it_says_what_it_needs(gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
     """Textual, a terminal that can place text, a valid scenario; --light is an option of it."""
-    path = ROOT / "scenarios" / f"{FIG_4}.toml"
+    path = ROOT / "gms_fsm/scenarios" / f"{FIG_4}.toml"
     one_message(
         gms_fsm("debug", "--tui", path), "needs a terminal", "without --tui it reads commands"
     )
@@ -288,7 +288,7 @@ def test_without_textual_the_extra_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "textual", None)
     one_message(
-        gms_fsm("debug", "--tui", ROOT / "scenarios" / f"{FIG_4}.toml"),
+        gms_fsm("debug", "--tui", ROOT / "gms_fsm/scenarios" / f"{FIG_4}.toml"),
         "the full-screen debugger needs textual, which is not installed",
         'pip install "gms-fsm[tui]"',
         "without --tui answers at a prompt",

@@ -19,7 +19,7 @@ from gms_fsm.run.simulate import Moment
 from tests.helpers import FASTEST, FIG4_SINE, ROOT, open_loop, pulled_mass, stick_slip
 from tests.scenario_files import CommandLine
 
-FIG_4 = str(ROOT / "scenarios" / "paper_fig4_stick_slip.toml")
+FIG_4 = str(ROOT / "gms_fsm/scenarios" / "paper_fig4_stick_slip.toml")
 END = 12.0  # s
 
 

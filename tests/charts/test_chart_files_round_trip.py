@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -62,3 +63,10 @@ def test_what_no_file_can_store_is_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="which no file can store"):
         Chart("\ud800", states=(State("a"),), outputs={"F": "v"}).save(tmp_path / "one.toml")
     assert not (tmp_path / "one.toml").exists()
+
+
+def test_charts_are_shown_and_compared_by_what_their_authors_wrote() -> None:
+    derived = {each.name for each in fields(Chart) if not each.init}
+    assert derived == {"guards", "flows", "assignments", "forces", "lets", "totals"}
+    assert [each.name for each in fields(Chart) if each.repr != each.init] == []
+    assert [each.name for each in fields(Chart) if each.compare != each.init] == []

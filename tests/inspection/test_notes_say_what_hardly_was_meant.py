@@ -85,7 +85,7 @@ def test_a_run_that_resolves_them_has_no_such_note():
 
 @pytest.mark.slow
 def test_the_command_line_prints_them_and_the_summary_shows_them(gms_fsm):
-    path = ROOT / "scenarios" / "pulled_mass.toml"
+    path = ROOT / "gms_fsm/scenarios" / "pulled_mass.toml"
     sets = ("model.v_c=10.0", "run.t_end=2.0", "output.figures=[]")
     done = gms_fsm("run", path, "-o", "out", *(word for each in sets for word in ("--set", each)))
     assert done.code == 0

@@ -46,8 +46,8 @@ def drawn(ax: Any, label: str) -> Any:
 def test_curves_are_those_of_the_fit_with_units() -> None:
     (part,) = small().residuals()
     over_time, residual, loop, over_x, bars = lettered(fit_figure(small(), window=(2.0, 4.0)))
-    assert [ax.get_xlabel() for ax in (over_time, loop)] == ["t [s]", "x [mm]"]
-    assert (over_time.get_ylabel(), over_x.get_ylabel()) == ("F [N]", "measured − model [N]")
+    assert [ax.get_xlabel() for ax in (over_time, loop)] == ["$t$ [s]", "$x$ [mm]"]
+    assert (over_time.get_ylabel(), over_x.get_ylabel()) == ("$F$ [N]", "measured − model [N]")
     assert bars.get_xlabel() == "interval relative to the value [%]"
     inside = (part.t >= 2.0) & (part.t <= 4.0)
     assert np.array_equal(drawn(over_time, "measured").get_xdata(), part.t[inside])

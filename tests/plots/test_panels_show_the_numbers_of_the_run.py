@@ -69,10 +69,10 @@ def holds_all(x: np.ndarray, y: np.ndarray, xs: np.ndarray, ys: np.ndarray) -> b
 def test_lines_over_time_contain_every_row_in_units_that_fit(run: Trace, ax: Axes) -> None:
     (line,) = panels.velocity(ax, run)
     assert holds_all(*drawn(line), run.t, run.v)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("t [s]", "v [m/s]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$t$ [s]", "$v$ [m/s]")
     whole, first, third = panels.force(ax, run, elements=[0, 2])
     assert holds_all(*drawn(whole), run.t, run.F)
-    assert ax.get_ylabel() == "F [N]"
+    assert ax.get_ylabel() == "$F$ [N]"
     assert holds_all(*drawn(third), run.t, run.F_elements[:, 2])
     assert [first.get_label(), third.get_label()] == ["$F_{1}$", "$F_{3}$"]
     *elements, up, down = panels.ratio(ax, run)
@@ -84,7 +84,7 @@ def test_lines_over_time_contain_every_row_in_units_that_fit(run: Trace, ax: Axe
     assert len({line.get_linestyle() for line in lines}) == 4
     slow = simulate(stick_slip("signed"), Prescribed("2e-5*sin(t)"), 3.0)
     (line,) = panels.velocity(ax, slow)
-    assert ax.get_ylabel() == "v [µm/s]"
+    assert ax.get_ylabel() == "$v$ [µm/s]"
     assert drawn(line)[1].max() == pytest.approx(20.0, rel=1e-3)
 
 
@@ -102,7 +102,7 @@ def test_charts_without_edges_variables_or_s_have_no_threshold_and_say_so(ax: Ax
     model = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))
     lugre = simulate(model, non_drifting("signed")[1], 5.0)
     assert len(panels.ratio(ax, lugre)) == 1
-    assert ax.get_ylabel() == "z / s(v) [mm/N]"
+    assert ax.get_ylabel() == "$z / s(v)$ [mm/N]"
     (note,) = panels.margins(ax, lugre)
     assert "no threshold:\nthis chart has no edges" in note.get_text()
     for panel in (panels.deflections, panels.ratio):
@@ -120,7 +120,7 @@ def test_charts_without_edges_variables_or_s_have_no_threshold_and_say_so(ax: Ax
     trace = simulate(ChartModel(stop, {"k": 2.0}), Prescribed("0.4"), 2.0)
     (line,) = panels.ratio(ax, trace)
     assert drawn(line)[1].max() == pytest.approx(0.5)
-    assert ax.get_ylabel() == "d"  # it may not be a deflection in metres
+    assert ax.get_ylabel() == "$d$"  # it may not be a deflection in metres
     (line,) = panels.deflections(Figure().subplots(), trace)
     assert line.get_label() == "d1"
     (note,) = panels.margins(ax, trace)
@@ -133,7 +133,7 @@ def test_a_window_is_smooth_and_exact_and_axes_may_be_logarithmic(run: Trace, ax
     assert t.size >= 1000
     np.testing.assert_allclose(v, 0.2 * np.sin(2 * np.pi * t / 20), atol=1e-12)
     (line,) = panels.velocity(ax, run, log=True)
-    assert (ax.get_yscale(), ax.get_ylabel()) == ("log", "|v| [m/s]")
+    assert (ax.get_yscale(), ax.get_ylabel()) == ("log", "$|v|$ [m/s]")
     assert (drawn(line)[1] >= 0).all()
     for panel in (panels.portrait, panels.stribeck):
         for log in (True, False):
@@ -148,7 +148,7 @@ def test_portrait_and_hysteresis_count_slipping_elements(run: Trace, ax: Axes) -
     points = np.concatenate([path.vertices for path in pieces.get_paths()])
     assert holds_all(points[:, 0], points[:, 1], run.v, run.F)
     assert set(pieces.get_array()) == {0, 1, 2, 3, 4}
-    assert ax.get_xlabel() == "v [m/s]"
+    assert ax.get_xlabel() == "$v$ [m/s]"
     assert ax.figure.axes[1].get_ylabel() == "elements in slip"
     (pieces,) = panels.portrait(ax, run, elements=[3], bar=False)
     assert set(pieces.get_array()) == {0, 1}
@@ -165,7 +165,7 @@ def test_portrait_and_hysteresis_count_slipping_elements(run: Trace, ax: Axes) -
     ax = Figure().subplots()
     (line,) = panels.hysteresis(ax, run)
     assert holds_all(*drawn(line), run.x - run.x[0], run.F)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "F [N]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [m]", "$F$ [N]")
     first, second = panels.hysteresis(ax, run, [("up", 5.0), ("rest", np.inf)])
     assert [first.get_label(), second.get_label()] == ["up", "rest"]
     (pieces,) = panels.hysteresis(ax, run, slipping=True)
@@ -181,7 +181,7 @@ def test_stribeck_curve_and_measured_points(run: Trace, ax: Axes) -> None:
     np.testing.assert_allclose(drawn(viscous)[1], model.stribeck(x) + model.sigma_2 * x)
     np.testing.assert_array_equal(drawn(points), np.abs([v, F]))
     assert drawn(steady)[0].size > 0
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("|v| [m/s]", "|F| [N]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$|v|$ [m/s]", "$|F|$ [N]")
 
 
 def test_differences_are_those_of_the_runs_and_of_many_points_the_envelope(run: Trace) -> None:
@@ -431,4 +431,4 @@ def test_a_run_of_one_instant_has_no_axis_of_time(ax: Axes) -> None:
         simulate(stick_slip("signed"), Prescribed("0.1*sqrt(-t)"), 5.0)
     assert stopped.value.trace is not None
     panels.velocity(ax, stopped.value.trace)
-    assert ax.get_xlabel() == "t [s]"
+    assert ax.get_xlabel() == "$t$ [s]"

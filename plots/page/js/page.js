@@ -5,6 +5,8 @@ const whole = {}, span = {};
 const breakpoints = new Map();
 let frame = 0, following = true, zooming = false;
 const views = [];
+// A wide screen: the page fills it and does not scroll; two runs need more of it than one.
+const isWide = () => innerHeight >= 520 && innerWidth >= (runs.length > 1 ? 1240 : 1000);
 const keyOf = (view, contact, element, edge) => `${view.place}/${contact.name}/${element}/${edge}`;
 
 function show(k, words = "") {
@@ -40,6 +42,7 @@ function chooseElement(element) {
 
 function openPane(side, key) {
   for (const view of views) view.openPane(side, key);
+  for (const view of views) view.fit(); // once all are in place
 }
 
 function nextPane(side) {
@@ -270,6 +273,7 @@ function load(given) {
   }
   document.title = $("#title").textContent = data.title;
   $("#runs").className = runs.length > 1 ? "two" : "one";
+  document.documentElement.classList.toggle("wide", isWide());
   $("#names").textContent = `${Object.keys(runs[0].names).join(", ")}, state(1) == ${runs[0].contacts[0].states.at(-1)}`;
   $("#facts").textContent = runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" ");
   for (const run of runs) views.push(new RunView(run));
@@ -286,5 +290,6 @@ function load(given) {
 
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) $("#speed").value = "rows";
 load(data);
+addEventListener("resize", () => document.documentElement.classList.toggle("wide", isWide()));
 new ResizeObserver(() => { for (const view of views) view.fit(); }).observe($("#runs"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => eachPlots((pane) => pane.recolour()));

@@ -19,6 +19,7 @@ from gms_fsm.language import (
     Value,
     clauses,
     comparisons,
+    latex_name,
     raised,
     spell,
     split,
@@ -27,7 +28,7 @@ from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.findings import Finding, Report
 from plots.panels.guards.line_names import LineNames, NamedLine
-from plots.panels.parts.axes import Artists, beside
+from plots.panels.parts.axes import Artists, axis_title, beside
 from plots.panels.parts.selection import checked_row, checked_window, one_element, scaled, shown
 from plots.style import (
     EDGE_COLOURS,
@@ -86,7 +87,7 @@ def view_of(trace: Trace, element: int, plane: Plane) -> PlaneWindow:
         reach = np.concatenate([reach, s, -s])
     low, high = float(reach.min()), float(reach.max())
     pad = 0.14 * (high - low) or 0.5 * abs(high) or 1.0
-    factor, title = _axis_title(chart, second, np.array([low - pad, high + pad]))
+    factor, title = axis_title(second, unit_of(chart, second), np.array([low - pad, high + pad]))
     return PlaneWindow(linear, speed, low - pad, high + pad, factor, title)
 
 
@@ -104,14 +105,6 @@ def _column(trace: Trace, name: str, element: int) -> Floats:
     found = guard_columns(trace, [name])[name]
     every = np.broadcast_to(found, (trace.n, len(trace)))
     return np.asarray(every[element])
-
-
-def _axis_title(chart: Chart, name: str, values: Floats) -> tuple[float, str]:
-    unit = unit_of(chart, name)
-    if not unit:
-        return 1.0, name
-    factor, prefixed = scaled(values, unit)
-    return factor, f"{name} [{prefixed}]"
 
 
 def unit_of(chart: Chart, name: str) -> str:
@@ -201,7 +194,7 @@ def landscape(
     ax.set(
         xlim=(-view.speed, view.speed),
         ylim=(view.factor * view.low, view.factor * view.high),
-        xlabel=f"{plane.names[0]} [m/s], linear below {_power(view.linear)}",
+        xlabel=f"${latex_name(plane.names[0])}$ [m/s], linear below {_power(view.linear)}",
         ylabel=view.title,
     )
     ax.grid(visible=False)

@@ -32,7 +32,7 @@ class BristlesPane {
     const z = this.deflection(), label = Math.max(...contact.states.map((state) => textWidth(`E${contact.n} ${state}`))) * BOLD + 12;
     const value = z ? textWidth(`${z} −000.0 mm`) + 12 : 0;
     const room = Math.floor((box.clientHeight - BRISTLE.head - (this.note() ? 20 : 2)) / contact.n);
-    this.height = WIDE.matches ? clamp(room, BRISTLE.least, BRISTLE.most) : contact.n > 6 ? BRISTLE.least + 4 : BRISTLE.page;
+    this.height = isWide() ? clamp(room, BRISTLE.least, BRISTLE.most) : contact.n > 6 ? BRISTLE.least + 4 : BRISTLE.page;
     const two = this.height >= BRISTLE.two, forces = contact.n > 1 && width > 520;
     const right = forces ? 84 : BRISTLE.arrow;
     Object.assign(this, { z, two, left: two ? Math.max(label, value) : label + value, wall: width - right - BRISTLE.slider - 4, looks: [] });

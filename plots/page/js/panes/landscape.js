@@ -91,10 +91,10 @@ class LandscapePane {
     this.none.hidden = this.known;
     body.hidden = !this.known;
     if (!this.known) return;
-    const beside = box.clientWidth >= 560, width = beside ? Math.floor(box.clientWidth * 0.6) : box.clientWidth;
+    const across = box.clientWidth, beside = across >= 540, width = beside ? Math.floor(Math.min(across * 0.6, across - 250)) : across;
     body.classList.toggle("narrow", !beside);
     plane.svg.parentNode.style.width = `${width}px`;
-    const height = WIDE.matches && beside ? Math.max(box.clientHeight - 4, 180) : Math.min(width * 0.85, 400), key = `${view.contact.name}/${width}/${height}`;
+    const height = isWide() && beside ? Math.max(box.clientHeight - 4, 180) : Math.min(width * 0.85, 400), key = `${view.contact.name}/${width}/${height}`;
     if (this.fitted !== key) { // a page that scrolls also asks when only its texts grow
       Object.assign(this, { fitted: key, size: [width, height], laid: "" });
       this.layouts.clear();

@@ -146,11 +146,11 @@ class MicroscopePane {
     const count = this.lines.length, rest = this.box.clientHeight - COLUMN.foot - 14; // 14: the bar to scroll
     const { least, two, most, page } = LINE_HEIGHT, fits = Math.floor((rest - STAIRS.page) / count);
     const height = fits < two && rest - count * two >= STAIRS.least ? two : clamp(fits, least, most);
-    this.height = WIDE.matches ? height : page;
-    this.top = WIDE.matches ? clamp(rest - count * this.height, STAIRS.least, STAIRS.most) : STAIRS.page;
+    this.height = isWide() ? height : page;
+    this.top = isWide() ? clamp(rest - count * this.height, STAIRS.least, STAIRS.most) : STAIRS.page;
     this.unfold(this.height >= LINE_HEIGHT.two);
     for (const [name, value] of [["--row", this.height], ["--top", this.top], ["--foot", COLUMN.foot]]) this.scroller.style.setProperty(name, `${value}px`);
-    this.scroller.style.height = WIDE.matches ? "" : `${this.top + COLUMN.foot + 14 + Math.min(count, LINE_HEIGHT.count) * this.height}px`;
+    this.scroller.style.height = isWide() ? "" : `${this.top + COLUMN.foot + 14 + Math.min(count, LINE_HEIGHT.count) * this.height}px`;
     this.across = this.scroller.clientWidth - this.labels;
     this.down = this.scroller.clientHeight - this.top - COLUMN.foot;
     place(this.svg, { width: this.scroller.clientWidth, height: this.top });

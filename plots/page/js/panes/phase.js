@@ -21,7 +21,7 @@ class PhasePane {
     this.told = make("output", this.legend);
     const width = box.clientWidth, beside = width >= 560, head = this.legend.offsetHeight;
     const each = beside ? Math.floor(width / 2) - 4 : width;
-    const height = WIDE.matches ? Math.max(box.clientHeight - head - 6, 150) / (beside ? 1 : 2) : Math.min(each * 0.8, 420);
+    const height = isWide() ? Math.max(box.clientHeight - head - 6, 150) / (beside ? 1 : 2) : Math.min(each * 0.8, 420);
     for (const plot of plots) plot.fit(each, Math.floor(height));
     this.show();
   }
