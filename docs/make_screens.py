@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console, Group
 
 from gms_fsm.app.live import LiveView
-from gms_fsm.app.scenario import load_scenario, scenario_to_debug, session_of
+from gms_fsm.app.scenario import load_scenario, session_of
 from gms_fsm.debugger.tui._app import FullScreen
 from gms_fsm.foundation.files import write_whole
 from gms_fsm.run.simulate import Moment
@@ -45,7 +45,7 @@ def screen(
     name: str, scenario: str, size: tuple[int, int], *lines: str, light: bool = False
 ) -> None:
     """Write the full-screen debugger after some commands."""
-    loaded = scenario_to_debug(SCENARIOS / f"{scenario}.toml")
+    loaded = load_scenario(SCENARIOS / f"{scenario}.toml")
     app = FullScreen(session_of(loaded), loaded.title, light=light)
 
     async def show() -> str:

@@ -349,9 +349,7 @@ def run_figure(item: Item) -> Figure:
     with rc_context(RC):
         tall = 0.5 + 0.2 * item.entry.demonstration.n  # inches, of the states
         figure = Figure(figsize=(6.4, 3.2 + tall), layout="constrained")
-        force, velocity, states = figure.subplots(
-            3, 1, sharex=True, height_ratios=(1.6, 1.6, tall)
-        )
+        force, velocity, states = figure.subplots(3, 1, sharex=True, height_ratios=(1.6, 1.6, tall))
         force.plot(pad.t, pad.F, color=INK)
         force.set(ylabel="$F$ [N]", xlim=(0, T_END))
         velocity.plot(pad.t, pad.v, color=INK)

@@ -132,7 +132,11 @@ if "IPython" in sys.modules:  # else this is no notebook
 
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
-        raise AttributeError(f"module 'gms_fsm' has no attribute {name!r}")
+        from gms_fsm.foundation.arguments import meant
+
+        hint = "" if name.startswith("_") else meant(name, _HOME).strip()
+        said = f"module 'gms_fsm' has no attribute {name!r}"
+        raise AttributeError(f"{said}; {hint}" if hint else said)
     found = getattr(import_module(f"gms_fsm.{_HOME[name]}"), name)
     globals()[name] = found
     return found

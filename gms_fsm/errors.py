@@ -12,6 +12,7 @@ import enum
 from typing import Any, NamedTuple, Self
 
 LONGEST_SHOWN = 120  # characters of a value in a message
+SCENE = 72  # of the line of a text that is at fault
 
 
 def cut(text: str, longest: int = LONGEST_SHOWN) -> str:
@@ -186,6 +187,18 @@ class GMSError(Exception):
         return made.replaced(outer=error.outer, key=error.key)
 
 
+def scene(text: str, column: int) -> str:
+    """Return a line of a text with a mark below a column, cut around it to fit a screen.
+
+    >>> print(scene("z > u", 5))
+        z > u
+            ^
+    """
+    start = max(0, column - 1 - SCENE // 2)
+    shown = text[start : start + SCENE].replace("\n", " ").replace("\t", " ").rstrip()
+    return f"    {shown}\n    {' ' * (column - 1 - start)}^"
+
+
 class Part(NamedTuple):
     """A part of a chart or of a system, to be named in errors.
 
@@ -235,13 +248,10 @@ class ExpressionError(GMSError, ValueError):
     """
 
     def __init__(self, reason: str, text: str, column: int, allowed: str, where: str = "") -> None:
-        # A very long text is cut around the column to keep the message short.
-        start = max(0, column - 61)
-        shown = text[start : start + 120].replace("\n", " ").replace("\t", " ")
         super().__init__(
             reason,
             place=f"{where}, column {column}" if where else f"column {column}",
-            advice=f"allowed: {allowed}\n    {shown}\n    {' ' * (column - 1 - start)}^",
+            advice=f"allowed: {allowed}\n{scene(text, column)}",
         )
         self.text, self.column, self.allowed, self.where = text, column, allowed, where
 

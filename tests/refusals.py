@@ -234,10 +234,17 @@ rows = {
     "very long": ('title = "open loop"', f'"{LONG}" = 1'),
     "very long value": (END, f"{END}\nend = '{LONG}'"),
     "3000 tables deep": ("[run]", f"{'a.' * 3000}b = 1\n[run]"),
+    "of a table within": ("v_c = 1e-6", "v_c = 1e-6\nF_c = 1.0"),
+    "of another program": (END, f"{END}\ndt = 1e-3"),
+    "no C": (f"{ONE_C}\n", ""),
 }
 group("key of a scenario", ScenarioError, edited, rows, "a.toml")
 rows = {
     "unknown model": ('"GMS"', '"GSM"'),
+    "model in other letters": ('"GMS"', '"gms"'),
+    "model with a hyphen": ('"GMS"', '"lu-gre"'),
+    "number with its unit": (END, 't_end = "60 s"'),
+    "numbers in a text": ("[100.0, 50.0]", '"100, 50"'),
     "unknown law": ('"signed"', '"singed"'),
     "unknown column of Table I": (MODEL, PAPER.replace("stick-slip", "stickslip")),
     "unknown method": (END, f'{END}\nmethod = "rk45"'),
@@ -277,6 +284,10 @@ rows = {
     "expression that ends early": ("signal, column 8", ..., "sin(t)", "sin(t"),
     "unknown name": ("signal, column 9", ..., "sin(t)", "sin(x)"),
     "name that is an emoji elsewhere": ("signal, column 1", ..., SIN, ":warning:"),
+    "product without a sign": ("signal, column 5", ..., SIN, "0.1 sin(2 pi t)"),
+    "function of a module": ("signal, column 5", ..., SIN, "0.1*math.sin(t)"),
+    "letter for pi": ("signal, column 9", ..., SIN, "0.1*sin(\u03c0*t)"),
+    "case": ("signal, column 1", ..., SIN, "0 if t < 1 else 0.1"),
     "program": ("signal, column 1", ..., QUOTED, """'__import__("os").mkdir("pwned")'"""),
     "one corner": ("a.toml: rig.velocity = [[0.0, 0.1]]: signal", ..., QUOTED, "[[0.0, 0.1]]"),
     "no corner": ("a.toml: rig.velocity = []: signal", ..., QUOTED, "[]"),
@@ -312,6 +323,27 @@ rows = {
     "an inline key without end": ("\nk = { " + "a." * 300_000 + "a = 1 }\n",),
 }
 group("file that is no scenario", ScenarioError, scenario, rows, "a.toml")
+rows = {
+    "unit": (END, "t_end = 60 s"),
+    "unit that is a quotient": ("v_c = 1e-6", "v_c = 1e-3 mm/s"),
+    "decimal comma": (END, "t_end = 1,5"),
+    "list without brackets": ("[100.0, 50.0]", "100.0, 50.0"),
+    "list without commas": ("[100.0, 50.0]", "[100.0 50.0]"),
+    "colon": (END, "t_end: 1.0"),
+    "semicolon": (END, "t_end = 1.0;"),
+    "comment of another language": (END, "t_end = 1.0 // s"),
+    "word without quotes": ('"signed"', "signed"),
+    "formula without quotes": (QUOTED, SIN),
+    "truth of Python": ("[output]", "[output]\ncsv = True"),
+    "nothing of Python": (END, f"{END}\nstep = None"),
+    "one quote": ('"open loop"', '"open loop'),
+    "words behind a text": ('"open loop"', '"open loop" of mine'),
+    "quotes of a typesetter": ('"open loop"', "“open loop”"),
+    "path of Windows in double quotes": (QUOTED, SIGNAL % "C:\\Users\\me\\x.csv"),
+    "braces over two lines": ("stribeck = {", "stribeck = {\n"),
+    "table twice": ("[run]", "[rig]\n[run]"),
+}
+group("line that is no TOML", ScenarioError, edited, rows, "a.toml")
 rows = {
     "of another table": (OPEN_LOOP, "law=signed"),
     "typo": (OPEN_LOOP, "tend=3"),
@@ -409,6 +441,8 @@ rows = {
     ),
 }
 group("own file", ScenarioError, own, rows, "pair.toml")
+rows = {"one bracket": ("pulled", "[[contact]]", "[contact]", "run pulled.toml")}
+group("own file", ScenarioError, own, rows, "pulled.toml")
 rows = {
     "guard": ("guard, column 5", ..., "own", TO_FORWARD, 'guard = "F > F_k"', "run pair.toml"),
     "missing chart": ("one.toml", ..., "pulled", '"own.toml"', '"one.toml"', "blocks pulled.toml"),
@@ -452,6 +486,7 @@ rows = {
     "value for a contact": ("pair.toml", ..., "run pair.toml --set contact.gear=1"),
     "scenario that is missing": ("gone.toml", ..., "run gone.toml"),
     "scenario that is a folder": (".", ..., "run ."),
+    "name of no scenario": (None, ..., "debug pulledmass"),
 }
 group("command", ScenarioError, command, rows)
 rows = {
@@ -492,6 +527,10 @@ rows = {
     "elements of a system": ("--elements", ..., "blocks pair.toml --elements 3"),
     "blocks of a chart file": ("own.toml", ..., "blocks own.toml"),
     "check of a missing chart": ("", ..., "check nothing"),
+    "chart in other letters": ("", ..., "chart GMS"),
+    "chart with a hyphen": ("", ..., "handout lu-gre"),
+    "beginning of a model": ("", ..., "phenomena --model GMS -o o"),
+    "number of the rig in a sweep": ("--over", ..., "sweep pulled.toml --over rig.m=1:2:2"),
     "law of a broken chart": ("", ..., "check broken:arms --law signed"),
     "domain that is empty": ("", ..., "check gms --law signed --domain s>0 --domain s<0"),
     "domain that is not encoded": ("", ..., "check gms --law signed --domain exp(s)>1"),
@@ -505,15 +544,16 @@ rows = {
     "chart without values": ("own.toml", ..., "phenomena own.toml -o o"),
     "system of several contacts": ("pair.toml", ..., "phenomena pair.toml -o o"),
     "model that is no file": ("", ..., "phenomena lugre -o o"),
-    "data set that is missing": ("dataset", "skates", "benchmark --only skates -o out"),
+    "data set that is missing": ("dataset", ..., "benchmark --only skates -o out"),
     "export without a format": ("--to", ..., "export own.toml"),
     "handout of a chart file": ("own.toml", ..., "handout own.toml"),
 }
 group("command", ParameterError, command, rows)
 rows = {
     "debug of a missing scenario": ("none.toml", ..., "debug none.toml"),
-    "debug of a program": ("", ..., "debug mine.py"),
-    "debug of a trace": ("", ..., "debug t.CSV"),
+    "run of a trace": ("t.npz", ..., "run t.npz"),
+    "debug of a program": ("mine.py", ..., "debug mine.py"),
+    "debug of a trace": ("t.CSV", ..., "debug t.CSV"),
     "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),
     "fit of a missing scenario": ("none.toml", ..., "fit none.toml"),
     "debug of a run that cannot be": ("pulled.toml", ..., "debug pulled.toml --set run.t_end=-1"),
@@ -527,6 +567,7 @@ group("command", ExpressionError, command, rows)
 rows = {
     "plot of a missing trace": ("none.npz", ..., "plot none.npz"),
     "plot of no trace": ("own.toml", ..., "plot own.toml"),
+    "replay of a scenario": ("pulled.toml", ..., "replay pulled.toml"),
 }
 group("command", TraceFileError, command, rows)
 rows = {"data that are missing": ("nowhere", ..., "benchmark --data nowhere -o out")}
@@ -686,6 +727,9 @@ rows = {
     "no row where it is asked, and words": (
         from_csv(INSTRUMENT.replace(";4;2.0", ";4;off"), where="time > 1e3 s"),
     ),
+    "name without its unit": (from_csv(INSTRUMENT.replace("F_N", "F [N]")),),
+    "no names": (from_csv(INSTRUMENT.partition("\n")[2]),),
+    "spreadsheet": (from_csv(b"PK\x03\x04" + bytes(range(256))),),
     "unit beside a number": (from_csv(INSTRUMENT.replace("0.0;0;0.0", "s;0;0.0", 1)),),
 }
 group("Record.from_csv", RecordError, lambda given: read(**given), rows, "own.csv")
@@ -1628,6 +1672,7 @@ rows = {
     "all rows": ("", ..., {"output": "all"}),
     "times that are missing": ("", ..., {"output": "t_eval"}),
     "typo": ("", ..., {"t_evil": [0.5]}),
+    "parameter that varies": ("", ..., {"F_s": [1.5, 2.0]}),
     "unknown engine": ("engine", "turbo", {"engine": "turbo"}),
     "negative tolerance": ("rtol", -1.0, {"rtol": -1}),
     "unknown initial value": ("", ..., {"initial": {"q": 1}}),

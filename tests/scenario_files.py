@@ -115,7 +115,7 @@ def command_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> CommandLine:
     """Return ``gms-fsm`` as a function of its arguments, run in this process."""
-    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("COLUMNS", "2000")  # a message on one line
     monkeypatch.delenv("GMS_FSM_DATA", raising=False)
 
     def call(*arguments: str | Path) -> Answer:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self, TypeAlias
 from gms_fsm.coupling.joints import content_of
 from gms_fsm.coupling.stepping import FrictionState, Snapshot
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.arguments import checked_kind, unknown
 from gms_fsm.foundation.extras import require
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
@@ -115,12 +115,7 @@ class JointFriction:
         kinds, model = self._mujoco.mjtJoint, self.model
         names = [model.joint(i).name for i in range(model.njnt)]
         if name not in names:
-            raise ParameterError(
-                "there is no such joint",
-                place="frictions",
-                value=name,
-                advice=f"joints: {', '.join(filter(None, names)) or 'none has a name'}",
-            )
+            raise unknown("joint", name, filter(None, names), place="frictions")
         joint = model.joint(name)
         if joint.type[0] not in (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE)):
             raise ParameterError(

@@ -164,8 +164,8 @@ class RunTable(Table):
 
     t_end: float | None = Field(None, description="s; by default the end of the record")
     t_start: float | None = Field(None, description="s; by default 0, or the start of the record")
-    method: MethodName = _DEFAULT.method_name
-    step: float | None = Field(_DEFAULT.step, gt=0, description="fixed step, s")
+    method: MethodName = Field(_DEFAULT.method_name, description="the solver")
+    step: float | None = Field(_DEFAULT.step, gt=0, description="fixed time step dt, s")
     rtol: float = Field(_DEFAULT.rtol, gt=0)
     atol: PositiveFloat | dict[str, PositiveFloat | list[PositiveFloat]] | None = Field(
         None,

@@ -6,8 +6,10 @@ error messages appear at once.
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args
 
@@ -47,8 +49,27 @@ class CliOptions:
     debug: bool = False
 
 
+_UsageError: Any = typer.BadParameter.__base__  # of click, or of its copy in newer typers
+_MEANT = {
+    "simulate": "run",
+    "start": "run",
+    "draw": "chart",
+    "prove": "check",
+    "verify": "check",
+    "film": "animate",
+    "step": "debug",
+    "identify": "fit",
+    "teach": "lesson",
+}
+
+
 class _Verbs(TyperGroup):
     """The verbs; ``--debug`` is accepted before or after one."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args and args[0] in _MEANT:
+            raise _UsageError(f"No such command {args[0]!r}. Did you mean {_MEANT[args[0]]!r}?")
+        return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         options = args[: args.index("--")] if "--" in args else args
@@ -64,7 +85,40 @@ class _Verbs(TyperGroup):
             raise
 
 
-class _Drawing(TyperCommand):
+class _Verb(TyperCommand):
+    """A verb; an option or argument that it does not have is answered with what is meant."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        given = [*args]  # parsing empties the list
+        try:
+            return super().parse_args(ctx, args)
+        except _UsageError as error:
+            param = getattr(error, "param", None)  # the missing one
+            help_ = "" if error.message or param is None else str(getattr(param, "help", ""))
+            said = [error.message.rstrip("."), help_.rstrip("."), *self.cures(given)]
+            error.message = ". ".join(filter(None, said))
+            raise
+
+    def cures(self, args: list[str]) -> Iterator[str]:
+        """Yield what could be meant by arguments that are not taken."""
+        from gms_fsm.charts.gms import LAWS
+
+        known = {option for param in self.params for option in param.opts}
+        alone = [
+            each for before, each in zip(["", *args], args, strict=False) if before not in known
+        ]
+        if "--set" in known and "--law" in args:
+            yield "A scenario has its law as a key: --set model.law=signed"
+        for each in alone:
+            if "--set" in known and re.fullmatch(r"[\w.]+=.*", each):
+                yield f"A key is changed by --set {each}"
+            if "--law" in known and each in LAWS:
+                yield f"A law is chosen by --law {each}"
+        if {"-o", "--output"} & {*args} and "--output" not in known:
+            yield f"It prints: gms-fsm {self.name} ... > FILE"
+
+
+class _Drawing(_Verb):
     """A verb whose help lists file endings: ``{chart}`` stands for those of charts, and so on."""
 
     def get_params(self, ctx: Any) -> Any:
@@ -112,25 +166,25 @@ def root(
     context.ensure_object(CliOptions).debug = debug
 
 
-app.command("paper")(paper_command)
-app.command("run")(run_command)
-app.command("copy")(copy_command)
-app.command("sweep")(sweep_command)
-app.command("fit")(fit_command)
-app.command("phenomena")(phenomena_command)
-app.command("schema")(schema_command)
+app.command("paper", cls=_Verb)(paper_command)
+app.command("run", cls=_Verb)(run_command)
+app.command("copy", cls=_Verb)(copy_command)
+app.command("sweep", cls=_Verb)(sweep_command)
+app.command("fit", cls=_Verb)(fit_command)
+app.command("phenomena", cls=_Verb)(phenomena_command)
+app.command("schema", cls=_Verb)(schema_command)
 app.command("chart", cls=_Drawing)(chart_command)
-app.command("check")(check_command)
+app.command("check", cls=_Verb)(check_command)
 app.command("blocks", cls=_Drawing)(blocks_command)
 app.command("handout", cls=_Drawing)(handout_command)
-app.command("plot")(plot_command)
+app.command("plot", cls=_Verb)(plot_command)
 app.command("animate", cls=_Drawing)(animate_command)
 app.command("replay", cls=_Drawing)(replay_command)
-app.command("debug")(debug_command)
-app.command("lesson")(lesson_command)
-app.command("code")(code_command)
-app.command("export")(export_command)
-app.command("benchmark")(benchmark_command)
+app.command("debug", cls=_Verb)(debug_command)
+app.command("lesson", cls=_Verb)(lesson_command)
+app.command("code", cls=_Verb)(code_command)
+app.command("export", cls=_Verb)(export_command)
+app.command("benchmark", cls=_Verb)(benchmark_command)
 
 
 def main() -> None:

@@ -26,13 +26,14 @@ from gms_fsm.app._tables import (
 )
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
+from gms_fsm.foundation.arguments import no_file, unknown
 from gms_fsm.foundation.files import inside
 from gms_fsm.foundation.tables import explained, read_file
 from gms_fsm.foundation.toml import override, parsed
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import simulate
-from gms_fsm.scenarios import scenario_path
+from gms_fsm.scenarios import scenario_path, shipped
 from gms_fsm.session.session import Session
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import mounted, mounted_alone
@@ -48,7 +49,6 @@ __all__ = [
     "Scenario",
     "load_scenario",
     "load_system",
-    "scenario_to_debug",
 ]
 __all__ += ["schema", "session_of"]
 
@@ -150,6 +150,7 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         If a record is invalid; the message names file, row and column.
     """
     path = scenario_path(path)
+    _check_ending(path)
     data = parsed(path)
     if not data:
         raise ScenarioError(
@@ -185,6 +186,27 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     except GMSError as error:
         place = f"[rig] {error.place}".rstrip()
         raise ScenarioError.of(error).replaced(place=place).inside(path) from None
+
+
+def _check_ending(path: Path) -> None:
+    """Refuse a file that is none of ours, or a run."""
+    match path.suffix.lower():
+        case ".py":
+            raise ScenarioError(
+                "it is a Python file, and a scenario (.toml) is wanted",
+                place=str(path),
+                advice="for a custom model use simulate(model, rig, t_end), or "
+                "Debugger(Session(model, rig, t_end)).run(), see docs/howto/debugging.md",
+            )
+        case ".npz" | ".csv":
+            raise ScenarioError(
+                "it is a trace or a table, and a scenario (.toml) is wanted",
+                place=str(path),
+                advice=f"`gms-fsm replay {path}` steps through a trace, `gms-fsm plot {path}` "
+                "draws it; a table is named in the [record] of a scenario",
+            )
+        case "" if len(path.parts) == 1 and not path.exists():
+            raise unknown("file or scenario", path.name, shipped(), ScenarioError)
 
 
 def kind_of(data: Mapping[str, Any]) -> str:
@@ -343,7 +365,9 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
             return as_signal([(t, value) for t, value in given])
         return as_signal(given)
     except GMSError as error:
-        raise ScenarioError.of(error).inside(f"{key} = {shown(given)}").inside(path) from None
+        raise (
+            ScenarioError.of(error).inside(f"{key} = {cut(shown(given), 40)}").inside(path)
+        ) from None
 
 
 def find_file(scenario: Path, name: str) -> Path:
@@ -367,54 +391,13 @@ def find_file(scenario: Path, name: str) -> Path:
             )
         if found.is_file():
             return found
-    looked = " and ".join(str(folder) for folder in folders)
-    hint = "" if len(folders) > 1 else f" (set {DATA_VARIABLE} to name a data folder)"
-    raise ScenarioError(
-        f"file = {shown(name)}: no such file in {looked}{hint}", place=str(scenario)
+    missing = no_file(folders[0] / name, ScenarioError)
+    second = f"or in {folders[1]}, the" if len(folders) > 1 else f"or set {DATA_VARIABLE} to a"
+    raise missing.replaced(
+        reason=f"file = {shown(name)}: {missing.reason}",
+        place=str(scenario),
+        advice=f"{missing.advice}; put it beside the scenario, {second} data folder",
     )
-
-
-def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
-    """Read the scenario for ``gms-fsm debug``; for other files, raise an error with advice.
-
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file, or the name of a scenario of the package, such as "servo".
-    overrides : sequence of str
-        See `load_scenario`.
-
-    Returns
-    -------
-    Loaded
-        The scenario, for `session_of`.
-
-    Raises
-    ------
-    ScenarioError
-        If it is a trace, a Python file, or not a valid scenario.
-
-    Examples
-    --------
-    >>> scenario_to_debug("t.npz")  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-    ...
-    gms_fsm.errors.ScenarioError: t.npz is a trace; `gms-fsm replay t.npz` steps through it; ...
-    """
-    match Path(path).suffix.lower():
-        case ".py":
-            raise ScenarioError(
-                f"{path} is a Python file",
-                advice="debug takes a scenario (.toml); for a custom model use "
-                "Debugger(Session(model, rig, t_end)).run(), see "
-                "docs/howto/debugging.md",
-            )
-        case ".npz" | ".csv":
-            raise ScenarioError(
-                f"{path} is a trace",
-                advice=f"`gms-fsm replay {path}` steps through it; debug takes a scenario (.toml)",
-            )
-    return load_scenario(path, overrides)
 
 
 def session_of(loaded: Loaded) -> Session:

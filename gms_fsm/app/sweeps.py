@@ -13,6 +13,7 @@ import numpy as np
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import ParameterError, cut
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.files import csv_text, output_folder, refuse_input, write_text
 from gms_fsm.foundation.markdown import plain, table_lines
 from gms_fsm.run.sweep import Sweep, sweep
@@ -165,10 +166,7 @@ def _check(axes: Sequence[Axis], known: Sequence[Parameter]) -> None:
     names = [each.name for each in axes]
     for name in names:
         if name not in [each.name for each in known]:
-            units = (f"{each.name} [{each.unit}]".removesuffix(" []") for each in known)
-            raise ParameterError(
-                f"--over {cut(name)}: unknown name", advice=f"choose from {', '.join(units)}"
-            )
+            raise unknown("parameter", name, (each.name for each in known), place="--over")
         if names.count(name) > 1:
             raise ParameterError(f"--over {name}: it is given twice", advice="give it once")
     runs = math.prod(each.values.size for each in axes)

@@ -29,6 +29,7 @@ from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import either
 
 __all__ = [
     "CHARTS",
@@ -37,6 +38,8 @@ __all__ = [
     "PARAMETERS",
     "SLIP_LAWS",
     "TABLE_I",
+    "WHICH_C",
+    "WHICH_LAW",
     "Law",
     "check_law",
     "gms_element",
@@ -44,6 +47,14 @@ __all__ = [
 
 Law = Literal["signed", "published"]
 LAWS: tuple[Law, ...] = get_args(Law)
+WHICH_LAW = (
+    "'signed' (Al-Bender et al. 2005) is for simulations; 'published', eq. (1) as printed, repeats "
+    "the paper, and makes energy for v < 0"
+)
+WHICH_C = (
+    "while an element slips, its force follows s(v) in the time F_c / C: for 50 ms at F_c = 1 N "
+    "give C = 20 N/s with shares, or C_i = share * C / k_i in m/s, a list"
+)
 
 PARAMETERS = (
     Parameter("k", "N/m", "> 0", meaning="stiffness"),
@@ -72,12 +83,7 @@ def check_law(law: object) -> None:
         If it is not one of them.
     """
     if law not in LAWS:
-        raise ParameterError(
-            "it must be 'published' (eq. (1) of the paper as printed) or 'signed' "
-            "(Al-Bender et al. 2005)",
-            place="law",
-            value=law,
-        )
+        raise ParameterError(f"it must be {either(LAWS)}", place="law", value=law, advice=WHICH_LAW)
 
 
 def gms_element(law: Law) -> Chart:

@@ -236,7 +236,10 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
             f"{name} has shape {array.shape}", advice="it must be a flat list of numbers, not empty"
         )
     if n is not None and array.size != n:
-        raise ParameterError(f"{name} has {array.size} entries, but there are {n} elements")
+        raise ParameterError(
+            f"{name} has {array.size} entries, but there are {n} elements",
+            advice="give one number for each element",
+        )
     bounds = [bound for bound in bounds_of(rule) if not isinstance(bound.limit, str)]
     sound = all(bool(bound.holds(array, bound.limit).all()) for bound in bounds)
     if not (sound and np.isfinite(array).all()):

@@ -5,7 +5,6 @@ A command yields its lines as they are produced, so an interruption does not los
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -16,6 +15,8 @@ from gms_fsm.debugger._help import ALIASES, COMMANDS, MOVES, help_of, overview
 from gms_fsm.debugger._over_time import events, ribbons
 from gms_fsm.debugger._view import branches, chart_states, ending, view
 from gms_fsm.errors import GMSError, SessionError
+from gms_fsm.foundation.arguments import meant, there_are
+from gms_fsm.foundation.quantities import WIDTH
 from gms_fsm.language import evaluate
 from gms_fsm.session.explain import holds
 from gms_fsm.session.session import KINDS, Breakpoint, Session
@@ -46,7 +47,7 @@ class Commands:
         self,
         session: Session,
         marks: text_of.Marks = text_of.PLAIN,
-        width: int = text_of.WIDTH,
+        width: int = WIDTH,
     ) -> None:
         self.session, self.marks, self.width, self.element = session, marks, width, 0
         self.last_move = ""  # the line that moved last, which an empty line repeats
@@ -77,9 +78,8 @@ class Commands:
     def answer(self, name: str, arg: str) -> Iterator[str]:
         """Execute a command."""
         if name not in COMMANDS:
-            near = difflib.get_close_matches(name, COMMANDS, 1)
-            hint = f"did you mean {near[0]}? " if near else ""
-            raise SessionError(f"unknown command {name!r}", advice=f"{hint}help lists all commands")
+            hint = f"{meant(name, COMMANDS)}help lists all commands"
+            raise SessionError(f"there is no command {name!r}", advice=hint)
         yield from getattr(self, f"do_{name}")(arg)
 
     @property
@@ -203,7 +203,8 @@ class Commands:
         try:
             t = float(arg.removesuffix("s"))
         except ValueError:
-            raise SessionError(f"{arg!r} is not a time", advice=f"{self._usage('goto')}") from None
+            advice = f"{self._usage('goto')}; the run ends at {self.session.t_end:g} s"
+            raise SessionError(f"{arg!r} is not a time", advice=advice) from None
         try:
             self.session.goto(t)
         except KeyboardInterrupt:
@@ -274,7 +275,7 @@ class Commands:
             if edge not in self._edges or words:
                 raise SessionError(
                     f"{' '.join([edge, *words])!r} is not an edge",
-                    advice=f"there are {', '.join(self._edges) or 'none'}; {self._usage('why')}",
+                    advice=f"{there_are(edge, self._edges)}; {self._usage('why')}",
                 )
         found, branch = self.session.why(self.elements.address(i), edge), self.session.branch
         yield str(found)
@@ -465,8 +466,14 @@ class Commands:
         yield from ()
 
 
+_BACKWARD = {"step": "back", "back": "step"}
+
+
 def _count(name: str, text: str, default: int = 1) -> int:
-    count = integer(text, COMMANDS[name].usage) if text else default
+    usage = COMMANDS[name].usage
+    if name in _BACKWARD:
+        usage += f"; {_BACKWARD[name]} [N] goes the other way"
+    count = integer(text, usage) if text else default
     if count < 1:
         raise SessionError(
             f"{name} {count}: the count must be at least 1", advice=f"usage: {COMMANDS[name].usage}"

@@ -122,7 +122,7 @@ def read_edits(session: Session, arg: str, usage: str, states: Iterable[str]) ->
         name, _, value = part.partition("=")
         state = re.fullmatch(r"(?:(\w+)\.)?state(\d*)", name)
         if not value:
-            raise SessionError(f"{part!r} cannot be poked", advice=usage)
+            raise SessionError(f"{part!r} gets no value", advice=usage)
         if state:
             named[_whose(elements, name, state[1], state[2])] = spelled(value, states)
         elif elements.named:
@@ -158,8 +158,8 @@ def _variable(session: Session, name: str, part: str, usage: str) -> tuple[str, 
     if form is None:
         if name in parameter_names(session.model):
             raise SessionError(
-                f"{name} is a parameter",
-                advice="to change it, start a session with another model",
+                f"{name} is a parameter, which stays in a run",
+                advice="leave with quit and give the scenario another value (--set)",
             )
         raise SessionError(f"{part!r} cannot be poked", advice=usage)
     if not form[2] and session.model.n > 1:
@@ -170,7 +170,8 @@ def _variable(session: Session, name: str, part: str, usage: str) -> tuple[str, 
 def integer(text: str, usage: str) -> int:
     """Return an integer that a person wrote; raise `SessionError` for any other text."""
     if not re.fullmatch(r"\d{1,9}", text):
-        raise SessionError(f"{text!r} is not an integer", advice=f"usage: {usage}")
+        reason = f"{text!r} is not a whole number below 1e9" if text else "a number is missing"
+        raise SessionError(reason, advice=f"usage: {usage}")
     return int(text)
 
 

@@ -143,7 +143,12 @@ COMMANDS = {
     ),
     "quit": Command("file", "quit", "Leave.", ("quit",), "q"),
 }
-ALIASES = {each.alias: name for name, each in COMMANDS.items() if each.alias} | {"?": "help"}
+ALIASES = {each.alias: name for name, each in COMMANDS.items() if each.alias} | {
+    "?": "help",
+    "exit": "quit",
+    ":q": "quit",
+    "set": "poke",
+}
 MOVES = ("step", "back", "next", "prev", "until", "continue")
 OVERVIEW = """\
 To find out why an element switches or does not:  goto {t}   then   why {first}

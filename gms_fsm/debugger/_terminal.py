@@ -17,7 +17,8 @@ import sys
 from typing import TextIO
 
 from gms_fsm.debugger._commands import Commands
-from gms_fsm.debugger._text import DRAWN, PLAIN, WIDTH, wrapped
+from gms_fsm.debugger._text import DRAWN, PLAIN
+from gms_fsm.foundation.quantities import WIDTH, wrapped
 from gms_fsm.session.session import Session
 
 NARROWEST = 40  # columns; a narrower terminal breaks the lines itself

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from gms_fsm.debugger._over_time import Ribbons
 from gms_fsm.debugger._view import BranchView, ContactView, Screen, StateView
-from gms_fsm.foundation.quantities import named_numbers
+from gms_fsm.foundation.quantities import WIDTH, named_numbers
 from gms_fsm.session.session import Breakpoint
 
-WIDTH = 80  # columns, where there is no terminal
 BAR = 8  # characters for |z|/s = 1, and more in a wide terminal
 
 
@@ -228,18 +226,3 @@ def short(text: str, wide: int) -> str:
     'break_a~'
     """
     return text if len(text) <= wide else text[: wide - 1] + "~"
-
-
-def wrapped(line: str, width: int = WIDTH) -> Iterator[str]:
-    """Yield a line in parts that fit the screen.
-
-    >>> [len(part) <= WIDTH for part in wrapped("word " * 40)]
-    [True, True, True]
-    >>> [len(part) <= 120 for part in wrapped("word " * 40, 120)]
-    [True, True]
-    """
-    if len(line) <= width:
-        yield line.rstrip()
-        return
-    indent = " " * (len(line) - len(line.lstrip()) + 2)
-    yield from textwrap.wrap(line, width, subsequent_indent=indent[: width // 2])

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.formats import Format, of
-from gms_fsm.foundation.arguments import checked_path, unknown
+from gms_fsm.foundation.arguments import checked_path, either, unknown
 from gms_fsm.foundation.display import asked
 from gms_fsm.foundation.files import output_folder, write_together
 from gms_fsm.run.settings import Settings
@@ -98,7 +99,12 @@ def export(
     """
     known = formats()
     if not isinstance(format, str) or format not in known:
-        raise unknown("format", format, known)
+        error, word = unknown("format", format, known), str(format).lower()
+        kinds = {each.name: re.findall(r"\w+", each.kind.lower()) for each in known.values()}
+        serving = [name for name, words in kinds.items() if word in words]
+        if serving:
+            raise error.replaced(advice=f"{shown(format)} is served by {either(serving)}")
+        raise error
     where = checked_path("folder", folder)
     form = known[format]
     subject = Subject.of(

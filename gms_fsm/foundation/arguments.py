@@ -5,6 +5,7 @@ Checks of numbers are in `charts.parameters`.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import operator
 import os
@@ -79,13 +80,18 @@ def listed(name: str, value: Any, wanted: str) -> list[Any]:
 def nearest(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
     """Return the known name most like a wrong one, whatever its case; empty if none is.
 
+    A name of which the wrong one is the beginning is near, too.
+
     Examples
     --------
-    >>> nearest("SIGMA2", ["k", "sigma_2"]), nearest("mass", ["k"])
-    ('sigma_2', '')
+    >>> nearest("SIGMA2", ["k", "sigma_2"]), nearest("mass", ["k"]), nearest("GMS", ["gms-signed"])
+    ('sigma_2', '', 'gms-signed')
     """
     by_case = {each.casefold(): each for each in known}
-    near = difflib.get_close_matches(str(name)[:100].casefold(), by_case, n=1, cutoff=cutoff)
+    folded = str(name)[:100].casefold()
+    near = difflib.get_close_matches(folded, by_case, n=1, cutoff=cutoff)
+    if not near and len(folded) > 2:
+        near = [each for each in by_case if each.startswith(folded)]
     return by_case[near[0]] if near else ""
 
 
@@ -132,9 +138,44 @@ def unknown(
     >>> print(unknown("parameter", "K", ["k", "sigma_2"]))
     there is no parameter 'K'; did you mean 'k'? there are k, sigma_2
     """
-    names = [*known]
-    advice = f"{meant(name, names)}there {'is' if len(names) == 1 else 'are'} {some_of(names)}"
-    return kind(f"there is no {noun} {shown(name)}", advice=advice, **at)
+    return kind(f"there is no {noun} {shown(name)}", advice=there_are(name, known), **at)
+
+
+def there_are(name: object, known: Iterable[str]) -> str:
+    """Return the advice on a name that is not known.
+
+    Examples
+    --------
+    >>> there_are("K", ["k", "sigma_2"])
+    "did you mean 'k'? there are k, sigma_2"
+    """
+    names = [*dict.fromkeys(known)]
+    hint = meant(name, names)
+    if hint and len(names) > MOST_NAMED + 1:  # a wall of names would hide the one that is meant
+        return f"{hint}there are {len(names)} in all"
+    return f"{hint}there {'is only' if len(names) == 1 else 'are'} {some_of(names)}"
+
+
+def no_file(path: str | os.PathLike[str], kind: type[GMSError]) -> GMSError:
+    """Return the error of a file that is missing: it names those of its folder.
+
+    Examples
+    --------
+    >>> print(no_file("no/such/folder/run.npz", GMSError))
+    no/such/folder/run.npz: no such file; there is no folder no/such/folder either
+    """
+    place = Path(path)
+    advice = f"there is no folder {place.parent} either"
+    with contextlib.suppress(OSError):
+        there = [each.name for each in place.parent.iterdir() if not each.name.startswith(".")]
+        alike = sorted(each for each in there if place.suffix in ("", Path(each).suffix))
+        what = f"no *{place.suffix}" if place.suffix else "nothing"
+        where = "this folder" if place.parent == Path() else str(place.parent)
+        near = nearest(place.stem, stems := {Path(each).stem: each for each in alike})
+        advice = f"did you mean {stems[near]!r}? " if near else ""
+        if not advice or len(alike) <= MOST_NAMED:
+            advice += f"in {where} there is {some_of(alike) if alike else what}"
+    return kind("no such file", place=str(path), advice=advice)
 
 
 def one_of(

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+
+WIDTH = 80  # columns, where there is no terminal
 
 PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate(["a", *"fpnµm", "", *"kMGT"])}
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
@@ -60,3 +63,27 @@ def sparkline(values: Sequence[float | None]) -> str:
         return BLOCKS[round(share * (len(BLOCKS) - 1))]
 
     return "".join(map(block, values))
+
+
+def wrapped(line: str, width: int = WIDTH, *, whole: bool = False) -> Iterator[str]:
+    """Yield a line in parts that fit a screen, below the text behind its first column, if any.
+
+    Whole words, such as the names of files, are not broken on request.
+
+    >>> [len(part) <= WIDTH for part in wrapped("word " * 40)]
+    [True, True, True]
+    >>> list(wrapped("  proved   never at the same time", 24))
+    ['  proved   never at the', '           same time']
+    """
+    if len(line) <= width:
+        yield line.rstrip()
+        return
+    column = re.match(r" *\S+ {2,}", line)
+    hanging = column.end() if column else len(line) - len(line.lstrip()) + 2
+    yield from textwrap.wrap(
+        line,
+        width,
+        subsequent_indent=" " * min(hanging, width // 2),
+        break_long_words=not whole,
+        break_on_hyphens=not whole,
+    )

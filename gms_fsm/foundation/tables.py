@@ -5,14 +5,16 @@ The sentence gives key, value, rule, and the nearest key; it names no file.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
+from pydantic.fields import FieldInfo
 
 from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, shown
-from gms_fsm.foundation.arguments import nearest, some_of
+from gms_fsm.foundation.arguments import either, meant, nearest, some_of
 from gms_fsm.foundation.files import output_folder, write_whole
 from gms_fsm.foundation.toml import LARGEST_FILE, Key, data_of, line_of, override, text_of, written
 
@@ -148,38 +150,98 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
     key = cut(".".join(map(str, places)))
     value, kind = first.get("input"), first["type"]
     if kind == "extra_forbidden":
-        valid = _valid_keys(places[:-1], data, root)
-        wanted = str(places[-1])[:LONGEST_SHOWN]
-        near = nearest(wanted, valid) or _elsewhere(wanted, data, root)
+        valid = _fields_at(places[:-1], data, root)
+        near = _instead(str(places[-1])[:LONGEST_SHOWN], places[:-1], valid, data, root)
         hint = f"did you mean {near!r}? " if near else ""
-        return f"{key} = {shown(value)}: unknown key; {hint}valid here: {some_of(valid)}"
+        return f"{key} = {cut(shown(value), 40)}: unknown key; {hint}valid here: {some_of(valid)}"
     if kind == "missing":
-        return f"{key} is missing"
+        field = _fields_at(places[:-1], data, root).get(str(places[-1]))
+        return f"{key} is missing{'' if field is None else _what(field)}"
     if kind == "union_tag_not_found":
-        return f"{key}.kind is missing"
+        field = _fields_at(places[:-1], data, root).get(str(places[-1]))
+        return f"{key}.kind is missing{'' if field is None else _what_kind(field)}"
     if kind == "union_tag_invalid":
         tag, allowed = first["ctx"]["discriminator"].strip("'"), first["ctx"]["expected_tags"]
-        return f"{key}.{tag} = {shown(first['ctx']['tag'])}: it must be one of {allowed}"
+        given = first["ctx"]["tag"]
+        hint = meant(given, re.findall("'([^']+)'", allowed))
+        return f"{key}.{tag} = {shown(given)}: {hint}it must be one of {allowed}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{key} = {shown(value)}: it must be a table, [{key}]"
     text = first["msg"].removeprefix("Value error, ")
     text = text.replace("Input should be", "it must be")
     if isinstance(value, dict):
+        if kind == "list_type":
+            return f"[{key}]: there may be several of it; write [[{key}]]"
         return f"[{key}] {text}" if key else text
-    return f"{key} = {shown(value)}: {text}"
+    return f"{key} = {shown(value)}: {_other_form(kind, value) or text}"
 
 
-def _elsewhere(key: str, data: dict[str, Any], root: type[BaseModel]) -> str:
-    """Return the most similar key of another table, with its table."""
+def _other_form(kind: str, value: object) -> str:
+    """Return how a value of another type is written; empty if the rule says it."""
+    number = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+    text = value.strip() if isinstance(value, str) else ""
+    if kind == "float_type" and (found := re.match(number, text)):
+        return f"it must be a number, without quotes and unit: {found[0]}, in SI units"
+    if kind == "list_type" and (several := re.findall(number, text)):
+        return f"it must be a list: [{', '.join(several)}]"
+    if kind == "list_type" and isinstance(value, int | float) and not isinstance(value, bool):
+        return f"it must be a list, with one number for each element: [{value!r}]"
+    return ""
+
+
+def _what(field: FieldInfo) -> str:
+    """Return what a missing key is: its choices, its description."""
+    choices, known = _choices(field.annotation), field.description or ""
+    if not all(repr(each) in known for each in choices):
+        known = "; ".join(filter(None, (f"give {either(choices)}", known)))
+    return known and f"; {known}"
+
+
+def _what_kind(field: FieldInfo) -> str:
+    """Return the kinds of a table."""
+    kinds = [table.model_fields.get("kind") for table in _tables_in(field.annotation)]
+    choices = [each for kind in kinds if kind for each in _choices(kind.annotation)]
+    return f"; give {either(choices)}" if choices else ""
+
+
+def _choices(annotation: Any) -> list[str]:
+    """Return the texts that an annotation allows, if it allows only some."""
+    return [each for each in get_args(annotation) if isinstance(each, str)]
+
+
+def _instead(
+    key: str,
+    table: Key,
+    valid: Mapping[str, FieldInfo],
+    data: dict[str, Any],
+    root: type[BaseModel],
+) -> str:
+    """Return the key that is meant by an unknown one.
+
+    That is the key of this name in a table within, the most similar one here, the one of this name
+    elsewhere, the one that is described by this name, or the most similar one elsewhere.
+    """
+    inner = {
+        name: f"{each}.{name}" for each in valid for name in _fields_at((*table, each), data, root)
+    }
+    described = [
+        each
+        for each, field in valid.items()
+        if re.search(rf"\b{re.escape(key)}\b", field.description or "")
+    ]
     tables = [
         name
         for name, field in root.model_fields.items()
         if name in data or isinstance(field.default, BaseModel)
     ]
-    places = {
-        name: f"{table}.{name}" for table in tables for name in _valid_keys((table,), data, root)
-    }
-    return places.get(nearest(key, places), "")
+    places = {name: f"{each}.{name}" for each in tables for name in _fields_at((each,), data, root)}
+    found = (
+        inner.get(key),
+        nearest(key, valid),
+        places.get(key),
+        described[0] if len(described) == 1 else "",
+    )
+    return next(filter(None, found), places.get(nearest(key, places, 0.75), ""))
 
 
 def _written_key(loc: tuple[int | str, ...], data: Any) -> Key:
@@ -203,7 +265,7 @@ def _inside(data: Any, part: str | int) -> Any:
     return data[part]
 
 
-def _valid_keys(places: Key, data: dict[str, Any], root: type[BaseModel]) -> list[str]:
+def _fields_at(places: Key, data: dict[str, Any], root: type[BaseModel]) -> dict[str, FieldInfo]:
     """Return the keys that are valid in a table of the file."""
     options, table = [root], data
     for place in places:
@@ -211,16 +273,16 @@ def _valid_keys(places: Key, data: dict[str, Any], root: type[BaseModel]) -> lis
             fields = _fitting(options, table).model_fields
             named = {field.alias or name: field for name, field in fields.items()} | fields
             if place not in named:
-                return []
+                return {}
             options = _tables_in(named[place].annotation)
             if not options:
-                return []
+                return {}
         try:
             table = _inside(table, place)
         except (LookupError, TypeError):
             table = {}
     fields = _fitting(options, table).model_fields
-    return [field.alias or name for name, field in fields.items()]
+    return {field.alias or name: field for name, field in fields.items()}
 
 
 def _fitting(options: list[type[BaseModel]], table: Any) -> type[BaseModel]:

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gms_fsm.errors import GMSError, ScenarioError, cut, shown
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.errors import GMSError, ScenarioError, cut, scene, shown
+from gms_fsm.foundation.arguments import no_file, unknown
 
 Key = tuple[str | int, ...]  # names of keys, and places in arrays from 0
 
@@ -25,6 +25,44 @@ _TEXT_OR_COMMENT = re.compile(r""""[^"]*"?|'[^']*'?|#.*""")
 _HALF_A_NUMBER = re.compile(  # a digit on only one side of the point
     r"(?<![\w.+-])([+-]?)(?:(\d+)\.|\.(\d+))((?:[eE][+-]?\d+)?)(?![\w.])"
 )
+_AT = re.compile(r" \(at line (\d+), column (\d+)\)| \(at end of document\)")
+# What is usual in a line that is not TOML, without its comment, and the cure.
+_NUMBER = r"[+-]?\d[\d_]*(?:\.\d+)?(?:[eE][+-]?\d+)?"
+_USUAL: Sequence[tuple[str, str]] = (
+    (r"[“”„«»‘’]", "write straight quotes, \" or '"),
+    (r"^([\w.]+)\s*=\s*(\d+),(\d+)$", "a number has a decimal point: write {1} = {2}.{3}"),
+    (rf"^([\w.]+)\s*=\s*({_NUMBER}(?:\s*[,;\s]\s*{_NUMBER})+)$", "write a list in brackets: [{2}]"),
+    (rf"^([\w.]+)\s*=\s*({_NUMBER})\s*;$", "a line ends without ';': write {1} = {2}"),
+    (rf"^([\w.]+)\s*=\s*({_NUMBER})\s*//(.*)$", "a comment begins with #: write {1} = {2}  # {3}"),
+    (
+        rf"^([\w.]+)\s*=\s*({_NUMBER})\s*([a-zA-Zµμ°%][\w/^²*·µ]*)$",
+        "write the number alone, in SI units; {3} can stand behind a #",
+    ),
+    (rf"=\s*\[\s*{_NUMBER}(?:,?\s+{_NUMBER})+", "write commas between the numbers of a list"),
+    (
+        r"\"[A-Za-z]:\\",
+        "in double quotes a \\ has a meaning: write the path with / or in single quotes",
+    ),
+    (r"^([\w.]+)\s*=\s*True\b", "write {1} = true"),
+    (r"^([\w.]+)\s*=\s*False\b", "write {1} = false"),
+    (
+        r"^([\w.]+)\s*=\s*(?:None|null|nan|NaN)?$",
+        "a key needs a value: leave the line out, or give one",
+    ),
+    (r"^([\w.]+)\s*:\s*(.*)$", "write {1} = {2}"),
+    (r"^([\w.]+)\s*=\s*([^\W\d]\w*)$", 'a text has quotes: write {1} = "{2}"'),
+    (
+        rf"^([\w.]+)\s*=\s*((?:{_NUMBER}|[^\W\d]\w*|[-(])[^\"']*)$",
+        'a formula has quotes: write {1} = "{2}" where one is allowed, else its value',
+    ),
+    (r"^[\w.]+\s*=\s*(?:\"[^\"]*|'[^']*)$", "the closing quote is missing"),
+    (r"^[\w.]+\s*=\s*(?:\"[^\"]*\"|'[^']*')\s*\S", "the line ends after the closing quote"),
+    (r"\{[^}]*$", "a table in braces stands on one line"),
+    (
+        r"^\[[^\]]*$|^\[\[[^\]]*\]$",
+        "write the head of a table as [run], or [[body]] where there may be several",
+    ),
+)
 
 
 def parsed(path: Path) -> dict[str, Any]:
@@ -38,9 +76,7 @@ def text_of(path: Path, kind: type[GMSError] = ScenarioError) -> str:
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
-        raise kind(
-            "no such file", place=str(path), advice="check the name and the folder"
-        ) from None
+        raise no_file(path, kind) from None
     except (OSError, ValueError) as error:  # a ValueError if the name contains a null byte
         reason = getattr(error, "strerror", None) or str(error)
         raise kind(
@@ -70,19 +106,40 @@ def data_of(text: str, path: Path, kind: type[GMSError] = ScenarioError) -> dict
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a number with 5,000 digits raises ValueError
-        hint = _with_digits(text)
-        raise kind(f"not valid TOML: {cut(str(error))}{hint}", place=str(path)) from None
+        reason, advice = _refused(str(error), text)
+        raise kind(reason, place=str(path), advice=advice) from None
 
 
-def _with_digits(text: str) -> str:
-    """Return advice on the first number of a text that is invalid in TOML, such as .25."""
-    for number, line in enumerate(text.splitlines(), start=1):
-        found = _HALF_A_NUMBER.search(_TEXT_OR_COMMENT.sub("", line))
-        if found:
-            sign, whole, part, exponent = found.groups()
-            better = f"{sign}{whole or 0}.{part or 0}{exponent}"
-            return f"; line {number}: write {better}, not {found[0]}"
+def _refused(said: str, text: str) -> tuple[str, str]:
+    """Return what is wrong with a text that is not TOML, and advice that shows the line."""
+    if (at := _AT.search(said)) is None:
+        return f"not valid TOML: {cut(said)}", ""
+    lines = text.split("\n")
+    number, column = (int(at[1]), int(at[2])) if at[1] else (len(lines), 1)
+    line = lines[number - 1].rstrip()
+    if said.startswith("Cannot"):  # declare, overwrite, redefine: all of what is there already
+        advice = "the key, or its table, is given twice: join them"
+    else:
+        advice = _with_digits(line) or _usual(line) or cut(said.replace(at[0], ""))
+    return f"line {number} is not valid TOML", f"{advice}\n{scene(line, column)}"
+
+
+def _usual(line: str) -> str:
+    """Return the advice on what is usual in a line that is not TOML."""
+    plain = re.sub(r"\s*#[^\"']*$", "", line).strip()
+    for pattern, advice in _USUAL:
+        if found := re.search(pattern, plain):
+            return advice.format("", *(each.strip() for each in found.groups("")))
     return ""
+
+
+def _with_digits(line: str) -> str:
+    """Return advice on the first number of a line that is invalid in TOML, such as .25."""
+    found = _HALF_A_NUMBER.search(_TEXT_OR_COMMENT.sub("", line))
+    if not found:
+        return ""
+    sign, whole, part, exponent = found.groups()
+    return f"write {sign}{whole or 0}.{part or 0}{exponent}, not {found[0]}"
 
 
 def override(data: dict[str, Any], setting: str) -> Key:
@@ -106,7 +163,9 @@ def override(data: dict[str, Any], setting: str) -> Key:
         value = text.strip()
         hint = _with_digits(text)
         if hint and (value[0] in "[{" or _HALF_A_NUMBER.fullmatch(value)):
-            raise ScenarioError(f"not valid TOML{hint}", place=f"--set {cut(setting)}") from None
+            raise ScenarioError(
+                "not valid TOML", place=f"--set {cut(setting)}", advice=hint
+            ) from None
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{cut(str(error))}", place=f"--set {cut(setting)}") from None
     return _set(data, parts, value, f"--set {cut(setting)}")

@@ -62,14 +62,30 @@ _INSTEAD: Mapping[str, str] = {
     "!": "not",
     "¬": "not",
     "=": "<= or >=",
+    "=>": ">=",
+    "=<": "<=",
     "≤": "<=",
     "≥": ">=",
     "^": "**",
     "·": "*",
+    "×": "*",
+    "²": "**2",
+    "³": "**3",
     "−": "-",
 }
-_FOREIGN = re.compile(r"&&?|\|\|?|!(?!=)|(?<![<>=!:])=(?![=>])|[∧∨¬≤≥^·−]")
-_ALIASES: Mapping[str, str] = {"sign": "sgn", "signum": "sgn", "fabs": "abs"}
+_FOREIGN = re.compile(r"&&?|\|\|?|!(?!=)|(?<![<>=!:])=[<>]|(?<![<>=!:])=(?!=)|[∧∨¬≤≥^·×²³−]")
+_NO_SIGN_BETWEEN = re.compile(r"[\w.)]\s+[\w(]|\)[\w(]|\d[^\W\d_eE]")  # 2 pi, 2pi, (a)(b)
+_ALIASES: Mapping[str, str] = {
+    "sign": "sgn",
+    "signum": "sgn",
+    "fabs": "abs",
+    "π": "pi",
+    "time": "t",
+    "position": "x",
+    "velocity": "v",
+    "speed": "v",
+    "force": "F",
+}
 _GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(FUNCTIONS) + " pi"
 
 
@@ -217,7 +233,9 @@ def _parsed(text: str) -> ast.expr:
         # Python reports offset 0 when it reached the end and expected more.
         column = min(error.offset + lead, len(text) + 1) if error.offset else len(text) + 1
         reason = "the text ends too early" if column > len(text) else "cannot be read from here"
-        raise ExpressionError(reason, text, column, _GRAMMAR) from None
+        factors = _NO_SIGN_BETWEEN.search(text, max(0, column - 3), column + 1)
+        allowed = "a sign between factors, as in 2*pi*t" if factors else _GRAMMAR
+        raise ExpressionError(reason, text, column, allowed) from None
     except (ValueError, RecursionError, MemoryError):
         raise ExpressionError("cannot be read (nested too deeply)", text, 1, _GRAMMAR) from None
     raw = flat[lead:].encode()
@@ -291,7 +309,13 @@ class _Reader:
                 return self.call(node, function, arguments, depth)
             case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
                 raise self.refuse("found a comparison where a number is needed", node)
-        raise self.refuse(f"{_plain(node)} is not part of the language", node)
+        instead = _GRAMMAR
+        match node:
+            case ast.Call(func=ast.Attribute(attr=function)) if function in FUNCTIONS:
+                instead = f"{function}(...), without a module before it"
+            case ast.IfExp():
+                instead = "min, max, abs, sgn; a case in a chart is a state of its own"
+        raise self.refuse(f"{_plain(node)} is not part of the language", node, instead)
 
     def name(self, node: ast.expr, name: str) -> Value:
         if name in self.names:
@@ -301,7 +325,7 @@ class _Reader:
         if name in FUNCTIONS:
             raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
         raise self.refuse(
-            f"unknown name {shown(name)}{_suggestion(name, self.names)}",
+            f"unknown name {shown(name)}{_suggestion(name, [*self.names, *CONSTANTS])}",
             node,
             f"the names {some_of(self.names)}, and pi",
         )

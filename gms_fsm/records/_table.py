@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError, cut, shown
+from gms_fsm.foundation.arguments import meant, no_file
 from gms_fsm.records._columns import Column
 from gms_fsm.records.units import FACTORS, plain
 
@@ -209,9 +210,7 @@ def _encoding_of(path: Path) -> str:
         with path.open("rb") as file:
             return MARKS.get(file.read(2), "utf-8-sig")
     except FileNotFoundError:
-        raise RecordError(
-            "no such file", place=str(path), advice="check the name and the folder"
-        ) from None
+        raise no_file(path, RecordError) from None
     except OSError as error:
         raise RecordError(f"cannot be read ({error.strerror})", place=str(path)) from None
     except ValueError:  # it has a null in it
@@ -235,7 +234,7 @@ def _check_line(path: Path, number: int, line: str, encoding: str) -> None:
         raise RecordError(
             f"line {number} contains binary data",
             place=str(path),
-            advice="give a text table (CSV or TSV); if it is UTF-16 without a byte order mark, "
+            advice="save it as a text table (CSV, TSV); if it is UTF-16 without a byte order mark, "
             'give encoding = "utf-16-le"',
         )
     if not line.isascii() and any("\udc80" <= each <= "\udcff" for each in line):
@@ -282,6 +281,8 @@ def _readings(number: int, line: str, form: TextFormat) -> Iterator[_Head]:
         texts.insert(0, line.lstrip().removeprefix(mark))
     for text in texts:
         likely = sorted(DELIMITERS, key=lambda each: each == " " or -text.count(each))
+        if any(each in text for each in likely if each != " "):
+            likely.remove(" ")  # it is in the names, as in "x [mm]"
         for delimiter in [form.delimiter] if form.delimiter else likely:
             names = [name.strip() for name in next(form.cells([text], delimiter), [])]
             while names and not names[-1]:  # a separator at the end
@@ -298,7 +299,11 @@ def _places(path: Path, head: _Head, columns: Mapping[str, Column]) -> dict[str,
                 f"name the right one: {quantity} = {{ column = ..., unit = ... }} in a scenario, "
                 f"{quantity}=(name, unit){or_none} in Python"
             )
-            if len(head.names) == 1:
+            if column.name not in head.names:
+                advice = meant(column.name, head.names) + advice
+            if all(map(_is_number, head.names)):
+                advice = "the table has no names: write a line of names above the numbers"
+            elif len(head.names) == 1:
                 advice = "if these are several columns, give their separator: delimiter = ..."
             if not head.found(columns):
                 advice += "; if the names are in another row, give its number: header = ..."

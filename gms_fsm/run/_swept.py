@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
-from gms_fsm.foundation.arguments import checked_path, unknown
+from gms_fsm.foundation.arguments import checked_path, no_file, unknown
 from gms_fsm.foundation.extras import require
 from gms_fsm.foundation.files import write_whole
 from gms_fsm.foundation.logs import Log
@@ -332,9 +332,7 @@ class Sweep:
             with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 return _read(file)
         except FileNotFoundError:
-            raise TraceFileError(
-                "there is no such file", place=str(path), advice="check its name and the folder"
-            ) from None
+            raise no_file(path, TraceFileError) from None
         except Exception as error:  # numpy and zipfile raise many kinds for damaged files
             raise TraceFileError(
                 f"not a sweep, or damaged ({why(error)})", place=str(path), advice="run it again"

@@ -14,7 +14,7 @@ import integrators
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.arguments import there_are, unknown
 from gms_fsm.lowering.floor import floor_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.log_columns import LogRecord
@@ -526,5 +526,5 @@ def _unknown_initial(
     states = ["states"] if len(layout.banks) == 1 else [f"{b.name}.states" for b in layout.banks]
     return (
         f"initial has the key {shown(key)}",
-        f"known are {', '.join(map(repr, [*known, *states]))}",
+        there_are(key, [*known, *states]),
     )

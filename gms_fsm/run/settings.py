@@ -159,8 +159,8 @@ class Settings:
         if isinstance(method, str):
             if method not in integrators.METHODS:
                 raise ParameterError(
-                    f"it must be one of {', '.join(integrators.METHODS)}, or a "
-                    "scipy.integrate.OdeSolver class",
+                    f"it must be {', '.join(map(repr, integrators.METHODS))}, or a class such as "
+                    "scipy.integrate.RK45, without quotes",
                     place="method",
                     value=method,
                 )

@@ -7,9 +7,9 @@ import os
 import signal
 import threading
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut
-from gms_fsm.foundation.arguments import checked_kind, unknown
+from gms_fsm.foundation.arguments import checked_kind, meant, unknown
 from gms_fsm.foundation.logs import Log
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
@@ -245,6 +245,14 @@ def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
         options = {**options, "output": "end"}
     if settings is None:
         options = {"engine": "compiled", **options}
+    known = [each.name for each in fields(Settings)]
+    for name, value in options.items():
+        if name not in known and isinstance(value, Iterable) and not isinstance(value, str):
+            raise ParameterError(
+                f"a sweep takes no argument {name!r}",
+                advice=meant(name, known).strip()
+                or f"what varies is given by its name: parameters={{{name!r}: [...]}}",
+            )
     chosen = Settings.of(settings, "a sweep", **options)
     if chosen.output == "all":
         raise ParameterError(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gms_fsm.errors import SessionError
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.run.problem import Problem
 from gms_fsm.session._conditions import holds_at, read
 from gms_fsm.session.elements import chart_of, contact_named, machine_of, source_of
@@ -52,9 +53,7 @@ def new_breakpoint(
 ) -> Breakpoint:
     """Return a breakpoint; raise an error if one of its parts is invalid."""
     if kind not in KINDS:
-        raise SessionError(
-            f"unknown breakpoint kind {kind!r}", advice=f"it must be one of {', '.join(KINDS)}"
-        )
+        raise unknown("kind of breakpoint", kind, KINDS, SessionError)
     banks = start.program.layout.banks
     contact, index = "", None
     if isinstance(element, str) and element in [bank.name for bank in banks]:
@@ -68,8 +67,11 @@ def new_breakpoint(
     states = [state.name for chart in charts for state in chart.states]
     known, what = (states, "state") if kind in ("enter", "leave") else (edges, "edge")
     if name not in known:
-        there = ", ".join(dict.fromkeys(known)) or "none"
-        raise SessionError(f"no {what} {name!r}", advice=f"there are {there}")
+        error = unknown(what, name, known, SessionError)
+        if name in edges + states:
+            other, verb = ("an edge", "fires") if name in edges else ("a state", "enter")
+            error = error.replaced(advice=f"{name} is {other}: break {verb} {name}")
+        raise error
     if hits < 1:
         raise SessionError(f"hits is {hits}", advice="it must be at least 1")
     if condition:

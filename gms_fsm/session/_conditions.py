@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+
 from gms_fsm.errors import ExpressionError, SessionError
 from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
 from gms_fsm.run.problem import Problem
@@ -48,7 +50,7 @@ def value_of(start: Problem, text: str, values: Mapping[str, Any]) -> float:
 
 @contextmanager
 def _explained(start: Problem) -> Iterator[None]:
-    """Say how to write a name that lacks the number of an element, or its contact."""
+    """Say how to write a name that lacks the number of an element or its contact, or is none."""
     try:
         yield
     except ExpressionError as error:
@@ -67,6 +69,8 @@ def _complete(start: Problem) -> dict[str, str]:
         for name in contact.chart.variables:
             for each in (name, f"{lead}{name}"):
                 found.setdefault(each, f"for element 1 write {lead}{name}1")
+        for name, value in contact.values.items():
+            found.setdefault(name, f"it is a parameter, {np.asarray(value).tolist()}")
         for each in known:
             if lead and each.startswith(lead):
                 found.setdefault(each.removeprefix(lead), f"write {each}")

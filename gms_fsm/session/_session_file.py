@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gms_fsm.errors import SessionError, TraceFileError, why
+from gms_fsm.foundation.arguments import no_file
 from gms_fsm.foundation.files import write_whole
 from gms_fsm.run.settings import Settings
 from gms_fsm.session._breakpoints import Breakpoint
@@ -165,9 +166,7 @@ def blamed(path: Path) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError:
-        raise TraceFileError(
-            "no such file", place=str(path), advice="check the name and the folder"
-        ) from None
+        raise no_file(path, TraceFileError) from None
     except Exception as error:  # any error is the fault of the damaged file
         raise TraceFileError(
             f"not a session file, or damaged ({why(error)})", place=str(path)

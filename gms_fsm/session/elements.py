@@ -12,6 +12,7 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SessionError, shown
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.run.problem import Problem
 
@@ -75,7 +76,8 @@ def contact_named(name: str, start: Problem) -> BankPlaces:
     for bank in start.program.layout.banks:
         if bank.name == name and start.what.named:
             return bank
-    raise SessionError(f"no contact {shown(name)}", advice=_known(start.program.layout.banks))
+    known = (bank.name for bank in start.program.layout.banks)
+    raise unknown("contact", name, known, SessionError)
 
 
 def element_name(start: Problem, machine: int) -> str:
@@ -100,6 +102,5 @@ def source_of(edge: str, chart: Chart) -> tuple[str, ...]:
     """Return the states that an edge leaves; raise `SessionError` if there is no such edge."""
     sources = tuple(each.source for each in chart.transitions if each.name == edge)
     if not sources:
-        known = ", ".join(dict.fromkeys(each.name for each in chart.transitions))
-        raise SessionError(f"no edge {edge!r}", advice=f"there are {known or 'none'}")
+        raise unknown("edge", edge, (each.name for each in chart.transitions), SessionError)
     return sources

@@ -1,7 +1,7 @@
 """Notes on a finished run: not errors, but probably not what the user meant.
 
-Mixed-up units (a stroke in metres with thresholds in micrometres, a v_c above every speed), and
-arrests that the clock could not resolve.
+Mixed-up units (a stroke in metres with thresholds in micrometres, a v_c above every speed, a mass
+in grams, a friction in millinewtons), and arrests that the clock could not resolve.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ __all__ = ["notes_on"]
 FAR = 1e4  # a stroke of more thresholds than this is worth a note
 NEAR = 1e-2  # of the smallest threshold: smaller deflections are not near it
 MOST_ROWS = 1000  # rows
+GRAVITY = 9.81  # m/s^2
+FRICTIONS = (1e-3, 1e2)  # of the weight: less and more are hardly meant
 
 
 def notes_on(trace: Trace) -> tuple[str, ...]:
@@ -45,7 +47,23 @@ def notes_on(trace: Trace) -> tuple[str, ...]:
     >>> notes_on(simulate(model, Prescribed("1e-7*sin(t)"), 1.0))
     ('no transition: the speed stays below v_c (largest |v| 8.41e-08 m/s, v_c 1e-06 m/s)',)
     """
-    return (*_sizes(trace), *_windows(trace))
+    return (*_sizes(trace), *_weight(trace), *_windows(trace))
+
+
+def _weight(trace: Trace) -> Iterator[str]:
+    """Compare the friction with the weight of the mass of a rig."""
+    mass, curve = trace.rig.numbers.get("mass", 0.0), trace.model.stribeck
+    friction = max(float(np.abs(trace.F).max()), 0.0 if curve is None else curve.F_s)
+    if trace.system is not None or not mass or not friction:
+        return
+    ratio, (least, most) = friction / (GRAVITY * mass), FRICTIONS
+    if least <= ratio <= most:
+        return
+    cure = f"if the mass is in g, give {mass / 1e3:g}" if ratio < least else "if F is in mN, give N"
+    yield (
+        f"a friction of {friction:.3g} N is {ratio:.2g} times the weight of {mass:g} kg; masses "
+        f"are in kg, forces in N: {cure}"
+    )
 
 
 def _sizes(trace: Trace) -> Iterator[str]:
@@ -66,6 +84,12 @@ def _sizes(trace: Trace) -> Iterator[str]:
             yield (
                 f"no transition: the speed stays below {bound} (largest |v| {fastest:.3g} m/s, "
                 f"{bound} {scales.speed:.3g} m/s)"
+            )
+        elif model.stribeck is not None and (model.weights == 1.0).all():
+            yield (
+                f"no transition: an element breaks away at its weight times the Stribeck curve, "
+                f"here {thresholds.min():.3g} m or more, because all weights are 1 m/N, as in "
+                "Table I of the paper; give shares of the friction, which sum to 1, or weights"
             )
         elif 0.0 < deflected < NEAR:
             yield (

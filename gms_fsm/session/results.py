@@ -10,7 +10,8 @@ from typing import TypeVar
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import SessionError, shown
+from gms_fsm.errors import SessionError
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.traces.trace import Trace
 
@@ -207,9 +208,7 @@ class Here:
 
 def _found(parts: Mapping[str, Part], name: str, kind: str) -> Part:
     if name not in parts:
-        raise SessionError(
-            f"no {kind} {shown(name)}", advice=f"there are {', '.join(map(repr, parts))}"
-        )
+        raise unknown(kind, name, parts, SessionError)
     return parts[name]
 
 

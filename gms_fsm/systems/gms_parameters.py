@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm.charts.gms import PARAMETERS, TABLE_I
+from gms_fsm.charts.gms import PARAMETERS, TABLE_I, WHICH_C
 from gms_fsm.charts.parameters import (
     SIGMA_2,
     WEIGHTS,
@@ -193,7 +193,8 @@ class GMSParameters:
         k : array_like, shape (n,)
             Stiffness, N/m, > 0.
         C : float
-            Attraction parameter of the whole bank, N/s, >= 0.
+            Attraction rate of the whole bank, N/s, >= 0: a slipping element follows s(v) in the
+            time ``F_c / C``.
         stribeck : Stribeck
             The curve.
         v_c : float
@@ -222,6 +223,10 @@ class GMSParameters:
         """
         stiffness = checked_array("k", k, None, RULES["k"])
         shares = checked_array("alpha", alpha, stiffness.size, "> 0")
+        if np.ndim(C):
+            raise ParameterError(
+                "with shares it is one number [N/s]", place="C", value=C, advice=WHICH_C
+            )
         rate = checked_scalar("C", C, RULES["C"])
         total = math.fsum(shares)
         if abs(total - 1.0) > 1e-9:

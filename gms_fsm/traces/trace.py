@@ -22,7 +22,7 @@ from gms_fsm.errors import (
     ParameterError,
     shown,
 )
-from gms_fsm.foundation.arguments import checked_integer, checked_path
+from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.extras import require
 from gms_fsm.lowering.layout import BankPlaces
@@ -43,6 +43,7 @@ from gms_fsm.traces.views import (
     BodyTrace,
     driven_velocity,
     dwell_times,
+    no_attribute,
     read_parts,
     sigma_at,
     sliding_of,
@@ -126,6 +127,12 @@ class Trace:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    if not TYPE_CHECKING:  # which knows all attributes there are
+
+        def __getattr__(self, name):
+            """Raise an error that says how the attribute is called here."""
+            raise AttributeError(no_attribute(name), name=name, obj=self)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: generated functions cannot be, and are made again."""
@@ -259,9 +266,7 @@ class Trace:
         if isinstance(name, str) and name in names:
             return self.seen[names[name]]
         known = [*layout.y.shared, *(each for each in names if " " not in each)]
-        raise ParameterError(
-            f"there is no value {shown(name)}", advice=f"there are {', '.join(map(repr, known))}"
-        )
+        raise unknown("value", name, known)
 
     @property
     def x(self) -> FloatArray:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, why
+from gms_fsm.foundation.arguments import no_file
 from gms_fsm.foundation.display import short_repr
 from gms_fsm.foundation.logs import Log
 from gms_fsm.lowering.observing import armed, rate, sigmas
@@ -179,6 +180,8 @@ def read_parts(path: Path) -> Parts:
     from gms_fsm.traces.files import csv_files, npz_files
 
     reader = {".npz": npz_files.read, ".csv": csv_files.read}.get(path.suffix)
+    if path.is_dir() and (inside := path / "trace.npz").is_file():
+        raise TraceFileError("it is a folder", place=str(path), advice=f"give {inside}")
     if reader is None:
         raise TraceFileError(
             f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",
@@ -189,9 +192,7 @@ def read_parts(path: Path) -> Parts:
     except TraceFileError as error:
         raise (error if error.outer else error.inside(path)) from None
     except FileNotFoundError as error:
-        raise TraceFileError(
-            "no such file", place=error.filename, advice="check the name and the folder"
-        ) from None
+        raise no_file(error.filename, TraceFileError) from None
     except Exception as error:
         # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, each
         # with its own errors; in every case the file is at fault.
@@ -200,3 +201,21 @@ def read_parts(path: Path) -> Parts:
             place=str(path),
             advice="write it again",
         ) from None
+
+
+_CALLED = {  # what other programs have, and what it is here
+    "time": "trace.t",
+    "position": "trace.x",
+    "velocity": "trace.v",
+    "force": "trace.F",
+    "deflection": "trace.z",
+    "state": "trace.states",
+    "events": "trace.transitions",
+    "plot": "plots.overview(trace)",
+    "to_csv": "trace.save('run.csv')",
+}
+
+
+def no_attribute(name: str) -> str:
+    """Return what is said of an attribute that a trace does not have."""
+    return f"a Trace has no {name!r}" + (f"; write {_CALLED[name]}" if name in _CALLED else "")

@@ -17,7 +17,7 @@ import graphviz
 
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import checked_kind, listed
+from gms_fsm.foundation.arguments import checked_kind, listed, one_of
 from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
 from plots.charts.arrange import arrange
@@ -252,15 +252,6 @@ def _whole(number: object, name: str) -> int:
         raise ParameterError(
             "the number of elements must be an integer of at least 1", place=name, value=number
         ) from None
-
-
-def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
-    """Return a value if it is allowed."""
-    words = tuple(allowed)
-    if value not in words:
-        listed = " or ".join(repr(word) for word in words)
-        raise ParameterError(f"it must be {listed}", place=name, value=value)
-    return value
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import one_of
 from plots.style import RC
 
 __all__ = [
@@ -135,10 +136,7 @@ def preset(chosen: str | Preset) -> Iterator[Preset]:
     3.5
     """
     if not isinstance(chosen, Preset):
-        if not isinstance(chosen, str) or chosen not in PRESETS:
-            names = ", ".join(map(repr, PRESETS))
-            raise ParameterError(f"it must be one of {names}", place="preset", value=chosen)
-        chosen = PRESETS[chosen]
+        chosen = PRESETS[one_of("preset", chosen, PRESETS)]
     token = _CURRENT.set(chosen)
     try:
         yield chosen

@@ -147,9 +147,9 @@ def test_joints_are_told_apart() -> None:
 @pytest.mark.parametrize(
     ("frictions", "words"),
     [
-        ({"wrist": bearing()}, "'wrist'; there is no such joint; joints: shoulder, elbow, ball"),
+        ({"wrist": bearing()}, "no joint 'wrist'; there are shoulder, elbow, ball"),
         ({"ball": bearing()}, "'ball'; this joint has more than one degree of freedom"),
-        ({0: bearing()}, "no such joint"),
+        ({0: bearing()}, "no joint 0"),
         ({}, "frictions: it is empty"),
         ([bearing()], "it must be a mapping"),
         ({"elbow": 1.5}, "joint 'elbow': "),

@@ -232,7 +232,7 @@ GOOD: dict[str, Any] = {"name": "mine", "dataset": "rig", "F": [0.0] * int((T >=
         ("[]", "no name, dataset, F"),
         ({"name": "mine"}, "no dataset, F"),
         (GOOD | {"name": 3}, "name is 3"),
-        (GOOD | {"dataset": "rigg"}, "'rigg'.*there are rig"),
+        (GOOD | {"dataset": "rigg"}, "'rigg'.*there is only rig"),
         (GOOD | {"F": [1.0]}, "1 forces for 201 rows"),
         (GOOD | {"F": 3}, "a list for each record"),
         (GOOD | {"F": {"test99": []}}, "no record 'test99'.*rig"),

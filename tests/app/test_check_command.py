@@ -143,5 +143,5 @@ def test_a_mark_changes_no_text_and_has_to_exist(tmp_path: Path) -> None:
     assert not marked(plain)
     for line in note.splitlines():
         assert line in texts(drawn)
-    with pytest.raises(ParameterError, match=r"marked is 'slide'.*'stick' or 'slip' or"):
+    with pytest.raises(ParameterError, match=r"marked is 'slide'.*'stick', 'slip', "):
         plots.statechart(chart, marked=["slide"])

@@ -214,6 +214,16 @@ def test_an_exported_contact_has_the_tolerance_of_its_scenario(gms_fsm: CommandL
     said(gms_fsm(*bearing, "--to", "st"))  # which has no use for it
 
 
+@pytest.mark.slow
+def test_the_only_friction_of_a_scenario_is_exported_where_no_body_can_be(
+    gms_fsm: CommandLine,
+) -> None:
+    Path("own.toml").write_text(OPEN_LOOP)
+    done = gms_fsm("export", "own.toml", "--to", "matlab", "-o", "out")
+    assert "note: matlab takes friction only: written is that of own.toml" in done.err
+    assert Path("out/own.m").is_file()
+
+
 def test_formats_of_export_are_listed(gms_fsm: CommandLine) -> None:
     lines = said(gms_fsm("export", "--list")).splitlines()
     assert [line.split()[0] for line in lines] == [*formats()]

@@ -162,4 +162,4 @@ def test_a_pipe_gets_plain_text_and_exit_code_0() -> None:
     assert done.stderr == b""
     text = done.stdout.replace(b"\r\n", b"\n")
     assert text.startswith(talk(FIG_4, "goto 25", "why 1").rpartition("(t=")[0].encode("ascii"))
-    assert b"error: unknown command" in text
+    assert b"error: there is no command" in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import graphviz
 import numpy as np
 import pytest
 
+import gms_fsm as package
 from gms_fsm import Prescribed, simulate
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import ParameterError, shown
@@ -33,6 +35,24 @@ def test_the_formats_are_named_from_one_table(tmp_path: Path, gms_fsm: CommandLi
     for graph in (block_diagram(2), graphviz.Digraph("own")):  # only a chart is Mermaid text
         with pytest.raises(ParameterError, match=r"must end in \.svg.*\.gv for DOT text$"):
             render(graph, tmp_path / "x.mmd")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "cure"),
+    [
+        ("simulate a.toml", "Did you mean 'run'?"),
+        ("run a.toml t_end=10", "changed by --set t_end=10"),
+        ("run a.toml --law signed", "--set model.law=signed"),
+        ("chart gms signed", "chosen by --law signed"),
+        ("code lugre -o lugre.py", "gms-fsm code ... > FILE"),
+    ],
+)
+def test_arguments_that_are_not_taken_are_answered_with_what_is_meant(
+    arguments: str, cure: str, gms_fsm: CommandLine
+) -> None:
+    done = gms_fsm(*arguments.split())
+    assert done.code == 2
+    assert cure in done.err
 
 
 @pytest.mark.parametrize(
@@ -67,6 +87,20 @@ def test_no_bar_before_an_error(arguments: tuple[str, ...], gms_fsm: CommandLine
 )
 def test_numbers_are_shown_as_plain_numbers(value: object, text: str) -> None:
     assert shown(value) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "cure"), [("velocity", "write trace.v"), ("plot", "write plots.overview(trace)")]
+)
+def test_a_trace_says_what_is_called_otherwise(name: str, cure: str) -> None:
+    trace = simulate(stick_slip("signed"), Prescribed("0.2"), 0.1)
+    with pytest.raises(AttributeError, match=f"a Trace has no '{name}'; {re.escape(cure)}$"):
+        getattr(trace, name)
+
+
+def test_the_package_suggests_a_name() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'simulte'; did you mean 'simulate'"):
+        _ = package.simulte
 
 
 def test_a_moment_knows_where_the_slider_is() -> None:

@@ -36,6 +36,7 @@ def refused(
 ) -> Callable[..., str]:
     """Run a command that must be rejected; return its message."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "2000")  # a message on one line
 
     def run(*arguments: str) -> str:
         capsys.readouterr()

@@ -14,7 +14,6 @@ from gms_fsm.app.scenario import (
     load_scenario,
     load_system,
     run_debugger,
-    scenario_to_debug,
 )
 from gms_fsm.lowering.program import lower
 from tests import own_files
@@ -140,7 +139,7 @@ def test_a_picture_shows_one_contact(name: str, verb: CommandLine) -> None:
     load_scenario("pair.toml").simulate(engine="ifelse").save("run.npz")
     said = ("run.npz: it has the contacts 'pad1', 'pad2', 'gear'", "--contact pad1")
     one_message(verb(name, "run.npz"), *said)
-    one_message(verb(name, "run.npz", "--contact", "pad"), "run.npz has no contact 'pad'")
+    one_message(verb(name, "run.npz", "--contact", "pad"), "run.npz: there is no contact 'pad'")
 
 
 @pytest.mark.slow
@@ -151,7 +150,7 @@ def test_replay_shows_all_contacts_or_the_chosen_one(verb: CommandLine) -> None:
     assert done.code == 0, done.err
     (run,) = data_of(Path("all.html").read_text(encoding="utf-8"))["runs"]
     assert [each["name"] for each in run["contacts"]] == ["pad1", "pad2", "gear"]
-    one_message(verb("replay", "run.npz", "--contact", "pad"), "run.npz has no contact 'pad'")
+    one_message(verb("replay", "run.npz", "--contact", "pad"), "run.npz: there is no contact 'pad'")
     done = verb("replay", "run.npz", "--contact", "gear", "-o", "page.html")
     assert done.code == 0, done.err
     assert "gear: Backlash" in Path("page.html").read_text(encoding="utf-8")
@@ -159,7 +158,7 @@ def test_replay_shows_all_contacts_or_the_chosen_one(verb: CommandLine) -> None:
 
 def test_debug_steps_through_a_system(verb: CommandLine) -> None:
     out = io.StringIO()
-    loaded = scenario_to_debug("pair.toml", ["run.t_end=9.0"])
+    loaded = load_scenario("pair.toml", ["run.t_end=9.0"])
     assert run_debugger(loaded, io.StringIO("next\nwhy pad1 1\nquit\n"), out) == 0
     assert "pad1 1: stuck -> forward by release_forward" in out.getvalue()
     assert "error" not in out.getvalue()

@@ -226,11 +226,21 @@ def test_folders_that_cannot_be_written(tmp_path: Path) -> None:
     assert 'write "."' in str(refused(tmp_path, PAPER, "st", ""))
 
 
-@pytest.mark.parametrize("form", ["", "c", "C99", "../c99", 3, None, ["c99"]])
+@pytest.mark.parametrize("form", ["", "c99x", "../c99", 33, None, ["c99"]])
 def test_an_unknown_format(form: Any, tmp_path: Path) -> None:
     said = str(refused(tmp_path, PAPER, form, tmp_path / "out"))
     assert "there is no format" in said
     assert all(each in said for each in formats())
+
+
+@pytest.mark.parametrize(
+    ("form", "served"),
+    [("simulink", "'fmu2', 'fmu3' or 'matlab'"), ("C", "'c99'"), ("Python", "'transitions'")],
+)
+def test_the_name_of_a_program_points_to_its_formats(
+    form: str, served: str, tmp_path: Path
+) -> None:
+    assert str(refused(tmp_path, PAPER, form, tmp_path / "out")).endswith(f"served by {served}")
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from gms_fsm import (
     ChartModel,
     GMSParameters,
     Prescribed,
+    PulledSlider,
     State,
     Stribeck,
     Transition,
@@ -68,6 +69,23 @@ def test_a_motion_that_fits_has_none():
 def test_scales_that_do_not_fit(model, velocity, said):
     (note,) = notes(model, velocity)
     assert re.match(said, note)
+
+
+@pytest.mark.parametrize(
+    ("mass", "said"),
+    [(250.0, "if the mass is in g, give 0.25"), (1e-3, "if F is in mN, give N"), (1.0, "")],
+)
+def test_a_mass_in_grams_or_a_force_in_millinewtons(mass: float, said: str):
+    found = notes_on(simulate(pulled_mass()[0], PulledSlider(mass, 2.0, 0.1), 0.1))
+    assert bool(said) == any(note.endswith(said) for note in found if "weight of" in note)
+
+
+def test_weights_that_nobody_gave_are_named():
+    curve = Stribeck(2.0, 2.4, 1e-3)
+    p = GMSParameters([4e5, 2e5], [0, 0], [1e-3, 1e-3], sigma_2=0.0, v_c=1e-6, stribeck=curve)
+    (note,) = notes(GMS(p, law="signed"), "1e-4*sin(t)")
+    assert "all weights are 1 m/N" in note
+    assert "give shares of the friction" in note
 
 
 @pytest.mark.parametrize("output", [{}, {"t_eval": np.linspace(0.0, 10.0, 11)}])

@@ -212,7 +212,7 @@ def test_answers_on_what_is_not_there() -> None:
     asked = debugger(fig4())
     assert "no contact 'pad'; the contacts are none" in asked.reply("poke pad.state1=slip")
     assert "'1 2' is not an element" in asked.reply("element 1 2")
-    assert "F_s is a parameter; to change it" in asked.reply("poke F_s=2")
+    assert "F_s is a parameter, which stays" in asked.reply("poke F_s=2")
     asked = debugger(a_system())
     assert "no contact 'gear'; the contacts are pad, bank" in asked.reply("poke gear.state1=slip")
     session = fig4()

@@ -89,7 +89,7 @@ def test_branches_are_made_compared_named_exported_and_deleted(host: Host) -> No
         page.emulate_media(color_scheme=scheme)
         assert faults(page, context=".gms-explore", options={"iframes": False}) == []
     pin = page.locator(".gms-pin")
-    expect(pin).to_contain_text("in run 1 element 1 is in slip; arrest is held back: |z| < s")
+    expect(pin).to_contain_text("in run 1 element 1 is in slip; arrest does not fire: |z| < s")
     pin.click()
     host.wait(lambda: host.replay("frame === pinned"))
     tokens = host.inner.locator(".run").first.locator(".token")

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import ParameterError, RecordError
+from gms_fsm.errors import RecordError
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.identification.certainty.compared import score_of
 from gms_fsm.records import damper, tribometer
 from gms_fsm.records.parts import only
@@ -110,10 +111,7 @@ def data_set(name: object) -> DataSet:
     for each in DATA_SETS:
         if each.name == name:
             return each
-    known = ", ".join(each.name for each in DATA_SETS)
-    raise ParameterError(
-        "there is no such data set", place="dataset", value=name, advice=f"there are {known}"
-    )
+    raise unknown("data set", name, (each.name for each in DATA_SETS), place="dataset")
 
 
 def held_rows(splits: tuple[Split, ...]) -> dict[str, Record]:

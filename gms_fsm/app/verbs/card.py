@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gms_fsm.app.verbs.console import note, progress_bars
+from gms_fsm.app.verbs.console import note, progress_bars, say
 from gms_fsm.app.verbs.options import INTERRUPTED, OutputFolder
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def benchmark_command(
 
         card = make(folder, only=names, progress=show)
     files = write(card, output)
-    typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
+    say(f"{len(files)} files in {output}; start with {files[0]}")
     if not card.complete:
         note("interrupted; what was complete is written")
         raise typer.Exit(INTERRUPTED)

@@ -6,11 +6,12 @@ import textwrap
 from collections.abc import Iterator
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.gms import LAWS, WHICH_LAW
 from gms_fsm.charts.registry import Entry, entry, registered
 from gms_fsm.errors import ParameterError
 
 WIDTH = 78
-OWN = "give a chart file, such as own.toml"
+OWN = "gms-fsm chart --list shows all; a chart of your own is named by its file, own.toml"
 
 
 def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
@@ -18,8 +19,7 @@ def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
     try:
         found = entry(name)
     except ParameterError as error:
-        advice = "; ".join(filter(None, (error.advice, f"for a custom chart: {OWN}")))
-        raise error.replaced(advice=advice) from None
+        raise error.replaced(advice=f"{error.advice}; {OWN}") from None
     options = " or ".join(f"--law {each}" for each in found.laws)
     if law and not options:
         others = [each.name for each in registered().values() if each.laws]
@@ -27,7 +27,10 @@ def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
             f"{verb} {name} takes no --law", advice=f"only {', '.join(others)} takes one"
         )
     if options and not law:
-        raise ParameterError(f"{verb} {name} needs {options}", advice="the laws differ")
+        raise ParameterError(
+            f"{verb} {name} needs {options}",
+            advice=WHICH_LAW if found.laws == LAWS else "the laws differ",
+        )
     if law not in found.laws and options:
         raise ParameterError(f"{verb} {name} has no law {law!r}", advice=f"give {options}")
     return found, found.chart(law)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
+from gms_fsm.app.verbs.console import say
 from gms_fsm.app.verbs.options import ChartName, ContactName, Law
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.files import output_folder, write_text
@@ -155,7 +156,7 @@ def check_command(
     from gms_fsm.app.verbs.catalogue import checkable, chosen
 
     if names:
-        typer.echo(checkable())
+        say(checkable())
         return
     own = own_file(name, law)
     no_contact(contact, own)
@@ -166,7 +167,7 @@ def check_command(
     if own is not None and own.system is not None:
         texts = [f"contact {each}:\n{text}" for each, text in zip(reports, texts, strict=True)]
     text = "\n\n".join(texts)
-    typer.echo(text)
+    say(text)
     for path in [] if folder is None else _write_reports(text, [*reports.values()], folder):
         typer.echo(str(path))
     if any(report.refuted for report in reports.values()):

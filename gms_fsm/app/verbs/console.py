@@ -1,10 +1,15 @@
-"""Messages, progress bars and notes on the terminal, all on standard error."""
+"""Messages, progress bars and notes on standard error; results that fit the terminal."""
 
 from __future__ import annotations
 
 import contextlib
+import shutil
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
+
+import typer
+
+from gms_fsm.foundation.quantities import WIDTH, wrapped
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -49,21 +54,30 @@ def named_bar() -> Iterator[Callable[[str, float], None]]:
 
 def error_line(text: str) -> None:
     """Print the message of an error."""
-    _line("[bold red]error:[/]", text)
+    _line("error:", "bold red", text)
 
 
 def note(message: Warning | str, *_: object, **__: object) -> None:
     """Print a note; a replacement for `warnings.showwarning`."""
-    _line("[bold yellow]note:[/]", str(message))
+    _line("note:", "bold yellow", str(message))
 
 
-def _line(label: str, text: str) -> None:
-    messages(soft_wrap=True).print(f"{label} {_escaped(text)}", highlight=False, emoji=False)
+def say(text: str) -> None:
+    """Print a result, in lines that fit the terminal; names of files stay whole."""
+    for part in _parts(text):
+        typer.echo(part)
 
 
-def _escaped(text: str) -> str:
-    """Return a text without markup and without terminal control codes."""
-    from rich.markup import escape
+def _line(label: str, style: str, text: str) -> None:
+    from rich.text import Text
 
     printable = (c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
-    return escape("".join(printable))
+    said = Text("\n".join(_parts(f"{label} {''.join(printable)}")))
+    said.stylize(style, 0, len(label))
+    messages(soft_wrap=True).print(said, highlight=False)
+
+
+def _parts(text: str) -> Iterator[str]:
+    width = shutil.get_terminal_size((WIDTH, 24)).columns
+    for line in text.split("\n"):
+        yield from wrapped(line, width, whole=True)

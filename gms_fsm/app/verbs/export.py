@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gms_fsm.app.verbs.console import note
 from gms_fsm.app.verbs.options import ContactName, Law
 from gms_fsm.errors import ParameterError
 
@@ -59,6 +60,11 @@ def export_command(
             "no format is given", place="--to", advice=f"give one of {', '.join(known)}"
         )
     given, default, more = _given(name, law, contact)
+    contacts: tuple[Contact, ...] = getattr(given, "contacts", ())
+    if to in known and "settings" not in known[to].takes and len(contacts) == 1:
+        # Only formats that contain the engine take the bodies, too.
+        given, _, more = _given(name, law, contacts[0].name)
+        note(f"{to} takes friction only: written is that of {name}, with its velocity as an input")
     if to in known:
         more = {each: value for each, value in more.items() if each in known[to].takes}
     chosen = called or default

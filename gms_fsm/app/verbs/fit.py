@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gms_fsm.app.verbs.console import note
+from gms_fsm.app.verbs.console import note, say
 from gms_fsm.app.verbs.options import INTERRUPTED, Overrides, PresetName, ScenarioFile
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ def fit_command(
             raise typer.Exit(INTERRUPTED) from None
         _print(found)
         page = write_report(found, folder)
-    typer.echo(f"{found.runs} runs in {found.seconds:.3g} s")
-    typer.echo(f"start with {page}")
+    say(f"{found.runs} runs in {found.seconds:.3g} s")
+    say(f"start with {page}")
     if found.stopped:
         note(found.stopped)
         raise typer.Exit(INTERRUPTED)
@@ -67,5 +67,5 @@ def _print(found: Fit) -> None:
         table.add_row(*map(Text, (each.name, *each.shown, each.unit, each.note)))
     Console(width=max(Console().width, NARROWEST)).print(table)
     if found.weakest:
-        typer.echo(found.weakest)
-    typer.echo(found.scores_text)
+        say(found.weakest)
+    say(found.scores_text)

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import messages, named_bar, note
+from gms_fsm.app.verbs.console import messages, named_bar, note, say
 from gms_fsm.app.verbs.options import (
     INTERRUPTED,
     ContactName,
@@ -51,11 +51,17 @@ def paper_command(
 
     with plots.preset(preset), named_bar() as show:
         files = writing.write(output, force, velocity, show)
-    typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
+    say(f"{len(files)} files in {output}; start with {files[0]}")
+
+
+def _list(wanted: bool) -> None:
+    if wanted:
+        say("\n".join(f"{name:<24} {title}" for name, title in titles().items()))
+        raise typer.Exit
 
 
 def run_command(
-    scenario: ScenarioFile = Path(),
+    scenario: ScenarioFile,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Output folder; out/<name> by default."),
@@ -80,18 +86,14 @@ def run_command(
         ),
     ] = False,
     preset: PresetName = "screen",
-    listed: Annotated[
-        bool, typer.Option("--list", help="List the scenarios of the package.")
+    _listed: Annotated[
+        bool,
+        typer.Option(
+            "--list", callback=_list, is_eager=True, help="List the scenarios of the package."
+        ),
     ] = False,
 ) -> None:
     """Run a scenario; write the trace, transition log, overview figure and summary."""
-    if listed:
-        typer.echo("\n".join(f"{name:<24} {title}" for name, title in titles().items()))
-        return
-    if not scenario.name:
-        raise typer.BadParameter(
-            "give a file, or a name that `gms-fsm run --list` shows", param_hint="SCENARIO"
-        )
     import plots
     from gms_fsm.app.live import LiveView
     from gms_fsm.app.report import monitor_lines, note_lines, run_scenario, velocity_note
@@ -113,12 +115,12 @@ def run_command(
         raise typer.Exit(INTERRUPTED) from None
     if loaded.motion is not None and (text := velocity_note(trace, loaded.motion)):
         note(text)
-    typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
+    say(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
     for line in monitor_lines(trace):
-        typer.echo(line)
+        say(line)
     for each in note_lines(trace):
-        typer.echo(f"note: {each}")
-    typer.echo(f"start with {files[0]}")
+        say(f"note: {each}")
+    say(f"start with {files[0]}")
 
 
 def copy_command(
@@ -143,7 +145,7 @@ def copy_command(
             "there is a file of this name", place=str(path), advice="give another with -o"
         )
     write_text(path, known[name].read_text(encoding="utf-8"))
-    typer.echo(f"{path}; run it with: gms-fsm run {path}")
+    say(f"{path}; run it with: gms-fsm run {path}")
 
 
 def sweep_command(
@@ -180,13 +182,13 @@ def sweep_command(
         note("interrupted; nothing was written")
         raise typer.Exit(INTERRUPTED) from None
     bad = int((result.outcome != "ok").sum())
-    typer.echo(
+    say(
         f"{len(result)} runs, {bad} failed, {len(result.transitions)} transitions; "
         f"{len(files)} files in {folder}"
     )
     for run, message in failures(result, most=1):
-        typer.echo(f"first failure: run {run}: {message}")
-    typer.echo(f"start with {files[0]}")
+        say(f"first failure: run {run}: {message}")
+    say(f"start with {files[0]}")
 
 
 def phenomena_command(
@@ -238,8 +240,8 @@ def phenomena_command(
     models_said = "1 model" if len(table.models) == 1 else f"{len(table.models)} models"
     measured = len(table.phenomena)
     phenomena_said = "1 phenomenon" if measured == 1 else f"{measured} phenomena"
-    typer.echo(f"{models_said}, {phenomena_said}: {said}")
-    typer.echo(f"{len(written)} files in {output}; start with {written[0]}")
+    say(f"{models_said}, {phenomena_said}: {said}")
+    say(f"{len(written)} files in {output}; start with {written[0]}")
 
 
 def schema_command() -> None:
@@ -260,12 +262,12 @@ def debug_command(
     ] = False,
 ) -> None:
     """Step through a scenario in the terminal: break, why, back, poke, compare."""
-    from gms_fsm.app.scenario import run_debugger, scenario_to_debug, session_of
+    from gms_fsm.app.scenario import load_scenario, run_debugger, session_of
     from gms_fsm.debugger.tui import run_tui
 
     if light and not tui:
         raise typer.BadParameter("it is an option of --tui", param_hint="--light")
-    loaded = scenario_to_debug(scenario, overrides or [])
+    loaded = load_scenario(scenario, overrides or [])
     if tui:
         raise typer.Exit(run_tui(session_of(loaded), loaded.title, light=light))
     raise typer.Exit(run_debugger(loaded))
@@ -285,7 +287,7 @@ def lesson_command(
     from gms_fsm.app.lessons import LESSONS, listed, numbered, teach
 
     if not number and not notebook:
-        typer.echo(listed())
+        say(listed())
         return
     if notebook:
         from gms_fsm.app.lessons.engine.notebooks import write_notebook
@@ -297,7 +299,7 @@ def lesson_command(
     with messages().status(f"running lesson {chosen}"):
         taught = teach(chosen, output)
     for line in taught.lines:
-        typer.echo(line)
+        say(line)
     typer.echo()
     for path in taught.files:
         typer.echo(str(path))

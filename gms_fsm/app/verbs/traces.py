@@ -10,7 +10,8 @@ import typer
 
 from gms_fsm.app.verbs.console import progress_bars
 from gms_fsm.app.verbs.options import ContactName, End, OutputFolder, PresetName, Start, TraceFile
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import TraceFileError
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.files import output_folder, refuse_input
 
 if TYPE_CHECKING:
@@ -23,11 +24,7 @@ def _of_contact(path: Path, contact: str) -> Trace:
 
     run = _loaded(path)
     if contact and contact not in run.contacts:
-        raise ParameterError(
-            f"{path} has no contact {shown(contact)}",
-            place="--contact",
-            advice=f"there are {', '.join(map(repr, run.contacts))}",
-        )
+        raise unknown("contact", contact, run.contacts).inside(path)
     if not contact and len(run.contacts) > 1:
         raise contacts_error(path, run.contacts, "say which one to show:")
     return run.contact(contact or run.contacts[0])
@@ -36,6 +33,12 @@ def _of_contact(path: Path, contact: str) -> Trace:
 def _loaded(path: Path) -> Trace:
     from gms_fsm import Trace
 
+    if path.suffix == ".toml":
+        raise TraceFileError(
+            "it is not a trace",
+            place=str(path),
+            advice=f"run it first: `gms-fsm run {path}`, then give out/{path.stem}/trace.npz",
+        )
     return Trace.load(path)
 
 

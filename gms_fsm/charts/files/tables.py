@@ -53,10 +53,10 @@ class EdgeTable(Table):
     model_config = ConfigDict(populate_by_name=True)
 
     name: str
-    source: Texts = Field(alias="from")
-    target: str = Field(alias="to")
-    guard: str
-    actions: dict[str, str] = Field({}, alias="do")
+    source: Texts = Field(alias="from", description="the state it leaves, its source")
+    target: str = Field(alias="to", description="the state it enters, its target")
+    guard: str = Field(description="the condition under which it is taken")
+    actions: dict[str, str] = Field({}, alias="do", description="actions: new values of variables")
     impulse: bool = False
 
 

@@ -7,10 +7,9 @@ import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from gms_fsm.debugger._text import wrapped
 from gms_fsm.debugger.tui._chart import MARKS
 from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line
-from gms_fsm.foundation.quantities import quantity
+from gms_fsm.foundation.quantities import quantity, wrapped
 from gms_fsm.session.explain import Clause, Why
 from gms_fsm.session.session import Breakpoint
 

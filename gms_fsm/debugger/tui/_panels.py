@@ -9,11 +9,11 @@ import textwrap
 from collections.abc import Mapping, Sequence
 
 from gms_fsm.debugger._over_time import EventView
-from gms_fsm.debugger._text import breakpoint_text, progress, wrapped
+from gms_fsm.debugger._text import breakpoint_text, progress
 from gms_fsm.debugger._view import BranchView, ContactView, ElementView, Screen
 from gms_fsm.debugger.tui._chart import MARKS
 from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line, state_role
-from gms_fsm.foundation.quantities import quantity
+from gms_fsm.foundation.quantities import quantity, wrapped
 from gms_fsm.session.session import Breakpoint, Fired
 
 BAR = 8  # characters for |z|/s = 1

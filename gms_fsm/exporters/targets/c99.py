@@ -149,7 +149,7 @@ register(
     Format(
         "c99",
         "friction",
-        "C99 with located switches, and the plain form",
+        "C (C99) with located switches, and the plain form",
         "gms-fsm",
         c99,
         words=WORDS,

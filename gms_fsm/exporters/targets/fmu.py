@@ -213,7 +213,7 @@ for _version in WORDINGS:
         Format(
             f"fmu{_version}",
             "friction",
-            f"FMU of FMI {_version}.0: Model Exchange and Co-Simulation",
+            f"FMU of FMI {_version}.0, for Simulink, Modelica tools and others",
             "gms-fsm",
             functools.partial(fmu, version=_version, describe=_files),
             words=WORDS,

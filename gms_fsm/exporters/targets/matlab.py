@@ -471,7 +471,7 @@ register(
     Format(
         "matlab",
         "friction",
-        "a function file for MATLAB and GNU Octave",
+        "a function file for MATLAB, Simulink and GNU Octave",
         "gms-fsm",
         matlab,
         words=WORDS,

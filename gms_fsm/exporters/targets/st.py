@@ -256,7 +256,7 @@ register(
     Format(
         "st",
         "friction",
-        "IEC 61131-3 structured text, the plain form",
+        "IEC 61131-3 structured text for a PLC, the plain form",
         "gms-fsm",
         structured_text,
         words=_Keywords(WORDS),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from gms_fsm.errors import SessionError, shown
+from gms_fsm.foundation.arguments import there_are, unknown
 from gms_fsm.run.problem import Problem
 from gms_fsm.session.elements import element_name, machine_of
 from gms_fsm.systems.models import parameter_names
@@ -103,8 +104,7 @@ def _of_model(start: Problem, given: Mapping[str, Any]) -> dict[str, float | Map
         if name in parameter_names(start.model):
             raise _constant(name, "parameter", "model")
         if name not in known:
-            advice = f"there are {', '.join(known)}" if known else "the chart has none"
-            raise SessionError(f"no variable {name!r}", advice=advice)
+            raise unknown("variable", name, known, SessionError)
         if not isinstance(values, Mapping):
             raise SessionError(
                 f"give its values by element, for example {{{name!r}: {{0: 0.1}}}}",
@@ -154,7 +154,7 @@ def _resolved(start: Problem, key: object) -> tuple[str, int | None]:
                 raise SessionError(
                     f"the velocity of {body.name} is given", advice="it cannot be poked"
                 )
-    raise SessionError(f"{shown(key)} cannot be poked", advice=f"there are {', '.join(known)}")
+    raise SessionError(f"{shown(key)} cannot be poked", advice=there_are(key, known))
 
 
 def _constant(name: str, kind: str, whole: str) -> SessionError:

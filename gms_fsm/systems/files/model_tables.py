@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from gms_fsm.charts.chart import SUPPLIED
-from gms_fsm.charts.gms import PARAMETERS, Law
+from gms_fsm.charts.gms import LAWS, PARAMETERS, WHICH_C, WHICH_LAW, Law
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, Parameter
 from gms_fsm.charts.registry import Entry, registered
 from gms_fsm.charts.zoo.bristles.lugre import LUGRE
@@ -55,7 +55,7 @@ class GMSTable(Table):
     """A GMS model: a column of Table I of the paper, or all parameters."""
 
     kind: Literal["GMS"]
-    law: Law = Field(description="slip law; there is no default")
+    law: Law = Field(description=WHICH_LAW)
     preset: Literal["non-drifting", "stick-slip"] | None = Field(
         None, description="column of Table I, instead of parameters"
     )
@@ -93,7 +93,8 @@ class GMSTable(Table):
         needed = ("k", "C", "v_c", "stribeck")
         missing = [name for name in needed if getattr(self, name) is None]
         if missing:
-            raise ValueError(f"missing {', '.join(missing)}; give them, or a preset")
+            help_ = f"; {WHICH_C}" if "C" in missing else ""
+            raise ValueError(f"missing {', '.join(missing)}; give them, or a preset{help_}")
         assert self.k is not None
         assert self.v_c is not None
         assert self.stribeck is not None
@@ -101,7 +102,7 @@ class GMSTable(Table):
         sigma = [0.0] * n if self.sigma is None else self.sigma
         if self.shares is not None:
             if isinstance(self.C, list) or self.weights is not None:
-                raise ValueError("shares need C as one number [N/s], and no weights")
+                raise ValueError(f"shares need C as one number [N/s], and no weights; {WHICH_C}")
             assert self.C is not None
             try:
                 parameters = GMSParameters.from_shares(
@@ -119,7 +120,8 @@ class GMSTable(Table):
         else:
             if not isinstance(self.C, list):
                 raise ValueError(
-                    "C must be a list with one number [m/s] per element (or give shares)"
+                    "C is one number [N/s], which needs shares; without them, C is a list with one "
+                    "number [m/s] for each element"
                 )
             parameters = GMSParameters(
                 self.k,
@@ -199,7 +201,7 @@ def _chart_table(entry: Entry) -> type[IncludedChartTable]:
     fields: dict[str, Any] = {"chart": (kind, Field(description=entry.title))}
     if entry.laws:
         law: Any = Literal[entry.laws]
-        fields["law"] = (law, Field(description="there is no default"))
+        fields["law"] = (law, Field(description=WHICH_LAW if entry.laws == LAWS else None))
     for each in entry.parameters:
         numbers: Any = Numbers if each.per_element else float
         description = each.described

@@ -192,9 +192,9 @@ class BodyTable(Table):
     """A body."""
 
     name: str
-    inertia: Value | None = None
-    force: Value = "0"
-    velocity: Value | None = None
+    inertia: Value | None = Field(None, description="mass in kg, or moment of inertia in kg m^2")
+    force: Value = Field("0", description="sum of forces in N, or torques in Nm")
+    velocity: Value | None = Field(None, description="of a driven body, instead of an inertia")
     x: str = "x"
     v: str = "v"
     motion: Motion = Field("along", description="along the surface, normal to it, or turning")

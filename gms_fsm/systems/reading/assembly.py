@@ -487,7 +487,8 @@ class SystemReader:
             raise ParameterError(
                 f"v = {text!r} is not linear in the velocities {', '.join(moved)}",
                 place=owner.words,
-                advice="write it for example as 'v_1 - ratio * v_2'",
+                advice="write it for example as 'v_1 - ratio * v_2'; what moves as prescribed is a "
+                'driven body: velocity = "0.1" instead of its inertia',
                 key=(*owner.key, "v"),
             )
         return row

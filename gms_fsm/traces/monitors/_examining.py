@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.foundation.arguments import listed
+from gms_fsm.foundation.arguments import listed, there_are, unknown
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces.monitors._chattering import chattering
 from gms_fsm.traces.monitors._coverage import coverage
@@ -97,7 +96,7 @@ def _monitors(given: str | Monitor, known: Sequence[str]) -> list[Monitor]:
         raise ParameterError(
             f"monitors contains {shown(given if isinstance(given, str) else given.name)}: "
             f"there is no contact {contact!r}",
-            advice=f"there are {', '.join(map(repr, known))}"
+            advice=there_are(contact, known)
             if known
             else "a model on a rig has one contact, so leave its name out",
         )
@@ -124,13 +123,8 @@ def _monitor(given: str | Monitor) -> Monitor:
         )
     word = given.strip()
     if word.isidentifier() and word not in KNOWN:
-        near = difflib.get_close_matches(word[:40], KNOWN, n=1)
-        raise ParameterError(
-            f"unknown monitor {shown(word)}",
-            advice=f"{(f'did you mean {near[0]!r}? ' if near else '')}choose from "
-            f"{', '.join(map(repr, KNOWN))}, 'all', and invariants such as 'abs(z) "
-            "<= 2*s'",
-        )
+        error = unknown("monitor", word, [*KNOWN, "all"])
+        raise error.replaced(advice=f"{error.advice}, and invariants such as 'abs(z) <= 2*s'")
     return KNOWN.get(word) or Invariant(given)
 
 

@@ -253,7 +253,7 @@ function marginText(clause) {
 function heldBack(contact, leaving, scope) {
   const each = leaving.map((k) => ({ k, worst: worstClause(contact.clauses(k, scope)) })).sort((a, b) => relative(b.worst) - relative(a.worst));
   const { k, worst } = each[0], by = Number.isNaN(worst.margin) ? "" : ` by ${eng(Math.abs(worst.margin), worst.unit, 3)}`;
-  return `${contact.edges[k].name} is held back: ${worst.text} is ${worst.truth < 0 ? "not computable" : `false${by}`}`;
+  return `${contact.edges[k].name} does not fire: ${worst.text} is ${worst.truth < 0 ? "not computable" : `false${by}`}`;
 }
 
 // ------------------------------------------------------------------ the chart: its SVG is laid out once and restyled
