@@ -486,7 +486,7 @@ rows = {
     "value for a contact": ("pair.toml", ..., "run pair.toml --set contact.gear=1"),
     "scenario that is missing": ("gone.toml", ..., "run gone.toml"),
     "scenario that is a folder": (".", ..., "run ."),
-    "name of no scenario": (None, ..., "debug pulledmass"),
+    "name of no scenario": ("", ..., "debug pulledmass"),
 }
 group("command", ScenarioError, command, rows)
 rows = {
