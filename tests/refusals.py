@@ -1094,6 +1094,12 @@ rows = {
     "bad name": ("chart 'stiction'", ..., '"slip"\nout', '"is_x"\nout'),
     "rule": ("own.toml: line 6, parameter.1.rule", ..., PLAIN, TABLES),
     "loop": ("chart 'stiction', state 'slip', output 'F'", ..., '"level"', '"F"'),
+    "place of no state": (
+        "chart 'stiction': layout",
+        ...,
+        'do.v = "0"\n',
+        'do.v = "0"\n[layout]\nslop = [0, 0]\n',
+    ),
 }
 group("chart file", ChartError, chart_file, rows)
 rows = {
@@ -1189,6 +1195,18 @@ rows = {
     "force of a locked state": ("state 'slip'", ..., state(locked=True, outputs={"F": "k"})),
     "F in a flow": ("chart 'rubber', state 'slip', flow of 'z'", ..., state(flow={"z": "F"})),
     "a in a force": ("chart 'rubber', state 'slip', output 'F'", ..., state(outputs={"F": "a"})),
+    "layout of no state": (
+        "chart 'rubber': layout",
+        ...,
+        {"layout": {"stick": (0, 0), "slop": (9, 0)}},
+    ),
+    "layout without a state": ("chart 'rubber': layout", ..., {"layout": {"stick": (0, 0)}}),
+    "layout without numbers": (
+        "chart 'rubber': layout, 'slip'",
+        (9, "right"),
+        {"layout": {"stick": (0, 0), "slip": (9, "right")}},
+    ),
+    "layout that is no mapping": ("chart 'rubber': layout", "right", {"layout": "right"}),
     "let of a parameter": (
         "contact_outputs 'F'",
         ...,

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 WIDTH = 80  # columns, where there is no terminal
 JOINED = "\N{NO-BREAK SPACE}"
+NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=[pnuµmkMGT]?(?:m/s|m|N|s)\b)")
 
 PREFIXES = {3 * i - 12: prefix for i, prefix in enumerate([*"pnµm", "", *"kMGT"])}
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
 TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns)(?=$|[/*·])")
-AFTER_NUMBER = re.compile(r"(?<=\d) (?=[pnuµmkMGT]?(?:m/s|m|N|s)\b)")  # a space before a unit
 BLOCKS = "▁▂▃▄▅▆▇█"
 DIGITS = 4
 SMALLEST = -4  # power of ten of a value in the unit of its place, below which it has an exponent
@@ -142,21 +142,21 @@ def wrapped(line: str, width: int = WIDTH, *, whole: bool = False) -> Iterator[s
 
     >>> [len(part) <= WIDTH for part in wrapped("word " * 40)]
     [True, True, True]
+    >>> list(wrapped("v = 300 mm/s", 11))
+    ['v =', '  300 mm/s']
     >>> list(wrapped("  proved   never at the same time", 24))
     ['  proved   never at the', '           same time']
-    >>> list(wrapped("v = 300 mm/s", 11))  # a number stays with its unit
-    ['v =', '  300 mm/s']
     """
     if len(line) <= width:
         yield line.rstrip()
         return
     column = re.match(r" *\S+ {2,}", line)
     hanging = column.end() if column else len(line) - len(line.lstrip()) + 2
-    parts = textwrap.wrap(
-        AFTER_NUMBER.sub(JOINED, line),
+    for part in textwrap.wrap(
+        NUMBER_AND_UNIT.sub(JOINED, line),
         width,
         subsequent_indent=" " * min(hanging, width // 2),
         break_long_words=not whole,
         break_on_hyphens=not whole,
-    )
-    yield from (part.replace(JOINED, " ") for part in parts)
+    ):
+        yield part.replace(JOINED, " ")

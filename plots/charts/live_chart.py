@@ -452,14 +452,10 @@ class ElementParts:
             texts = _paired(sheet.state_rows(state, number), group.findall("text"))
             self.states[state.name] = (group, texts)
             for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-                name = edge_id(chart, element, "edge", edge)
+                line = groups[edge_id(chart, element, "edge", edge)]
                 guard = groups[edge_id(chart, element, "guard", edge)]
                 texts = _paired(sheet.guard_rows(edge, priority, number), guard.findall("text"))
-                self.edges[edge.name, edge.source] = (
-                    guard,
-                    texts,
-                    [groups[f"{name}-1"], groups[f"{name}-2"]],
-                )
+                self.edges[edge.name, edge.source] = guard, texts, line
 
     def paint(self, look: ElementLook) -> None:
         """Paint the element."""
@@ -474,16 +470,15 @@ class ElementParts:
         self, key: tuple[str, str], leaving: bool, marks: Marks | None, fired: str = ""
     ) -> None:
         """Paint an edge, given its name and source."""
-        guard, texts, halves = self.edges[key]
+        guard, texts, line = self.edges[key]
         colour = fired or (self.colours.ink if leaving else self.colours.pale)
         classes = ["leaving" if leaving else "pale"] + ["fired"] * bool(fired)
-        for half in halves:
-            _classify(half, "edge", classes)
-            for shape in _shapes(half):
-                shape.set("stroke", colour)
-                shape.set("stroke-width", THICK if fired else THIN)
-                if shape.get("fill") != "none":
-                    shape.set("fill", colour)
+        _classify(line, "edge", classes)
+        for shape in _shapes(line):
+            shape.set("stroke", colour)
+            shape.set("stroke-width", THICK if fired else THIN)
+            if shape.get("fill") != "none":
+                shape.set("fill", colour)
         _classify(guard, "node guard", classes)
         plain = self.colours.pale if classes == ["pale"] else self.colours.ink
         for piece, node in texts:

@@ -31,7 +31,7 @@ from plots.handouts.excitation import Excited, excited, of_rig
 from plots.output import formats
 from plots.output.graphviz import picture
 from plots.output.svg_artists import EXACT, drawn, smallest
-from plots.style import INK, PALE_GREY, TEXT_GREY, presets
+from plots.style import INK, MONO_FONT, PALE_GREY, SANS_FONT, TEXT_GREY, presets
 from plots.style.mathtext import Formulas, formula
 from plots.style.matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
 
@@ -383,7 +383,7 @@ def _table(page: _Page, rows: Sequence[tuple[str, str, str, str]], top: float, w
     for row in cells:
         for k, (x, lines) in enumerate(zip(starts, row, strict=True)):
             for number, line in enumerate(lines):
-                family = "DejaVu Sans Mono" if k == 0 else "DejaVu Sans"
+                family = MONO_FONT if k == 0 else SANS_FONT
                 page.text(x, y - number * TEXT * LEAD, line, family=family, parse_math=False)
         y -= TEXT * LEAD * max(map(len, row))
 

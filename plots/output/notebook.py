@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
 
-MOST_ELEMENTS = 4  # a larger bank is shown as one element, because all have the same chart
+MOST_ELEMENTS = 4  # of a live chart
 MOST_ROWS = 10  # of a table
 DPI = 200  # of a figure: two pixels per point of a screen, crisp on dense displays
 
@@ -77,7 +77,7 @@ def _png(figure: Any, **options: Any) -> bytes:
 @functools.singledispatch
 def graph_of(subject: Any) -> DrawnGraph:
     """Return what is drawn of a chart, a model, a contact or a system."""
-    return statechart(subject.chart, subject.n if subject.n <= MOST_ELEMENTS else 1)
+    return statechart(subject.chart, subject.n)
 
 
 graph_of.register(System, block_diagram)

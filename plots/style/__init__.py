@@ -209,9 +209,10 @@ def element_colour(i: int, n: int, theme: Theme = "light") -> str:
     return ramp("elements", n, theme)[i]
 
 
-# Lists of names; the first installed one is used.
-SANS = "Helvetica,Arial,Liberation Sans,DejaVu Sans,sans-serif"
-MONO = "DejaVu Sans Mono,Menlo,Consolas,Liberation Mono,monospace"
+# The shipped fonts; for readers of an SVG there follow others that are about as wide.
+SANS_FONT, MONO_FONT = "DejaVu Sans", "DejaVu Sans Mono"
+SANS = f"{SANS_FONT},Verdana,Arial,sans-serif"
+MONO = f"{MONO_FONT},Menlo,Lucida Console,monospace"
 
 ELEMENT_STEPS = 7  # of a page and a schematic; dashes repeat only after the colours
 ELEMENT_COLOURS = ramp("elements", ELEMENT_STEPS)
@@ -272,6 +273,8 @@ def compared_look(number: int) -> dict[str, Any]:
 
 RC: Any = {  # matplotlib types each key separately
     "font.family": "sans-serif",
+    "font.sans-serif": [SANS_FONT],
+    "font.monospace": [MONO_FONT],
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",

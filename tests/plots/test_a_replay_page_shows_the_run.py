@@ -119,7 +119,7 @@ def test_chart_table_and_crosshair_follow_every_firing(open_page: Open) -> None:
             f"#{element}-state-{record.source}.active": 0,
             ".guard.fired": 1,
             f"#{element}-guard-{record.edge}.fired": 1,
-            f"#{element}-edge-{record.edge}-2.fired": 1,
+            f"#{element}-edge-{record.edge}.fired": 1,
         }
         texts = "(each) => [...document.querySelectorAll(each)].map((node) => node.textContent)"
         *found, marks = page.evaluate(

@@ -154,16 +154,16 @@ def assert_drawn(chart: Chart, drawn: dict[str, Group], look: Any) -> None:
         assert (dot.get("visibility") == "visible") == active
     for edge in chart.transitions:
         guard = drawn[f"{element}-guard-{edge.name}"]
-        halves = [drawn[f"{element}-edge-{edge.name}-{half}"] for half in (1, 2)]
+        line = drawn[f"{element}-edge-{edge.name}"]
         expected = [{True: "✓", False: "✗"}[m] for m in look.marks.get(edge.name, ())]
         assert marks(guard) == expected
         fired, leaving = edge.name == look.fired, edge.name in look.leaving
         pale = not fired and not leaving
-        for group in (guard, *halves):
+        for group in (guard, line):
             assert ("fired" in classes(group)) == fired
             assert ("leaving" in classes(group)) == leaving
         colour = colours.fired if fired else colours.ink if leaving else colours.pale
-        lines = [s for half in halves for s in half.iter() if s.get("stroke-width")]
+        lines = [shape for shape in line.iter() if shape.get("stroke-width")]
         assert {s.get("stroke") for s in lines} == {colour}
         assert {s.get("stroke-width") for s in lines} == {"2.6" if fired else "1.1"}
         shown = [t for t in guard.iter("text") if t.get("visibility") != "hidden"]

@@ -194,17 +194,17 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
 def _listing(trace: Trace) -> Figure:
     """Draw the functions of the if-else program of a run that decide and that move z."""
     from plots.style import INK, TEXT_GREY
-    from plots.style.fonts import MONO_EM
+    from plots.style.fonts import width
     from plots.style.matplotlib import Figure
 
     functions = lower(trace.model, trace.rig).source.split("\n\n\n")
     texts = [next(each for each in functions if f"def {name}(" in each) for name in USED]
     wide = [max(map(len, text.splitlines())) + 6 for text in texts]
     tall = max(len(text.splitlines()) for text in texts) + 4
-    em = 7.0 / 72  # inches
-    figure = Figure(figsize=(MONO_EM * em * sum(wide), LINE * em * tall))
+    size = 7.0  # points
+    figure = Figure(figsize=(width("m", size) / 72 * sum(wide), LINE * size / 72 * tall))
     figure.suptitle(LISTED, x=0.01, y=1 - 0.6 / tall, ha="left", size=9.0)
-    look: dict[str, Any] = {"size": 7.0, "family": "monospace", "va": "top", "linespacing": LINE}
+    look: dict[str, Any] = {"size": size, "family": "monospace", "va": "top", "linespacing": LINE}
     for text, x in zip(texts, (0.01, 0.01 + wide[0] / sum(wide)), strict=True):
         code = [each.partition("#")[0] for each in text.splitlines()]
         comments = [

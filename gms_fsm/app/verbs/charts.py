@@ -59,7 +59,7 @@ def chart_command(
     ] = Path("chart.svg"),
     law: Law = "",
     elements: Annotated[
-        int, typer.Option(help="Number of elements, drawn as parallel states.")
+        int, typer.Option(help="Number of elements; they are alike and drawn once.")
     ] = 1,
     notation: Annotated[Notation, typer.Option(help="Notation of guards.")] = Notation.stateflow,
     direction: Annotated[Direction, typer.Option(help="Layout direction.")] = Direction.TB,
