@@ -268,6 +268,9 @@ class ChartModel:
                 "ElementMachines(model).machine)",
                 place="chart",
                 value=self.chart,
+                advice=f"an included one is gms_fsm.charts.CHARTS[{self.chart!r}]"
+                if isinstance(self.chart, str)
+                else "",
             )
         if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
             raise ParameterError(
