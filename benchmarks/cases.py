@@ -49,7 +49,7 @@ def pulled(law: Any = "signed") -> tuple[GMS, Any]:
 
 
 def servo() -> tuple[System]:
-    """Return the servo of the README and of scenarios/servo.toml."""
+    """Return the servo of the README and of gms_fsm/scenarios/servo.toml."""
     friction = GMSParameters.from_shares(
         [0.4, 0.3, 0.2, 0.1],
         [4e4, 3e4, 2e4, 1e4],
@@ -112,7 +112,7 @@ class Problem:
     Parameters
     ----------
     title : str
-        For headings; the part before the comma also for the README.
+        For headings; the part before the comma also for docs/performance.md.
     t_end : float
         s.
     transitions : int

@@ -5,7 +5,7 @@ and its time is divided by that of the C loop in the same round. The error is th
 run of gms-fsm at rtol 1e-12, atol 1e-15. Run it with ``make bench``, or
 
     python benchmarks/compare.py [--quick] [--markdown] [--rounds 15] [section ...]
-    python benchmarks/compare.py --write        the tables in README.md and docs/numerics.md
+    python benchmarks/compare.py --write        the tables in docs/{performance,numerics}.md
 """
 
 from __future__ import annotations
@@ -529,7 +529,7 @@ SHOWN = (C_LOOP, COMPILED, "the same loop, by hand for numba", "gms-fsm, machine
 
 
 def documents(rounds: int) -> dict[str, str]:
-    """Return what README.md and docs/numerics.md say, measured here."""
+    """Return what docs/performance.md and docs/numerics.md say, measured here."""
     scores = {name: measured(problem, rounds)[0] for name, problem in PROBLEMS.items()}
     rows = {name: {each.name: each for each in mine if each.rows} for name, mine in scores.items()}
     titles = [PROBLEMS[name].title.rpartition(",")[0] for name in rows]
@@ -542,7 +542,7 @@ def documents(rounds: int) -> dict[str, str]:
     count, rates = sweep_rates(rounds)
     rate, wrong, _ = rates[1]
     began = {name.rpartition(", ")[2]: time_s for name, time_s in start_times(rounds).items()}
-    readme = [
+    performance = [
         textwrap.fill(
             "Run time relative to C loops written and tuned by hand for each model "
             f"({ROWS:,} rows with friction, rtol 1e-6; {loops}), and the largest error relative to "
@@ -570,7 +570,7 @@ def documents(rounds: int) -> dict[str, str]:
         ],
     )
     return {
-        "README.md": "\n".join(readme),
+        "docs/performance.md": "\n".join(performance),
         "docs/numerics.md": "\n".join([*numerics, "", textwrap.fill(machine(), WIDTH)]),
     }
 
@@ -630,7 +630,9 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="3 rounds, no bank of 10,000")
     parser.add_argument("--markdown", action="store_true", help="tables as Markdown")
     parser.add_argument(
-        "--write", action="store_true", help="replace the tables in README.md and docs/numerics.md"
+        "--write",
+        action="store_true",
+        help="replace the tables in docs",
     )
     parser.add_argument("--task", choices=TASKS, help=argparse.SUPPRESS)
     options = parser.parse_args()

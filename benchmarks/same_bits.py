@@ -130,7 +130,7 @@ PULLED = fsm.PulledSlider(1.0, 2.0, 0.1)
 def runs() -> dict[str, Callable[[], Parts]]:
     """Return all runs by name; those whose name ends in * make up ``--quick``."""
     found: dict[str, Callable[[], Parts]] = {}
-    for path in sorted(Path("scenarios").glob("*.toml")):
+    for path in sorted(Path().glob("**/scenarios/*.toml")):
         if "\n[record]" in path.read_text(encoding="utf-8") and not os.environ.get("GMS_FSM_DATA"):
             print(f"{path.name} is skipped: GMS_FSM_DATA is not set", file=sys.stderr)
         else:

@@ -23,18 +23,17 @@ from notebooks import common_sources
 from numpy.typing import NDArray
 from PIL import Image
 
-from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Stribeck, Trace, simulate
+from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, Trace, simulate
+from gms_fsm.app.scenario import load_scenario
 from plots import LiveChart, panels
 from plots.page.replay import replay_html
 from plots.style import INK, LINE_GREY, RC
 
 DPI = 120
-PULLED_END = 60.0  # s
-SETTLED = (30.0, 60.0)  # s, the part that is shown: the first cycles differ
-CYCLE = (17.5, 27.5)  # s, a little more than one cycle of the pulled mass
+SETTLED = (0.3, 0.6)  # s, the part that is shown: the first cycle differs
+CYCLE = (0.22, 0.37)  # s, a little more than one cycle of the pulled mass
 ROWS = 60  # shown of that cycle
-REPLAYED = (0.0, 30.0)  # s, on the first page
-SHARE = (0.4, 0.3, 0.2, 0.1)
+REPLAYED = (0.0, 0.4)  # s, on the first page
 WIDEST = 2e-3  # m, the largest break-away distance of the bank that has more and more elements
 STROKE = 1.5e-3  # m
 
@@ -86,21 +85,10 @@ class Slider:
 
 
 # --------------------------------------------------------------------------- the pulled mass
-def pulled(F_s: float = 1.5, v_s: float = 0.05) -> Trace:
-    """Run the mass of scenarios/pulled_mass.toml with another Stribeck curve."""
-    k = np.array([40.0, 30.0, 20.0, 10.0])
-    parameters = GMSParameters(
-        k,
-        SHARE,
-        np.full(4, 0.02),
-        sigma_2=0.4,
-        stribeck=Stribeck(F_c=1.0, F_s=F_s, v_s=v_s),
-        v_c=1e-6,
-        weights=1 / (4 * k),
-    )
-    return simulate(
-        GMS(parameters, law="signed"), PulledSlider(1.0, 2.0, 0.1), PULLED_END, engine="ifelse"
-    )
+def pulled(F_s: float = 1.5, v_s: float = 5e-4) -> Trace:
+    """Run the scenario with another Stribeck curve."""
+    curve = f"model.stribeck={{F_c=1.0, F_s={F_s}, v_s={v_s}}}"
+    return load_scenario("pulled_mass", [curve]).simulate(engine="ifelse")
 
 
 def cycles(runs: dict[str, Trace]) -> Iterator[Frame]:
@@ -118,12 +106,12 @@ def cycles(runs: dict[str, Trace]) -> Iterator[Frame]:
             speed.set(xlabel="", ylim=(-0.08 * fastest, 1.06 * fastest), ylabel="v [m/s]")
             cycle = Figure(figsize=(3.0, 3.3), layout="constrained")
             orbit = cycle.subplots()
-            orbit.plot(extension(trace)[keep], trace.v[keep], color=INK)
-            limits(orbit, span, (0.0, fastest))
-            orbit.axhline(0.1, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
+            orbit.plot(1e6 * extension(trace)[keep], 1e3 * trace.v[keep], color=INK)
+            limits(orbit, (1e6 * span[0], 1e6 * span[1]), (0.0, 1e3 * fastest))
+            orbit.axhline(1.0, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
             orbit.set(
-                xlabel="spring extension [m]",
-                ylabel="v [m/s]",
+                xlabel="spring extension [µm]",
+                ylabel="v [mm/s]",
                 title="limit cycle; dotted: pulling speed",
             )
             speed.set_title("speed of the mass")
@@ -138,7 +126,7 @@ def settled(trace: Trace) -> NDArray[np.bool_]:
 
 def extension(trace: Trace) -> NDArray[np.float64]:
     """Return how far the spring of the pulled mass is stretched, m."""
-    return np.asarray(0.1 * trace.t - trace.x)
+    return np.asarray(1e-3 * trace.t - trace.x)
 
 
 def motion(trace: Trace) -> str:
@@ -146,14 +134,14 @@ def motion(trace: Trace) -> str:
     log = trace.transitions
     stops = log[(log.edge == "arrest") & (log.t >= SETTLED[0])]
     if not stops.size:
-        return "The mass slides: no element arrests in these 30 s."
+        return "The mass slides: no element arrests in these 0.3 s."
     late = settled(trace)
     t, v = trace.t[late], trace.v[late]
     rises = t[1:][(v[:-1] < v.max() / 2) & (v[1:] >= v.max() / 2)]
     period = float(np.diff(rises).mean())
     return (
-        f"Stick-slip: one cycle in {period:.1f} s, {stops.size} arrests of elements in 30 s; "
-        f"the mass reaches {v.max():.2f} m/s."
+        f"Stick-slip: one cycle in {period:.3f} s, {stops.size} arrests of elements in 0.3 s; "
+        f"the mass reaches {1e3 * v.max():.1f} mm/s."
     )
 
 
@@ -225,7 +213,7 @@ def moments(_: int) -> Slider:
         edge = f", {look.fired} fires" if row in at_edges else ""
         said = f"Element 1 is in {look.active}{edge}; F = {trace.F[row]:.3f} N."
         at = float(box.x0 + share * (box.x1 - box.x0))
-        frames.append(Frame(f"{trace.t[row]:.3f} s", said, (chart.frame(row),), at))
+        frames.append(Frame(f"{trace.t[row]:.4f} s", said, (chart.frame(row),), at))
     return Slider("t", rows.index(at_edges[0]), tuple(frames), beside)
 
 
@@ -256,9 +244,9 @@ def peaks(every: int) -> Slider:
 
 def velocities(every: int) -> Slider:
     """Change v_s over more than two decades."""
-    tried = (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2)
-    start, values = spaced(tried, 0.05, every)
-    runs = {f"{v_s:g} m/s": pulled(v_s=v_s) for v_s in values}
+    tried = (5e-6, 1e-5, 2e-5, 3e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3)
+    start, values = spaced(tried, 5e-4, every)
+    runs = {f"{1e3 * v_s:g} mm/s": pulled(v_s=v_s) for v_s in values}
     return Slider("v_s", start, tuple(cycles(runs)))
 
 
@@ -322,7 +310,7 @@ def write_replay(folder: Path) -> None:
     page = replay_html(trace, title="Pulled mass", window=REPLAYED)
     (folder / "replay.html").write_text(page, encoding="utf-8")
     slipping = (trace.states == "slip").sum(axis=1)
-    row = int(np.flatnonzero((slipping == 2) & (trace.t > 15.0))[0])
+    row = int(np.flatnonzero((slipping == 2) & (trace.t > 0.2))[0])
     for ending, content in both(LiveChart(trace, values=True).frame(row)):
         (folder / f"replay{ending}").write_bytes(content)
 

@@ -44,7 +44,7 @@ from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY, ramp
 from plots.systems.mechanism import schematic_figure
 
 FOLDER = Path(__file__).parent / "images"
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
+SCENARIOS = Path(__file__).parents[1] / "gms_fsm" / "scenarios"
 
 
 def main() -> None:
@@ -87,7 +87,7 @@ def draw_charts(published: Trace, signed: Trace) -> None:
     write_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
     # Four elements stick and load, break away one after another, slide, and are caught at once.
     pulled = run("pulled_mass")
-    plots.animate(pulled, FOLDER / "film.gif", seconds=9.5, t_start=12.0, t_end=18.6)
+    plots.animate(pulled, FOLDER / "film.gif", seconds=9.5, t_start=0.21, t_end=0.346)
 
 
 def draw_systems() -> None:
@@ -113,10 +113,10 @@ def draw_figures(signed: Trace) -> None:
     figures.save(schematic_figure(signed, row), FOLDER / "schematic.png")
     pulled = run("pulled_mass")
     figures.save(figures.overview(pulled, title="Pulled mass"), FOLDER / "figure_overview.png")
-    landscape = plots.landscape(pulled, 1, t=20.8, title="Pulled mass")
+    landscape = plots.landscape(pulled, 1, t=0.4, title="Pulled mass")
     figures.save(landscape, FOLDER / "figure_landscape.png")
     figures.save(plots.unfold(signed, 32.6, 32.7), FOLDER / "figure_unfold.png")
-    phase = plots.phase(pulled, window=(17.5, 25.5), title="Pulled mass")
+    phase = plots.phase(pulled, window=(0.22, 0.345), title="Pulled mass")
     figures.save(phase, FOLDER / "figure_phase.png")
     with rc_context(RC):
         figure = Figure(figsize=(5.4, 3.6), layout="constrained")
@@ -360,21 +360,20 @@ def loops_figure(bilinear: Chart) -> Figure:
 
 
 def sweep_figure() -> Figure:
-    """Draw the number of arrests of a pulled mass in 60 s over speed and v_s."""
+    """Draw the number of arrests of a pulled mass in 0.6 s over speed and v_s."""
     parameters = GMSParameters.from_shares(
-        [0.4, 0.3, 0.2, 0.1],
-        [40, 30, 20, 10],
-        C=2.0,
-        stribeck=Stribeck(1.0, 1.5, 0.05),
+        [0.25] * 4,
+        [4e5, 3e5, 2e5, 1e5],
+        C=100.0,
+        stribeck=Stribeck(1.0, 1.5, 5e-4),
         v_c=1e-6,
-        sigma=[0.4, 0.3, 0.2, 0.1],
-        sigma_2=0.4,
+        sigma=[25.0] * 4,
     )
-    speed, v_s = np.meshgrid(np.linspace(0.02, 0.3, 40), np.geomspace(5e-3, 0.2, 40))
+    speed, v_s = np.meshgrid(np.linspace(5e-4, 5e-3, 40), np.geomspace(5e-6, 1e-3, 40))
     result: Sweep = sweep(
         GMS(parameters, law="signed"),
-        PulledSlider(1.0, 2.0, 0.1),
-        60.0,
+        PulledSlider(1.0, 1e4, 1e-3),
+        0.6,
         {"speed": speed.ravel(), "v_s": v_s.ravel()},
     )
     arrests = result.transitions["run"][result.transitions["edge"] == result.edges.index("arrest")]
@@ -383,10 +382,10 @@ def sweep_figure() -> Figure:
         figure = Figure(figsize=(6.0, 3.8), layout="constrained")
         ax = figure.subplots()
         image = ax.pcolormesh(
-            speed, v_s, counts, cmap=ListedColormap(ramp("heat", 256)), rasterized=True
+            1e3 * speed, 1e3 * v_s, counts, cmap=ListedColormap(ramp("heat", 256)), rasterized=True
         )
-        ax.set(yscale="log", xlabel="pulling speed [m/s]", ylabel="v_s [m/s]")
-        ax.set_title(f"arrests in 60 s, {len(result):,} runs; signed law")
+        ax.set(yscale="log", xlabel="pulling speed [mm/s]", ylabel="v_s [mm/s]")
+        ax.set_title(f"arrests in 0.6 s, {len(result):,} runs; signed law")
         figure.colorbar(image, label="arrests")
     return figure
 

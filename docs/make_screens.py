@@ -16,7 +16,7 @@ from gms_fsm.foundation.files import write_whole
 from gms_fsm.run.simulate import Moment
 
 FOLDER = Path(__file__).parent / "images"
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
+SCENARIOS = Path(__file__).parents[1] / "gms_fsm" / "scenarios"
 FONTS = "DejaVu Sans Mono, Menlo, Consolas, monospace"
 
 
@@ -38,7 +38,7 @@ def main() -> None:
         light=True,
     )
     screen("debugger_brake", "brake_squeal", (124, 42), "element pad 1", "goto 5.2", "next")
-    live("live", "pulled_mass", 17.0)
+    live("live", "pulled_mass", 0.29)
 
 
 def screen(

@@ -30,7 +30,7 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.foundation.files import write_whole
 from gms_fsm.traces.failures import StepLimitError
 from gms_fsm.verification.findings import Report, Status
-from plots import figures
+from plots import figures, panels
 from plots.style import INK, LINE_GREY, RC
 
 DOCS = Path(__file__).parent
@@ -40,6 +40,8 @@ PICTURES = DOCS / "images" / "zoo"
 T_END = 12.0  # s: one cycle of stick-slip
 MOST_STEPS = 100_000  # of a run
 DRIVEN = "1e-3 * (1.5 + cos(t))"  # m/s
+PULLED = "0.1 * t"  # m, the end of the spring
+SWUNG = "2 * sin(0.7 * t)"  # m, for laws that differ for v < 0
 CURVE = Stribeck(1.0, 1.0, 1.0).text
 INTRODUCTION = """# The friction zoo
 
@@ -235,19 +237,20 @@ def _short(value: object) -> str:
 def system_file(item: Item, *, driven: bool = False) -> str:
     """Return a scenario file: a mass pulled through a spring, or driven at a given velocity."""
     lines = [f'name = "{"driven" if driven else "pulled"} mass, {item.name}"']
-    for body, given in bodies(item.chart, driven=driven).items():
+    for body, given in bodies(item, driven=driven).items():
         lines += ["", "[[body]]", f'name = "{body}"', *given]
     lines += ["", "[[contact]]", 'name = "pad"', *contact(item)]
     lines += ["", "[run]", f"t_end = {T_END}", "", "[output]", "figures = []"]
     return "\n".join(lines) + "\n"
 
 
-def bodies(chart: Chart, *, driven: bool) -> dict[str, tuple[str, ...]]:
+def bodies(item: Item, *, driven: bool) -> dict[str, tuple[str, ...]]:
     """Return the lines of each body; there is one for each velocity of the chart."""
     if driven:
         return {"mass": (f'velocity = "{DRIVEN}"',)}
-    if len(chart.velocities) == 1:
-        return {"mass": ("inertia = 1.0", 'force = "2 * (0.1 * t - x)"')}
+    if len(item.chart.velocities) == 1:
+        end = SWUNG if item.law else PULLED
+        return {"mass": ("inertia = 1.0", f'force = "2 * ({end} - x)"')}
     return {
         body: ("inertia = 1.0", f'force = "2 * ({V} * t - {x})"', f'x = "{x}"', f'v = "v_{x}"')
         for body, x, V in (("mass", "x", 0.1), ("side", "y", 0.05))
@@ -310,7 +313,8 @@ class Run:
 @functools.cache
 def run_of(item: Item) -> Run:
     """Run a chart: pulled, or driven where a pulled mass would take too many steps."""
-    about = "A mass of 1 kg is pulled through a spring of 2 N/m, whose end moves at 0.1 m/s."
+    how = f"swings by {SWUNG}, in m: the laws differ for v < 0" if item.law else "moves at 0.1 m/s"
+    about = f"A mass of 1 kg is pulled through a spring of 2 N/m, whose end {how}."
     if len(item.chart.velocities) > 1:
         about += "\nA second spring pulls it sideways, at 0.05 m/s."
     if item.chart.sets_velocity:
@@ -339,16 +343,18 @@ def simulated(text: str) -> Trace:
 
 
 def run_figure(item: Item) -> Figure:
-    """Draw friction force and velocity of the run."""
+    """Draw friction force, velocity and states of the run."""
     trace = run_of(item).trace
     pad = trace.sample(np.linspace(trace.t[0], trace.t[-1], 2001)).contact("pad")
     with rc_context(RC):
-        figure = Figure(figsize=(6.4, 3.4), layout="constrained")
-        force, velocity = figure.subplots(2, 1, sharex=True)
+        tall = 0.5 + 0.2 * item.entry.demonstration.n  # inches, of the states
+        figure = Figure(figsize=(6.4, 3.2 + tall), layout="constrained")
+        force, velocity, states = figure.subplots(3, 1, sharex=True, height_ratios=(1.6, 1.6, tall))
         force.plot(pad.t, pad.F, color=INK)
-        force.set(ylabel="F [N]", xlim=(0, T_END))
+        force.set(ylabel="$F$ [N]", xlim=(0, T_END))
         velocity.plot(pad.t, pad.v, color=INK)
-        velocity.set(xlabel="t [s]", ylabel="v [m/s]")
+        velocity.set(ylabel="$v$ [m/s]")
+        panels.ribbons(states, trace)
         for ax in (force, velocity):
             ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
     return figure
@@ -359,7 +365,7 @@ def example(item: Item) -> Iterator[str]:
     run = run_of(item)
     name, text, trace = run.name, run.text, run.trace
     yield run.about
-    yield from ("", f"![Force and velocity of the run](../images/zoo/{item.name}_run.png)")
+    yield from ("", f"![Force, velocity and states of the run](../images/zoo/{item.name}_run.png)")
     yield from ("", f"<!-- file: {name} -->", "```toml", *text.splitlines(), "```")
     yield from (
         "",

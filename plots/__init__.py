@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from gms_fsm.foundation.extras import require
 from plots.charts.live_chart import LiveChart, live_statechart
-from plots.charts.statechart import statechart
+from plots.charts.statechart import layout, statechart
 from plots.output.mermaid import mermaid
 from plots.output.render import render
 from plots.page.replay import replay, write_replay
@@ -40,6 +40,7 @@ __all__ = [
     "explore",
     "handout",
     "landscape",
+    "layout",
     "live_statechart",
     "mermaid",
     "overview",

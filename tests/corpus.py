@@ -538,7 +538,7 @@ def _scenario(name: str) -> Maker:
         with pytest.MonkeyPatch.context() as patch:
             if name == "tribometer":
                 patch.setenv("GMS_FSM_DATA", str(data_folder()))
-            read = load_scenario(ROOT / "scenarios" / f"{name}.toml")
+            read = load_scenario(name)
         how = {key: u for key, u in read.arguments.items() if key not in ("engine", "t_end")}
         *subject, t_end = read.subject
         if name == "tribometer":  # its record has thousands of rows
@@ -549,7 +549,7 @@ def _scenario(name: str) -> Maker:
     return made
 
 
-SCENARIOS = tuple(sorted(path.stem for path in (ROOT / "scenarios").glob("*.toml")))
+SCENARIOS = tuple(sorted(path.stem for path in (ROOT / "gms_fsm/scenarios").glob("*.toml")))
 SCENARIO_RUNS: dict[str, Maker] = {f"scenario {name}": _scenario(name) for name in SCENARIOS}
 
 

@@ -181,7 +181,7 @@ def main():
     parser.add_argument("--budget", type=float, default=float("inf"), help="seconds a module")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        for part in ("gms_fsm", "integrators", "plots", "tests", "scenarios", "pyproject.toml"):
+        for part in ("gms_fsm", "integrators", "plots", "tests", "pyproject.toml"):
             copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy
             copy(ROOT / part, Path(folder, part))
         os.chdir(folder)

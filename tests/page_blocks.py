@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import re
-import shutil
 import sys
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +12,6 @@ from unittest import mock
 
 from gms_fsm.app.cli import main
 from gms_fsm.app.scenario import load_scenario, run_debugger
-from tests.helpers import ROOT
 
 FENCE = re.compile(
     r"(?:^<!-- file: (?P<file>\S+) -->\n)?^```(?P<kind>[^\n`]*)\n(?P<body>.*?)^```$",
@@ -58,7 +56,6 @@ class Page:
     def __init__(self, name: str) -> None:
         self.name = name
         self.namespace: dict[str, Any] = {"__name__": "page"}
-        shutil.copytree(ROOT / "scenarios", "scenarios")
 
     def python(self, block: Block) -> str:
         """Execute a Python block and return its output."""

@@ -486,6 +486,7 @@ rows = {
     "value for a contact": ("pair.toml", ..., "run pair.toml --set contact.gear=1"),
     "scenario that is missing": ("gone.toml", ..., "run gone.toml"),
     "scenario that is a folder": (".", ..., "run ."),
+    "name of no scenario": ("", ..., "debug pulledmass"),
 }
 group("command", ScenarioError, command, rows)
 rows = {
@@ -1095,6 +1096,12 @@ rows = {
     "bad name": ("chart 'stiction'", ..., '"slip"\nout', '"is_x"\nout'),
     "rule": ("own.toml: line 6, parameter.1.rule", ..., PLAIN, TABLES),
     "loop": ("chart 'stiction', state 'slip', output 'F'", ..., '"level"', '"F"'),
+    "place of no state": (
+        "chart 'stiction': layout",
+        ...,
+        'do.v = "0"\n',
+        'do.v = "0"\n[layout]\nslop = [0, 0]\n',
+    ),
 }
 group("chart file", ChartError, chart_file, rows)
 rows = {
@@ -1190,6 +1197,18 @@ rows = {
     "force of a locked state": ("state 'slip'", ..., state(locked=True, outputs={"F": "k"})),
     "F in a flow": ("chart 'rubber', state 'slip', flow of 'z'", ..., state(flow={"z": "F"})),
     "a in a force": ("chart 'rubber', state 'slip', output 'F'", ..., state(outputs={"F": "a"})),
+    "layout of no state": (
+        "chart 'rubber': layout",
+        ...,
+        {"layout": {"stick": (0, 0), "slop": (9, 0)}},
+    ),
+    "layout without a state": ("chart 'rubber': layout", ..., {"layout": {"stick": (0, 0)}}),
+    "layout without numbers": (
+        "chart 'rubber': layout, 'slip'",
+        (9, "right"),
+        {"layout": {"stick": (0, 0), "slip": (9, "right")}},
+    ),
+    "layout that is no mapping": ("chart 'rubber': layout", "right", {"layout": "right"}),
     "let of a parameter": (
         "contact_outputs 'F'",
         ...,
@@ -1910,6 +1929,11 @@ rows = {
 }
 group("session", ExpressionError, unmoved, rows)
 rows = {
+    f"condition {text!r}": (lambda s, text=text: s.until(text),)
+    for text in ("v > 3 mm", "z1 > 3 mm/s", "F > 2 furlong", "abs(v) > 1 m")
+}
+group("session", UnitError, unmoved, rows, "")
+rows = {
     "element too many": (lambda s: s.until("state(9) == slip"),),
     "condition of a breakpoint": (lambda s: s.break_on("fires", "arrest", None, "z9 > 0"),),
     "name without its contact": (lambda s: s.parse("F > 1"), a_system),
@@ -2439,6 +2463,7 @@ rows = {
     "an unknown model": ('"GMS"', '"GMs"'),
     "a number": ("{ m = 1.0 }", '{ m = "1" }'),
     "an unknown key": ("inertia = 2", "inertia = 2\nmass = 1"),
+    "an unknown motion": ("inertia = 2", 'inertia = 2\nmotion = "rotary"'),
     "an unknown table": ("[[sampled]]", "[[sample]]"),
 }
 group("system file", ScenarioError, system_file, rows, "own.toml")
@@ -2492,6 +2517,7 @@ rows = {
     "number among the bodies": ("bodies", 3, {"bodies": (Body("mass", inertia=1.0), 3)}),
     "negative": ("body 'mass'", ..., {"body": DIFFERENCE, "numbers": {"a": 1.0, "b": 2.0}}),
     "no number": ("body 'mass'", ..., {"body": {"inertia": "1 / m"}, "numbers": {"m": 0.0}}),
+    "motion": ("body 'mass': motion", "rotary", {"body": {"motion": "rotary"}}),
     "stiffness": ("k", "-a", {"springs": (Spring("s", "mass", k="-a"),), "numbers": {"a": 1.0}}),
     "locks that repeat": ("system 'one'", ..., {"contacts": TWICE}),
     "load without a curve": ("system 'one', contact 'p'", ..., {"contacts": (DAHL,)}),

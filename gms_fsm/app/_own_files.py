@@ -16,6 +16,7 @@ from gms_fsm.charts.registry import registered
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.toml import parsed
+from gms_fsm.scenarios import scenario_path
 from gms_fsm.systems.models import ChartModel, Model
 from gms_fsm.systems.system import System, system_of
 
@@ -104,7 +105,7 @@ def contacts_error(path: Path, names: Sequence[str], advice: str, more: str = ""
 
 def own_file(name: str, law: str = "") -> OwnFile | None:
     """Return what a file describes, if a name on the command line is that of a file."""
-    path = Path(name)
+    path = scenario_path(name)
     if path.suffix != ".toml" and not (len(path.parts) > 1 and path.exists()):
         return None
     if law:

@@ -29,6 +29,7 @@ from gms_fsm.app.verbs.console import error_line, note
 from gms_fsm.app.verbs.export import export_command
 from gms_fsm.app.verbs.fit import fit_command
 from gms_fsm.app.verbs.runs import (
+    copy_command,
     debug_command,
     lesson_command,
     paper_command,
@@ -167,6 +168,7 @@ def root(
 
 app.command("paper", cls=_Verb)(paper_command)
 app.command("run", cls=_Verb)(run_command)
+app.command("copy", cls=_Verb)(copy_command)
 app.command("sweep", cls=_Verb)(sweep_command)
 app.command("fit", cls=_Verb)(fit_command)
 app.command("phenomena", cls=_Verb)(phenomena_command)

@@ -13,6 +13,7 @@ from gms_fsm.foundation.toml import parsed
 from gms_fsm.identification.fit import task_of
 from gms_fsm.identification.problem.task import Task
 from gms_fsm.records.record import Record
+from gms_fsm.scenarios import scenario_path
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
 
@@ -69,7 +70,7 @@ def load_fit(path: str | Path, overrides: Sequence[str] = ()) -> LoadedFit:
     RecordError
         If the record is invalid, or nothing can be found from it.
     """
-    path = Path(path)
+    path = scenario_path(path)
     scenario: Scenario | SystemScenario
     model: Model | System
     if kind_of(parsed(path)) == "system":

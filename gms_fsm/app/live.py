@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
+import numpy as np
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
-from gms_fsm.foundation.quantities import quantity, sparkline
+from gms_fsm.foundation.quantities import Scale, scale_of, sparkline
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.run.simulate import Moment
+from plots.style import ANSI
 
 BETWEEN_FRAMES = 0.1  # s; drawing more often would cost more than the simulation
 BETWEEN_LINES = 1.0  # s of the clock, without a terminal
@@ -24,7 +27,6 @@ LATE = 1.0  # s of the clock by which a run may be behind before the clock waits
 BAR = 20  # characters for |z|/s = 1
 CURVE = 60  # characters of v and F over time; against the clock each is one frame
 EVENTS = 5  # transitions shown
-COLOURS = ("blue", "dark_orange3", "green", "magenta", "yellow")
 
 
 class LiveView:
@@ -54,21 +56,21 @@ class LiveView:
         pace: float | None = None,
     ) -> None:
         self.detail, self.pace = detail, pace
-        self.names: list[str] = []
+        self.largest: dict[str, float] = {}  # of each quantity so far, which chooses its unit
         self.next_frame = self.next_line = 0.0
         self.latest: Moment | None = None
         self.begin: float | None = None  # time of the clock at t_start, against the clock
         self.behind = False  # whether computing takes longer than the pace allows
         self.read = 0  # transitions read
         self.last: list[LogRecord] = []  # the last of them
+        self.t_start, self.time = t_start, Scale(0, "s")  # as in the log
         self.bar = Progress(
             TextColumn("t = {task.fields[t]}"),
             BarColumn(),
             TimeElapsedColumn(),
             console=console,
         )
-        self.t_start = t_start
-        self.task = self.bar.add_task("", total=t_end - t_start, t=quantity(t_start, "s"))
+        self.task = self.bar.add_task("", total=t_end - t_start, t=self.time.text(t_start, 5))
         self.console = console
         self.live = Live(self.bar, console=console, auto_refresh=False)
 
@@ -128,9 +130,7 @@ class LiveView:
 
     def show(self, moment: Moment) -> None:
         """Draw now."""
-        self.bar.update(
-            self.task, completed=moment.t - self.t_start, t=quantity(moment.t, "s", digits=5)
-        )
+        self.bar.update(self.task, completed=moment.t - self.t_start, t=self.time.text(moment.t, 5))
         shown = Group(*self.picture(moment), self.bar) if self.detail else self.bar
         self.live.start()
         self.live.update(shown, refresh=True)
@@ -146,7 +146,7 @@ class LiveView:
         """Print the transitions since the last line, and the values."""
         self._print_transitions(moment)
         count = "" if self.pace is not None else f", {self.read} transitions"
-        self._print(f"t = {quantity(moment.t, 's', digits=5)}{count}: {_summary(moment)}")
+        self._print(f"t = {self.time.text(moment.t, 5)}{count}: {self._summary(moment)}")
 
     def _print(self, text: str) -> None:
         self.console.print(text, markup=False, highlight=False, soft_wrap=True)
@@ -158,15 +158,30 @@ class LiveView:
         self.last = [*self.last, *new][-EVENTS:]
         return new
 
+    def _summary(self, moment: Moment) -> str:
+        """Return v, F and the states of each contact in one line."""
+        values, states, parts = moment.values, iter(moment.states), []
+        for lead in _leads(values):
+            here = list(itertools.islice(states, len(values[f"{lead}z"])))
+            text = (
+                f"{lead}{name} = "
+                + self.scale(lead + name, [values[lead + name]], unit).text(values[lead + name])
+                for name, unit in (("v", "m/s"), ("F", "N"))
+            )
+            counts = (f"{here.count(name)} {name}" for name in dict.fromkeys(here))
+            parts.append(", ".join([*text, *counts]))
+        return "; ".join(parts)
+
     # ------------------------------------------------------------------ the picture
     def picture(self, moment: Moment) -> list[RenderableType]:
         """Return tables, curves and the last transitions."""
         self._read(moment)
+        curves = self.curves(moment)  # first: they choose units that suit what they show
         slow = "; computing is slower than that" * self.behind
         pace = "" if self.pace is None else f"{self.pace:g} simulated seconds per second{slow}"
         return [
             *self.tables(moment),
-            *self.curves(moment),
+            *curves,
             Text(f"last transitions ({self.read} so far)" if self.last else "no transition so far"),
             *(Text(f"  {_event(record)}", no_wrap=True) for record in self.last),
             *([Text(pace)] if pace else []),
@@ -186,49 +201,55 @@ class LiveView:
         for lead in _leads(seen[-1]):
             for name, unit in (("v", "m/s"), ("F", "N")):
                 values = [float(each[lead + name]) for each in seen]
-                low, high = quantity(min(values), unit), quantity(max(values), unit)
+                scale = self.scale(lead + name, values, unit)
+                low, high = scale.number(min(values)), scale.text(max(values))
                 text = f"{lead}{name} {sparkline(values)} {low} to {high}"
                 lines.append(Text(text, no_wrap=True))
-        return [*lines, Text(f"over the last {quantity(span, 's')}")]
+        return [*lines, Text(f"over the last {self.time.text(span)}")]
 
     def tables(self, moment: Moment) -> list[Table]:
         """Return the table of each contact."""
-        values, states, found = moment.values, moment.states, list[Table]()
+        values, found = moment.values, list[Table]()
+        states = zip(moment.states, moment.modes, strict=True)
         for name in _leads(values):
-            own = {each: values[name + each] for each in ("v", "F", "z", "s")}
-            lead = f"{name.removesuffix('.')}   ".lstrip()
-            here, states = states[: len(own["z"])], states[len(own["z"]) :]
-            found.append(self.table(moment.t, here, own, lead))
+            here = list(itertools.islice(states, len(values[f"{name}z"])))
+            found.append(self.table(moment.t, here, values, name))
         return found
 
+    def scale(self, name: str, values: Iterable[float], unit: str) -> Scale:
+        """Return how a quantity is written: in the unit that suits the largest value so far."""
+        sizes = (abs(each) for each in values if math.isfinite(each))
+        self.largest[name] = max(self.largest.get(name, 0.0), *sizes, 0.0)
+        return scale_of(self.largest[name], unit)
+
     def table(
-        self, t: float, states: Sequence[str], values: Mapping[str, Any], lead: str = ""
+        self, t: float, states: Sequence[tuple[str, int]], seen: Mapping[str, Any], lead: str
     ) -> Table:
-        """Return a table with one line per element."""
-        title = (
-            f"{lead}t = {quantity(t, 's', digits=5):<9}   v = {quantity(values['v'], 'm/s'):>11}   "
-            f"F = {quantity(values['F'], 'N'):>9}"
-        )
+        """Return a table with one line per element: of each the state and its place."""
+        values = {each: seen[lead + each] for each in ("v", "F", "z", "s")}
+        scales = {
+            name: self.scale(lead + name, np.ravel(values[name]), unit)
+            for name, unit in (("v", "m/s"), ("F", "N"), ("z", "m"))
+        }
+        v, F = (scales[name].text(values[name]) for name in ("v", "F"))
+        title = f"{lead.removesuffix('.')}   ".lstrip()
+        title += f"t = {self.time.text(t, 5):<9}   v = {v:>11}   F = {F:>9}"
         bare = all(map(math.isnan, values["s"]))  # no threshold without a Stribeck curve
         still = all(map(math.isnan, values["z"]))  # a chart without variables
         table = Table("element", "state", title=title, title_justify="left", min_width=len(title))
         for head in (*(() if bare else ("|z|/s", "")), *(() if still else ("z",))):
             table.add_column(head)
-        for i, (state, z, s) in enumerate(zip(states, values["z"], values["s"], strict=True)):
-            if state not in self.names:
-                self.names.append(state)
-            colour = COLOURS[self.names.index(state) % len(COLOURS)]
-            # Colours and bars are repeated as words and numbers.
-            row = [
-                Text(f"E{i + 1}"),
-                Text(state.upper() if self.names.index(state) else state, style=colour),
-            ]
+        rows = zip(states, values["z"], values["s"], strict=True)
+        for i, ((state, place), z, s) in enumerate(rows):
+            # Colours and bars are repeated as words and numbers; the default state is plain.
+            look = f"{'bold ' if place else ''}color({ANSI['active']})"
+            row = [Text(f"E{i + 1}"), Text(state.upper() if place else state, style=look)]
             if not bare:
                 ratio = abs(z) / s
                 filled = min(BAR, round(BAR * ratio))
-                bar = Text("█" * filled + "░" * (BAR - filled), style=colour)
+                bar = Text("█" * filled + "░" * (BAR - filled), style=look)
                 row += [Text(f"{ratio:.3f}"), bar]
-            table.add_row(*row, *([] if still else [f"{quantity(z, 'm'):>9}"]))
+            table.add_row(*row, *([] if still else [f"{scales['z'].text(z):>9}"]))
         return table
 
 
@@ -241,15 +262,3 @@ def _event(record: LogRecord) -> str:
     who = f"{record.contact} {record.element + 1}".lstrip() if record.contact else ""
     who = who or f"element {record.element + 1}"
     return f"t = {record.t:.9g} s  {who}: {record.source} -> {record.target} by {record.edge}"
-
-
-def _summary(moment: Moment) -> str:
-    """Return v, F and the states of each contact in one line."""
-    values, states, parts = moment.values, moment.states, []
-    for lead in _leads(values):
-        count = len(values[f"{lead}z"])
-        here, states = states[:count], states[count:]
-        v, F = quantity(values[f"{lead}v"], "m/s"), quantity(values[f"{lead}F"], "N")
-        counts = [f"{here.count(name)} {name}" for name in dict.fromkeys(here)]
-        parts.append(f"{lead}v = {v}, {lead}F = {F}, {', '.join(counts)}")
-    return "; ".join(parts)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -26,13 +26,14 @@ from gms_fsm.app._tables import (
 )
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
-from gms_fsm.foundation.arguments import no_file
+from gms_fsm.foundation.arguments import no_file, unknown
 from gms_fsm.foundation.files import inside
 from gms_fsm.foundation.tables import explained, read_file
 from gms_fsm.foundation.toml import override, parsed
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import simulate
+from gms_fsm.scenarios import scenario_path, shipped
 from gms_fsm.session.session import Session
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import mounted, mounted_alone
@@ -122,7 +123,7 @@ class Loaded:
         """
         given: Any = {**self.arguments, **options}
         what: Any = (*self.subject[:-1], given.pop("t_end"))
-        return simulate(*what, **given)
+        return replace(simulate(*what, **given), heading=self.scenario.title)
 
 
 def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
@@ -131,7 +132,7 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     Parameters
     ----------
     path : str or Path
-        A TOML file.
+        A TOML file, or the name of a scenario of the package, such as "servo".
     overrides : sequence of str
         ``"model.law=published"``: a key path and a TOML value (a bare word is a string).
 
@@ -148,7 +149,7 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     RecordError
         If a record is invalid; the message names file, row and column.
     """
-    path = Path(path)
+    path = scenario_path(path)
     _check_ending(path)
     data = parsed(path)
     if not data:
@@ -156,8 +157,8 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
             "the file is empty",
             place=str(path),
             advice="a scenario needs at least the tables [model], [rig] and [run], or [[body]], "
-            "[[contact]] and [run] (see the examples in scenarios/; gms-fsm schema prints all "
-            "keys)",
+            "[[contact]] and [run] (`gms-fsm copy servo` gives an example, `gms-fsm schema` prints "
+            "all keys)",
         )
     if kind_of(data) == "chart":
         raise ScenarioError(
@@ -204,6 +205,8 @@ def _check_ending(path: Path) -> None:
                 advice=f"`gms-fsm replay {path}` steps through a trace, `gms-fsm plot {path}` "
                 "draws it; a table is named in the [record] of a scenario",
             )
+        case "" if len(path.parts) == 1 and not path.exists():
+            raise unknown("file or scenario", path.name, shipped(), ScenarioError)
 
 
 def kind_of(data: Mapping[str, Any]) -> str:
@@ -240,7 +243,7 @@ def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
     Parameters
     ----------
     path : str or Path
-        A TOML file.
+        A TOML file, or the name of a scenario of the package, such as "servo".
     overrides : sequence of str
         As in `load_scenario`.
 
@@ -254,7 +257,7 @@ def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
     ScenarioError
         Naming file, line, key and text.
     """
-    return read_system(Path(path), overrides)[1]
+    return read_system(scenario_path(path), overrides)[1]
 
 
 def read_system(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, System]:

@@ -8,13 +8,21 @@ from __future__ import annotations
 
 import keyword
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
-from gms_fsm.charts.parts import State, Transition, texts_of
+from gms_fsm.charts.parts import (
+    State,
+    Transition,
+    parameter_of,
+    places_of,
+    texts_of,
+    tuple_of,
+)
 from gms_fsm.charts.reader import ChartReader
 from gms_fsm.errors import ChartError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path
@@ -71,6 +79,9 @@ class Chart:
     contact_outputs : mapping of str to str, optional
         The force of a contact, where it is not just the sum of its elements' forces, which is
         called ``F`` here: ``{"F": "F + sigma_2 * v"}``.
+    layout : mapping of str to (float, float), optional
+        Where pictures show the centre of each state: points to the right and down. Charts that
+        differ in nothing else are equal.
 
     Raises
     ------
@@ -99,6 +110,7 @@ class Chart:
     let: Mapping[str, str] = field(default_factory=dict)
     velocities: tuple[str, ...] = ("v",)
     contact_outputs: Mapping[str, str] = field(default_factory=dict)
+    layout: Mapping[str, tuple[float, float]] = field(default_factory=dict, compare=False)
     guards: Mapping[str, Condition] = field(init=False, repr=False, compare=False)
     flows: Mapping[tuple[str, str], Value] = field(init=False, repr=False, compare=False)
     assignments: Mapping[tuple[str, str], Mapping[str, Value]] = field(
@@ -123,6 +135,7 @@ class Chart:
         let: Mapping[str, str] | None = None,
         velocities: Iterable[str] = ("v",),
         contact_outputs: Mapping[str, str] | None = None,
+        layout: Mapping[str, Sequence[float]] | None = None,
     ) -> None:
         here = f"chart {name!r}"
         given: dict[str, object] = {"name": name, "reference": reference}
@@ -133,9 +146,9 @@ class Chart:
             ("transitions", transitions),
             ("velocities", velocities),
         ):
-            given[each] = _tuple(parts, f"{here}: {each}")
-        constants = _tuple(parameters, f"{here}: parameters")
-        given["parameters"] = tuple(_parameter(each, here) for each in constants)
+            given[each] = tuple_of(parts, f"{here}: {each}")
+        constants = tuple_of(parameters, f"{here}: parameters")
+        given["parameters"] = tuple(parameter_of(each, here) for each in constants)
         for each, texts in (
             ("outputs", outputs),
             ("let", let),
@@ -146,6 +159,7 @@ class Chart:
             object.__setattr__(self, each, value)
         self._check_names()
         self._check_rules()
+        object.__setattr__(self, "layout", places_of(layout or {}, self.states, here))
         expanded = tuple(each for edge in self.transitions for each in edge.each())
         for each, value in {**ChartReader(self).trees(), "transitions": expanded}.items():
             object.__setattr__(self, each, value)
@@ -429,6 +443,35 @@ class Chart:
 
         return save(self, checked_path("path", path))
 
+    def placed(self, layout: Mapping[str, Sequence[float]]) -> Chart:
+        """Return the same chart with another layout; `plots.layout` has one to begin with.
+
+        Parameters
+        ----------
+        layout : mapping of str to (float, float)
+            As for `Chart`; without any, pictures find places themselves.
+
+        Returns
+        -------
+        Chart
+            An equal chart; `save` writes its layout, too.
+
+        Raises
+        ------
+        ChartError
+            If a state is missing or unknown, or a place is not two finite numbers.
+
+        Examples
+        --------
+        >>> from gms_fsm.charts import GMS_ELEMENT
+        >>> chart = GMS_ELEMENT["signed"].placed({"stick": (0, 0), "slip": (300, 150)})
+        >>> chart.layout["slip"], chart == GMS_ELEMENT["signed"]
+        ((300.0, 150.0), True)
+        """
+        other = copy(self)
+        object.__setattr__(other, "layout", places_of(layout, self.states, f"chart {self.name!r}"))
+        return other
+
     # ------------------------------------------------------------------ queries
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -529,31 +572,6 @@ class Chart:
                 advice=f"its edges are {', '.join(map(repr, self.guards)) or 'none'}",
             )
         return spell(self.guards[edge], MATLAB_LIKE)
-
-
-def _tuple(given: Any, owner: str) -> tuple[Any, ...]:
-    """Return a copy of a sequence, which is no single thing."""
-    if isinstance(given, str | State | Transition | Parameter):
-        text = shown(given) if isinstance(given, str) else f"{type(given).__name__}(...)"
-        raise ChartError(
-            f"{owner} is {text}, not a tuple", advice=f"write it with a comma: ({text},)"
-        )
-    if not isinstance(given, Iterable):
-        raise ChartError("give a tuple", place=owner, value=given)
-    return tuple(given)
-
-
-def _parameter(given: object, here: str) -> Parameter:
-    """Return a parameter; a plain name has no unit, and no rule but to be finite."""
-    if isinstance(given, Parameter):
-        return given
-    if isinstance(given, str):
-        return Parameter(given)
-    raise ChartError(
-        f"parameters has {shown(given)}",
-        place=here,
-        advice="write it as 'k', or as Parameter('k', 'N/m', '> 0') with its unit and rule",
-    )
 
 
 def _check_name(name: str, kind: str, here: str, key: tuple[str | int, ...]) -> None:

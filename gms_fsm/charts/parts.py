@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from math import isfinite, nan
 from typing import Any
 
+from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ChartError, shown
 
 
@@ -150,3 +152,70 @@ def texts_of(given: object, owner: str) -> dict[str, str]:
             "it gives a text for each name, for example {'z': 'v'}", place=owner, value=given
         )
     return dict(given)
+
+
+def tuple_of(given: Any, owner: str) -> tuple[Any, ...]:
+    """Return a copy of a sequence, which is no single thing."""
+    if isinstance(given, str | State | Transition | Parameter):
+        text = shown(given) if isinstance(given, str) else f"{type(given).__name__}(...)"
+        raise ChartError(
+            f"{owner} is {text}, not a tuple", advice=f"write it with a comma: ({text},)"
+        )
+    if not isinstance(given, Iterable):
+        raise ChartError("give a tuple", place=owner, value=given)
+    return tuple(given)
+
+
+def parameter_of(given: object, here: str) -> Parameter:
+    """Return a parameter; a plain name has no unit, and no rule but to be finite."""
+    if isinstance(given, Parameter):
+        return given
+    if isinstance(given, str):
+        return Parameter(given)
+    raise ChartError(
+        f"parameters has {shown(given)}",
+        place=here,
+        advice="write it as 'k', or as Parameter('k', 'N/m', '> 0') with its unit and rule",
+    )
+
+
+def places_of(given: object, parts: Sequence[State], here: str) -> dict[str, tuple[float, float]]:
+    """Return the places of all states, or none."""
+    states, owner = [state.name for state in parts], f"{here}: layout"
+    example = {name: [150 * i, 0] for i, name in enumerate(states[:2])}
+    if not isinstance(given, Mapping):
+        raise ChartError(
+            f"it gives a place for each state, like {example}", place=owner, value=given
+        )
+    for name in given:
+        if name not in states:
+            raise ChartError(
+                f"{name!r} is not a state",
+                place=owner,
+                advice=f"states: {', '.join(states)}",
+                key=("layout", name),
+            )
+    missing = [name for name in states if name not in given] if given else []
+    if missing:
+        raise ChartError(
+            f"it has no place for {', '.join(missing)}",
+            place=owner,
+            advice="give a place for each state, or for none",
+            key=("layout",),
+        )
+    return {name: _place(given[name], f"{owner}, {name!r}", name) for name in states if given}
+
+
+def _place(given: object, owner: str, name: str) -> tuple[float, float]:
+    try:
+        x, y = (float(each) for each in given)  # type: ignore[attr-defined]  # may fail
+    except (TypeError, ValueError):
+        x = y = nan
+    if not (isfinite(x) and isfinite(y)):
+        raise ChartError(
+            "a place is two finite numbers, points to the right and down",
+            place=owner,
+            value=given,
+            key=("layout", name),
+        )
+    return x, y

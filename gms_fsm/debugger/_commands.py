@@ -14,12 +14,13 @@ from gms_fsm.debugger._elements import Elements, completions, integer, read_edit
 from gms_fsm.debugger._help import ALIASES, COMMANDS, MOVES, help_of, overview
 from gms_fsm.debugger._over_time import events, ribbons
 from gms_fsm.debugger._view import branches, chart_states, ending, view
-from gms_fsm.errors import GMSError, SessionError
+from gms_fsm.errors import ExpressionError, GMSError, SessionError
 from gms_fsm.foundation.arguments import meant, there_are
-from gms_fsm.foundation.quantities import WIDTH
+from gms_fsm.foundation.quantities import WIDTH, in_words
 from gms_fsm.language import evaluate
 from gms_fsm.session.explain import holds
 from gms_fsm.session.session import KINDS, Breakpoint, Session
+from gms_fsm.session.units import in_si, units_of
 
 
 class Commands:
@@ -33,6 +34,8 @@ class Commands:
         Drawing characters.
     width : int
         Columns of tables and pictures.
+    follow : bool
+        Whether a step to a firing chooses the element that fired.
 
     Examples
     --------
@@ -40,7 +43,7 @@ class Commands:
     >>> session = Session(GMS(GMSParameters.paper("stick-slip"), law="published"),
     ...                   Prescribed("0.15"), 1.0)
     >>> list(Commands(session).answer("print", "s1"))
-    ['0.4']
+    ['400 mm']
     """
 
     def __init__(
@@ -48,7 +51,10 @@ class Commands:
         session: Session,
         marks: text_of.Marks = text_of.PLAIN,
         width: int = WIDTH,
+        *,
+        follow: bool = False,
     ) -> None:
+        self.follow = follow
         self.session, self.marks, self.width, self.element = session, marks, width, 0
         self.last_move = ""  # the line that moved last, which an empty line repeats
         self.left = False  # whether the last line was `quit`
@@ -81,6 +87,10 @@ class Commands:
             hint = f"{meant(name, COMMANDS)}help lists all commands"
             raise SessionError(f"there is no command {name!r}", advice=hint)
         yield from getattr(self, f"do_{name}")(arg)
+        fired = self.session.here.fired
+        if self.follow and name in MOVES and fired is not None:
+            bank = self.session.start.program.layout.contact(fired.contact)
+            self.element = bank.first + fired.element
 
     @property
     def prompt(self) -> str:
@@ -201,8 +211,8 @@ class Commands:
     def do_goto(self, arg: str) -> Iterator[str]:
         """Go to a time."""
         try:
-            t = float(arg.removesuffix("s"))
-        except ValueError:
+            t = self.session.watch(in_si(self.session.start, arg, "t"))
+        except ExpressionError:
             advice = f"{self._usage('goto')}; the run ends at {self.session.t_end:g} s"
             raise SessionError(f"{arg!r} is not a time", advice=advice) from None
         try:
@@ -228,8 +238,18 @@ class Commands:
                     "it becomes true"
                 )
             else:
-                yield "it does not become true before the end"
+                yield f"it does not become true before the end{self._units_in(arg)}"
         yield from self.here()
+
+    def _unit(self, name: str) -> str:
+        """Return the unit of a name, empty if it is not known."""
+        return units_of(self.session.start).get(name, "")
+
+    def _units_in(self, text: str) -> str:
+        """Return the units in which a text's numbers are read."""
+        found = ((name, self._unit(name)) for name in re.findall(r"[^\W\d][\w.]*", text))
+        units = ", ".join(f"{name} in {unit}" for name, unit in dict(found).items() if unit)
+        return f" ({units}, unless a unit is given)" if units else ""
 
     def _with_states(self, condition: str) -> str:
         """Return a condition with the states spelled as in the chart."""
@@ -311,7 +331,7 @@ class Commands:
     def _value(self, text: str) -> str:
         if re.search(r"[<>]|==|\b(and|or|not|state)\b", text):
             return "true" if self._truth(text) else "false"
-        return f"{self.session.watch(text):.9g}"
+        return in_words(self.session.watch(text), self._unit(text.strip()), 9)
 
     def _truth(self, text: str) -> bool:
         tree = self.session.parse(self._with_states(text))

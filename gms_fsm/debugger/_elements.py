@@ -14,6 +14,7 @@ from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.session.elements import chart_of, element_name
 from gms_fsm.session.session import Session
 from gms_fsm.session.tree.poking import Edits, pokeable
+from gms_fsm.session.units import in_si
 from gms_fsm.systems.models import parameter_names
 
 
@@ -118,7 +119,7 @@ def read_edits(session: Session, arg: str, usage: str, states: Iterable[str]) ->
     named: dict[int | str, str] = {}
     v: float | None = None
     elements = Elements(session, 0)
-    for part in re.sub(r"\s*=\s*", "=", arg).split():
+    for part in filter(None, re.split(r"\s+(?=[\w.]+=)", re.sub(r"\s*=\s*", "=", arg))):
         name, _, value = part.partition("=")
         state = re.fullmatch(r"(?:(\w+)\.)?state(\d*)", name)
         if not value:
@@ -126,12 +127,12 @@ def read_edits(session: Session, arg: str, usage: str, states: Iterable[str]) ->
         if state:
             named[_whose(elements, name, state[1], state[2])] = spelled(value, states)
         elif elements.named:
-            variables[name] = session.watch(value)
+            variables[name] = session.watch(in_si(session.start, value, name))
         elif name == "v":
-            v = session.watch(value)
+            v = session.watch(in_si(session.start, value, name))
         else:
             variable, i = _variable(session, name, part, usage)
-            variables.setdefault(variable, {})[i] = session.watch(value)
+            variables.setdefault(variable, {})[i] = session.watch(in_si(session.start, value, name))
     return Edits(variables, v, named)
 
 

@@ -77,15 +77,19 @@ COMMANDS = {
     "next": Command("move", "next", "Go forward to the next transition.", ("next",), "n"),
     "prev": Command("move", "prev", "Go back to the previous transition.", ("prev",)),
     "goto": Command(
-        "move", "goto T", "Go to the last row at or before a time in seconds.", ("goto {t}",)
+        "move",
+        "goto T",
+        "Go to the last row at or before a time, in seconds without a unit.",
+        ("goto {t}",),
     ),
     "until": Command(
         "move",
         "until CONDITION",
-        "Go forward to the next point where a condition becomes true, also between rows.",
+        "Go forward to the next point where a condition becomes true, also between rows. Numbers "
+        "without a unit are in SI units.",
         (
             "until abs({z}1) > 0.9*{s}1",
-            "until {lead}F > 0",
+            "until {lead}F > 500 mN",
             "u {lead}state({n}) == {state} and {lead}{v} > 0",
         ),
         "u",
@@ -114,7 +118,7 @@ COMMANDS = {
         "change",
         "poke {poked}=VALUE {lead}state1=STATE ...",
         "Change values here and continue in a new branch; the present one is kept. What can be "
-        "changed: {pokeable}. A value can be an expression without spaces.",
+        "changed: {pokeable}. A value can be an expression, or a number with a unit.",
         (
             "poke {z}1=0",
             "poke {z}{n}=0.9*{s}{n} {lead}state{n}={state}",

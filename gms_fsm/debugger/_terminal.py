@@ -20,10 +20,18 @@ from gms_fsm.debugger._commands import Commands
 from gms_fsm.debugger._text import DRAWN, PLAIN
 from gms_fsm.foundation.quantities import WIDTH, wrapped
 from gms_fsm.session.session import Session
+from plots.style import ansi
 
 NARROWEST = 40  # columns; a narrower terminal breaks the lines itself
-COLOURS = ("34", "33", "35", "36", "32")  # for states
-WORDS = {"true": "32", "false": "31", "fired": "1", "FIRED": "1", "error:": "1;31", "ACTIVE": "1"}
+# Looks of words, in the colours that the terminal gives to the roles; bold where it changes.
+WORDS = {
+    "true": ansi("holds"),
+    "false": ansi("fails"),
+    "fired": ansi("now", bold=True),
+    "FIRED": ansi("now", bold=True),
+    "error:": ansi("error", bold=True),
+    "ACTIVE": ansi("active", bold=True),
+}
 
 
 class Debugger(cmd.Cmd):
@@ -48,12 +56,12 @@ class Debugger(cmd.Cmd):
     >>> session = Session(GMS(GMSParameters.paper("stick-slip"), law="published"),
     ...                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
     >>> print(Debugger(session).reply("print s1"))
-    1.5
+    1.5 m
     >>> code = Debugger(session, stdin=io.StringIO("next\nquit\n")).run()
     GMS, 4 elements, published law; prescribed velocity, to t = 100 s
     help lists the commands, where shows everything, quit exits.
     (t=0.0000 s) next
-    row 12, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
+    row 12, t = 4.91276067 s, micro-step 1: v = 141.608 mm/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
     (t=4.9128 s) quit
     """
@@ -168,7 +176,7 @@ class Debugger(cmd.Cmd):
     def say(self, text: str) -> None:
         """Print lines, wrapped to the screen width."""
         width = self.width
-        for line in text.split("\n"):
+        for line in text.replace("µ", self.commands.marks.micro).split("\n"):
             for part in wrapped(line, width):
                 part = part.encode(self.encoding, "replace").decode(self.encoding)
                 self.stdout.write(f"{self._painted(part)}\n")
@@ -177,7 +185,7 @@ class Debugger(cmd.Cmd):
         if not self.coloured:
             return line
         states = self.commands.states
-        codes = WORDS | {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(states)}
+        codes = WORDS | {name: ansi("active", bold=i > 0) for i, name in enumerate(states)}
         words = "|".join(re.escape(word) for word in codes)
         return re.sub(
             rf"(?<!\w)({words})(?!\w)", lambda m: f"\x1b[{codes[m[0]]}m{m[0]}\x1b[0m", line

@@ -15,17 +15,18 @@ BAR = 8  # characters for |z|/s = 1, and more in a wide terminal
 
 @dataclass(frozen=True)
 class Marks:
-    """Drawing characters: no and yes, bar, states of a ribbon, a box, the active box."""
+    """Drawing characters: no and yes, bar, states of a ribbon, a box, the active box, micro."""
 
     truth: str
     bar: str
     ribbon: str
     box: str
     active: str
+    micro: str
 
 
-PLAIN = Marks("ny", ".#", "-#=+%o", "+-+|++", "+=+|++")
-DRAWN = Marks("✗✓", "░█", "─▓═┼▒┄", "┌─┐│└┘", "╔═╗║╚╝")
+PLAIN = Marks("ny", ".#", "-#=+%o", "+-+|++", "+=+|++", "u")
+DRAWN = Marks("✗✓", "░█", "─▓═┼▒┄", "┌─┐│└┘", "╔═╗║╚╝", "µ")
 
 
 def screen_lines(
@@ -60,27 +61,28 @@ def _contact_lines(
     contact: ContactView, view: Screen, chosen: int, marks: Marks, width: int
 ) -> Iterator[str]:
     """Yield a contact: its force, and each element with its values and edges."""
-    more = "".join(f", {name} = {value:.6g}" for name, value in contact.more.items())
-    shared = "  (shared with other locks)" if contact.shared else ""
+    shared = "  (shared with other locks)" if contact.here.shared else ""
     if contact.name:
         yield contact.title
-        yield f"  v = {contact.v:.6g} m/s, F = {contact.F:.6g} N{more}{shared}"
+        yield f"  {contact.here.written('v', 'F', *contact.here.more)}{shared}"
     else:
-        yield f"v = {contact.v:.6g} m/s, x = {contact.x:.6g} m, F = {contact.F:.6g} N"
+        yield contact.here.written("v", "x", "F")
         yield from ending_lines(view.ending)
-    chart = contact.chart
+    chart, scales = contact.chart, contact.scales
+    columns = [scales[name] for name in chart.variables]
     bar, most = BAR + max(0, width - WIDTH) // 4, 8 + max(0, width - WIDTH) // 4
     wide = max(5, min(most, max(len(state.name) for state in chart.states)))
     yield "  ".join(["  el", " ".join([f"{'state':<{wide}}", *_heads(contact, bar)]), "edges"])
     for i, each in enumerate(contact.elements, start=contact.first):
         lead = f"{'>' if i == chosen else ' '}{each.number:>3}  "
-        cells = [f"{value:>10.4g}" for value in each.variables]
+        pairs = zip(columns, each.variables, strict=True)
+        cells = [f"{scale.number(value):>10}" for scale, value in pairs]
         if each.s is not None and each.ratio is not None:
             shown = f"{each.ratio:.3f}" if each.ratio < 100 else f"{each.ratio:.1e}"
-            cells += [f"{each.s:>9.4g}", f"{shown:>7}"]
+            cells += [f"{scales['s'].number(each.s):>9}", f"{shown:>7}"]
             if len(each.variables) == 1:  # further variables take the place of the bar
                 cells.append(_bar(each.ratio, marks, bar))
-        cells.append(f"{each.F:>10.4g}")
+        cells.append(f"{scales['F'].number(each.F):>10}")
         line = lead + " ".join([f"{short(each.state, wide):<{wide}}", *cells])
         edges = " ".join(
             f"{edge.priority}:"
@@ -98,14 +100,18 @@ def _contact_lines(
 def _heads(contact: ContactView, bar: int) -> list[str]:
     """Return the headings of the values of an element, with the same widths."""
     chart = contact.chart
-    units = {name: chart.unit(name) for name in chart.variables}
-    names = [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
+    named = {"s": "s", "F": "F_i"} | {name: name for name in chart.variables}
+    heading = {
+        name: f"{named[name]} [{scale.unit}]" if scale.unit else named[name]
+        for name, scale in contact.scales.items()
+    }
+    names = [heading[name] for name in chart.variables]
     heads = [f"{short(name, 10):>10}" for name in names]
     if contact.elements[0].ratio is not None:
-        heads += [f"{'s [m]':>9}", f"{short(f'|{chart.variables[0]}|/s', 7):>7}"]
+        heads += [f"{heading['s']:>9}", f"{short(f'|{chart.variables[0]}|/s', 7):>7}"]
         if len(names) == 1:
             heads.append(" " * (bar + 2))
-    return [*heads, f"{'F_i [N]':>10}"]
+    return [*heads, f"{heading['F']:>10}"]
 
 
 def _bar(ratio: float, marks: Marks, wide: int) -> str:

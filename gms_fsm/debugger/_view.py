@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.foundation.quantities import Scale, scale_of
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.session.elements import chart_of
 from gms_fsm.session.here import why_at
+from gms_fsm.session.results import ContactHere, Fired
 from gms_fsm.session.session import Session
 from gms_fsm.session.tree.branch import Branch
 
@@ -79,12 +81,8 @@ class ContactView:
         Its chart.
     first : int
         Number of its first element, counted over all contacts from 0.
-    x, v, F : float
-        Position, m; velocity, m/s; friction force, N.
-    more : mapping of str to float
-        Further velocities and forces of its chart.
-    shared : bool
-        Whether F is that of a lock which other locks share.
+    here : ContactHere
+        Its position, velocity and force.
     elements : tuple of ElementView
         Its elements.
     """
@@ -93,12 +91,22 @@ class ContactView:
     title: str
     chart: Chart
     first: int
-    x: float
-    v: float
-    F: float
-    more: Mapping[str, float]
-    shared: bool
+    here: ContactHere
     elements: tuple[ElementView, ...]
+
+    @property
+    def scales(self) -> Mapping[str, Scale]:
+        """The units in which a table of its elements is written, one for each column.
+
+        A threshold has that of the variable it is compared with, F_i that of F.
+        """
+        found: dict[str, Scale] = {}
+        columns = zip(*(each.variables for each in self.elements), strict=True)
+        for name, values in zip(self.chart.variables, columns, strict=False):
+            bounds = () if found else [each.s for each in self.elements if each.s is not None]
+            found[name] = scale_of((*values, *bounds), self.chart.unit(name))
+        length = next(iter(found.values()), Scale(0, "m"))
+        return found | {"s": length, "F": self.here.scales["F"]}
 
 
 @dataclass(frozen=True)
@@ -152,6 +160,8 @@ class Screen:
         Whether the position is between this row and the next.
     t : float
         Time, s.
+    fired : Fired or None
+        The firing that made this row.
     ending : str
         ``"end"`` at the end of the run, the reason at a failure, else empty.
     contacts : tuple of ContactView
@@ -167,6 +177,7 @@ class Screen:
     microstep: int
     located: bool
     t: float
+    fired: Fired | None
     ending: str
     contacts: tuple[ContactView, ...]
     bodies: tuple[BodyView, ...] = ()
@@ -280,6 +291,7 @@ def view(session: Session) -> Screen:
         here.microstep,
         here.located,
         here.t,
+        here.fired,
         ending(session),
         tuple(_contact(session, bank) for bank in start.program.layout.banks),
         bodies,
@@ -297,11 +309,7 @@ def _contact(session: Session, bank: BankPlaces) -> ContactView:
         title,
         part.chart,
         bank.first,
-        here.x,
-        here.v,
-        here.F,
-        here.more,
-        here.shared,
+        here,
         elements,
     )
 

@@ -1,21 +1,77 @@
-"""Values in engineering units for screens: ``-776.2 mm``, ``1.346 N``, ``25.00 kN/m``."""
+"""Values in engineering units, with one unit for each quantity and place: ``-776.2 mm``."""
 
 from __future__ import annotations
 
 import math
 import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 WIDTH = 80  # columns, where there is no terminal
+JOINED = "\N{NO-BREAK SPACE}"
+NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=[pnuµmkMGT]?(?:m/s|m|N|s)\b)")
 
-PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate(["a", *"fpnµm", "", *"kMGT"])}
+PREFIXES = {3 * i - 12: prefix for i, prefix in enumerate([*"pnµm", "", *"kMGT"])}
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
 TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns)(?=$|[/*·])")
 BLOCKS = "▁▂▃▄▅▆▇█"
+DIGITS = 4
+SMALLEST = -4  # power of ten of a value in the unit of its place, below which it has an exponent
 
 
-def quantity(value: float, unit: str = "", digits: int = 4) -> str:
+@dataclass(frozen=True)
+class Scale:
+    """The unit of a quantity at one place: that of SI with the prefix of a power of ten."""
+
+    power: int
+    unit: str
+
+    @property
+    def factor(self) -> float:
+        """What a value in SI is multiplied by."""
+        return 10.0**-self.power
+
+    def number(self, value: float, digits: int = DIGITS) -> str:
+        """Return a value in this unit, without the unit.
+
+        >>> Scale(-3, "mm").number(0.0123456), Scale(-3, "mm").number(0.0)
+        ('12.35', '0')
+        """
+        rounded = float(f"{value:.{digits - 1}e}")  # of the largest numbers it is infinite
+        if not math.isfinite(rounded) or value == 0.0:
+            return f"{value:g}"
+        power = _power(rounded)
+        shown = power - self.power
+        if SMALLEST <= shown < max(digits, 3 if self.power else 0):
+            return f"{_shifted(rounded, -self.power):.{max(0, digits - 1 - shown)}f}"
+        return f"{_shifted(rounded, -self.power):.{digits - 1}e}"
+
+    def text(self, value: float, digits: int = DIGITS) -> str:
+        """Return a value in this unit.
+
+        >>> Scale(-3, "mm/s").text(0.0), Scale(-3, "mm/s").text(2e-6)
+        ('0 mm/s', '0.002000 mm/s')
+        """
+        return f"{self.number(value, digits)} {self.unit}".rstrip()
+
+
+def scale_of(values: float | Iterable[float], unit: str, digits: int = DIGITS) -> Scale:
+    """Return the scale that suits the largest of some values: one unit for all of them.
+
+    >>> scale_of([0.0, 2e-4, -0.03], "m/s"), scale_of([0.0], "N"), scale_of(3e-7, "m^2")
+    (Scale(power=-3, unit='mm/s'), Scale(power=0, unit='N'), Scale(power=0, unit='m^2'))
+    """
+    each = (values,) if isinstance(values, (int, float)) else values
+    largest = max((abs(value) for value in each if math.isfinite(value)), default=0.0)
+    rounded = float(f"{largest:.{digits - 1}e}")
+    step = 3 * (_power(rounded) // 3) if 0.0 < rounded < math.inf else 0
+    if unit and TAKES_PREFIX.match(unit) and step in PREFIXES:
+        return Scale(step, f"{PREFIXES[step]}{unit}")
+    return Scale(0, unit)
+
+
+def quantity(value: float, unit: str = "", digits: int = DIGITS) -> str:
     """Return a value with its unit, and a prefix instead of an exponent.
 
     Examples
@@ -25,16 +81,30 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     >>> quantity(1e-6, "m/s"), quantity(0.99999, "m"), quantity(3e-7, "m^2"), quantity(1.51743)
     ('1.000 µm/s', '1.000 m', '3.000e-07 m^2', '1.517')
     """
-    rounded = float(f"{value:.{digits - 1}e}")  # of the largest numbers it is infinite
-    if not math.isfinite(rounded) or value == 0.0:
-        return f"{value:g} {unit}".rstrip()
-    power = math.floor(math.log10(abs(rounded)) + 1e-12)
-    step = 3 * (power // 3)
-    if unit and TAKES_PREFIX.match(unit) and step in PREFIXES:
-        return f"{rounded / 10.0**step:.{digits - 1 - power + step}f} {PREFIXES[step]}{unit}"
-    if -4 <= power < digits:
-        return f"{rounded:.{digits - 1 - power}f} {unit}".rstrip()
-    return f"{rounded:.{digits - 1}e} {unit}".rstrip()
+    return scale_of(value, unit, digits).text(value, digits)
+
+
+def in_words(value: float, unit: str = "", digits: int = 6) -> str:
+    """Return a value with its unit for a sentence: without zeros at its end.
+
+    >>> in_words(0.3, "m/s"), in_words(-3.173430001, "N"), in_words(1e-6, "m"), in_words(100.0)
+    ('300 mm/s', '-3.17343 N', '1 µm', '100')
+    """
+    return trimmed(quantity(value, unit, digits))
+
+
+def trimmed(text: str) -> str:
+    """Return a number, with or without a unit, without zeros at its end."""
+    return re.sub(r"(\.\d*[1-9])0+(?!\d)|\.0+(?!\d)", r"\1", text)
+
+
+def _power(value: float) -> int:
+    return math.floor(math.log10(abs(value)) + 1e-12)
+
+
+def _shifted(value: float, power: int) -> float:
+    """Return a value times a power of ten, rounded once."""
+    return value * 10.0**power if power >= 0 else value / 10.0**-power
 
 
 def named_numbers(values: Mapping[str, float]) -> str:
@@ -72,6 +142,8 @@ def wrapped(line: str, width: int = WIDTH, *, whole: bool = False) -> Iterator[s
 
     >>> [len(part) <= WIDTH for part in wrapped("word " * 40)]
     [True, True, True]
+    >>> list(wrapped("v = 300 mm/s", 11))
+    ['v =', '  300 mm/s']
     >>> list(wrapped("  proved   never at the same time", 24))
     ['  proved   never at the', '           same time']
     """
@@ -80,10 +152,11 @@ def wrapped(line: str, width: int = WIDTH, *, whole: bool = False) -> Iterator[s
         return
     column = re.match(r" *\S+ {2,}", line)
     hanging = column.end() if column else len(line) - len(line.lstrip()) + 2
-    yield from textwrap.wrap(
-        line,
+    for part in textwrap.wrap(
+        NUMBER_AND_UNIT.sub(JOINED, line),
         width,
         subsequent_indent=" " * min(hanging, width // 2),
         break_long_words=not whole,
         break_on_hyphens=not whole,
-    )
+    ):
+        yield part.replace(JOINED, " ")

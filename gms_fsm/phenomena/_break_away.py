@@ -136,5 +136,6 @@ PHENOMENA = (
         "slider has moved by 10 F_s / sigma_0, over the break-away force.",
         ("amplitude of the vibration / break-away force [1]", "x [µm]"),
         _vibration,
+        decimals=2,
     ),
 )

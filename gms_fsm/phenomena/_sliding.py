@@ -170,6 +170,7 @@ PHENOMENA = (
         "minus that while it falls, at the mean speed, for w = 1, 10 and 25 rad/s.",
         ("v [mm/s]", "friction [N]"),
         _lag,
+        decimals=1,
     ),
     Phenomenon(
         "stribeck",
@@ -200,5 +201,6 @@ PHENOMENA = (
         "given back at any time beyond what it had taken before.",
         ("t [ms]", "energy taken [mJ]"),
         _passivity,
+        decimals=2,
     ),
 )

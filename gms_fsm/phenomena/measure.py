@@ -40,7 +40,7 @@ def measure_phenomena(
         Numbers of the signals: forces, speeds and lengths in them follow its F_s, v_s and sigma_0,
         which should be those of the models.
     progress : callable, optional
-        ``progress(model, done)``, with the share of its experiments done.
+        ``progress(model, done)``, with the share of all experiments done.
 
     Returns
     -------
@@ -67,10 +67,10 @@ def measure_phenomena(
     specimens = specimens_of(models, bench or Bench())
     cells = []
     for specimen in specimens:
-        for k, phenomenon in enumerate(chosen):
+        for phenomenon in chosen:
             cells.append(Cell(specimen.name, phenomenon, _measured(specimen, phenomenon)))
             if progress is not None:
-                progress(specimen.name, (k + 1) / len(chosen))
+                progress(specimen.name, len(cells) / (len(specimens) * len(chosen)))
     return PhenomenaTable({each.name: each.title for each in specimens}, chosen, tuple(cells))
 
 

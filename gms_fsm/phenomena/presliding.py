@@ -22,6 +22,7 @@ OUTER = (0.95, -0.95, 0.95)
 HOLD = 5.0  # s
 NESTED = (0.95, -0.8, 0.8, -0.8, 0.95)
 SLIDING = 20.0  # in F_s / sigma_0: a longer stroke is not pre-sliding
+AWAY = "slides away"
 BIAS_RAMP = ((0.0, 0.0), (2.0, 0.6), (4.0, 0.3), (5.0, 0.3))
 RIPPLE, FREQUENCY = 0.1, 2.0  # Hz
 PER_PERIOD = 50  # samples
@@ -51,7 +52,8 @@ def _hysteresis(specimen: Specimen) -> PhenomenonResult:
     stroke = float(max(down.max(), up.max()) - min(down.min(), up.min()))
     loss = work(load, down) + work(back, up)
     share = abs(width) / stroke if stroke > 0.0 else 0.0
-    if stroke > SLIDING * specimen.bench.bristle:
+    slides = stroke > SLIDING * specimen.bench.bristle
+    if slides:
         verdict: Verdict = "shows wrongly"
         said = "it slides away although the break-away force is not reached"
     elif share <= LIMITS["hysteresis.width"].value:
@@ -67,7 +69,8 @@ def _hysteresis(specimen: Specimen) -> PhenomenonResult:
         MeasuredNumber("width over stroke", share, "1"),
         MeasuredNumber("energy lost per cycle", 1e6 * loss, "µJ"),
     )
-    return PhenomenonResult(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
+    curves = (Curve("", 1e6 * trace.x, applied),)
+    return PhenomenonResult(verdict, numbers, said, curves, AWAY if slides else "")
 
 
 def nested(specimen: Specimen) -> tuple[ForcePath, Trace]:
@@ -89,7 +92,8 @@ def _memory(specimen: Specimen) -> PhenomenonResult:
     rising, falling = (way.force(branch) for branch in way.branches[2:4])
     width = _at(0.0, falling, down) - _at(0.0, rising, up)
     open_by, wide = (abs(u / stroke) if stroke else 0.0 for u in (gap, width))
-    if abs(stroke) > SLIDING * specimen.bench.bristle:
+    slides = abs(stroke) > SLIDING * specimen.bench.bristle
+    if slides:
         verdict: Verdict = "does not show"
         said = "it slides away although the break-away force is not reached"
     elif wide <= LIMITS["memory.width"].value and open_by <= LIMITS["memory.gap"].value:
@@ -105,8 +109,8 @@ def _memory(specimen: Specimen) -> PhenomenonResult:
         MeasuredNumber("stroke of the inner loop", 1e6 * stroke, "µm"),
         MeasuredNumber("width of the inner loop at F = 0", 1e6 * width, "µm"),
     )
-    applied = way.force(trace.t)
-    return PhenomenonResult(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
+    curves = (Curve("", 1e6 * trace.x, way.force(trace.t)),)
+    return PhenomenonResult(verdict, numbers, said, curves, AWAY if slides else "")
 
 
 def _drift(specimen: Specimen) -> PhenomenonResult:
@@ -148,6 +152,7 @@ PHENOMENA = (
         "Measured is the width of the last loop at F = 0.",
         ("x [µm]", "applied force [N]"),
         _hysteresis,
+        decimals=1,
     ),
     Phenomenon(
         "memory",
@@ -158,6 +163,7 @@ PHENOMENA = (
         "larger of the two gaps, over the stroke of the inner loop.",
         ("x [µm]", "applied force [N]"),
         _memory,
+        decimals=1,
     ),
     Phenomenon(
         "drift",

@@ -87,12 +87,15 @@ class PhenomenonResult:
         One sentence; the reason, where there is no number.
     curves : tuple of Curve
         For the picture.
+    instead : str
+        What the table says where the first number would tell nothing, such as "slides away".
     """
 
     verdict: Verdict
     numbers: tuple[MeasuredNumber, ...]
     said: str
     curves: tuple[Curve, ...] = field(default=(), repr=False)
+    instead: str = ""
 
     def number(self, name: str) -> float:
         """Return a measured number.
@@ -138,6 +141,8 @@ class Phenomenon:
         ``measure(specimen)`` returns a `PhenomenonResult`.
     log : bool
         Whether the horizontal axis is logarithmic.
+    decimals : int
+        Of the first number in a table.
     """
 
     name: str
@@ -147,6 +152,26 @@ class Phenomenon:
     axes: tuple[str, str]
     measure: Callable[..., PhenomenonResult] = field(repr=False)
     log: bool = False
+    decimals: int = 3
+
+    def brief(self, found: PhenomenonResult) -> str:
+        """Return what a table says of a result; empty if nothing was measured.
+
+        Parameters
+        ----------
+        found : PhenomenonResult
+            Of this experiment.
+
+        Returns
+        -------
+        str
+            The first number, with as many decimals as in the results of all other models.
+        """
+        if found.instead or not found.numbers:
+            return found.instead
+        first = found.numbers[0]
+        value = round(first.value, self.decimals) + 0.0  # no -0
+        return f"{value:.{self.decimals}f} {first.unit}".removesuffix(" 1").replace("-", "−")
 
     @property
     def limits(self) -> dict[str, Limit]:
@@ -234,9 +259,9 @@ class PhenomenaTable:
         head = ["model", *(each.short for each in self.phenomena)]
         lines = [_row(head), _row(["---"] * len(head))]
         for model in self.models:
-            found = [self.cell(model, each.name) for each in self.phenomena]
-            if any(each.verdict != "does not apply" for each in found):
-                lines.append(_row([model, *map(_brief, found)]))
+            found = [(each, self.cell(model, each.name)) for each in self.phenomena]
+            if any(result.verdict != "does not apply" for _, result in found):
+                lines.append(_row([model, *(_marked(each, result) for each, result in found)]))
         return "\n".join(lines) + "\n"
 
     def left_out(self) -> dict[str, str]:
@@ -288,9 +313,8 @@ MARKS = {
 }
 
 
-def _brief(found: PhenomenonResult) -> str:
-    mark = MARKS[found.verdict]
-    return f"{mark} {found.numbers[0]}" if found.numbers else mark
+def _marked(phenomenon: Phenomenon, found: PhenomenonResult) -> str:
+    return f"{MARKS[found.verdict]} {phenomenon.brief(found)}".strip()
 
 
 def _row(cells: list[str]) -> str:

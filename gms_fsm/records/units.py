@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from gms_fsm.errors import UnitError, shown
 
@@ -78,13 +79,15 @@ def factor(quantity: str, unit: str) -> float:
     )
 
 
-def convert_numbers(text: str) -> str:
+def convert_numbers(text: str, quantities: Mapping[str, str] | None = None) -> str:
     """Replace each ``number unit`` in a condition by the number in SI.
 
     Parameters
     ----------
     text : str
         Condition, for example ``"normal > 4.5 N"``.
+    quantities : mapping of str to str, optional
+        The quantity that each name measures; by default names are those of quantities.
 
     Returns
     -------
@@ -94,30 +97,30 @@ def convert_numbers(text: str) -> str:
     Raises
     ------
     UnitError
-        If a word after a number is not a unit.
+        If a word after a number is not a unit, or not one of the quantity that it is compared with.
 
     Examples
     --------
     >>> convert_numbers("normal > 4500 mN and time < 3 min")
     'normal > 4.5     and time < 180.0'
+    >>> convert_numbers("abs(v) > 300 mm/s", {"v": "velocity"})
+    'abs(v) > 0.3     '
     """
+    known = {each: each for each in FACTORS} if quantities is None else quantities
     # Possessive (++): 2e3 is not 2 with the unit e3, and long digit strings do not backtrack.
     number = r"(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?\d++)?+"
     number_unit = rf"(?<![\w.])({number})\s*+([^\W\d]\w*+(?:/s)?)"
 
     def converted(clause: str) -> str:
-        # The unit must be one of the quantity it is compared with.
-        quantities = [q for q in FACTORS if re.search(rf"\b{q}\b", clause)]
+        measured = [known[name] for name in re.findall(r"[^\W\d][\w.]*", clause) if name in known]
 
         def in_si(found: re.Match[str]) -> str:
             value, unit = float(found.group(1)), found.group(2)
-            fitting = (
-                quantities or [q for q, units in FACTORS.items() if unit in units] or ["force"]
-            )
+            fitting = measured or [q for q, units in FACTORS.items() if plain(unit) in units]
             # Padded to the length of the original if possible, so columns in messages are correct.
-            return repr(value * factor(fitting[0], unit)).ljust(len(found.group(0)))
+            return repr(value * factor((fitting or ["force"])[0], unit)).ljust(len(found.group(0)))
 
         return re.sub(number_unit, in_si, clause)
 
-    parts = re.split(r"(\band\b|\bor\b|\bnot\b)", text)
-    return "".join(p if p in ("and", "or", "not") else converted(p) for p in parts)
+    parts = re.split(r"(\band\b|\bor\b|\bnot\b|&&|\|\|)", text)
+    return "".join(p if k % 2 else converted(p) for k, p in enumerate(parts))

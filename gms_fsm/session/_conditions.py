@@ -13,13 +13,8 @@ from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
 from gms_fsm.run.problem import Problem
 from gms_fsm.session.explain import holds
 from gms_fsm.session.tree.branch import Branch, BranchRow
-from gms_fsm.traces.scope import watch_names
-from gms_fsm.traces.system_scope import owners_of, system_names
-
-
-def names_of(start: Problem) -> list[str]:
-    """Return the names allowed in conditions and watches."""
-    return system_names(start.system) if start.what.named else watch_names(start.model)
+from gms_fsm.session.units import in_si, names_of
+from gms_fsm.traces.system_scope import owners_of
 
 
 def read(start: Problem, text: str) -> Condition:
@@ -30,6 +25,7 @@ def read(start: Problem, text: str) -> Condition:
     if start.what.named:
         owners = owners_of(start.system)
     with _explained(start):
+        text = in_si(start, text)
         return parse_condition(text, names_of(start), states, n, own_state=n == 1, owners=owners)
 
 
@@ -41,7 +37,7 @@ def holds_at(condition: Condition, branch: Branch, row: BranchRow) -> bool:
 def value_of(start: Problem, text: str, values: Mapping[str, Any]) -> float:
     """Return the value of a watch expression, given the values of its names."""
     with _explained(start):
-        tree = parse_value(text, names_of(start))
+        tree = parse_value(in_si(start, text), names_of(start))
     try:
         return float(evaluate(tree, values))
     except (ArithmeticError, ValueError) as error:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.foundation.display import displayed, short_repr
+from gms_fsm.foundation.quantities import Scale, scale_of, trimmed
 from gms_fsm.language import (
     MATLAB_LIKE,
     Condition,
@@ -69,6 +70,11 @@ class Clause:
     unit: str = ""
 
     @property
+    def scale(self) -> Scale:
+        """The unit in which both sides and the margin are written: that of the larger side."""
+        return scale_of((self.left, self.right), self.unit)
+
+    @property
     def relative(self) -> float:
         """Margin over the larger side; 0 if it is due to rounding, NaN where the margin is."""
         if math.isinf(self.margin):
@@ -112,8 +118,8 @@ class Explanation:
     >>> print(forward)
     break_away_forward does not fire: z >= s is false by 0.5 m.
       1 break_away_forward: stick -> slip
-        false  z >= s   left 0.5         right 1           margin -0.5 m
-        true   v > v_c  left 0.2         right 1e-06       margin +0.2 m/s
+        false  z >= s   left 0.5        right 1          margin -0.5 m
+        true   v > v_c  left 200        right 0.001      margin +200 mm/s
     """
 
     edge: Transition
@@ -421,14 +427,12 @@ def _sides(clause: Clause) -> str:
         return "  cannot be computed here"
     if math.isnan(clause.margin):  # compound: no two sides
         return ""
-    return (
-        f"  left {clause.left:<11.5g} right {clause.right:<11.5g} margin "
-        f"{_amount(clause, signed=True)}"
-    )
+    left, right = (trimmed(clause.scale.number(u, 5)) for u in (clause.left, clause.right))
+    return f"  left {left:<10} right {right:<10} margin {_amount(clause, signed=True)}"
 
 
 def _amount(clause: Clause, *, signed: bool) -> str:
     if clause.relative == 0.0:
-        return "0 (rounding)"
-    shown = f"{clause.margin:+.3g}" if signed else f"{abs(clause.margin):.3g}"
-    return f"{shown} {clause.unit}".rstrip()
+        return f"{clause.scale.text(0.0)} (rounding)"
+    sign = "+" if signed and clause.margin > 0.0 else ""
+    return sign + trimmed(clause.scale.text(clause.margin if signed else abs(clause.margin), 3))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from gms_fsm.errors import SessionError
+from gms_fsm.foundation.quantities import Scale
 from gms_fsm.session.elements import chart_of, element_name, source_of
 from gms_fsm.session.explain import Why, explain_state
 from gms_fsm.session.results import BodyHere, ContactHere, Here
@@ -21,7 +24,10 @@ def here_at(branch: Branch, row: int) -> Here:
         row,
         place.t,
         place.microstep,
-        {bank.name: _contact(scope.contacts[bank.name]) for bank in banks},
+        {
+            bank.name: _contact(scope.contacts[bank.name], branch.scales(bank.name))
+            for bank in banks
+        },
         {body.name: BodyHere(scope.value(body.x), scope.value(body.v)) for body in system.bodies},
         {name: scope.value(name) for name in further},
         located,
@@ -30,7 +36,7 @@ def here_at(branch: Branch, row: int) -> Here:
     )
 
 
-def _contact(scope: Scope) -> ContactHere:
+def _contact(scope: Scope, scales: Mapping[str, Scale]) -> ContactHere:
     chart = scope.model.chart
     more = (*chart.velocities[1:], *chart.force_names[1:])
     return ContactHere(
@@ -43,6 +49,7 @@ def _contact(scope: Scope) -> ContactHere:
         tuple(scope.states),
         {name: scope.seen[name] for name in more},
         any(scope.seen.get(f"{force} shared", 0.0) for force in chart.force_names),
+        scales,
     )
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.foundation.quantities import in_words
 from gms_fsm.language import Call, Name, Relation, Value, clauses, evaluate
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.session.explain import holds, values_at
@@ -45,7 +46,7 @@ def notes_on(trace: Trace) -> tuple[str, ...]:
     >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> notes_on(simulate(model, Prescribed("1e-7*sin(t)"), 1.0))
-    ('no transition: the speed stays below v_c (largest |v| 8.41e-08 m/s, v_c 1e-06 m/s)',)
+    ('no transition: the speed stays below v_c (largest |v| 84.1 nm/s, v_c 1 µm/s)',)
     """
     return (*_sizes(trace), *_weight(trace), *_windows(trace))
 
@@ -82,8 +83,8 @@ def _sizes(trace: Trace) -> Iterator[str]:
         if 0.0 < fastest <= scales.speed:
             bound = "v_c" if "v_c" in model.values else "the smallest speed in a guard"
             yield (
-                f"no transition: the speed stays below {bound} (largest |v| {fastest:.3g} m/s, "
-                f"{bound} {scales.speed:.3g} m/s)"
+                f"no transition: the speed stays below {bound} (largest |v| "
+                f"{in_words(fastest, 'm/s', 3)}, {bound} {in_words(scales.speed, 'm/s', 3)})"
             )
         elif model.stribeck is not None and (model.weights == 1.0).all():
             yield (
@@ -92,16 +93,18 @@ def _sizes(trace: Trace) -> Iterator[str]:
                 "Table I of the paper; give shares of the friction, which sum to 1, or weights"
             )
         elif 0.0 < deflected < NEAR:
+            smallest = in_words(float(thresholds.min()), model.chart.unit(name), 3)
             yield (
                 f"no transition: no element comes near its threshold (largest |{name}| is "
-                f"{deflected:.2g} of it, the smallest threshold {thresholds.min():.3g}); if this "
+                f"{deflected:.2g} of it, the smallest threshold {smallest}); if this "
                 f"is not intended, check the units of {_scaling(model)}motion (m)"
             )
     elif stroke > FAR * float(thresholds.max()):
+        times = f"{stroke / float(thresholds.max()):.2g} times"
         yield (
-            f"the stroke of {stroke:.3g} m is {stroke / float(thresholds.max()):.2g} times the "
-            "largest threshold: nearly all of it is gross sliding; if pre-sliding is intended, "
-            "check the unit of the motion (m)"
+            f"the stroke of {in_words(stroke, 'm', 3)} is {times} the largest threshold: nearly "
+            "all of it is gross sliding; if pre-sliding is intended, check the unit of the motion "
+            "(m)"
         )
 
 

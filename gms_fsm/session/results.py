@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import TypeVar
 
@@ -13,10 +13,12 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SessionError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.display import displayed, short_repr
+from gms_fsm.foundation.quantities import Scale, in_words, trimmed
 from gms_fsm.traces.trace import Trace
 
 SAMPLES = 2000  # number of common times at which two branches are compared
 Part = TypeVar("Part")
+UNITS = {"z": "m", "F": "N"}  # of what is compared
 MANY = 4  # contacts; with more, a row prints only those that fired
 
 
@@ -77,6 +79,8 @@ class ContactHere:
         Further velocities and forces of the chart, by name (a planar contact).
     shared : bool
         Whether F is that of a lock which other locks share; see the trace's ``F shared``.
+    scales : mapping of str to Scale
+        How x, v and F are written: in units that suit the largest so far.
     """
 
     x: float
@@ -88,11 +92,21 @@ class ContactHere:
     states: tuple[str, ...]
     more: Mapping[str, float]
     shared: bool
+    scales: Mapping[str, Scale] = field(compare=False, repr=False)
+
+    def written(self, *names: str) -> str:
+        """Return values as text: ``v = 150 mm/s, F = 1.5 N``."""
+        values = {"x": self.x, "v": self.v, "F": self.F} | dict(self.more)
+        # Further names are of velocities, and of forces along them (`Chart.force_names`).
+        kinds = {name: "F" if name.startswith("F_") else "v" for name in self.more}
+        return ", ".join(
+            f"{name} = {trimmed(self.scales[kinds.get(name, name)].text(values[name], 6))}"
+            for name in names
+        )
 
     def __str__(self) -> str:
-        more = "".join(f", {name} = {value:.6g}" for name, value in self.more.items())
         share = " (shared with other locks)" if self.shared else ""
-        text = f"v = {self.v:.6g} m/s, F = {self.F:.6g} N{more}{share}"
+        text = f"{self.written('v', 'F', *self.more)}{share}"
         if len(self.states) == 1:
             return f"{text}, {self.states[0]}"
         counts = [(self.states.count(name), name) for name in dict.fromkeys(self.states)]
@@ -198,7 +212,7 @@ class Here:
         lead = f"{place}, t = {self.t:.9g} s{step}"
         fired = "" if self.fired is None else f"\n  {self.fired}"
         if not self.system:
-            return f"{lead}: v = {self.v:.6g} m/s, F = {self.F:.6g} N{fired}"
+            return f"{lead}: {self.only.written('v', 'F')}{fired}"
         shown_of = self.contacts
         if len(shown_of) > MANY:
             who = "" if self.fired is None else self.fired.contact
@@ -252,7 +266,10 @@ class BranchComparison:
 
     def __str__(self) -> str:
         (a, b), (p, q) = self.branches, self.transitions
-        largest = ", ".join(_amount(name, value) for name, value in self.differences.items())
+        largest = ", ".join(
+            f"{name} {in_words(value, UNITS.get(name.rsplit('.', 1)[-1], ''), 3)}"
+            for name, value in self.differences.items()
+        )
         return (
             f"branches {a} and {b} until t = {self.t:.9g} s: {p} and {q} transitions\n"
             + (
@@ -262,11 +279,6 @@ class BranchComparison:
             )
             + f"  largest difference: {largest}"
         )
-
-
-def _amount(name: str, value: float) -> str:
-    unit = {"z": " m", "F": " N"}.get(name.rsplit(".", 1)[-1], "")
-    return f"{name} {value:.3g}{unit}"
 
 
 def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> BranchComparison:

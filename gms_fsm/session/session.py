@@ -27,6 +27,7 @@ from gms_fsm.session.results import BranchComparison, Fired, Here
 from gms_fsm.session.tree import walker
 from gms_fsm.session.tree.branch import Branch
 from gms_fsm.session.tree.branches import Tree
+from gms_fsm.session.units import names_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import arguments_of, mounted
 from gms_fsm.systems.rigs import Rig
@@ -67,7 +68,7 @@ class Session:
     >>> round(here.t, 3), here.fired.element, here.fired.edge, here.states[0]
     (4.913, 0, 'break_away_forward', 'slip')
     >>> print(here)
-    row 12, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
+    row 12, t = 4.91276067 s, micro-step 1: v = 141.608 mm/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
 
     In a system elements are named in text, counted from 1: ``why("gear 1")``.
@@ -228,10 +229,9 @@ class Session:
     def names(self) -> list[str]:
         """Names allowed in conditions and watches, with elements numbered from 1.
 
-        Variables of a single element need no number. In a system these are its own names, and those
-        of its contacts, such as ``gear.F``.
+        Variables of a single element need no number. In a system: its names, and ``gear.F``.
         """
-        return _conditions.names_of(self.start)
+        return names_of(self.start)
 
     def parse(self, text: str) -> Condition:
         """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``.
@@ -239,8 +239,8 @@ class Session:
         Parameters
         ----------
         text : str
-            In the expression language; ``s`` is the Stribeck curve at v, ``s1`` the threshold
-            of element 1. In a system: ``"x_l > 0.1 and gear.state(1) == left"``.
+            Numbers may have units. ``s`` is the Stribeck curve at v, ``s1`` the threshold of
+            element 1. In a system: ``"x_l > 0.1 and gear.state(1) == left"``.
 
         Returns
         -------
@@ -412,8 +412,8 @@ class Session:
         element 1 is in slip at t = 24.9999735 s
         arrest does not fire: |z| < s is false by 0.776 m.
           1 arrest: slip -> stick
-            true   |v| <= v_c  left 1e-06       right 1e-06       margin 0 (rounding)
-            false  |z| < s     left 2.2762      right 1.5         margin -0.776 m
+            true   |v| <= v_c  left 1          right 1          margin 0 µm/s (rounding)
+            false  |z| < s     left 2.2762     right 1.5        margin -0.776 m
         >>> session.why()[0].clauses[1].holds
         False
         """
@@ -547,7 +547,7 @@ class Session:
         >>> print(session.compare())
         branches 0 and 1 until t = 30 s: 16 and 16 transitions
           first different transition at t = 19.3981272 s
-          largest difference: z 0.598 m, F 0.374 N
+          largest difference: z 598 mm, F 374 mN
         """
         return self.tree.compare(a, b)
 

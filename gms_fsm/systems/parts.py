@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, cut, shown
+from gms_fsm.foundation.arguments import one_of
 from gms_fsm.foundation.display import displayed
 from gms_fsm.systems.given import (
     Text,
@@ -25,6 +26,7 @@ from gms_fsm.systems.given import (
 )
 from gms_fsm.systems.models import Model, check_bank, is_model, with_values
 
+Motion = Literal["along", "normal", "turning"]  # the first is the default
 LOAD = "N"  # the input of a contact that multiplies its Stribeck curve
 LEAST_LOAD = 1e-9  # N; charts divide by thresholds
 
@@ -47,11 +49,16 @@ class Body:
         m/s, over ``t``, signals and numbers: the body moves like this whatever acts on it.
     x, v : str
         What its position and its velocity are called in texts.
+    motion : {"along", "normal", "turning"}
+        How pictures show it: along the surface that it rubs on, normal to it, or turning, with
+        its position in rad. Equations do not depend on it.
 
     Examples
     --------
     >>> Body("load", inertia=1.0, force="K * (x_m - x_l)", x="x_l", v="v_l").v
     'v_l'
+    >>> Body("rotor", inertia=1e-3, x="phi", v="w", motion="turning").unit
+    'rad'
     """
 
     name: str
@@ -60,6 +67,7 @@ class Body:
     velocity: Text | None = field(default=None, kw_only=True)
     x: str = field(default="x", kw_only=True)
     v: str = field(default="v", kw_only=True)
+    motion: Motion = field(default="along", kw_only=True)
 
     def __post_init__(self) -> None:
         here = f"body {shown(self.name)}"
@@ -71,6 +79,7 @@ class Body:
                 place=here,
                 advice="give inertia=... to a free body, velocity=... to a driven one",
             )
+        one_of(f"{here}: motion", self.motion, get_args(Motion))
         for each in ("inertia", "force", "velocity"):
             if (text := getattr(self, each)) is not None:
                 check_text(text, f"{here}: {each}")
@@ -81,6 +90,11 @@ class Body:
     def driven(self) -> bool:
         """Whether its velocity is given."""
         return self.velocity is not None
+
+    @property
+    def unit(self) -> str:
+        """Unit of its position."""
+        return "rad" if self.motion == "turning" else "m"
 
 
 @displayed("svg", "html")

@@ -243,7 +243,7 @@ class System:
         Parameters
         ----------
         path : str or Path
-            With the keys ``name``, ``[[body]]`` (name, inertia, force, velocity, x, v),
+            With the keys ``name``, ``[[body]]`` (name, inertia, force, velocity, x, v, motion),
             ``[[spring]]`` (name, first, second, k, d, ratio, rest), ``[[contact]]`` (name, v, n,
             inputs, period; ``chart``, a chart file next to this file, the name of an included
             chart, or a table as in a chart file, with ``values``; or ``model``, as in scenario

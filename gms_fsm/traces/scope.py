@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SignalError
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.observing import observe
@@ -49,6 +50,13 @@ def invariant_names(model: Model) -> list[str]:
     chart = model.chart
     own = (*_curve(model), *chart.variables, *chart.parameter_names)
     return ["t", "x", "v", "F", *own, *_numbered(model)]
+
+
+def unit_of(chart: Chart, name: str) -> str:
+    """Return the unit of a name in guards; empty if it is unknown."""
+    known = dict.fromkeys(chart.force_names, "N") | dict.fromkeys(chart.rate_names, "m/s^2")
+    known |= dict.fromkeys(chart.velocities, "m/s") | {"t": "s", "x": "m", "age": "s"}
+    return chart.unit(name) or known.get(name, "")
 
 
 def parameter_values(model: Model, element: int) -> dict[str, float]:

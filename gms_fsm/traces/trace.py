@@ -92,6 +92,8 @@ class Trace:
         Method, tolerances, engine and other settings.
     monitors : mapping of str to Verdict
         Verdicts of the monitors, by name; empty if the run had none.
+    heading : str
+        Title of the scenario that was run; empty if there is none.
 
     Examples
     --------
@@ -109,6 +111,7 @@ class Trace:
     settings: Mapping[str, Setting]
     stored: Mapping[str, FloatArray] = field(default_factory=dict, repr=False)
     monitors: Mapping[str, Verdict] = field(default_factory=dict, repr=False)
+    heading: str = field(default="", repr=False)
     which: str = field(default="", repr=False)  # the contact, of a system with several
     every: Firings | None = field(default=None, repr=False)  # of all contacts, where one is chosen
 
@@ -543,6 +546,7 @@ class Trace:
             parts.header.settings,
             parts.stored,
             parts.header.monitors,
+            parts.header.heading,
         )
 
     # ------------------------------------------------------------------ tables

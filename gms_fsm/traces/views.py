@@ -160,7 +160,7 @@ def write_trace(trace: Trace, path: Path) -> Path:
     from gms_fsm.traces.files import csv_files, npz_files
     from gms_fsm.traces.files.header import Header
 
-    header = Header.of(trace.what, trace.settings, trace.monitors)
+    header = Header.of(trace.what, trace.settings, trace.monitors, trace.heading)
     if path.suffix == ".csv":
         starts = range(0, len(trace), csv_files.AT_ONCE)
         parts = (picked(trace, slice(start, start + csv_files.AT_ONCE)) for start in starts)

@@ -14,20 +14,20 @@ from typing import TYPE_CHECKING
 import graphviz
 
 from plots.charts.cells import Label
-from plots.charts.drawing import DOT_SIZE, Drawing, DrawnLine, Node, graph_drawing, thirds
+from plots.charts.drawing import DOT_SIZE, Drawing, DrawnLine, Node, graph_drawing
 from plots.charts.labels import Piece, Row, element_id
-from plots.charts.layers import ARROW, Point
+from plots.charts.layout.layers import ARROW, Point, straight
 from plots.charts.matrix import matrix_drawing
 
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
 
-MARGIN = 12.0  # around what is in a region
-APART = 12.0  # between regions
+MARGIN = 7.0  # around what is in a region
+APART = 10.0  # between regions
 # Type of 10 points is at least 7 points high if this width is printed on 170 mm.
 PRINTED = 688.0
-MOST_ALIKE = 6  # regions; more that are all alike are drawn as one
+SHOWN = 1200.0  # the same of a live chart, on a screen
 
 
 def arrange(
@@ -38,15 +38,16 @@ def arrange(
     below: Sequence[Row],
     *,
     bare: bool,
+    folded: bool,
 ) -> None:
-    """Draw elements into a graph."""
-    alike = sheet.tally is None and not sheet.live
-    shared = alike and len(numbers) > (1 if sheet.form == "matrix" else MOST_ALIKE)
+    """Draw elements into a graph; folded, elements that are all alike are drawn as one."""
+    alike = folded or (sheet.form == "matrix" and sheet.tally is None)
+    shared = alike and len(numbers) > 1
     shown = [numbers[0]] if shared else list(numbers)
     draw = matrix_drawing if sheet.form == "matrix" else graph_drawing
     titles = [None if bare else _title(sheet, numbers, n, shared, values) for n in shown]
     regions = [_Region(draw(sheet, n), title) for n, title in zip(shown, titles, strict=True)]
-    grid = _Grid.of(regions)
+    grid = _Grid.of(regions, SHOWN if sheet.live else PRINTED)
     legend = _legend(sheet, grid.width, grid.height)
     foot = sheet.cells.text(below) if below else None
     bottom = max([grid.height, *(node.at[1] + label.height / 2 for node, label in legend)])
@@ -81,9 +82,9 @@ class _Grid:
     lines: int
 
     @classmethod
-    def of(cls, regions: Sequence[_Region]) -> _Grid:
+    def of(cls, regions: Sequence[_Region], widest: float) -> _Grid:
         width, height = max(r.width for r in regions), max(r.height for r in regions)
-        most = int((PRINTED + APART) // (width + APART))
+        most = int((widest + APART) // (width + APART))
         columns = max(1, min(ceil(sqrt(len(regions))), most))
         return cls((width, height), columns, ceil(len(regions) / columns))
 
@@ -210,7 +211,7 @@ class _Paper:
             (x, y), (from_x, from_y) = points[-1], points[-4]
             part = ARROW / max(hypot(x - from_x, y - from_y), ARROW)
             end = x + (from_x - x) * part, y + (from_y - y) * part
-            points = (*points[:-3], *thirds(points[-4], end))
+            points = (*points[:-4], *straight(points[-4], end))
             tip = f"e,{self.at((x, y), corner)} "
         else:
             look["dir"] = "none"

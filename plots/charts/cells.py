@@ -1,13 +1,14 @@
 """Labels of Graphviz with fixed sizes: every piece of text has a cell of its own.
 
-The width of a cell comes from `plots.style.fonts`, not from the fonts that Graphviz finds, so that
-a picture has the same sizes wherever it is drawn. In the SVG a piece is one text, in this order.
+The width of a cell comes from `plots.style.fonts`, not from Graphviz, so that a picture has the
+same sizes wherever it is drawn. In the SVG a piece is one text, in this order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 from math import ceil
 
 from plots.charts.labels import Piece, Row, escape, printable
@@ -19,6 +20,7 @@ LEAST = 7  # points, of every text but an index
 SMALLER = 0.72  # a lowered index
 LINE, TITLE = 1.4, 1.5  # height of a line, in sizes of its font
 SIDE = 6  # left and right of the text of a state
+WIDER = 1.07  # the smallest texts in pictures of pixels: Graphviz puts letters at whole ones
 
 # Of a role: size, face, bold, secondary.
 _FACES = {
@@ -62,10 +64,13 @@ class CellWriter:
         The theme.
     scale : float
         Size of all texts, 1 for the usual one.
+    joined : bool
+        Whether pieces that look alike are one text; a picture of pixels rounds the width of each.
     """
 
     colours: ChartTheme
     scale: float = 1.0
+    joined: bool = False
 
     def text(self, rows: Sequence[Row]) -> Label:
         """Set lines of text below one another."""
@@ -92,27 +97,35 @@ class CellWriter:
     def state(
         self, rows: Sequence[Row], marked: bool = False, least: tuple[float, float] = (0, 0)
     ) -> Label:
-        """Set the box of a state: its title, a rule, the other rows."""
+        """Set the box of a state: its title, and below a rule the other rows, in its middle."""
         heights = [self._height(row) for row in rows]
-        wide = max(*map(self._width, rows), 36) + 2 * SIDE + 2
+        small = PLAIN * self.scale <= LEAST
+        text = ceil(max(map(self._width, rows)) * (WIDER if small else 1))
+        wide = max(text, 36) + 2 * SIDE + 2
         ink, border = self.colours.ink, 3 if marked else 1
         tall = sum(heights) + 4 + 2 * border
         wide += 2 * border - 2
         wide, tall = max(wide, ceil(least[0])), max(tall, ceil(least[1]))
         inner = wide - 2 * border
+        left = max((inner - text) // 2, SIDE - 1)
         title, *more = (
-            self._row([Piece("", "pad"), *row], height, inner)
+            self._row([Piece("", "pad"), *row], height, inner, left)
             for row, height in zip(rows, heights, strict=True)
         )
         look = f'BORDER="{border}" COLOR="{ink}" BGCOLOR="{self.colours.paper}" STYLE="ROUNDED" '
-        rest = f'<TR><TD HEIGHT="{tall - sum(heights) - 2 * border - 1}"></TD></TR>'
-        body = f"{title}<HR/>" + "".join(more) + rest
+        spare = tall - sum(heights) - 2 * border - bool(more)
+        above, below = (
+            f'<TR><TD HEIGHT="{room}"></TD></TR>' * bool(room)
+            for room in (spare // 2, spare - spare // 2)
+        )
+        texts = "".join(more)
+        body = f"{title}<HR/>{above}{texts}{below}" if more else f"{above}{title}{below}"
         return Label(f"<{_table(look, wide, tall, body)}>", wide, tall)
 
     def _row(self, row: Row, height: int, wide: int, first: int = 0) -> str:
         """Return one line as a row of a table; its pieces are a table in it."""
         cells, at = "", 0.0
-        for i, piece in enumerate(row):
+        for i, piece in enumerate(self._pieces(row)):
             end = at + self._piece_width(piece)
             if i == 0 and first:
                 end = first
@@ -122,6 +135,13 @@ class CellWriter:
         cells += f"<TD {_size(wide - round(at), height)}></TD>"
         inner = _table("", wide, height, f"<TR>{cells}</TR>")
         return f"<TR><TD {_size(wide, height)}>{inner}</TD></TR>"
+
+    def _pieces(self, row: Row) -> Row:
+        if not self.joined:
+            return row
+        alike = groupby(row, lambda piece: (_FACES.get(piece.role, _FORMULA), piece.lowered))
+        groups = (list(group) for _, group in alike)
+        return [replace(each[0], text="".join(piece.text for piece in each)) for each in groups]
 
     def _cell(self, piece: Piece, wide: int, height: int) -> str:
         size = _size(wide, height)
@@ -144,8 +164,8 @@ class CellWriter:
     def _piece_width(self, piece: Piece) -> float:
         if piece.role == "pad":
             return SIDE - 1
-        face = _FACES.get(piece.role, _FORMULA)[1]
-        return width(printable(piece.text), self._points(piece), mono=face == MONO)
+        _, face, bold, _ = _FACES.get(piece.role, _FORMULA)
+        return width(printable(piece.text), self._points(piece), mono=face == MONO, bold=bold)
 
     def _points(self, piece: Piece) -> int:
         """Return the size of a text; Graphviz takes whole points only."""

@@ -9,7 +9,7 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.language import Value
 from plots.charts.notation import ChartWriter
 
-SAID_ONCE = 3  # states: where so many have the same force, it is said once for all of them
+SAID_ONCE = 3  # states: what so many have alike, forces and flows, is said once for all of them
 
 Texts = list[tuple[str, list[str]]]  # kinds, such as during, each with its texts
 
@@ -18,7 +18,8 @@ def state_texts(write: ChartWriter, state: State) -> Texts:
     """Return what a picture shows in a state.
 
     Not shown are a variable that flows in no state and the timer behind ``after(T)``; nor, where
-    there are three states or more, a force that is the same in all of them: `chart_texts` has it.
+    there are three states or more, forces and flows that are the same in all of them: `chart_texts`
+    has them.
 
     Examples
     --------
@@ -33,7 +34,7 @@ def state_texts(write: ChartWriter, state: State) -> Texts:
         for kind, given in (("entry", state.entry), ("exit", state.exit))
         for trees in (chart.assignments[kind, state.name],)
     }
-    flowing = {name for each in chart.states for name in each.flow}
+    flowing = {name for each in chart.states for name in each.flow} - {*_flows_below(chart)}
     flows = [name for name in chart.variables if name in flowing]
     forces = {} if _force_below(chart) else _forces(chart, state)
     return [
@@ -51,6 +52,10 @@ def chart_texts(write: ChartWriter) -> Texts:
     shared = _forces(chart, chart.default_state) if _force_below(chart) else {}
     return [
         ("let", _equations(write, chart.lets)),
+        (
+            "during in all states",
+            [write.flow(name, tree) for name, tree in _flows_below(chart).items()],
+        ),
         ("force in all states", _equations(write, shared)),
         (
             "force of the contact",
@@ -67,6 +72,17 @@ def _force_below(chart: Chart) -> bool:
     """Return whether one force of many states is said once, below them."""
     own = any(state.outputs or state.locked for state in chart.states)
     return len(chart.states) >= SAID_ONCE and not own
+
+
+def _flows_below(chart: Chart) -> dict[str, Value]:
+    """Return the flows that all of many states share."""
+    shared = {}
+    for name in chart.variables if len(chart.states) >= SAID_ONCE else ():
+        first, *others = (chart.flows[state.name, name] for state in chart.states)
+        given = any(name in state.flow for state in chart.states)
+        if given and all(each == first for each in others):
+            shared[name] = first
+    return shared
 
 
 def _forces(chart: Chart, state: State) -> dict[str, Value]:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from plots.charts.cells import Label
 from plots.charts.contents import edges_by_priority
 from plots.charts.labels import edge_id, element_id, part_id
-from plots.charts.layers import LayerEdge, Point, layered
+from plots.charts.layout.layers import LayerEdge, Point, layered, straight
+from plots.charts.layout.placed import placed, ring
 
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
@@ -100,10 +101,18 @@ def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
         for own, state in zip(rows, chart.states, strict=True)
     ]
     links = [
-        LayerEdge(chart.state_index(edge.source), chart.state_index(edge.target), _roomy(box))
+        LayerEdge(
+            chart.state_index(edge.source), chart.state_index(edge.target), (box.width, box.height)
+        )
         for (edge, _), box in zip(edges, boxes, strict=True)
     ]
-    laid = layered([(box.width, box.height) for box in plain], links, sheet.direction)
+    sizes = [(float(box.width), float(box.height)) for box in plain]
+    centres = [chart.layout[each.name] for each in chart.states] if chart.layout else None
+    centres = centres or ring(sizes, links)
+    if centres is None:
+        laid = layered(sizes, links, sheet.direction)
+    else:
+        laid = placed(sizes, links, centres, sheet.direction)
     names = [part_id(element, "state", state.name) for state in chart.states]
     dot = f"{element}-default"
     nodes = [Node(dot, "default", laid.dot)]
@@ -114,7 +123,7 @@ def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
         kind = "state marked" if marked else "state"
         nodes.append(Node(name, kind, at, cells.state(own, marked, size)))
     lines = [_default_line(dot, names[0], laid.dot, laid.states[0], laid.sizes[0], sheet.direction)]
-    for (edge, _), box, link, at, (into, out) in zip(
+    for (edge, _), box, link, at, line in zip(
         edges, boxes, links, laid.labels, laid.lines, strict=True
     ):
         guard = edge_id(chart, element, "guard", edge)
@@ -126,14 +135,9 @@ def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
         if marked:
             look |= {"class": "marked", "penwidth": MARKED}
         nodes.append(Node(guard, "guard marked" if marked else "guard", at, box))
-        lines.append(DrawnLine(f"{name}-1", (names[link.source], guard), tuple(into), False, look))
-        lines.append(DrawnLine(f"{name}-2", (guard, names[link.target]), tuple(out), True, look))
+        ends = names[link.source], names[link.target]
+        lines.append(DrawnLine(name, ends, tuple(line), True, look))
     return Drawing(laid.width, laid.height, tuple(nodes), tuple(lines))
-
-
-def _roomy(box: Label) -> tuple[float, float]:
-    """Return the size of a label with the gaps to its lines."""
-    return box.width + 3.0, box.height + 2.0
 
 
 def _default_line(
@@ -145,15 +149,4 @@ def _default_line(
     else:
         start, end = (x + DOT_SIZE / 2, y), (to_x - size[0] / 2, y)
     name = f"{dot}-edge"
-    return DrawnLine(name, (dot, state), (start, *thirds(start, end)), True, {"class": "default"})
-
-
-def thirds(a: Point, b: Point) -> tuple[Point, ...]:
-    """Return the points that continue a Bezier curve straight from one point to another.
-
-    Examples
-    --------
-    >>> thirds((0.0, 0.0), (3.0, 6.0))
-    ((1.0, 2.0), (2.0, 4.0), (3.0, 6.0))
-    """
-    return tuple((a[0] + (b[0] - a[0]) * t / 3, a[1] + (b[1] - a[1]) * t / 3) for t in (1, 2, 3))
+    return DrawnLine(name, (dot, state), tuple(straight(start, end)), True, {"class": "default"})

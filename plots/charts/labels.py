@@ -12,6 +12,7 @@ from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.traces.trace import Trace, dwell_times
 from plots.charts.contents import chart_texts, state_texts
 from plots.charts.notation import ChartWriter
+from plots.style import MONO_FONT
 from plots.style.fonts import missing_glyphs
 
 SAID = 5  # missing characters in a warning
@@ -186,7 +187,7 @@ def warn_of_missing_glyphs(write: ChartWriter, note: str = "") -> None:
         )
         more = f" and {len(found) - SAID} more" if len(found) > SAID else ""
         warnings.warn(
-            f"the font of charts, DejaVu Sans Mono, has no {listed}{more}: the picture shows a box "
+            f"the font of charts, {MONO_FONT}, has no {listed}{more}: the picture shows a box "
             "or another font there",
             stacklevel=3,
         )

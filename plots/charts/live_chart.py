@@ -1,11 +1,11 @@
-"""The chart of a run at one of its rows: the active state, the edges that could fire, the last one.
+"""The chart of a run at one of its rows: the active state, the edges that could fire, or just did.
 
 The layout is drawn once, with room for every mark. A frame only changes colours, widths, classes
 and texts of known parts of that SVG, so hundreds of frames take seconds.
 
 The active state has a thick border and a dot. Only the edges that leave it have marks: their
-clauses carry ✓ or ✗. The edge that the element took last is thick; on the row of that firing it
-carries the marks with which it was taken. Everything else is pale.
+clauses carry ✓ or ✗. The edge that the element has just taken is thick and orange; on the row of
+that firing it carries the marks with which it was taken. Everything else is pale.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ import numpy as np
 
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.foundation.arguments import checked_integer
+from gms_fsm.foundation.quantities import Scale, scale_of, trimmed
 from gms_fsm.language import Condition, clauses, evaluate, names_in
 from gms_fsm.session.explain import values_at
+from gms_fsm.traces.scope import guard_columns, unit_of
 from gms_fsm.traces.trace import Trace, check_trace
 from gms_fsm.traces.views import steps_of
 from plots.charts.labels import FALSE, TRUE, UNKNOWN, Piece, Row, edge_id, element_id, part_id
@@ -34,7 +36,7 @@ THIN, THICK, BORDER = "1.1", "2.6", "3"
 VALUES_PER_LINE = 3
 SAID = 8  # elements in a repr
 TITLE = 2  # texts of a region before its values
-WIDEST = "-0.000e+000"  # a value is never longer than this
+WIDEST = "-0.0001234"  # a number is never longer than this
 
 Marks = tuple[bool | None, ...]
 
@@ -55,7 +57,7 @@ class ElementLook:
     leaving : tuple of str
         The edges that leave the active state, highest priority first.
     fired : str
-        The last edge taken up to this row; empty if there was none.
+        The edge taken at the time of this row, or since the row before; empty if there was none.
     source : str
         The state that this edge left; empty if there was none.
     """
@@ -131,7 +133,8 @@ class LiveChart:
         names = dict.fromkeys([*chart.variables, *chart.inputs, *chart.velocities, *late])
         self._names = [name for name in names if name != "t"]
         self._steps = steps_of(trace)
-        self._log_count = _log_counts(trace)
+        self._log_count, self._since = _log_counts(trace), _times_before(trace)
+        self._scales = _scales(trace, self._names)
         log = trace.transitions
         self._own = {i: np.flatnonzero(log.element == i) for i in self.elements}
         bare = trace.n == 1 and len(self.elements) == 1 and not isinstance(elements, Sequence)
@@ -139,7 +142,7 @@ class LiveChart:
             self.elements,
             bare=bare,
             values=self._value_rows(None),
-            foot=f"t = {WIDEST} s" if values else "",
+            foot=f"t = {WIDEST}0 s" if values else "",
         )
         self.root = plain_tree(picture(graph, "svg"))
         self.root.set("style", f"background:{self._sheet.colours.paper}")
@@ -223,6 +226,8 @@ class LiveChart:
             return ElementLook(element, state, marks, leaving, "", "")
         last = int(own[past - 1])
         record = trace.transitions[last]
+        if not self._since[row] < record.t:  # long ago
+            return ElementLook(element, state, marks, leaving, "", "")
         fired, source = str(record.edge), str(record.source)
         if (record.t, self._steps[last]) == (trace.t[row], trace.microstep[row]):
             # This row is that firing; its marks are those of the row before.
@@ -289,10 +294,11 @@ class LiveChart:
         if not self.values:
             return []
         numbers = {} if at is None else values_at(self.trace, *at)
-        cells = [
-            f"{name} = " + (f"{numbers[name]:+.3e}" if at else WIDEST).ljust(len(WIDEST))
-            for name in self._names
-        ]
+        cells = []
+        for name, scale in self._scales.items():
+            widest = f"{WIDEST} {scale.unit}".rstrip()
+            text = trimmed(scale.text(numbers[name])) if at else widest
+            cells.append(f"{name} = {text.ljust(len(widest))}")
         return [
             [Piece("  ".join(cells[i : i + VALUES_PER_LINE]), "value")]
             for i in range(0, len(cells), VALUES_PER_LINE)
@@ -352,6 +358,30 @@ def live_statechart(
 
 
 # --------------------------------------------------------------------------- reading the run
+def _scales(trace: Trace, names: Sequence[str]) -> dict[str, Scale]:
+    """Return how values are written: each in one unit for the run, a threshold in that of z."""
+    chart, columns = trace.model.chart, guard_columns(trace, names)
+    units = {name: unit_of(chart, name) for name in names}
+    if chart.variables and "s" in units:
+        units["s"] = units[chart.variables[0]]
+    sizes = {name: np.abs(np.ravel(columns[name])) for name in names}
+    if chart.variables and "s" in sizes:
+        sizes["s"] = sizes[chart.variables[0]]
+    return {name: scale_of(sizes[name].tolist(), units[name]) for name in names}
+
+
+def _times_before(trace: Trace) -> list[float]:
+    """Return for each row the time after which a firing belongs to it."""
+    found: list[float] = []
+    for row, t in enumerate(trace.t.tolist()):
+        before = float(trace.t[row - 1]) if row else t
+        if row and before == t:
+            found.append(found[-1])
+        else:  # at the first row, and after a later one, only firings at its own time
+            found.append(before if before < t else math.nextafter(t, -math.inf))
+    return found
+
+
 def _log_counts(trace: Trace) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """Return for each row the number of log entries up to it.
 
@@ -422,14 +452,10 @@ class ElementParts:
             texts = _paired(sheet.state_rows(state, number), group.findall("text"))
             self.states[state.name] = (group, texts)
             for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-                name = edge_id(chart, element, "edge", edge)
+                line = groups[edge_id(chart, element, "edge", edge)]
                 guard = groups[edge_id(chart, element, "guard", edge)]
                 texts = _paired(sheet.guard_rows(edge, priority, number), guard.findall("text"))
-                self.edges[edge.name, edge.source] = (
-                    guard,
-                    texts,
-                    [groups[f"{name}-1"], groups[f"{name}-2"]],
-                )
+                self.edges[edge.name, edge.source] = guard, texts, line
 
     def paint(self, look: ElementLook) -> None:
         """Paint the element."""
@@ -444,16 +470,15 @@ class ElementParts:
         self, key: tuple[str, str], leaving: bool, marks: Marks | None, fired: str = ""
     ) -> None:
         """Paint an edge, given its name and source."""
-        guard, texts, halves = self.edges[key]
+        guard, texts, line = self.edges[key]
         colour = fired or (self.colours.ink if leaving else self.colours.pale)
         classes = ["leaving" if leaving else "pale"] + ["fired"] * bool(fired)
-        for half in halves:
-            _classify(half, "edge", classes)
-            for shape in _shapes(half):
-                shape.set("stroke", colour)
-                shape.set("stroke-width", THICK if fired else THIN)
-                if shape.get("fill") != "none":
-                    shape.set("fill", colour)
+        _classify(line, "edge", classes)
+        for shape in _shapes(line):
+            shape.set("stroke", colour)
+            shape.set("stroke-width", THICK if fired else THIN)
+            if shape.get("fill") != "none":
+                shape.set("fill", colour)
         _classify(guard, "node guard", classes)
         plain = self.colours.pale if classes == ["pale"] else self.colours.ink
         for piece, node in texts:

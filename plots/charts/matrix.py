@@ -10,7 +10,7 @@ from plots.charts.cells import Label
 from plots.charts.contents import edges_by_priority
 from plots.charts.drawing import Drawing, DrawnLine, Node
 from plots.charts.labels import DOT, Piece, edge_id, element_id, part_id
-from plots.charts.layers import Point
+from plots.charts.layout.layers import Point
 
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet

@@ -1,8 +1,8 @@
 """Draw a friction chart in the style of Stateflow.
 
 Everything in the picture is read from the chart: states with their actions, edges with priority,
-guard and action. `plots.charts.layers` and `plots.charts.matrix` make the layout, and Graphviz only
-draws, so every Graphviz gives the same picture. A guard is a node on its edge's path. Ids and
+guard and action. `plots.charts.layout` and `plots.charts.matrix` make the layout, and Graphviz only
+draws, so every Graphviz gives the same picture. A guard is a node beside its edge. Ids and
 classes are stable, so that the SVG can be restyled without a new layout: class ``state``,
 ``guard``, ``edge``, ``default`` and ``region``, and ids such as ``element1-state-slip``.
 """
@@ -59,6 +59,9 @@ MOST_EDGES = 20  # of a graph; a chart with more is drawn as a matrix
 MOST_LINES = 6  # of a guard on an edge; a longer one is written below the picture
 LONGEST_LABEL = 34  # characters of a line on an edge
 SMALLEST = 0.7  # smallest size of texts: 7 points instead of 10
+# How a graph that is too wide becomes narrower: characters of a line on an edge, size of texts.
+# Not 8 points: in pictures of pixels, Graphviz draws these much narrower than in others.
+NARROWER = ((2 * LONGEST_LABEL, 1.0), (24, 1.0), (24, 0.9), (12, SMALLEST), (0, SMALLEST))
 
 
 class ChartGraph(DrawnGraph):
@@ -87,8 +90,9 @@ def statechart(
     chart : Chart
         The chart.
     elements : int or sequence of int, optional
-        How many elements, or which ones, counted from 0. They are drawn as parallel (AND) regions
-        in a grid, and the picture counts from 1; only the number 1 gives a chart without a region.
+        How many elements, or which ones, counted from 0. Elements that are listed, or whose counts
+        differ, are parallel (AND) regions in a grid, and the picture counts from 1; a number of
+        elements that are all alike is one region. Only the number 1 gives a chart without a region.
     notation : {"stateflow", "math"}
         ``z >= s && v > v_c``, or ``z ≥ s(v) ∧ v > v_c``.
     direction : {"TB", "LR"}
@@ -107,8 +111,9 @@ def statechart(
     form : {"auto", "graph", "matrix"}
         Boxes and arrows; or a matrix with a row for each source and a column for each target, whose
         cells have the priority and the number of the guard. ``"auto"`` is a matrix above 20 edges,
-        or where a graph would be wider than two A4 pages. Long guards are numbered ``g1``, ``g2``,
-        ... and written below the picture.
+        or where a graph would be wider than two A4 pages; never if the chart has a layout, whose
+        places a graph keeps. Long guards are numbered ``g1``, ``g2``, ... and written below the
+        picture.
 
     Returns
     -------
@@ -134,10 +139,7 @@ def statechart(
     >>> "z ≥ s(v)" in statechart(GMS_ELEMENT["signed"], notation="math").source
     True
     """
-    if not hasattr(chart, "guards"):
-        raise ParameterError(
-            f"chart is {chart!r:.60}", advice="give a Chart, of a model its .chart"
-        )
+    _check_chart(chart)
     checked_kind("note", note, str, "a text")
     if counts is not None:
         checked_kind("counts", counts, Trace, "a Trace, a run of this chart")
@@ -164,7 +166,52 @@ def statechart(
     warn_of_missing_glyphs(sheet.write, note)
     numbers = chosen(elements, None if counts is None else counts.n)
     bare = elements == 1 and (counts is None or counts.n == 1)
-    return sheet.graph(numbers, bare=bare, foot=note)
+    folded = counts is None and not isinstance(elements, Sequence)
+    return sheet.graph(numbers, bare=bare, folded=folded, foot=note)
+
+
+def _check_chart(chart: object) -> None:
+    if not hasattr(chart, "guards"):
+        raise ParameterError(
+            f"chart is {chart!r:.60}", advice="give a Chart, of a model its .chart"
+        )
+
+
+def layout(chart: Chart, *, direction: str = "TB") -> dict[str, tuple[float, float]]:
+    """Return where a chart's states are in its picture, to move them by hand.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    direction : {"TB", "LR"}
+        States from top to bottom, or from left to right.
+
+    Returns
+    -------
+    dict of str to (float, float)
+        Centres in points, to the right and down. `Chart.placed` gives a chart other ones, and
+        `Chart.save` writes them into its file.
+
+    Raises
+    ------
+    ParameterError
+        If the chart is none, or the direction is not one of those above.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT
+    >>> places = layout(GMS_ELEMENT["signed"])
+    >>> places["stick"][1] < places["slip"][1]
+    True
+    >>> moved = GMS_ELEMENT["signed"].placed(places | {"slip": (400, 60)})
+    >>> statechart(moved).source.count("class=state")
+    2
+    """
+    _check_chart(chart)
+    drawing = graph_drawing(ChartSheet(chart, direction=direction, form="graph").fitted(), 0)
+    places = [node.at for node in drawing.nodes if node.kind == "state"]
+    return {state.name: at for state, at in zip(chart.states, places, strict=True)}
 
 
 def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ...]:
@@ -265,30 +312,34 @@ class ChartSheet:
     @property
     def cells(self) -> CellWriter:
         """What sets the labels."""
-        return CellWriter(self.colours, self.scale)
+        return CellWriter(self.colours, self.scale, joined=not self.live)
 
     def fitted(self) -> ChartSheet:
         """Return the sheet as it is drawn: a graph or a matrix, with guards or their numbers."""
         if self.scale < 1 or self.numbered:
             return self
-        long, every = (self._numbers(all_of_them=flag) for flag in (False, True))
-        many = self.form == "auto" and not self.live and len(self.chart.transitions) > MOST_EDGES
+        every = self._numbers(0)
+        free = self.form == "auto" and not self.live and not self.chart.layout
+        many = free and len(self.chart.transitions) > MOST_EDGES
         if self.form == "matrix" or many:
             return replace(self, form="matrix", numbered=every)
-        for numbered, scale in ((long, 1.0), (every, 1.0), (every, SMALLEST)):
+        for longest, scale in NARROWER:
+            numbered = self._numbers(longest)
             sheet = replace(self, form="graph", numbered=numbered, scale=scale)
-            if graph_drawing(sheet, 0).width <= WIDEST:
+            if self.chart.layout or graph_drawing(sheet, 0).width <= WIDEST:
                 return sheet
-        if self.form == "graph" or self.live:
+        if not free:
             return sheet
         return replace(self, form="matrix", numbered=every)
 
-    def _numbers(self, all_of_them: bool) -> dict[str, int]:
-        """Return numbers for guards; edges with the same guard and action share one."""
+    def _numbers(self, longest: int) -> dict[str, int]:
+        """Return numbers for guards with longer lines; equal guards and actions share one."""
         texts: dict[str, int] = {}
         numbers: dict[str, int] = {}
         for _, edge in edges_by_priority(self.chart):
-            if all_of_them or len(self._lines_of(edge)) > MOST_LINES:
+            lines = self._lines_of(edge)
+            widest = max(sum(len(piece.text) for piece in row) for row in lines)
+            if len(lines) > MOST_LINES or widest > longest:
                 numbers[edge.name] = texts.setdefault(self.legend_text(edge), len(texts) + 1)
         return numbers
 
@@ -296,9 +347,15 @@ class ChartSheet:
         return replace(self, tally=None, names=False, numbered={}).guard_rows(edge, 1, 0)
 
     def graph(
-        self, numbers: Sequence[int], *, bare: bool, values: Sequence[Row] = (), foot: str = ""
+        self,
+        numbers: Sequence[int],
+        *,
+        bare: bool,
+        folded: bool = False,
+        values: Sequence[Row] = (),
+        foot: str = "",
     ) -> DrawnGraph:
-        """Draw elements."""
+        """Draw elements (see `arrange`)."""
         sheet = self.fitted()
         graph = ChartGraph(
             name=graphviz.escape(printable(self.chart.name)),
@@ -306,7 +363,7 @@ class ChartSheet:
             graph_attr={
                 "fontname": SANS,
                 "bgcolor": self.colours.paper,
-                "pad": "0.15",
+                "pad": "0.1",
                 "layout": "nop2",  # all positions are given, and the DOT text is self-contained
                 "outputorder": "edgesfirst",
             },
@@ -316,7 +373,8 @@ class ChartSheet:
         graph.chart, graph.text = self.chart, chart_in_words(self.chart)
         below = self.definitions() + (list(values) if bare else [])
         below += [[Piece(line, "value")] for line in foot.splitlines()]
-        arrange(graph, sheet, numbers, [] if bare else values, below, bare=bare)
+        shown = [] if bare else values
+        arrange(graph, sheet, numbers, shown, below, bare=bare, folded=folded)
         return graph
 
     def legend(self) -> list[Row]:
@@ -348,10 +406,10 @@ class ChartSheet:
     def state_rows(self, state: State, number: int) -> list[Row]:
         """Return the text in a state's box."""
         title = [Piece(state.name, "title")]
-        if self.live:
-            title.append(Piece(f" {DOT}", "dot"))
         if self.among:
             title += [Piece("  ", "note"), Piece(f"{self.among} of {self.among}", "among")]
+        if self.live:  # last: a hidden dot leaves no gap
+            title.append(Piece(f" {DOT}", "dot"))
         narrow = self.direction == "LR" or self.form == "matrix"
         limit = LONGEST_LABEL if narrow else LONGEST_LINE
         texts = _rows(state_texts(self.write, state), limit)
@@ -375,8 +433,8 @@ class ChartSheet:
     def _number_row(self, edge: Transition) -> list[Row]:
         marks = range(len(clauses(self.chart.guards[edge.name]))) if self.live else ()
         number = Piece(f"g{self.numbered[edge.name]}", "clause")
-        row = [Piece("[", "bracket"), number, *(Piece(TRUE, "mark", c) for c in marks)]
-        return [[*row, Piece("]", "bracket")]]
+        row = [Piece("[", "bracket"), number, Piece("]", "bracket")]
+        return [[*row, *(Piece(TRUE, "mark", c) for c in marks)]]
 
     def _guard_lines(self, edge: Transition) -> list[Row]:
         guard = self.chart.guards[edge.name]
@@ -389,13 +447,13 @@ class ChartSheet:
         for i, (line, clause) in enumerate(lines):
             last = i + 1 == len(lines) or lines[i + 1][1] != clause
             row = [Piece("[" if i == 0 else " ", "bracket"), Piece(line, "clause", clause)]
-            if last and self.live and clause >= 0:
-                row.append(Piece(TRUE, "mark", clause))
             if last and i + 1 < len(lines):
                 # The space is a separate text: some SVG readers drop leading spaces.
                 row += [Piece(" ", "bracket"), Piece(self.write.words[Both], "bracket")]
             if i + 1 == len(lines):
                 row.append(Piece("]", "bracket"))
+            if last and self.live and clause >= 0:  # last: a hidden mark leaves no gap
+                row.append(Piece(TRUE, "mark", clause))
             rows.append(self._indexed(row))
         action = self.write.actions(self.chart.assignments["action", edge.name])
         lines_of_action = wrapped(action, LONGEST_LABEL)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.language import latex_name
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import last_cycles, letter_panels
 from plots.panels.parts.axes import VECTOR_ROWS, draw_curve, time_axis
@@ -125,7 +126,7 @@ def fit_figure(
         whole = begin <= part.t[0] and end >= part.t[-1]
         names = [
             "measurement and model" + ("" if whole else f", {begin:.4g} to {end:.4g} s"),
-            _score_name(chosen, fit.task.measured.unit),
+            _score_name(chosen, part),
             "loop",
             "residual",
         ]
@@ -175,11 +176,13 @@ def _title(fit: Fit, chosen: Residuals, count: int, which: int | None) -> str:
     return f"{fit.title}, fitted to {chosen.record.name}{others}"
 
 
-def _score_name(chosen: Residuals, unit: str) -> str:
+def _score_name(chosen: Residuals, part: _Compared) -> str:
     """Name the panel of the residual, with its size in the rows of this record."""
     parts = [("RMSE", chosen.rows), ("held out", chosen.held)]
-    sizes = [f"{name} {_size(chosen, rows):.3g}" for name, rows in parts if rows.any()]
-    return f"residual; {', '.join(sizes)} {unit}"
+    sizes = [
+        f"{name} {part.factor * _size(chosen, rows):.3g}" for name, rows in parts if rows.any()
+    ]
+    return f"residual; {', '.join(sizes)} {part.small}"
 
 
 def _size(each: Residuals, rows: NDArray[np.bool_]) -> float:
@@ -211,7 +214,7 @@ def _over_time(ax: Axes, part: _Compared, shown: Window, test: Window | None) ->
     measured: dict[str, Any] = {"color": LINE_GREY, "linewidth": pt(2.4), "label": "measured"}
     draw_curve(ax, t, part.measured[inside], **measured)
     draw_curve(ax, t, part.modelled[inside], color=INK, label="model")
-    ax.set_ylabel(f"{part.name} [{part.unit}]")
+    ax.set_ylabel(f"${latex_name(part.name)}$ [{part.unit}]")
     time_axis(ax, *shown)
     legend_above(ax)
 
@@ -243,7 +246,7 @@ def _shaded(ax: Axes, part: _Compared, test: Window | None, shown: Window, label
 def _loop(ax: Axes, part: _Compared) -> None:
     draw_curve(ax, part.x, part.measured, color=LINE_GREY, linewidth=pt(2.0), label="measured")
     draw_curve(ax, part.x, part.modelled, color=INK, linewidth=pt(0.7), label="model")
-    ax.set(xlabel=f"x [{part.place}]", ylabel=f"{part.name} [{part.unit}]")
+    ax.set(xlabel=f"$x$ [{part.place}]", ylabel=f"${latex_name(part.name)}$ [{part.unit}]")
 
 
 def _residual_over_x(ax: Axes, part: _Compared) -> None:
@@ -266,7 +269,7 @@ def _residual_over_x(ax: Axes, part: _Compared) -> None:
     for (x, mean), name, look in means:
         ax.plot(x, mean, color=colour("paper"), linewidth=pt(look["linewidth"] + 2.0))
         ax.plot(x, mean, label=name, **to_scale(look))
-    ax.set(xlabel=f"x [{part.place}]", ylabel=f"measured − model [{part.small}]")
+    ax.set(xlabel=f"$x$ [{part.place}]", ylabel=f"measured − model [{part.small}]")
     legend_above(ax)
 
 

@@ -112,7 +112,7 @@ def landscape(
         handles = [Line2D([], [], color=c, linestyle=dash, label=n) for n, c, dash in looks]
         if plane.threshold is not None:
             handles.append(
-                Line2D([], [], color=LINE_GREY, linewidth=pt(5), alpha=0.45, label="±s(v)")
+                Line2D([], [], color=LINE_GREY, linewidth=pt(5), alpha=0.45, label="$±s(v)$")
             )
         close: Any = {"handlelength": 1.4, "columnspacing": 1.0} if low() else {}
         legend = left.legend(

@@ -75,7 +75,7 @@ def figure_3(
         axes = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
         axes[0].plot(chart.t, force, color=INK, linewidth=pt(0.9))
         axes[0].set_xlim(*checked_window(chart, window))
-        axes[0].set(xlabel="t [s]", ylabel=r"$F_a$ [N]")
+        axes[0].set(xlabel="$t$ [s]", ylabel=r"$F_a$ [N]")
         runs = chart, ifelse, lugre
         # Drift is compared: one unit and one range of x.
         scale = scaled(np.concatenate([trace.x - trace.x[0] for trace in runs]), "m")
@@ -91,7 +91,7 @@ def figure_3(
         names = ["applied force (chosen by us)", f"{chart.model.title}; chart"]
         letter_panels(axes, [*names, "the same; if-else", "LuGre"])
         if len(phases) > 1:
-            axes[1].legend(loc="lower right")
+            legend_below(figure, *axes[1].get_legend_handles_labels())
         figure.suptitle(title, x=0.01, ha="left")
     return fitted(figure)
 
@@ -118,26 +118,20 @@ def figure_4(
     Returns
     -------
     Figure
-        Panels a to f; b and c have the same axis. Insets show the first peak of F, and of z of
-        LuGre, except on a slide.
+        Panels a to f. Insets show the first peak of F, except on a slide.
     """
     chart, ifelse, lugre = (shown(trace, window) for trace in (chart, ifelse, lugre))
     with rc_context(settings()):
         figure = sheet(4.2, 10.0) if narrow() else sheet(10.5, 6.2)
         axes = figure.subplots(*(6, 1) if narrow() else (2, 3), sharex=True).ravel()
         panels.velocity(axes[0], chart)
-        scale = _common_scale(chart, lugre)
-        panels.deflections(axes[1], chart, elements=elements, scale=scale)
+        panels.deflections(axes[1], chart, elements=elements)
         element_legend(figure, axes[1])
-        panels.deflections(axes[2], lugre, scale=scale)
-        if scale is not None:
-            axes[2].sharey(axes[1])
-            z = scale[0] * lugre.z[:, 0]
-            _zoom(axes[2], lugre, z, scale[1].partition("[")[2].rstrip("]"), (0.4, 0.15))
+        panels.deflections(axes[2], lugre)
         for ax, trace in zip(axes[3:], (chart, ifelse, lugre), strict=True):
             panels.force(ax, trace)
             _make_room(ax)
-            _zoom(ax, trace, trace.F, "N", (0.5, 0.65))
+            _zoom(ax, trace)
         names = ["velocity (chosen by us)", "deflections, GMS", "deflection, LuGre"]
         kinds = ("chart", "if-else", "LuGre")
         letter_panels(axes, [*names, *(f"friction, {kind}" for kind in kinds)])
@@ -155,18 +149,18 @@ def _common_scale(*runs: Trace) -> tuple[float, str] | None:
     return first_variable(largest, largest.z)
 
 
-def _first_peak(trace: Trace, values: Floats) -> int:
-    """Return the row of the largest value up to the first reversal."""
+def _first_peak(trace: Trace) -> int:
+    """Return the row of the largest force up to the first reversal."""
     back = np.flatnonzero(trace.v < 0)
     last = int(back[0]) + 1 if back.size and back[0] > 0 else len(trace)
-    return int(np.nanargmax(np.abs(values[:last])))
+    return int(np.nanargmax(np.abs(trace.F[:last])))
 
 
-def _zoom(ax: Axes, trace: Trace, values: Floats, unit: str, place: tuple[float, float]) -> None:
-    """Show the first peak of the line of a panel in an inset, in the panel's unit."""
+def _zoom(ax: Axes, trace: Trace) -> None:
+    """Show the first peak of a force in an inset."""
     if low():
         return
-    peak = _first_peak(trace, values)
+    peak, values = _first_peak(trace), trace.F
     half = ZOOM * float(trace.t[-1] - trace.t[0])
     t0, t1 = max(trace.t[0], trace.t[peak] - half), min(trace.t[-1], trace.t[peak] + half)
     near = values[(trace.t >= t0) & (trace.t <= t1)]
@@ -174,16 +168,13 @@ def _zoom(ax: Axes, trace: Trace, values: Floats, unit: str, place: tuple[float,
     # A fall that is much larger than the rise to the peak leaves the inset.
     bottom = max(float(near.min()), high - 3 * float(high - near[0]))
     edge = 0.1 * (high - bottom) or 1.0
-    size = int(np.floor(np.log10(abs(high)))) if high else 0
-    power = size if size < -2 else 0
-    inset = ax.inset_axes((*place, 0.46, 0.28))
-    inset.plot(trace.t, values / 10.0**power, color=ax.lines[0].get_color(), linewidth=pt(1.0))
-    inset.set(xlim=(t0, t1), ylim=((bottom - edge) / 10.0**power, (high + edge) / 10.0**power))
+    inset = ax.inset_axes((0.5, 0.65, 0.46, 0.28))
+    inset.plot(trace.t, values, color=ax.lines[0].get_color(), linewidth=pt(1.0))
+    inset.set(xlim=(t0, t1), ylim=(bottom - edge, high + edge))
     inset.tick_params(labelsize=font(7), length=2)
     inset.locator_params(nbins=3, prune="both")
     inset.spines[:].set(visible=True, color=LINE_GREY)
-    scale = rf"$10^{{{power}}}$ " if power else ""
-    inset.set_title(f"first peak [{scale}{unit}]".replace("-", "−"), fontsize=font(7), pad=2)
+    inset.set_title("first peak [N]", fontsize=font(7), pad=2)
     bounds = (t0, bottom - edge, t1 - t0, high - bottom + 2 * edge)
     frame = ax.indicate_inset(bounds, inset, edgecolor=LINE_GREY, alpha=1.0)
     for line in frame.connectors or ():

@@ -34,8 +34,9 @@ class Moving(Protocol):
 
 
 def head(trace: Trace, title: str) -> str:
-    """Return the title of a figure: the given title, the model and its law."""
-    return f"{title}: {trace.model.title}" if title else trace.model.title
+    """Return the title of a figure: the given one, or that of the scenario; the model, its law."""
+    first = title or trace.heading
+    return f"{first}: {trace.model.title}" if first else trace.model.title
 
 
 def letter_panels(axes: Sequence[Axes], names: Sequence[str]) -> None:

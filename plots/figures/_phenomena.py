@@ -99,7 +99,7 @@ def _panel(
     ax.locator_params(axis="y", nbins=4)
     ax.tick_params(labelsize=font(7.5), length=2.5)
     ax.set_title(model, fontsize=font(9), fontweight="bold", pad=inches(15))
-    brief = f"{MARKS[found.verdict]} {found.numbers[0]}" + (", own scale" if own else "")
+    brief = f"{MARKS[found.verdict]} {phenomenon.brief(found)}" + (", own scale" if own else "")
     look = {"xycoords": "axes fraction", "ha": "left", "va": "baseline", "family": "DejaVu Sans"}
     beside(ax, brief, (0.0, 1.0), (0, inches(4)), **look)
 
@@ -186,9 +186,9 @@ def phenomena_matrix(
                     Rectangle(corner, wide, high, facecolor=tint, edgecolor=PALE_GREY, lw=pt(0.6))
                 )
                 _symbol(ax, corner[0] + (0.5 * wide if brief else 0.2), y, found.verdict)
-                if found.numbers and not brief:
-                    number = str(found.numbers[0])
-                    ax.text(corner[0] + 0.36, y, number, va="center", fontsize=font(8.5))
+                if not brief:
+                    text = phenomenon.brief(found)
+                    ax.text(corner[0] + 0.36, y, text, va="center", fontsize=font(8.5))
         for column, note in enumerate(() if brief else notes):
             x, side = (
                 (left - 0.1, "right") if column == 0 else (left + (column - 0.5) * wide, "center")

@@ -82,8 +82,7 @@ def overview(
     title : str
         Of the figure; the model and its law are added.
     window : (float, float), optional
-        Time interval, s. Default: on the right the whole run, on the left the last three
-        cycles of a long one.
+        Time interval of all panels, s; by default the last three cycles of a long run.
     elements : sequence of int, optional
         Elements whose states are shown, counted from 0; by default all.
 
@@ -93,36 +92,42 @@ def overview(
         On the left over time, on the right F against x and v.
     """
     check_trace(trace)
-    begin, end = last_cycles(trace) if window is None else checked_window(trace, window)
-    whole = window is None and begin == trace.t[0]
+    window = last_cycles(trace) if window is None else checked_window(trace, window)
     part = shown(trace, window)
-    left_part = part if whole or window is not None else shown(trace, (begin, end))
     count = len(checked_elements(trace, elements))
     tall = [1.6, 1.6, *([1.0] if count > MANY else []), lanes_height(count, 1.6)]  # inches
     with rc_context(settings()):
         figure, time, (loop, portrait) = _overview_axes(tall)
-        panels.velocity(time[0], left_part, window=(begin, end))
-        panels.force(time[1], left_part, window=(begin, end))
+        panels.velocity(time[0], part, window=window)
+        panels.force(time[1], part, window=window)
         if count > MANY:
-            panels.slipping(time[2], left_part, window=(begin, end), elements=elements)
-        panels.ribbons(time[-1], left_part, window=(begin, end), elements=elements)
+            panels.slipping(time[2], part, window=window, elements=elements)
+        panels.ribbons(time[-1], part, window=window, elements=elements)
         panels.hysteresis(loop, trace, window=window)
         panels.portrait(portrait, part, elements=elements)
         if measured is not None:
-            _add_measured(time[1], loop, measured, trace, (begin, end))
+            _add_measured(time[1], loop, measured, trace, window)
         if trace.model.chart.transitions:
             legend_above(time[-1])
         for ax in time[:-1]:
             ax.set_xlabel("")
-        note = "" if whole or window is not None else f", last {end - begin:.3g} s"
-        # Beside the third name there is the number at the end; the time axis is the same.
-        names = [f"velocity{note}", f"friction{note}", f"active states{note}"]
+        names = ["velocity", "friction", "active states"]
         names[2:2] = ["how many slip"] if count > MANY else []
         letter_panels([*time, loop, portrait], [*names, "hysteresis", "friction against velocity"])
         for ax in (loop, portrait):  # narrow, and labels such as -0.35 are wide
             ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
-        figure.suptitle(head(trace, title), x=0.01, ha="left")
+        figure.suptitle(f"{head(trace, title)}{_left_out(trace, window)}", x=0.01, ha="left")
     return fitted(figure)
+
+
+def _left_out(trace: Trace, window: Window) -> str:
+    """Return which part of a run is shown, if not all of it."""
+    (begin, end), first, last = window, trace.t[0], trace.t[-1]
+    if (begin, end) == (first, last):
+        return ""
+    if end == last:
+        return f"; last {end - begin:.3g} s of {last - first:.3g} s"
+    return f"; {begin:.4g} s to {end:.4g} s"
 
 
 def _overview_axes(tall: Sequence[float]) -> tuple[Figure, Sequence[Axes], Sequence[Axes]]:
@@ -156,11 +161,11 @@ def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window
         rasterized=bool(inside.sum() > VECTOR_ROWS),
     )
     legend_above(ax)
-    factor, _ = scaled(trace.x - trace.x[0], "m")
+    factor, _ = scaled(shown(trace, window).x - trace.x[0], "m")
     loop.lines[0].set(linewidth=pt(0.9), zorder=3, rasterized=True)
     loop.plot(
-        factor * (measured.x - trace.x[0]),
-        measured.F,
+        factor * (measured.x[inside] - trace.x[0]),
+        measured.F[inside],
         color=LINE_GREY,
         linewidth=pt(0.5),
         alpha=0.7,
@@ -187,7 +192,7 @@ def ribbons_figure(
         The break-away that the middle column shows, s; see `plots.panels.cascade_window`.
     window : (float, float), optional
         Of the left and right columns, s. By default the whole run; if it has too many states to
-        read, the last three cycles on the left.
+        read, its last three cycles.
     elements : sequence of int, optional
         Which elements, counted from 0; by default all.
     within : float
@@ -203,8 +208,7 @@ def ribbons_figure(
         panels: v and z / s are left out, and with a zoom also what is on the right.
     """
     limits = checked_window(trace, window)
-    crowded = window is None and len(trace.transitions) > MOST_SPANS * trace.n
-    if crowded:
+    if window is None and len(trace.transitions) > MOST_SPANS * trace.n:
         limits = last_cycles(trace)
     part = shown(trace, limits)
     # Prefer a cascade that the left column also shows.
@@ -221,24 +225,21 @@ def ribbons_figure(
         panels.force(left[-2], part, window=limits)
         panels.ribbons(left[-1], part, window=limits, elements=elements)
         one_time_axis(left)
-        names = ["velocity", second, "friction", "active states"]
-        if limits[0] > trace.t[0] and crowded:
-            names = [f"{name}, last {limits[1] - limits[0]:.3g} s" for name in names]
-        names = names[-len(left) :]
+        names = ["velocity", second, "friction", "active states"][-len(left) :]
         if zoom:
             margin = _cascade_column(middle, trace, zoom, elements)
             for ax in left:
                 ax.axvspan(*zoom, color=PALE_GREY, linewidth=pt(1.0), alpha=0.6, zorder=0)
             names += _zoom_names(zoom, margin)[-len(middle) :]
         if right:
-            (lines,) = panels.portrait(right[0], trace, window=window, elements=elements, bar=False)
-            panels.hysteresis(right[1], trace, window=window, elements=elements, slipping=True)
+            (lines,) = panels.portrait(right[0], part, elements=elements, bar=False)
+            panels.hysteresis(right[1], trace, window=limits, elements=elements, slipping=True)
             assert isinstance(lines, LineCollection)
             panels.slip_bar(lines, trace, right)
             names += ["friction against velocity", "hysteresis"]
         letter_panels([*left, *middle, *right], names)
         figure.align_ylabels(left)
-        figure.suptitle(head(trace, title), x=0.01, ha="left")
+        figure.suptitle(f"{head(trace, title)}{_left_out(trace, limits)}", x=0.01, ha="left")
         element_legend(figure, *left[1:4:2])
     return fitted(figure)
 

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.foundation.quantities import scale_of
 from gms_fsm.traces.trace import Trace
 from plots.film._pace import Frame
-from plots.panels.parts.selection import has_threshold, scaled
+from plots.panels.parts.selection import has_threshold
 from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme, ramp
 from plots.style.matplotlib import Artist, Axes, Line2D, LineCollection, Rectangle, patches
 
@@ -100,7 +101,7 @@ class Bristles:
         # In some charts s is a force and not the threshold of z.
         limit = np.nanmin(curve.s) if self.z is not None and has_threshold(trace) else np.inf
         self.limited = bool(self.scale * limit < space)
-        self.units = scaled(curve.v, "m/s"), scaled(curve.F, "N")
+        self.scales = scale_of(self.most["v"], "m/s"), scale_of(self.most["F"], "N")
         self.moving: list[Artist] = []
         self._draw()
 
@@ -221,11 +222,14 @@ class Bristles:
                 marks.append([(at, floor), (at - 0.05, floor + deep)])
         return marks
 
+    def told(self, which: int, value: float) -> str:
+        """Return v or F as text, in one unit for the whole film."""
+        return f"{'+' if value > 0 else ''}{self.scales[which].text(value, 3)}"
+
     def _point(self, which: int, name: str, value: float, share: float) -> None:
         """Draw the arrow and number of a quantity; a share of 1 points to the right."""
         arrow, said, y = self.arrows[which]
-        factor, unit = self.units[which]
-        said.set_text(f"{name} = {factor * value:+.3g} {unit}")
+        said.set_text(f"{name} = {self.told(which, value)}")
         start, head = self.wall + SLIDER + 0.1, 0.045
         length = ARROW * min(abs(share), 1.0) if np.isfinite(share) else 0.0
         tip, tail = (start + length, start) if share > 0 else (start, start + length)

@@ -12,6 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from gms_fsm.errors import cut
 from gms_fsm.traces.trace import Trace
 from plots.film._bristles import Bristles, panel_height
 from plots.film._chart import FilmChart
@@ -27,11 +28,12 @@ DPI = 100
 RIGHT, LEAST_LEFT = 4.9, 4.9  # inches, of the columns
 WIDEST, TALLEST = 9.0, 6.0  # inches of a chart; a larger one is drawn smaller
 SMALLEST = 0.8  # but not smaller than this: its texts have at least 7 points
-SAID, LABELS, MARGIN = 0.78, 0.5, 0.12  # inches: texts above the force; below an axis; around
+LINE, LABELS, MARGIN = 0.23, 0.5, 0.12  # inches: a text above the force; below an axis; around
 FORCE = 1.7  # inches of the force axis, at least
 LANE, LOWEST_LANE, LANES = 0.3, 0.16, 2.4  # inches of a ribbon; of all ribbons, if there are many
 MOST = 24  # elements with ribbon and bristle
 SIZE = 8.5  # points
+LETTERS = 66  # of a line above the force
 CURSOR = 1.44  # points: two pixels
 
 
@@ -69,8 +71,11 @@ class FilmPicture:
         self.left = max(drawing[0], LEAST_LEFT)
         bristles = panel_height(len(elements))
         lanes = len(elements) * min(LANE, max(LOWEST_LANE, LANES / len(elements)))
+        what = f"{self.trace.model.title}; {self.trace.rig.title}"
+        about = [cut(each, LETTERS) for each in (self.trace.heading, what) if each]
+        self.said = 0.09 + LINE * (len(about) + 2)
         self.tall = max(
-            drawing[1] + bristles + 2 * MARGIN, SAID + FORCE + 0.12 + lanes + LABELS + MARGIN
+            drawing[1] + bristles + 2 * MARGIN, self.said + FORCE + 0.12 + lanes + LABELS + MARGIN
         )
         self.wide = self.left + RIGHT
         size = (_even(self.wide), _even(self.tall))
@@ -88,10 +93,10 @@ class FilmPicture:
         ax = self._axes(MARGIN, self.tall - spare / 2 - bristles, *own)
         self.bristles = Bristles(ax, self.trace, curve, elements, theme, own)
         self.moving: list[Artist] = []
-        force = self.tall - SAID - 0.12 - lanes - LABELS - MARGIN
+        force = self.tall - self.said - 0.12 - lanes - LABELS - MARGIN
         self._draw_force(curve, window, force)
         self._draw_lanes(curve, window, elements, lanes)
-        self._draw_texts()
+        self._draw_texts(about)
         self.canvas.draw()
         self.ground = self.canvas.copy_from_bbox(self.figure.bbox)
         self.look: object = None
@@ -105,10 +110,10 @@ class FilmPicture:
         return self.figure.add_axes(box, facecolor=self.colours.paper)
 
     def _draw_force(self, curve: Trace, window: Window, height: float) -> None:
-        ax = self._axes(self.left + 0.75, SAID, RIGHT - 0.95, height)
+        ax = self._axes(self.left + 0.75, self.said, RIGHT - 0.95, height)
         ax.plot(curve.t, curve.F, color=self.colours.ink, linewidth=1.2)
         ax.set_xlim(*window)
-        ax.set_ylabel("F [N]", fontsize=SIZE)
+        ax.set_ylabel("$F$ [N]", fontsize=SIZE)
         ax.tick_params(labelbottom=False)
         self._paint_axes(ax)
         self.cursors = [ax.axvline(window[0])]
@@ -139,7 +144,7 @@ class FilmPicture:
             yticks=range(1, len(elements) + 1),
             yticklabels=[f"E{i + 1}" for i in elements],
         )
-        ax.set_xlabel("t [s]", fontsize=SIZE)
+        ax.set_xlabel("$t$ [s]", fontsize=SIZE)
         self._paint_axes(ax)
         ax.tick_params(axis="y", length=0)
         self.cursors.append(ax.axvline(window[0]))
@@ -156,20 +161,21 @@ class FilmPicture:
             spine.set_color(colours.ink)
         ax.yaxis.set_label_coords(-0.62 / (RIGHT - 0.95), 0.5)
 
-    def _draw_texts(self) -> None:
+    def _draw_texts(self, about: Sequence[str]) -> None:
         """Write what runs, and leave room for the clock and what happens."""
-        title, start = self.trace.model.title, self.left + 0.35
-        looks: tuple[dict[str, Any], ...] = (
-            {"fontsize": SIZE, "color": self.colours.soft},
-            {"fontsize": SIZE + 1.5, "fontweight": "bold", "color": self.colours.ink},
-            {"fontsize": SIZE, "color": self.colours.ink},
-        )
-        self.texts = []
-        for line, look in enumerate(looks):
-            at = (start / self.wide, 1 - (0.2 + 0.23 * line) / self.tall)
-            self.texts.append(self.figure.text(*at, "", va="center", parse_math=False, **look))
-        self.texts[0].set_text(title)
-        self.moving += self.texts[1:]
+
+        def write(
+            line: int, text: str, colour: str, size: float = SIZE, weight: str = "normal"
+        ) -> Any:
+            at = ((self.left + 0.35) / self.wide, 1 - (0.2 + LINE * line) / self.tall)
+            look: dict[str, Any] = {"color": colour, "fontsize": size, "fontweight": weight}
+            return self.figure.text(*at, text, va="center", parse_math=False, **look)
+
+        for line, text in enumerate(about):
+            write(line, text, self.colours.soft)
+        self.clock = write(len(about), "", self.colours.ink, SIZE + 1.5, "bold")
+        self.happens = write(len(about) + 1, "", self.colours.ink)
+        self.moving += [self.clock, self.happens]
         for artist in self.moving:
             artist.set_animated(True)
 
@@ -198,8 +204,8 @@ class FilmPicture:
             cursor.set_xdata([t, t])
         self.point.set_data([t], [force])
         slow = {1.0: "", np.inf: "    held"}.get(frame.slowed, f"    slowed ×{frame.slowed:g}")
-        self.texts[1].set_text(f"t = {t:.3f} s    F = {force:+.3f} N{slow}")
-        self.texts[2].set_text(self._event(frame))
+        self.clock.set_text(f"t = {t:.3f} s    F = {self.bristles.told(1, force)}{slow}")
+        self.happens.set_text(self._event(frame))
         self.bristles.show(frame)
 
     def _event(self, frame: Frame) -> str:

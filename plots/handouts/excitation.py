@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.foundation.quantities import in_words, quantity
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Prescribed, Rig, TextRig
 from gms_fsm.traces.trace import Trace
+from plots.systems.system_diagram import signal_text
 
 PERIOD, CYCLES = 10.0, 2.25  # s; the first quarter leaves the origin
 SMALLEST, FACTOR, TRIES = 1e-7, 4.0, 14  # m: amplitudes that are tried, up to 6.7 m
@@ -38,10 +40,18 @@ class Excited:
     about: str
 
 
-def excited(model: Model, velocity: str | None, t_end: float | None) -> Excited:
+def of_rig(trace: Trace) -> Excited:
+    """Return a run of one's own, with what moved it."""
+    rig = trace.rig
+    units = {each.name: each.unit for each in getattr(rig, "parameters", ())}
+    numbers = {} if trace.system is not None else rig.numbers
+    given = [f"{name} = {quantity(u, units.get(name, ''), 3)}" for name, u in numbers.items()]
+    given += [signal_text(name, signal) for name, signal in rig.signals.items()]
+    return Excited(trace, f"{rig.title}: {', '.join(given)}" if given else rig.title)
+
+
+def excited(model: Model) -> Excited:
     """Return a run for the hysteresis loop of a model."""
-    if velocity is not None and t_end is not None:
-        return Excited(simulate(model, Prescribed(velocity), t_end), f"v(t) = {velocity} m/s")
     pulled = model.chart.locks or model.chart.sets_velocity
     found, before = [], 0.0
     for step in range(TRIES):
@@ -71,7 +81,7 @@ def excited(model: Model, velocity: str | None, t_end: float | None) -> Excited:
     largest = SMALLEST * FACTOR ** (TRIES - 1)
     raise ParameterError(
         f"no sine between {SMALLEST:g} and {largest:.2g} m gives a loop of {model.title}",
-        advice="give velocity, for example '0.1*cos(t)', and t_end",
+        advice="give a run, for example simulate(model, Prescribed('0.1*cos(t)'), 7.0)",
     )
 
 
@@ -108,7 +118,7 @@ def _run(model: Model, amplitude: float, cycles: float, *, pulled: bool) -> Trac
 
 
 def _about(amplitude: float, *, pulled: bool) -> str:
-    sine = f"A sin(2πt/T), A = {amplitude:.3g} m, T = {PERIOD:g} s"
+    sine = f"A sin(2πt/T), A = {in_words(amplitude, 'm', 3)}, T = {PERIOD:g} s"
     if not pulled:
         return f"x(t) = {sine}"
     return (

@@ -23,14 +23,15 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.language import parse_value
 from gms_fsm.systems.models import Model, is_model
 from gms_fsm.systems.system import loaded
+from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
 from plots.charts.live_chart import plain_tree
 from plots.charts.statechart import statechart
-from plots.handouts.excitation import Excited, excited
+from plots.handouts.excitation import Excited, excited, of_rig
 from plots.output import formats
 from plots.output.graphviz import picture
 from plots.output.svg_artists import EXACT, drawn, smallest
-from plots.style import INK, PALE_GREY, TEXT_GREY, presets
+from plots.style import INK, MONO_FONT, PALE_GREY, SANS_FONT, TEXT_GREY, presets
 from plots.style.mathtext import Formulas, formula
 from plots.style.matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
 
@@ -48,22 +49,17 @@ LARGEST = 1.2  # the largest scale of a chart
 SIZES = presets.Preset("handout", None, None, TEXT, SMALLEST, 1.0, 150.0)
 
 
-def handout(
-    model: Model, path: str | Path, *, velocity: str | None = None, t_end: float | None = None
-) -> Path:
+def handout(model: Model | Trace, path: str | Path) -> Path:
     """Write a model on one A4 page: chart, equations, parameters, and a hysteresis loop.
 
     Parameters
     ----------
-    model : Model
-        For example `GMS`, or a `ChartModel` of a chart of the zoo.
+    model : Model or Trace
+        For example `GMS`, or a `ChartModel` of a chart of the zoo: then x(t) of the loop is a sine
+        with an amplitude at which the model slips; a model that locks is pulled through a spring.
+        Of a run the model, the rig, the loop, and the title of its scenario.
     path : str or Path
         Its ending selects the format, for example ``.pdf``. An existing file is replaced.
-    velocity : str, optional
-        v(t) of the loop in m/s, as an expression in t. By default x(t) is a sine with an amplitude
-        at which the model slips; a model that locks is pulled through a spring instead.
-    t_end : float, optional
-        End of that motion, s; needed with `velocity`.
 
     Returns
     -------
@@ -87,29 +83,28 @@ def handout(
     'gms.pdf'
     """
     formats.chosen(path, "figure")
-    figure = handout_figure(model, velocity=velocity, t_end=t_end)
+    figure = handout_figure(model)
     with rc_context(EXACT):
         return formats.save(figure, path, "figure")
 
 
-def handout_figure(
-    model: Model, *, velocity: str | None = None, t_end: float | None = None
-) -> Figure:
+def handout_figure(model: Model | Trace) -> Figure:
     """Return the page of `handout` as a figure; its parameters and errors are the same."""
+    run, heading = None, ""
+    if isinstance(model, Trace):
+        check_trace(model)
+        run, heading, model = of_rig(model), model.heading, model.model
     if not is_model(model):
         raise ParameterError(
-            f"model is {model!r:.60}", advice="give a model, such as GMS(parameters, law='signed')"
-        )
-    if (velocity is None) != (t_end is None):
-        raise ParameterError(
-            "velocity and t_end belong together", advice="give both of them, or neither"
+            f"model is {model!r:.60}",
+            advice="give a model, such as GMS(parameters, law='signed'), or a run",
         )
     charts = _charts(model.chart)
-    run = excited(model, velocity, t_end)
+    run = excited(model) if run is None else run
     with presets.preset(SIZES), rc_context(presets.settings()):
         figure = Figure(figsize=(PAGE[0] / 72, PAGE[1] / 72), dpi=SIZES.dpi)
         page = _Page(figure)
-        top = _head(page, model)
+        top = _head(page, model, heading)
         foot = _foot(page, model)
         equations = _equations(model)
         rows = _rows(model)
@@ -177,16 +172,18 @@ def _lines(text: str, size: float, wide: float) -> list[str]:
     return wrap(text, max(8, int(wide / (LETTER * size)))) or [""]
 
 
-def _head(page: _Page, model: Model) -> float:
+def _head(page: _Page, model: Model, heading: str) -> float:
     """Write title, law and reference; return where the page goes on."""
     y = PAGE[1] - MARGIN
-    page.text(MARGIN, y, model.title, TITLE, fontweight="bold")
-    y -= TITLE * LEAD
+    for line in _lines(heading or model.title, TITLE, INNER):
+        page.text(MARGIN, y, line, TITLE, fontweight="bold")
+        y -= TITLE * LEAD
     count = "one element" if model.n == 1 else f"{model.n} elements, each with this chart"
-    about = [f"Chart: {model.chart.name}", count]
+    about = [model.title] * bool(heading) + [f"chart: {model.chart.name}", count]
     if model.chart.reference:
         about.append(f"equations: {model.chart.reference}")
-    for line in _lines("; ".join(about) + ".", TEXT, INNER):
+    text = "; ".join(about)
+    for line in _lines(f"{text[0].upper()}{text[1:]}.", TEXT, INNER):
         page.text(MARGIN, y, line, color=TEXT_GREY)
         y -= TEXT * LEAD
     return y - GAP / 2
@@ -386,7 +383,7 @@ def _table(page: _Page, rows: Sequence[tuple[str, str, str, str]], top: float, w
     for row in cells:
         for k, (x, lines) in enumerate(zip(starts, row, strict=True)):
             for number, line in enumerate(lines):
-                family = "DejaVu Sans Mono" if k == 0 else "DejaVu Sans"
+                family = MONO_FONT if k == 0 else SANS_FONT
                 page.text(x, y - number * TEXT * LEAD, line, family=family, parse_math=False)
         y -= TEXT * LEAD * max(map(len, row))
 

@@ -1,22 +1,65 @@
-"""Draws a Graphviz graph with the Graphviz that is available.
+"""Draws a Graphviz graph with the Graphviz that is available, in the fonts of `plots.style`.
 
 First the program ``dot`` on PATH, then the Python package pygraphviz, whose wheels contain the
-Graphviz libraries.
+Graphviz libraries. Both run in a process of their own: fontconfig reads its settings once in a
+process, and pygraphviz cannot be told to be silent about labels that are wider than they need be.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
+import sys
+from functools import cache
 from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from xml.sax.saxutils import escape
 
 import graphviz
 
 from gms_fsm.errors import OutputError
 from gms_fsm.foundation.extras import missing
+from plots.style.fonts import FOLDER
 
 PNG_DPI = "144"  # twice a screen point: crisp on dense displays
+
+_PACKAGE = """
+import sys, pygraphviz
+engine, form, args = sys.argv[1:]
+try:
+    graph = pygraphviz.AGraph(string=sys.stdin.buffer.read().decode())
+    sys.stdout.buffer.write(graph.draw(format=form, prog=engine, args=args))
+except (ValueError, OSError) as error:
+    sys.exit(str(error))
+"""
+
+# Not the file of the system, which old libraries complain of. Other fonts are for characters that
+# ours lack; DejaVu must be ours, because other versions of it may be installed.
+_FONTS = """<?xml version="1.0"?>
+<!DOCTYPE fontconfig SYSTEM "fonts.dtd">
+<fontconfig>
+  {folders}
+  <selectfont>
+    <acceptfont><glob>{ours}/*</glob></acceptfont>
+    <rejectfont><glob>*/DejaVuSans*</glob></rejectfont>
+  </selectfont>
+  <cachedir prefix="xdg">fontconfig</cachedir>
+  <cachedir>{cache}</cachedir>
+</fontconfig>
+"""
+_OTHERS = (
+    "<dir>/usr/share/fonts</dir>",
+    "<dir>/usr/local/share/fonts</dir>",
+    "<dir>/System/Library/Fonts</dir>",
+    "<dir>/Library/Fonts</dir>",
+    "<dir>WINDOWSFONTDIR</dir>",
+    "<dir>~/Library/Fonts</dir>",
+    '<dir prefix="xdg">fonts</dir>',
+    "<dir>~/.fonts</dir>",
+)
 
 
 def picture(graph: graphviz.Digraph, form: str) -> bytes:
@@ -29,13 +72,32 @@ def picture(graph: graphviz.Digraph, form: str) -> bytes:
 
 def drawn(graph: graphviz.Digraph, form: str) -> bytes | None:
     """Return a picture as bytes, or None if there is no Graphviz."""
-    picture = _by_program(graph, form)
-    if picture is None:
-        picture = _by_package(graph, form)
-    if picture is not None and form == "pdf":
+    if not available():
+        return None
+    program = shutil.which("dot")
+    # -q: our labels have fixed sizes, and Graphviz warns where it would make them wider.
+    args = ["-q", *([f"-Gdpi={PNG_DPI}"] if form == "png" else [])]
+    if program is not None:
+        name, command = program, [program, f"-K{graph.engine}", f"-T{form}", *args]
+    else:
+        name = "pygraphviz"
+        command = [sys.executable, "-c", _PACKAGE, graph.engine, form, " ".join(args)]
+    fonts = {"FONTCONFIG_FILE": str(Path(_settings().name, "fonts.conf"))}
+    done = subprocess.run(
+        command,
+        input=graph.source.encode(),
+        capture_output=True,
+        check=False,
+        env=os.environ | fonts,
+    )
+    if done.returncode != 0:
+        message = done.stderr.decode(errors="replace").strip()
+        raise OutputError(f"Graphviz ({name}) cannot draw this graph: {message}")
+    found: bytes = done.stdout
+    if form == "pdf":
         # The same chart gives the same file: only the date would differ.
-        picture = re.sub(rb"(/CreationDate \(D:)\d{14}", rb"\g<1>19700101000000", picture)
-    return picture
+        found = re.sub(rb"(/CreationDate \(D:)\d{14}", rb"\g<1>19700101000000", found)
+    return found
 
 
 def available() -> bool:
@@ -43,32 +105,12 @@ def available() -> bool:
     return shutil.which("dot") is not None or find_spec("pygraphviz") is not None
 
 
-def _by_program(graph: graphviz.Digraph, form: str) -> bytes | None:
-    program = shutil.which("dot")
-    if program is None:
-        return None
-    # -q: our labels have fixed sizes, and Graphviz warns where its own font is wider.
-    command = [program, "-q", f"-K{graph.engine}", f"-T{form}"]
-    if form == "png":
-        command.append(f"-Gdpi={PNG_DPI}")
-    done = subprocess.run(command, input=graph.source.encode(), capture_output=True, check=False)
-    if done.returncode != 0:
-        message = done.stderr.decode(errors="replace").strip()
-        raise OutputError(f"Graphviz ({program}) cannot draw this graph: {message}")
-    picture: bytes = done.stdout
-    return picture
-
-
-def _by_package(graph: graphviz.Digraph, form: str) -> bytes | None:
-    try:
-        import pygraphviz
-    except ImportError:
-        return None
-    try:
-        drawing = pygraphviz.AGraph(string=graph.source)
-        if form == "png":
-            drawing.graph_attr["dpi"] = PNG_DPI
-        picture: bytes = drawing.draw(format=form, prog=graph.engine, args="-q")
-    except (ValueError, OSError) as error:
-        raise OutputError(f"Graphviz (pygraphviz) cannot draw this graph: {error}") from None
-    return picture
+@cache
+def _settings() -> TemporaryDirectory[str]:
+    """Return a folder with settings for fontconfig; it is removed when Python ends."""
+    folder = TemporaryDirectory(prefix="gms-fsm-fonts-")
+    ours = escape(FOLDER.as_posix())
+    folders = "\n  ".join([f"<dir>{ours}</dir>", *_OTHERS])
+    text = _FONTS.format(folders=folders, ours=ours, cache=escape(Path(folder.name).as_posix()))
+    Path(folder.name, "fonts.conf").write_text(text, encoding="utf-8")
+    return folder

@@ -20,7 +20,8 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import GMSError, MissingExtraError
 from gms_fsm.foundation.display import Form
 from gms_fsm.foundation.logs import Log
-from gms_fsm.session.explain import Explanation, Why
+from gms_fsm.foundation.quantities import trimmed
+from gms_fsm.session.explain import Clause, Explanation, Why
 from gms_fsm.session.results import BranchComparison, Here
 from gms_fsm.session.session import Session
 from gms_fsm.systems.gms_parameters import GMSParameters
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
 
 
-MOST_ELEMENTS = 4  # a larger bank is shown as one element, because all have the same chart
+MOST_ELEMENTS = 4  # of a live chart
 MOST_ROWS = 10  # of a table
 DPI = 200  # of a figure: two pixels per point of a screen, crisp on dense displays
 
@@ -76,7 +77,7 @@ def _png(figure: Any, **options: Any) -> bytes:
 @functools.singledispatch
 def graph_of(subject: Any) -> DrawnGraph:
     """Return what is drawn of a chart, a model, a contact or a system."""
-    return statechart(subject.chart, subject.n if subject.n <= MOST_ELEMENTS else 1)
+    return statechart(subject.chart, subject.n)
 
 
 graph_of.register(System, block_diagram)
@@ -215,19 +216,14 @@ def explanation_html(edge: Explanation) -> str:
     """Return why one edge fires or not, clause by clause."""
     verdict = str(edge).partition("\n")[0]
     leads = f"{edge.priority} {edge.edge.name}: {edge.edge.source} → {edge.edge.target}"
-    rows = (
-        [c.text, "✓ true" if c.holds else "✗ false", _number(c.left), _number(c.right), _margin(c)]
-        for c in edge.clauses
-    )
+    rows = ([c.text, "✓ true" if c.holds else "✗ false", *_sides(c)] for c in edge.clauses)
     return paragraph(verdict) + table([leads, "", "left", "right", "margin"], rows)
 
 
-def _number(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.9g}"
-
-
-def _margin(clause: Any) -> str:
-    return "" if np.isnan(clause.margin) else f"{clause.margin:+.6g} {clause.unit}".rstrip()
+def _sides(clause: Clause) -> list[str]:
+    """Return both sides of a clause and its margin, in one unit."""
+    values = (clause.left, clause.right, clause.margin)
+    return ["" if np.isnan(u) else trimmed(clause.scale.text(u, 6)) for u in values]
 
 
 def why_html(why: Why) -> str:

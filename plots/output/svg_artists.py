@@ -17,8 +17,6 @@ import numpy as np
 
 from plots.style.matplotlib import Artist, Axes, Curve, Figure, patches
 
-# matplotlib's fonts are wider than those used for the layout.
-WIDE, MONO = 0.88, 0.975
 # Letters are not moved to whole pixels, so that a line has the width of its cell.
 EXACT: Any = {"text.hinting": "none"}
 INDEX = 0.75  # an index is smaller than that, relative to the text before it
@@ -119,8 +117,6 @@ def _artist(
 
 
 def _font(node: ElementTree.Element, scale: float) -> dict[str, Any]:
-    # The two families that matplotlib ships, so that it never searches for fonts.
-    size = scale * float(node.get("font-size", "10"))
-    if "Mono" in node.get("font-family", ""):
-        return {"fontfamily": "DejaVu Sans Mono", "fontsize": MONO * size}
-    return {"fontfamily": "DejaVu Sans", "fontsize": WIDE * size}
+    # The first of the families, which matplotlib has too, so that it never searches for fonts.
+    family, *_ = node.get("font-family", "").split(",")
+    return {"fontfamily": family, "fontsize": scale * float(node.get("font-size", "10"))}

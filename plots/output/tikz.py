@@ -1,8 +1,9 @@
 r"""Write a chart as a TikZ picture, which LaTeX sets in the fonts of a document.
 
-The result is one ``tikzpicture`` for ``\input``; its first lines name the packages. The state with
-most edges is in the middle, the others are around it. Edges between the same two states in the same
-direction are one arrow, whose label has a line for each: priority, guard and action.
+The result is one ``tikzpicture`` for ``\input``; its first lines name the packages. Without a
+layout of the chart the state with most edges is in the middle, and the others are around it. Edges
+between the same two states in the same direction are one arrow, whose label has a line for each:
+priority, guard and action.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ HEAD = r"""% {name}
 ]
 """
 CHARACTER, LINE = 0.165, 0.33  # cm: of the font above, rounded up
+POINT = 2.54 / 72  # cm
 # What TeX reads as syntax; and what looks different in some of its fonts.
 CODES: Mapping[str, str] = {
     "\\": r"\textbackslash{}",
@@ -69,7 +71,8 @@ def tikz(chart: Chart) -> str:
     for priority, edge in edges_by_priority(chart):
         text = edge_text(write, priority, edge)
         labels.setdefault((edge.source, edge.target), []).append(text)
-    places = _places(names, contents, labels)
+    places = {name: (POINT * x, -POINT * y) for name, (x, y) in chart.layout.items()}
+    places = places or _places(names, contents, labels)
     lines = []
     for i, name in enumerate(names, start=1):
         x, y = places[name]

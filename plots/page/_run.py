@@ -287,7 +287,8 @@ def _system(trace: Trace, pool: ColumnStore) -> dict[str, Any]:
     system, bodies = trace.what.system, []
     for body in system.bodies:
         motion = trace.body(body.name)
-        bodies.append({"name": body.name, "x": pool.add(motion.x), "v": pool.add(motion.v)})
+        columns = {"x": pool.add(motion.x), "v": pool.add(motion.v)}
+        bodies.append({"name": body.name, "unit": body.unit, **columns})
     sampled = {name: each.name for each in system.sampled for name in each.updates}
     given = [name for name in SystemScope.over(trace).given if name in system.signals]
     values = SystemScope.over(trace)

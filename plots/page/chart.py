@@ -42,8 +42,7 @@ def chart_svg(chart: Chart, n: int) -> str:
             _name_texts(group, sheet.state_rows(state, number))
             for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
                 guard = groups[edge_id(chart, element, "guard", edge)]
-                path = edge_id(chart, element, "edge", edge)
-                for part in (guard, groups[f"{path}-1"], groups[f"{path}-2"]):
+                for part in (guard, groups[edge_id(chart, element, "edge", edge)]):
                     part.attrib |= {"data-slot": str(number), "data-edge": str(edges)}
                 _name_texts(guard, sheet.guard_rows(edge, priority, number))
                 _make_button(guard)

@@ -27,6 +27,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, listed
 from gms_fsm.foundation.extras import missing
+from gms_fsm.foundation.quantities import PREFIXES, SMALLEST, TAKES_PREFIX
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
@@ -36,6 +37,7 @@ from gms_fsm.language import (
     OPERATIONS,
     SEVERAL,
 )
+from gms_fsm.records.units import FACTORS
 from gms_fsm.session.explain import ROUNDING
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.prove import Report
@@ -143,9 +145,9 @@ def replay(
     trace : Trace
         The run.
     other : Trace, optional
-        A second run, shown next to it on the same time axis.
+        A second run, drawn in the same plots over time.
     title : str, optional
-        Title of the page; by default the names of the models.
+        Title of the page; by default those of the scenarios, or the names of the models.
     names : sequence of str, optional
         Names of the runs; the only distinction between two runs of one model on one rig.
     window : (float, float), optional
@@ -259,9 +261,15 @@ def page_data(
         head = [*names[i : i + 1], each.title]
         runs.append({"title": ": ".join(head), "of": len(each), **run})
     data = {
-        "title": title or " and ".join(dict.fromkeys(_short(each) for each in traces)),
+        "title": title or " and ".join(dict.fromkeys(map(_heading, traces))),
         "runs": runs,
         "language": _language(),
+        "quantities": {
+            "prefixes": PREFIXES,
+            "prefixed": TAKES_PREFIX.pattern,
+            "smallest": SMALLEST,
+        },
+        "hatches": HATCH_ANGLES,
         "rounding": ROUNDING,
     }
     return data, charts
@@ -290,9 +298,9 @@ def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _part("template.html"))
 
 
-def _short(trace: Trace) -> str:
-    """Return the name of what runs."""
-    return trace.subject.title
+def _heading(trace: Trace) -> str:
+    """Return the title of the scenario, or else the name of what runs."""
+    return trace.heading or trace.subject.title
 
 
 def _language() -> dict[str, Any]:
@@ -304,6 +312,11 @@ def _language() -> dict[str, Any]:
         "sign": LEVELS["neg"],
         "functions": {name: "several" if name in SEVERAL else "one" for name in FUNCTIONS},
         "constants": dict(CONSTANTS),
+        "units": {  # each with its factor, and the unit of SI for what it measures
+            unit: [factor, next(name for name, one in units.items() if one == 1.0)]
+            for units in FACTORS.values()
+            for unit, factor in units.items()
+        },
     }
 
 

@@ -84,7 +84,7 @@ def heat(ax: Axes, trace: Trace, *, bar: bool = True, **part: Unpack[PartOptions
     if bar:
         side = ax.inset_axes((1.015, 0.0, 0.02, 1.0))
         scale = ax.figure.colorbar(picture, cax=side, ticks=[0, 0.5, 1], extend="max")
-        scale.set_label("|z| / s(v) [–]")
+        scale.set_label("$|z| / s(v)$ [–]")
         side.tick_params(length=2)
     return drawn
 

@@ -6,6 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
+from gms_fsm.language import latex_name
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import (
     Artists,
@@ -57,7 +58,7 @@ def velocity(ax: Axes, trace: Trace, *, window: Window | None = None, log: bool 
     rows = shown(trace, window)
     factor, unit = scaled(rows.v, "m/s")
     v = factor * (np.abs(rows.v) if log else rows.v)
-    ax.set_ylabel(f"{'|v|' if log else 'v'} [{unit}]")
+    ax.set_ylabel(f"{'$|v|$' if log else '$v$'} [{unit}]")
     lines = draw_curve(ax, rows.t, v, color=INK)
     if log:
         log_axis(ax, v, "y")
@@ -84,11 +85,11 @@ def force(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     """
     this = selected(trace, **part)
     rows = this.rows
-    lines = draw_curve(ax, rows.t, rows.F, color=INK, label="F")
+    lines = draw_curve(ax, rows.t, rows.F, color=INK, label="$F$")
     for i in this.elements if part.get("elements") is not None else ():
         look = element_look(i, trace.n)
         lines += draw_curve(ax, rows.t, rows.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **look)
-    ax.set_ylabel("F [N]")
+    ax.set_ylabel("$F$ [N]")
     time_axis(ax, *this.window)
     return lines
 
@@ -158,7 +159,7 @@ def ratio(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     if "s" in trace.model.chart.inputs:
         values = this.rows.z / this.rows.s
         factor, unit = (1.0, "–") if threshold else scaled(values, "m/N")
-        title = f"{trace.model.chart.variables[0]} / s(v) [{unit}]"
+        title = f"${latex_name(trace.model.chart.variables[0])} / s(v)$ [{unit}]"
     else:
         factor, title = first_variable(trace, values)
     lines = element_curves(ax, this, factor * values, "E{}")

@@ -120,7 +120,7 @@ def portrait(
         v[v == 0] = np.nan
         log_axis(ax, v, "x")
     lines = _by_slipping(ax, v, this)
-    ax.set(xlabel=f"{'|v|' if log else 'v'} [{unit}]", ylabel="F [N]")
+    ax.set(xlabel=f"{'$|v|$' if log else '$v$'} [{unit}]", ylabel="$F$ [N]")
     if bar:
         slip_bar(lines, trace, ax)
     return [lines]
@@ -161,7 +161,7 @@ def hysteresis(
     rows = this.rows
     x = rows.x - trace.x[0]
     factor, unit = scaled(x, "m") if scale is None else scale
-    ax.set(xlabel=f"x [{unit}]", ylabel="F [N]")
+    ax.set(xlabel=f"$x$ [{unit}]", ylabel="$F$ [N]")
     if slipping:
         return [_by_slipping(ax, factor * x, this)]
     begin = -np.inf

@@ -73,10 +73,10 @@ def stribeck(
     v = np.geomspace(low, top, 400) if log else np.linspace(0.0, top, 2000)
     factor, unit = scaled(v, "m/s")
     curve = model.stribeck(v)
-    drawn = draw_curve(ax, factor * v, curve, color=INK, linestyle="--", label="s(v)")
+    drawn = draw_curve(ax, factor * v, curve, color=INK, linestyle="--", label="$s(v)$")
     if model.sigma_2 > 0:
         drawn += draw_curve(
-            ax, factor * v, curve + model.sigma_2 * v, color=INK, label=r"s(v) + $\sigma_2$ |v|"
+            ax, factor * v, curve + model.sigma_2 * v, color=INK, label=r"$s(v) + \sigma_2 |v|$"
         )
     look: dict[str, Any] = {"color": PALE_GREY, "markeredgewidth": 0, "zorder": 1}
     look |= {"markersize": pt(5), "rasterized": True, "label": "run, steady sliding"}
@@ -85,7 +85,7 @@ def stribeck(
         look = {"color": INK, "markerfacecolor": PAPER, "zorder": 4}
         look |= {"markersize": pt(4.5), "label": "measured"}
         drawn += ax.plot(factor * points[0], points[1], "o", **look)
-    ax.set(xlabel=f"|v| [{unit}]", ylabel="|F| [N]")
+    ax.set(xlabel=f"$|v|$ [{unit}]", ylabel="$|F|$ [N]")
     if log:
         ax.set(xscale="log", xlim=(factor * low, 1.15 * factor * top))
     return drawn

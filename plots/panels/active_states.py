@@ -18,6 +18,7 @@ from plots.views.window import Window
 __all__ = ["ribbons"]
 
 LANE = 0.8  # height of a ribbon, in rows
+COVERED, HIGH = 0.75, 0.9  # of a span, by the ground of its name
 
 
 class _SpanName(Text):
@@ -48,15 +49,17 @@ class _SpanName(Text):
         self.set_clip_on(True)
 
     def fits(self, renderer: RendererBase) -> bool:
-        """Return whether the name is smaller than its span."""
+        """Return whether most of the span is still seen around the name and its ground."""
         assert self.axes is not None
         row = self.get_position()[1]
         corners = [
             (t, row + half) for t, half in zip(self.span, (LANE / 2, -LANE / 2), strict=True)
         ]
         (left, low), (right, high) = self.axes.transData.transform(corners)
-        extent = self.get_window_extent(renderer)
-        return bool(extent.width + 4 < right - left and extent.height < high - low)
+        patch: Any = self.get_bbox_patch()
+        self.update_bbox_position_size(renderer)
+        box = patch.get_window_extent(renderer)
+        return bool(box.width < COVERED * (right - left) and box.height < HIGH * (high - low))
 
     def draw(self, renderer: RendererBase) -> None:
         """Draw the name if it fits."""

@@ -111,7 +111,7 @@ def lag_between_ticks(ax: Axes, lags: Sequence[HeldLag], *, window: tuple[float,
         ink = compared_look(number)["color"]
         ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=pt(4))
     ax.set(
-        xlabel=f"t − {window[0]:g} s [ms]",
+        xlabel=f"$t$ − {window[0]:g} s [ms]",
         ylabel="difference of F [mN]",
         xlim=(0, MILLI * (window[1] - window[0])),
     )

@@ -16,6 +16,7 @@ from typing import Any, Literal
 from gms_fsm.errors import ParameterError
 
 Theme = Literal["light", "dark"]
+THEMES: tuple[Theme, ...] = ("light", "dark")
 
 INK = "#1B1B1B"
 TEXT_GREY = "#62676F"
@@ -141,6 +142,22 @@ _ROLES = (
     ),
 )
 ROLES: Mapping[str, Role] = MappingProxyType({role.name: role for role in _ROLES})
+# Roles where the terminal chooses the colours: numbers 0 to 15 of ANSI. It has no orange.
+ANSI: Mapping[str, int] = MappingProxyType(
+    {"active": 4, "now": 3, "holds": 2, "fails": 8, "error": 1}
+)
+
+
+def ansi(name: str, *, bold: bool = False) -> str:
+    """Return the code with which a terminal writes in the colour of a role.
+
+    Examples
+    --------
+    >>> ansi("holds"), ansi("active", bold=True), ansi("fails")
+    ('32', '1;34', '90')
+    """
+    number = ANSI[name]
+    return f"{'1;' * bold}{30 + number if number < 8 else 82 + number}"
 
 
 def colour(name: str, theme: Theme = "light") -> str:
@@ -192,9 +209,10 @@ def element_colour(i: int, n: int, theme: Theme = "light") -> str:
     return ramp("elements", n, theme)[i]
 
 
-# Lists of names; the first installed one is used.
-SANS = "Helvetica,Arial,Liberation Sans,DejaVu Sans,sans-serif"
-MONO = "DejaVu Sans Mono,Menlo,Consolas,Liberation Mono,monospace"
+# The shipped fonts; for readers of an SVG there follow others that are about as wide.
+SANS_FONT, MONO_FONT = "DejaVu Sans", "DejaVu Sans Mono"
+SANS = f"{SANS_FONT},Verdana,Arial,sans-serif"
+MONO = f"{MONO_FONT},Menlo,Lucida Console,monospace"
 
 ELEMENT_STEPS = 7  # of a page and a schematic; dashes repeat only after the colours
 ELEMENT_COLOURS = ramp("elements", ELEMENT_STEPS)
@@ -255,6 +273,8 @@ def compared_look(number: int) -> dict[str, Any]:
 
 RC: Any = {  # matplotlib types each key separately
     "font.family": "sans-serif",
+    "font.sans-serif": [SANS_FONT],
+    "font.monospace": [MONO_FONT],
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",

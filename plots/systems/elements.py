@@ -13,6 +13,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.quantities import in_words
 from gms_fsm.traces.trace import Trace, check_trace
 from plots.panels.parts.selection import checked_row, scaled
 from plots.style import (
@@ -139,7 +140,7 @@ def _numbers(trace: Trace | None, i: int) -> tuple[str, str]:
             continue
         value = np.broadcast_to(values[name], trace.n)[i]
         unit = trace.model.chart.unit(name)
-        texts.append(f"{symbols[name].format(i + 1)} = {value:.4g} {unit}".rstrip())
+        texts.append(f"{symbols[name].format(i + 1)} = {in_words(float(value), unit, 4)}")
     return texts[0], texts[1]
 
 

@@ -12,6 +12,7 @@ from plots.style.matplotlib import Figure, rc_context
 from plots.systems.mechanical_layout import (
     ABOVE,
     BRISTLE,
+    LEG,
     STUB,
     BodyColumn,
     DrawnSpring,
@@ -38,6 +39,7 @@ from plots.systems.system_diagram import signal_text
 
 MARGIN = 0.3
 FOOT = 90  # characters of a line below the drawing
+ROUND, BEND = 0.3, 0.4  # of what turns: corners of its box, heights of its arrows
 
 
 def mechanical_figure(system: System) -> Figure:
@@ -88,8 +90,9 @@ def _extent(pen: Pen) -> tuple[float, float, float, float]:
 def _columns(pen: Pen, layout: MechanismLayout) -> None:
     for column in layout.columns:
         body, high = column.body, layout.high
-        fill = PAPER if body.driven else PANEL
-        pen.box(column.left, 0.0, column.width, high, f"body {body.name}", fill=fill)
+        fill, corner = PAPER if body.driven else PANEL, ROUND if body.motion == "turning" else 0.0
+        gid = f"body {body.name}"
+        pen.box(column.left, 0.0, column.width, high, gid, fill=fill, corner=corner)
         name, inertia = column.texts
         middle = column.left + 0.5 * column.width
         rise = 0.17 if inertia else 0.0
@@ -100,29 +103,48 @@ def _columns(pen: Pen, layout: MechanismLayout) -> None:
         _force(pen, column, high)
     for slot, x in slots_of(layout.columns):
         y = layout.belts[slot.belt] if slot.belt else -BRISTLE
-        _below(pen, slot.touch, x, x + slot.width, y, belt=bool(slot.belt))
+        if slot.touch is None:
+            _legs(pen, slot.links, x)
+        else:
+            _below(pen, slot.touch, x, x + slot.width, y, belt=bool(slot.belt))
 
 
 def _motion(pen: Pen, column: BodyColumn, high: float) -> None:
     """Draw the direction in which the position of a body counts, or how a driven body moves."""
-    x, y = column.left + 0.3, high + 0.35
-    if not column.body.driven:
-        pen.line([(x, y - 0.17), (x, y + 0.17)], lw=0.9)
-    gid = f"velocity {column.body.name}" if column.body.driven else ""
-    pen.arrow((x, y), (x + 0.7, y), gid, lw=1.8 if column.body.driven else 0.9)
+    body, x, y = column.body, column.left + 0.3, high + 0.35
+    gid, lw = (f"velocity {body.name}", 1.8) if body.driven else (f"position {body.name}", 0.9)
+    match body.motion:
+        case "turning":
+            pen.arrow((x, y - 0.15), (x + 0.7, y - 0.15), gid, lw=lw, bend=BEND)
+        case "normal":
+            x += 0.2
+            if not body.driven:
+                pen.line([(x - 0.17, high + 0.1), (x + 0.17, high + 0.1)], lw=0.9)
+            pen.arrow((x, high + 0.1), (x, high + 0.7), gid, lw=lw)
+            x -= 0.6
+        case _:
+            if not body.driven:
+                pen.line([(x, y - 0.17), (x, y + 0.17)], lw=0.9)
+            pen.arrow((x, y), (x + 0.7, y), gid, lw=lw)
     pen.text(x + 0.8, y, column.motion, ha="left")
 
 
 def _force(pen: Pen, column: BodyColumn, high: float) -> None:
-    """Draw what acts on a body besides springs, dampers and contacts, to the right if positive."""
+    """Draw what acts on a body besides springs, dampers and contacts, as if it were positive."""
     if not column.force:
         return
     x, y = column.left + 0.12, high + 0.95
-    pen.line([(x, high), (x, y)])
-    pen.arrow((x, y), (x + 0.8, y), f"force {column.body.name}")
+    gid, text = f"force {column.body.name}", x + 0.9
+    if column.body.motion == "normal":
+        pen.arrow((x, high), (x, y + 0.2), gid)
+        text = x + 0.25
+    else:
+        turns = column.body.motion == "turning"
+        pen.line([(x, high - 0.2 * ROUND * turns), (x, y)])  # from the round corner
+        pen.arrow((x, y), (x + 0.8, y), gid, bend=BEND * turns)
     lines = column.force
     for k, line in enumerate(lines):
-        pen.text(x + 0.9, y + LINE * (len(lines) - 1 - k), line, ha="left")
+        pen.text(text, y + LINE * (len(lines) - 1 - k), line, ha="left")
 
 
 def _below(pen: Pen, touch: Touch, left: float, right: float, y: float, *, belt: bool) -> None:
@@ -143,6 +165,18 @@ def _below(pen: Pen, touch: Touch, left: float, right: float, y: float, *, belt:
         pen.text(middle, under - LINE * (k + 1), line, colour=TEXT_GREY)
 
 
+def _legs(pen: Pen, links: tuple[DrawnSpring, ...], left: float) -> None:
+    """Draw springs and dampers between a body and the ground below it."""
+    x = left + 0.35
+    for link in links:
+        points = spring_points if link.kind == "spring" else damper_points
+        upright = points(-LEG, 0.0, x)[:, ::-1]
+        pen.line(upright, gid=f"{link.kind} {link.constant}")
+        pen.floor(x - 0.25, x + 0.25, -LEG)
+        pen.text(x + 0.2, -0.5 * LEG, link.label, ha="left")
+        x += 0.65 + width(link.label)
+
+
 def _belts(pen: Pen, layout: MechanismLayout) -> None:
     for name, y in layout.belts.items():
         own = ((slot, x) for slot, x in slots_of(layout.columns) if slot.belt == name)
@@ -150,7 +184,9 @@ def _belts(pen: Pen, layout: MechanismLayout) -> None:
         left, right = min(span[0] for span in spans) - 0.2, max(span[1] for span in spans) + 0.2
         pen.box(left, y - 0.28, right - left, 0.28, f"body {name}", fill=PAPER)
         body = layout.bodies[name]
-        pen.arrow((right + 0.1, y - 0.14), (right + 0.8, y - 0.14), f"velocity {name}", lw=1.8)
+        start, end = (right + 0.1, y - 0.14), (right + 0.8, y - 0.14)
+        bend = BEND * (body.motion == "turning")
+        pen.arrow(start, end, f"velocity {name}", lw=1.8, bend=bend)
         pen.text(right + 0.9, y + 0.03, name, size=NAME, bold=True, ha="left")
         pen.text(right + 0.9, y - 0.29, motion_of(body), ha="left")
 

@@ -3,7 +3,8 @@
 Bodies stand next to each other; a driven body that others only rub on is a belt below them.
 Springs, dampers and contacts between two neighbours lie one above the other in the gap between
 them. What joins bodies that are no neighbours passes above the others. Friction on the ground or on
-a belt is below its body, an end stop on the side on which it is hit.
+a belt is below its body, an end stop on the side on which it is hit; so are the springs of a body
+that moves normal to the ground.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import permutations
 
-from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.registry import charts
 from gms_fsm.language import (
     MATLAB_LIKE,
@@ -36,6 +36,7 @@ ABOVE = 0.75  # from the top of a contact's lane to the middle of its symbol
 MOST_ORDERED = 7  # bodies; of more, all orders are too many to try
 BELOW = 1.75  # from the ground to a belt under it, and from one belt to the next
 BRISTLE = 0.35  # from the bottom of a body to what it rubs on
+LEG = 1.3  # from the bottom of a body to the ground under a spring
 STUB = 0.25  # between lines that pass above other bodies
 GROUND = ""  # stands for the name of a body where there is none
 # Contacts with a symbol of their own; all other included charts, and those that can lock, are
@@ -61,6 +62,7 @@ class Touch:
     contact: Contact
     symbol: str
     shares: Mapping[str, tuple[int, str]]
+    unit: str  # of its position
 
 
 @dataclass(frozen=True)
@@ -109,14 +111,17 @@ class Item:
 
 @dataclass(frozen=True)
 class Slot:
-    """A contact below a body: with the ground, or with a belt."""
+    """What is below a body: a contact with the ground or with a belt, or springs to the ground."""
 
-    touch: Touch
-    belt: str
+    touch: Touch | None
+    belt: str = GROUND
+    links: tuple[DrawnSpring, ...] = ()
 
     @property
     def width(self) -> float:
         """Width that it needs."""
+        if self.touch is None:
+            return sum(0.65 + width(link.label) for link in self.links) + 0.3
         texts = [width(line) for line in label_of(self.touch)]
         return 0.35 + max(1.2, width(self.touch.contact.name, NAME, bold=True), *texts)
 
@@ -225,6 +230,9 @@ def arranged(system: System) -> MechanismLayout:
     below = _slots(touches, belts)
     level = [*_sprung(system), *_touching(touches, belts)]
     row = _ordered([name for name in bodies if name not in belts], level)
+    for item in [each for each in level if _is_leg(bodies[each.left], each)]:
+        level.remove(item)
+        below[item.left].append(Slot(None, links=item.links))
     columns = [
         BodyColumn(bodies[name], tuple(below[name]), _lines(force_of(system, bodies[name])))
         for name in row
@@ -237,6 +245,12 @@ def arranged(system: System) -> MechanismLayout:
     return layout
 
 
+def _is_leg(body: Body, item: Item) -> bool:
+    """Return whether springs stand between a body and the ground below it."""
+    to_ground = item.right == GROUND and item.touch is None and not item.drive
+    return body.motion == "normal" and to_ground
+
+
 def label_of(touch: Touch) -> list[str]:
     """Return the lines under the symbol of a contact."""
     contact = touch.contact
@@ -245,7 +259,7 @@ def label_of(touch: Touch) -> list[str]:
     if _of_many(touch):
         lines += [formula(v) for v in contact.v]
     for name in SHOWN.get(touch.symbol, ()):
-        lines.append(_number(contact.chart, name, contact.values[name]))
+        lines.append(_number(touch, name))
     return lines
 
 
@@ -254,14 +268,11 @@ def _of_many(touch: Touch) -> bool:
     return len(touch.shares) > 2 or len(touch.contact.v) > 1
 
 
-def _number(chart: Chart, name: str, value: object) -> str:
+def _number(touch: Touch, name: str) -> str:
+    """Return a number of a contact, which is a length or an angle."""
+    value = touch.contact.values[name]
     shown = f"{value:.4g}" if isinstance(value, int | float) else "…"
-    unit = chart.unit(name)
-    return (
-        f"{formula(name)} = {shown} {unit}".rstrip()
-        if unit not in ("", "?")
-        else f"{formula(name)} = {shown}"
-    )
+    return f"{formula(name)} = {shown} {touch.unit}"
 
 
 def _wrapped(text: str) -> list[str]:
@@ -289,7 +300,9 @@ def _touch(system: System, contact: Contact) -> Touch:
             if share is not None and share != Number(0.0):
                 shares.setdefault(body.name, _share(share))
     many = len(shares) > 2 or len(contact.v) > 1
-    return Touch(contact, "box" if many else _symbol(contact), shares)
+    units = {system.body(name).unit for name in shares}
+    symbol = "box" if many else _symbol(contact)
+    return Touch(contact, symbol, shares, units.pop() if len(units) == 1 else "m")
 
 
 def _share(tree: Value) -> tuple[int, str]:

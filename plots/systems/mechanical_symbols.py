@@ -19,6 +19,7 @@ from plots.style.matplotlib import (
     Artist,
     Axes,
     FancyArrowPatch,
+    FancyBboxPatch,
     Figure,
     FigureCanvasAgg,
     Rectangle,
@@ -137,11 +138,14 @@ def damper_points(left: float, right: float, y: float) -> Points:
     return np.array(_joined(strokes))
 
 
-def arrow_between(ax: Axes, start: Point, end: Point, *, size: float, lw: float) -> Artist:
-    """Draw an arrow."""
+def arrow_between(
+    ax: Axes, start: Point, end: Point, *, size: float, lw: float, bend: float = 0.0
+) -> Artist:
+    """Draw an arrow; its bend is the height of the arc, in its length."""
     look: dict[str, Any] = {"color": INK, "linewidth": lw, "linestyle": "-", "zorder": 5}
     look |= {"arrowstyle": "-|>", "mutation_scale": size, "shrinkA": 0, "shrinkB": 0}
-    return ax.add_patch(FancyArrowPatch(start, end, **look))
+    arc = f"arc3,rad={-2.0 * bend}"
+    return ax.add_patch(FancyArrowPatch(start, end, connectionstyle=arc, **look))
 
 
 def hatched(
@@ -198,11 +202,14 @@ class Pen:
         *,
         fill: str = PANEL,
         line: float = 1.3,
+        corner: float = 0.0,
     ) -> None:
-        """Draw a rectangle."""
-        patch = Rectangle(
-            (left, bottom), wide, high, facecolor=fill, edgecolor=INK, linewidth=line, zorder=2
-        )
+        """Draw a rectangle, which may have round corners."""
+        look: dict[str, Any] = {"facecolor": fill, "edgecolor": INK, "linewidth": line, "zorder": 2}
+        patch: Rectangle | FancyBboxPatch = Rectangle((left, bottom), wide, high, **look)
+        if corner:
+            style = f"round,pad=0,rounding_size={corner}"
+            patch = FancyBboxPatch((left, bottom), wide, high, boxstyle=style, **look)
         self.keep(self.ax.add_patch(patch), gid)
 
     def ground(self, left: float, bottom: float, wide: float, high: float) -> None:
@@ -239,9 +246,11 @@ class Pen:
         )
         self.keep(drawn, gid)
 
-    def arrow(self, start: Point, end: Point, gid: str = "", *, lw: float = 1.3) -> None:
+    def arrow(
+        self, start: Point, end: Point, gid: str = "", *, lw: float = 1.3, bend: float = 0.0
+    ) -> None:
         """Draw an arrow."""
-        self.keep(arrow_between(self.ax, start, end, size=10, lw=lw), gid)
+        self.keep(arrow_between(self.ax, start, end, size=10, lw=lw, bend=bend), gid)
 
     # ----------------------------------------------------------------- contacts, level
     def friction_between(self, left: float, right: float, y: float, gid: str) -> None:

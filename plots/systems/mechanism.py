@@ -27,8 +27,9 @@ def schematic(system: System) -> Figure:
     their own; any other contact is a box. A driven body that others rub on is a belt. The number in
     a box on a line is a gear ratio.
 
-    A system says neither directions nor which of its bodies turn, so all bodies are drawn as
-    masses in a row, in an order in which connections are short.
+    All bodies stand in a row, in an order in which connections are short. The `motion` of a body
+    says whether it turns (round corners, bent arrows), and whether it moves normal to what it rubs
+    on (upright arrows and springs).
 
     Parameters
     ----------

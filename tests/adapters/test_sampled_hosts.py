@@ -189,7 +189,7 @@ def test_the_servo_in_pathsim_is_reset_continued_and_stops_where_it_should() -> 
     assert friction.switches is not switches
     simulation.run(0.15)
     assert x_l.state[0] == pytest.approx(LOAD, rel=5e-3)
-    assert len(friction.switches) == 24
+    assert len(friction.switches) == 30
 
 
 @pytest.mark.slow

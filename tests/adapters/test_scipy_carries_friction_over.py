@@ -1,6 +1,6 @@
 """Calls of `adapters.scipy.solve_ivp` go on where the last one ended: a controller between them.
 
-The servo of scenarios/servo.toml with its PID controller in Python: the load is at 1.3299 mm.
+The scenario servo with its PID controller in Python: the load is at 1.3215 mm.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ def _servo(**options: Any) -> tuple[float, int]:
 )
 def test_the_servo(how: dict[str, Any], error: float) -> None:
     where, switches = _servo(**how)
-    assert where == pytest.approx(1.32993e-3, rel=error)
-    assert switches == 24
+    assert where == pytest.approx(1.32149e-3, rel=error)
+    assert switches == 30
 
 
 def _mass(t: float, y: Any, F: float) -> list[float]:

@@ -14,7 +14,6 @@ from textual.pilot import Pilot
 from gms_fsm.app.scenario import load_scenario, session_of
 from gms_fsm.debugger.tui._app import FullScreen
 from gms_fsm.session.session import Session
-from tests.helpers import ROOT
 
 FIG_4 = "paper_fig4_stick_slip"
 SMALL, LARGE = (80, 24), (200, 60)
@@ -23,7 +22,7 @@ WIDE = 12.2  # of a character in an exported picture
 
 def session(scenario: str = FIG_4) -> Session:
     """Return a new session of a scenario."""
-    return session_of(load_scenario(ROOT / "scenarios" / f"{scenario}.toml"))
+    return session_of(load_scenario(scenario))
 
 
 async def settle(pilot: Pilot[Any]) -> None:

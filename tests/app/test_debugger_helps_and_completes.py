@@ -83,7 +83,7 @@ def test_an_unexpected_failure_does_not_end_the_session(monkeypatch: pytest.Monk
     made = debugger(fig4())
     monkeypatch.setattr(made.commands, "do_where", lambda arg: 1 / 0)
     assert made.reply("where") == "error: ZeroDivisionError: division by zero"
-    assert made.reply("print t") == "0"
+    assert made.reply("print t") == "0 s"
 
 
 @pytest.mark.slow

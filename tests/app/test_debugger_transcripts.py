@@ -14,13 +14,13 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition, simulate
-from gms_fsm.app.scenario import load_scenario, run_debugger, session_of
+from gms_fsm.app.scenario import load_scenario, run_debugger
 from gms_fsm.session.session import Session
-from tests.helpers import ROOT
+from tests.helpers import ROOT, pulled_mass
 from tests.inspection.sessions import a_system, both_ways, debugger, fig4, locked, warming
 
 APPROVED = Path(__file__).with_name("debugger.approved.txt")
-SCENARIOS = ROOT / "scenarios"
+SCENARIOS = ROOT / "gms_fsm/scenarios"
 FIG_4 = "paper_fig4_stick_slip"
 PROMPT = ">>> "
 
@@ -62,9 +62,7 @@ CASES = (Transition("go", "on", "ON", guard="z > 1"), Transition("Go", "ON", "on
 BAD = Transition("go", "on", "off", guard="0 / (z - z) > 0")
 SESSIONS: dict[str, Callable[[], Session]] = {
     "fig 4": fig4,
-    "pulled mass": lambda: session_of(
-        load_scenario(SCENARIOS / "pulled_mass.toml", ["run.t_end=20.0"])
-    ),
+    "pulled mass": lambda: Session(*pulled_mass(), 20.0),
     "a chart of one's own": warming,
     "two elements of it": lambda: warming(2),
     "a spring": lambda: _of(_element(states=("on",)), 2, t_start=1.0),

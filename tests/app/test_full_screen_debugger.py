@@ -14,7 +14,7 @@ pytest.importorskip("textual", reason="needs the extra tui")
 
 from gms_fsm import Prescribed
 from gms_fsm.debugger import COMMANDS
-from gms_fsm.debugger.tui import _app, run_tui
+from gms_fsm.debugger.tui import CLEARED, LOADING, _app, quiet, run_tui
 from gms_fsm.debugger.tui._app import FullScreen
 from gms_fsm.debugger.tui._keys import KEYS
 from gms_fsm.debugger.tui._spans import DARK, LIGHT
@@ -47,8 +47,9 @@ def _row(app: FullScreen) -> int:
 
 
 def _all_said(app: FullScreen, texts: list[str]) -> None:
+    said = "\n".join(app.said).replace("µ", "u")  # as the prompt writes it in plain text
     for text in texts:
-        assert text.replace("\n  by", " by") in "\n".join(app.said)
+        assert text.replace("\n  by", " by") in said
 
 
 def test_keys_find_out_why_on_a_small_screen() -> None:
@@ -62,7 +63,7 @@ def test_keys_find_out_why_on_a_small_screen() -> None:
         assert app.number == ""
         await press(pilot, "2", "5", "w")
         seen = screen_text(app)
-        for text in (ANSWER, "-776.2 mm", "✗ |z| < s", "24.9999735 s"):
+        for text in (ANSWER, "-0.7762 m", "✗ |z| < s", "24.9999735 s"):
             assert text in seen
         assert ANSWER in app.panels["why"].shown.replace("\n  ", " ")
         assert ANSWER in app.said
@@ -113,7 +114,7 @@ def test_moves_end_where_those_of_the_prompt_end() -> None:
         asked = [line.partition(") ")[2] for line in app.said if line.startswith("(t=")]
         assert [each.removesuffix(".0") for each in asked] == lines
         _all_said(app, answers(FIG_4, *lines))
-        await press(pilot, "home", "n", "s", "s", "s", "s", "b", "c", "w")
+        await press(pilot, "home", "n", "s", "s", "s", "s", "1", "e", "b", "c", "w")
         said = answers(FIG_4, "next", *["step"] * 4, "break valid arrest element 1", "continue")
         assert said[6].startswith("breakpoint 1: valid arrest, element 1\nrow ")
         _all_said(app, said[5:])
@@ -121,7 +122,14 @@ def test_moves_end_where_those_of_the_prompt_end() -> None:
         assert "● 1 valid arrest, element 1; hits: 1" in app.panels["session"].shown
         await press(pilot, "home", "7", "b")
         assert app.said[-1] == "error: stick has 2 edges, so there is no edge 7"
-        await press(pilot, "2", "b")
+        await press(pilot, "home", "n", "s", "s")
+        assert app.commands.element == 2
+        assert "FIRED E3 stick → slip  break_away_forward" in screen_text(app).splitlines()[0]
+        assert "break_away_forward FIRED" in app.panels["chart"].shown
+        await press(pilot, "f", "s")
+        assert app.commands.element == 2  # another one fired, which is not followed
+        assert "FIRED E4" in screen_text(app).splitlines()[0]
+        await press(pilot, "home", "1", "e", "2", "b")
         points = app.commands.session.breakpoints
         assert [point.name for point in points] == ["arrest", "break_away_backward"]
 
@@ -163,7 +171,9 @@ def test_commands_are_completed_remembered_and_repeated() -> None:
         assert "branches" in screen_text(app).splitlines()[-1]
         await press(pilot, *typed("eak ar"), "tab")
         assert prompt.value == "break arrest "
-        await press(pilot, "enter", *typed("goto 25"), "enter", "up")
+        await press(pilot, "enter")
+        assert app.focused is None  # keys are keys again after a command
+        await press(pilot, "colon", *typed("goto 25"), "enter", "colon", "up")
         assert prompt.value == "goto 25"
         await press(pilot, "up")
         assert prompt.value == "break arrest"
@@ -174,9 +184,11 @@ def test_commands_are_completed_remembered_and_repeated() -> None:
         await press(pilot, "escape", "s")
         assert app.focused is None
         assert app.said[-2].startswith("(t=25.0000 s) step")
-        await press(pilot, "home", "colon", *typed("step 3"), "enter", "enter", "enter")
+        await press(
+            pilot, "home", "colon", *typed("step 3"), "enter", "colon", "enter", "colon", "enter"
+        )
         assert _row(app) == 9
-        await press(pilot, *typed("quit"), "enter")
+        await press(pilot, "colon", *typed("quit"), "enter")
 
     assert drive(action, light=True).return_value == 0
 
@@ -267,7 +279,7 @@ def test_every_colour_can_be_read_on_its_ground(palette: Any, grounds: tuple[str
 
 def test_it_says_what_it_needs(gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
     """Textual, a terminal that can place text, a valid scenario; --light is an option of it."""
-    path = ROOT / "scenarios" / f"{FIG_4}.toml"
+    path = ROOT / "gms_fsm/scenarios" / f"{FIG_4}.toml"
     one_message(
         gms_fsm("debug", "--tui", path), "needs a terminal", "without --tui it reads commands"
     )
@@ -288,7 +300,7 @@ def test_without_textual_the_extra_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "textual", None)
     one_message(
-        gms_fsm("debug", "--tui", ROOT / "scenarios" / f"{FIG_4}.toml"),
+        gms_fsm("debug", "--tui", ROOT / "gms_fsm/scenarios" / f"{FIG_4}.toml"),
         "the full-screen debugger needs textual, which is not installed",
         'pip install "gms-fsm[tui]"',
         "without --tui answers at a prompt",
@@ -331,3 +343,19 @@ def test_on_a_terminal_it_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(FullScreen, "run", lambda _: 3)
     assert run_tui(session()) == 3
+    assert sys.stdout.getvalue() == f"{LOADING}{CLEARED}"  # type: ignore[attr-defined]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such terminal")
+def test_keys_typed_while_it_opens_are_not_echoed(monkeypatch: pytest.MonkeyPatch) -> None:
+    import pty
+    import termios
+
+    outer, inner = pty.openpty()
+    with open(outer, "wb", buffering=0), open(inner) as terminal:
+        monkeypatch.setattr(sys, "stdin", terminal)
+        echo = [termios.tcgetattr(terminal)[3] & termios.ECHO]
+        with quiet():
+            echo.append(termios.tcgetattr(terminal)[3] & termios.ECHO)
+        echo.append(termios.tcgetattr(terminal)[3] & termios.ECHO)
+    assert echo == [termios.ECHO, 0, termios.ECHO]

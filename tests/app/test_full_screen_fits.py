@@ -11,7 +11,6 @@ pytest.importorskip("textual", reason="needs the extra tui")
 from gms_fsm import Prescribed
 from gms_fsm.debugger.tui._app import PAGES, FullScreen
 from gms_fsm.debugger.tui._widgets import Panel
-from gms_fsm.foundation.quantities import quantity
 from gms_fsm.session.session import Session
 from tests.app.full_screen import LARGE, SMALL, drive, press, screen_text, session, settle
 from tests.helpers import FIG4_SINE, bank
@@ -42,7 +41,7 @@ def _check(app: FullScreen, size: tuple[int, int]) -> set[str]:
     status = screen_text(app).splitlines()[: app.status.region.height]
     assert f"t = {app.seen.t:.9g} s" in status[0]
     for contact in app.seen.contacts:
-        assert any(f"F = {quantity(contact.F, 'N')}" in text for text in status)
+        assert any(contact.here.written("F") in text for text in status)
     bar = app.keys
     assert bar.places[-1][1] <= size[0]
     assert [place[2] for place in bar.places[-2:]] == ["help", "leave"]

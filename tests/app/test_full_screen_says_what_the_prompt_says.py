@@ -12,7 +12,7 @@ pytest.importorskip("textual", reason="needs the extra tui")
 from gms_fsm.debugger import Debugger, view
 from gms_fsm.debugger._text import DRAWN
 from gms_fsm.debugger.tui._app import FullScreen
-from gms_fsm.foundation.quantities import quantity
+from gms_fsm.foundation.quantities import trimmed
 from tests.app.full_screen import LARGE, drive, session, settle
 from tests.app.test_debugger_is_plain_text import EVERYTHING
 
@@ -54,20 +54,22 @@ def test_panels_show_the_values_of_the_view_with_units() -> None:
     seen = view(made)
     shown = app.panels["elements"].shown
     rows = re.findall(r"^[▶ ] E\d.*", shown, re.MULTILINE)
+    scales = seen.contacts[0].scales
+    assert scales["z"].unit == scales["s"].unit == "mm"
     for row, each in zip(rows, seen.elements, strict=True):
         assert row.split()[-2 - len(each.edges) :]
         assert f" {each.state} " in row
-        assert f" {quantity(each.F, 'N')} " in row
+        assert f" {scales['F'].text(each.F)} " in row
         if each.s is not None and each.ratio is not None:
-            assert f" {quantity(each.s, 'm')} " in row
+            assert f" {scales['s'].text(each.s)} " in row
             assert f" {each.ratio:.3f} " in row
-            assert f" {quantity(each.variables[0], 'm')} " in row
+            assert f" {scales['z'].text(each.variables[0])} " in row
     why = made.why(app.commands.elements.address(0))
     text = app.panels["why"].shown
     for each in why:
         assert each.verdict in _lines(text)
         for clause in each.clauses:
-            margin = quantity(clause.margin, clause.unit) if clause.relative else "0, rounding"
+            margin = trimmed(clause.scale.text(clause.margin)) if clause.relative else "0, rounding"
             pattern = (
                 rf"{'✓' if clause.holds else '✗'} {re.escape(clause.text)} .* {re.escape(margin)} "
             )

@@ -14,12 +14,12 @@ from rich.console import Console
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.app.live import BETWEEN_FRAMES, CURVE, LiveView
 from gms_fsm.errors import OutputError
-from gms_fsm.foundation.quantities import quantity
+from gms_fsm.foundation.quantities import Scale, quantity, scale_of
 from gms_fsm.run.simulate import Moment
 from tests.helpers import FASTEST, FIG4_SINE, ROOT, open_loop, pulled_mass, stick_slip
 from tests.scenario_files import CommandLine
 
-FIG_4 = str(ROOT / "scenarios" / "paper_fig4_stick_slip.toml")
+FIG_4 = str(ROOT / "gms_fsm/scenarios" / "paper_fig4_stick_slip.toml")
 END = 12.0  # s
 
 
@@ -113,8 +113,8 @@ def test_each_frame_shows_the_time_of_the_clock(engine: str, pace: float, clock:
         assert f"t = {record.t:.9g} s  element {record.element + 1}: " in last
     assert f"last transitions ({len(trace.transitions)} so far)" in last
     assert f"{pace:g} simulated seconds per second" in last
-    assert re.search(r"\nv [▁▂▃▄▅▆▇█]+ -?[\d.]+ [mµ]?m/s to -?[\d.]+ [mµ]?m/s", last)
-    assert re.search(r"\nF [▁▂▃▄▅▆▇█]+ -?[\d.]+ m?N to -?[\d.]+ m?N", last)
+    assert re.search(r"\nv [▁▂▃▄▅▆▇█]+ -?[\d.]+ to -?[\d.]+ mm/s", last)
+    assert re.search(r"\nF [▁▂▃▄▅▆▇█]+ -?[\d.]+ to -?[\d.]+ N", last)
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_without_a_terminal_each_transition_is_one_plain_line(clock: Clock) -> N
         (f"{record.t:.9g}", str(record.element + 1), record.source, record.target, record.edge)
         for record in trace.transitions
     ]
-    lines = re.findall(r"^t = (\S+) m?s: v = \S+ \S+, F = \S+ m?N, \d \w+", text, re.MULTILINE)
+    lines = re.findall(r"^t = (\S+) s: v = \S+ \S+, F = \S+ m?N, \d \w+", text, re.MULTILINE)
     assert len(lines) == pytest.approx(END / 4.0, abs=2)  # one per second of the clock
 
 
@@ -219,7 +219,7 @@ def test_the_table_shows_state_bar_ratio_v_and_F(until: float) -> None:
     simulate(stick_slip("signed"), open_loop(), until, max_step=0.05, progress=note)
     ((t, text, seen, states),) = last
     lines = text.splitlines()
-    for part in (f"t = {quantity(t, 's', digits=5)}", quantity(seen["v"], "m/s")):
+    for part in (f"t = {Scale(0, 's').text(t, 5)} ", quantity(seen["v"], "m/s")):
         assert part in lines[0]
     assert f" {quantity(seen['F'], 'N')} " in lines[0]
     for i, state in enumerate(states):
@@ -227,7 +227,7 @@ def test_the_table_shows_state_bar_ratio_v_and_F(until: float) -> None:
         assert state in line.lower()
         ratio = abs(seen["z"][i]) / seen["s"][i]
         assert f"{ratio:.3f}" in line
-        assert f" {quantity(seen['z'][i], 'm')} " in line
+        assert f" {scale_of(seen['z'], 'm').text(seen['z'][i])} " in line
         assert line.count("█") == min(20, round(20 * ratio))
         assert line.count("█") + line.count("░") == 20
 

@@ -52,14 +52,14 @@ def test_a_table_becomes_a_page_numbers_and_pictures(tmp_path: Path) -> None:
         *(f"{name}.{end}" for name in ("matrix", *DRAWN) for end in ("png", "svg")),
     }
     page = files[0].read_text(encoding="utf-8")
-    assert "| one | ● 0.25 N |" in page
-    assert "| two | ✗ 0.25 N |" in page
+    assert "| one | ● 0.250 N | ● 0.2 N | ● 0.2 N | ● 0.250 N |" in page
+    assert "| two | ✗ 0.250 N |" in page
     assert "- four does not take part: it is a gear." in page
     assert "- **three** failed: t = 1 s: it chatters" in page
     assert "Limit: 0.02 for change of the break-away force" in page
     assert "other 0.000" in page  # small, but not exactly 0
     svg = (tmp_path / "matrix.svg").read_text(encoding="utf-8")
-    assert svg.count("0.25 N") >= 2 * len(DRAWN)
+    assert svg.count("0.250 N") == len(DRAWN)
     assert "four" not in svg
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
-from gms_fsm import Chart, State, Transition
+from gms_fsm import Chart, Prescribed, State, Stribeck, Trace, Transition, simulate
+from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.errors import OutputError
+from gms_fsm.systems.models import ChartModel
 
 
 def test_a_planar_chart_and_plain_names_are_written_as_one_would(tmp_path: Path) -> None:
@@ -34,6 +37,23 @@ def test_a_planar_chart_and_plain_names_are_written_as_one_would(tmp_path: Path)
     assert Chart.load(path) == chart
 
 
+def test_a_layout_is_kept_by_files_of_charts_and_of_runs(tmp_path: Path) -> None:
+    layout = {"stick": (0.0, 0.0), "slip": (320.0, 150.5)}
+    chart = GMS_ELEMENT["signed"].placed(layout)
+    path = chart.save(tmp_path / "moved.toml")
+    assert tomllib.loads(path.read_text(encoding="utf-8"))["layout"] == {
+        "stick": [0.0, 0.0],
+        "slip": [320.0, 150.5],
+    }
+    assert Chart.load(path).layout == layout
+    model = ChartModel(chart, {"k": 1.0, "sigma": 0.1, "C": 1.0, "v_c": 1e-6}, n=1, stribeck=CURVE)
+    trace = simulate(model, Prescribed("0.1"), 0.1).save(tmp_path / "run.npz")
+    assert Trace.load(trace).model.chart.layout == layout
+    assert "layout" not in GMS_ELEMENT["signed"].save(tmp_path / "plain.toml").read_text()
+    assert chart.placed({}).layout == {}
+
+
+CURVE = Stribeck(1.0, 1.5, 0.05)
 CHART = Chart("one", states=(State("a"),), outputs={"F": "v"})
 
 
@@ -43,3 +63,11 @@ def test_what_no_file_can_store_is_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="which no file can store"):
         Chart("\ud800", states=(State("a"),), outputs={"F": "v"}).save(tmp_path / "one.toml")
     assert not (tmp_path / "one.toml").exists()
+
+
+def test_charts_are_shown_and_compared_by_what_their_authors_wrote() -> None:
+    derived = {each.name for each in fields(Chart) if not each.init}
+    assert derived == {"guards", "flows", "assignments", "forces", "lets", "totals"}
+    assert [each.name for each in fields(Chart) if each.repr != each.init] == []
+    # Charts that only look different are equal.
+    assert [each.name for each in fields(Chart) if each.compare != each.init] == ["layout"]

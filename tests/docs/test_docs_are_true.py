@@ -16,8 +16,8 @@ import pytest
 
 from gms_fsm.app.scenario import Scenario
 from gms_fsm.exporters import FORMATS, formats
-from tests.helpers import matrix
-from tests.page_blocks import ROOT, Page, agrees, blocks_of
+from tests.helpers import ROOT, matrix
+from tests.page_blocks import Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow
 
@@ -100,7 +100,7 @@ def test_page(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 def _part_of_a_scenario(text: str) -> None:
     """Check that a part of a scenario fits into an included one."""
-    whole = tomllib.loads((ROOT / "scenarios/pulled_mass.toml").read_text(encoding="utf-8"))
+    whole = tomllib.loads((ROOT / "gms_fsm/scenarios/pulled_mass.toml").read_text(encoding="utf-8"))
     for name, table in tomllib.loads(text).items():
         whole[name] = whole.get(name, {}) | table if isinstance(table, dict) else table
     Scenario.model_validate(whole)

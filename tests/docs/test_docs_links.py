@@ -56,7 +56,7 @@ def test_links(path: Path) -> None:
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_named_files_and_modules_exist(path: Path) -> None:
-    names = r"`((?:benchmarks|docs|gms_fsm|integrators|plots|scenarios|tests)/[\w./-]+\.\w+)`"
+    names = r"`((?:benchmarks|docs|gms_fsm|integrators|plots|tests)/[\w./-]+\.\w+)`"
     for name in re.findall(names, prose(path)):
         if not re.search(r"lN_name|lesson_N", name):
             assert (ROOT / name).is_file(), name

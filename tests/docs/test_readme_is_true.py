@@ -47,7 +47,7 @@ def test_the_transcript_is_true() -> None:
     assert 3 <= len(commands) <= 12
     out = io.StringIO()
     script = io.StringIO("".join(f"{command}\n" for command in commands))
-    assert run_debugger(load_scenario(ROOT / scenario), script, out) == 0
+    assert run_debugger(load_scenario(scenario), script, out) == 0
     assert out.getvalue() == transcript
 
 

@@ -28,7 +28,6 @@ from gms_fsm.app.scenario import load_system
 from gms_fsm.charts.registry import entry
 from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
 from gms_fsm.systems.models import demonstration
-from tests.helpers import ROOT
 from tests.physics.test_sliding_follows_filippov import follower
 
 CHARTS = ("lugre", "elasto-plastic", "seven-parameter", "maxwell-slip", "reset-integrator")
@@ -38,7 +37,7 @@ KARNOPP_MODEL = ChartModel(KARNOPP, {"F_c": 1.0, "F_s": 1.5, "sigma_2": 0.4, "D"
 
 def servo() -> System:
     """Return the servo of the scenarios, whose controller is sampled."""
-    return load_system(ROOT / "scenarios" / "servo.toml")
+    return load_system("servo")
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from tests.exporters.frictions import DENSE, dense, times, walk
 from tests.helpers import ROOT
 
 SEEDS = range(2, 8)
-SCENARIOS = ROOT / "scenarios"
+SCENARIOS = ROOT / "gms_fsm/scenarios"
 
 
 def version(compiler: str) -> str:

@@ -52,7 +52,7 @@ def test_a_motion_that_fits_has_none():
         (
             bank(v_c=1e-2),
             "1e-3*sin(t)",
-            r"no transition: the speed stays below v_c \(largest .v. 0.001 m/s, v_c",
+            r"no transition: the speed stays below v_c \(largest .v. 1 mm/s, v_c",
         ),
         (  # the thresholds are millimetres, and a stroke of micrometres does not come near them
             bank(k=1e-3),
@@ -103,7 +103,7 @@ def test_a_run_that_resolves_them_has_no_such_note():
 
 @pytest.mark.slow
 def test_the_command_line_prints_them_and_the_summary_shows_them(gms_fsm):
-    path = ROOT / "scenarios" / "pulled_mass.toml"
+    path = ROOT / "gms_fsm/scenarios" / "pulled_mass.toml"
     sets = ("model.v_c=10.0", "run.t_end=2.0", "output.figures=[]")
     done = gms_fsm("run", path, "-o", "out", *(word for each in sets for word in ("--set", each)))
     assert done.code == 0

@@ -120,7 +120,7 @@ def test_the_debugger_returns_to_its_prompt_at_the_row_reached(command: str) -> 
     text = made.stdout.getvalue()  # type: ignore[attr-defined]
     assert "\nstopped\n" in text
     if command != "run":  # which never moves
-        assert "(t=60.0000 s) print t\n60\n" in text
+        assert "(t=60.0000 s) print t\n60 s\n" in text
         stopped = text.split("stopped\n")[1].split("(t=")[1]
         assert "row " in stopped
         assert "t = 0 s" not in stopped

@@ -28,6 +28,11 @@ from tests.inspection.sessions import a_system, debugger, fig4, locked, pulled, 
 from tests.systems_cases import DRY
 
 
+def plain(text: object) -> str:
+    """Return a text as a terminal without drawing characters shows it."""
+    return str(text).replace("µ", "u")
+
+
 def one_line(text: str) -> str:
     """Undo the line wrapping."""
     return " ".join(text.split())
@@ -59,10 +64,10 @@ def test_it_prints_the_text_of_the_debugger() -> None:
     session = fig4()
     asked = debugger(session)
     for command in ("step", "next", "next", "until z1 > 0.1", "prev", "goto 25", "prev"):
-        assert asked.reply(command) == str(session.here)
+        assert asked.reply(command) == plain(session.here)
         for element in range(4):
             said = asked.reply(f"why {element + 1}").partition("\nfor the edges that leave")[0]
-            assert one_line(str(session.why(element))) == one_line(said)
+            assert one_line(plain(session.why(element))) == one_line(said)
     title = "GMS, 4 elements, published law; prescribed velocity, to t = 100 s"
     assert repr(session) == f"<Session: {title}; at t = {session.here.t:.9g} s>"
     assert session.why() == session.why(0)

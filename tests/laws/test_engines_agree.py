@@ -6,10 +6,18 @@ log; where a run fails, the same error with the same text, and the same part tha
 
 from __future__ import annotations
 
+import zlib
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
 import gms_fsm
+from gms_fsm.run.machines import IfElse
+from gms_fsm.run.problem import Problem
+from gms_fsm.run.recording.own_machines import engine_of
+from gms_fsm.run.settings import Settings
+from integrators import JUMPED, LET_GO
 from tests.corpus import CORPUS, ENGINES, FAILING, FAILURES, each, outcome, run, trace
 from tests.helpers import other_parts, same_logs
 from tests.soak.random_systems import trial
@@ -91,3 +99,27 @@ def test_another_bit_is_found() -> None:
     changed = run("random system 0")(engine=ENGINES[0], rtol=1e-5)
     again = run("random system 0")(engine=ENGINES[0], rtol=1.0000000001e-5)
     assert "rows y" in other_parts(changed, again)
+
+
+@each(CORPUS)
+def test_both_decide_the_same_wherever_they_are_asked(name: str) -> None:
+    """At random values, states, jolts, and edges that must not be taken twice."""
+    what = run(name)
+    how, options = dict(what.how), {each.name for each in fields(Settings)}
+    chosen = Settings(**{key: how.pop(key) for key in options & {*how}})
+    start = Problem.of(*(*what.subject, None)[:2], what.t_end, chosen, **how)
+    program, draw = start.program, np.random.default_rng(zlib.crc32(name.encode()))
+    engines = (engine_of(start, {}), IfElse(program))
+    charts = [each.chart for each in start.system.contacts for _ in range(each.n)]
+    edges = [*range(-1, sum(len(each.chart.transitions) for each in start.system.contacts))]
+    size = 1e-9 + np.abs(start.y)
+    for k in range(60):
+        y = (draw.normal(size=size.size) * size * 10.0 ** draw.integers(0, 9)).tolist()
+        mode = [int(draw.integers(len(chart.states))) for chart in charts]
+        jolt = draw.choice([0, JUMPED, LET_GO], size=len(mode)).tolist()
+        skip = draw.choice(edges, size=len(mode)).tolist()
+        asked = []
+        for engine in engines:
+            asked.append(list(skip))
+            engine.ask(start.t_start + 0.1 * k, y, mode, program.p, jolt, asked[-1])
+        assert asked[0] == asked[1], (y, mode, jolt, skip)

@@ -25,7 +25,7 @@ from tests.helpers import ROOT, matrix
 from tests.scenario_files import CommandLine, one_message
 
 FOLDER = ROOT / "docs" / "lessons"
-COUNTED = ("", "elements n", "switches found once per step", "elements in slip")  # without a unit
+COUNTED = ("", "elements $n$", "switches found once per step", "elements in slip")  # without a unit
 FORMATTER = string.Formatter()
 Ran = Callable[[int], Result]
 SLOW = sorted({*LESSONS} - {1, 9})

@@ -187,7 +187,7 @@ def test_a_scenario_takes_both_forms(tmp_path):
 
     from gms_fsm.app.scenario import load_scenario
 
-    path = ROOT / "scenarios" / "pulled_mass.toml"
+    path = ROOT / "gms_fsm/scenarios" / "pulled_mass.toml"
     assert "atol" not in load_scenario(path).arguments
     assert load_scenario(path, ["run.atol=1e-8"]).arguments["atol"] == 1e-8
     named = load_scenario(path, ["run.atol={ v = 1e-9, z = [1e-9, 1e-9, 1e-9, 1e-9] }"])

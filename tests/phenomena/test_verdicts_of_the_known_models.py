@@ -5,9 +5,11 @@ With every verdict comes a number, or the reason why there is none.
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
-from gms_fsm import PhenomenaTable
+from gms_fsm import PhenomenaTable, measure_phenomena
 from gms_fsm.phenomena.limits import LIMITS
 from gms_fsm.phenomena.measure import PHENOMENA
 from tests.phenomena.cases import MODELS, known
@@ -64,6 +66,20 @@ def test_every_limit_is_used_and_has_a_reason(table: PhenomenaTable) -> None:
     used = {name for each in table.phenomena for name in each.limits}
     assert used == set(LIMITS)
     assert all(each.meaning and each.reason and each.value > 0.0 for each in LIMITS.values())
+
+
+def test_numbers_of_a_column_have_the_same_decimals(table: PhenomenaTable) -> None:
+    lines = [line.split(" | ")[1:] for line in table.markdown().splitlines()[2:]]
+    for column in zip(*lines, strict=True):
+        cells = [text.removesuffix(" |") for text in column]
+        forms = {re.sub(r"\d", "0", re.sub(r"^. −?\d+", "", text)) for text in cells}
+        assert len(forms) == 1, cells
+
+
+def test_what_slides_away_has_no_number_in_the_table() -> None:
+    away = measure_phenomena(["rate-state-slip"], ["hysteresis"])
+    assert away.cell("rate-state-slip", "hysteresis").numbers[0].value > 1e6  # µm
+    assert away.markdown().splitlines()[-1] == "| rate-state-slip | ✗ slides away |"
 
 
 def test_the_table_is_complete(table: PhenomenaTable) -> None:

@@ -74,6 +74,33 @@ MANY_EDGES = random_chart(1, 12, 40)
 THREE_LOOPS = random_chart(2, 3, 4, loops=3)
 LONG_GUARDS = random_chart(3, 3, 5, longest=150, least=120)
 
+RING = Chart(
+    "ring",
+    inputs=("v", "s"),
+    variables=("z",),
+    states=tuple(State(f"state_{i}", flow={"z": "v"}) for i in range(15)),
+    transitions=tuple(
+        Transition(f"next_{i}", f"state_{i}", f"state_{(i + 1) % 15}", guard="z > s and v < 0.2")
+        for i in range(15)
+    ),
+    outputs={"F": "z"},
+)
+THERE_AND_BACK = Chart(
+    "ring with a way back",
+    inputs=("v", "s"),
+    variables=("z",),
+    states=RING.states[:8],
+    transitions=tuple(
+        Transition(f"{way}_{i}", *ends, guard=f"abs(z) > s and v {sign} 0.1")
+        for i in range(8)
+        for way, sign, ends in (
+            ("next", ">", (f"state_{i}", f"state_{(i + 1) % 8}")),
+            ("back", "<", (f"state_{(i + 1) % 8}", f"state_{i}")),
+        )
+    ),
+    outputs={"F": "z"},
+)
+
 THREE_STATES = Chart(
     name="three states, a self loop, entry, exit and actions",
     inputs=("v", "s"),
@@ -120,9 +147,14 @@ HOSTILE = Chart(
 def texts_of(chart: Chart, state: str) -> dict[str, list[str]]:
     """Return what the box of a state must say, by the word that stands before it."""
     alone = len(chart.states) < 3 or any(each.outputs or each.locked for each in chart.states)
+    shared = {
+        v
+        for v in chart.variables
+        if len(chart.states) > 2 and len({chart.flows[each.name, v] for each in chart.states}) == 1
+    }
     trees = {
         "entry": chart.assignments["entry", state],
-        "during": {f"d{v}": chart.flows[state, v] for v in chart.variables},
+        "during": {f"d{v}": chart.flows[state, v] for v in chart.variables if v not in shared},
         "force": {f: chart.forces[state, f] for f in chart.force_names if alone},
         "exit": chart.assignments["exit", state],
     }

@@ -71,7 +71,7 @@ class Box:
 
 
 class Group:
-    """One group of the SVG: a state, a guard, half an edge, a region."""
+    """One group of the SVG: a state, a guard, an edge, a region."""
 
     def __init__(self, group: ElementTree.Element) -> None:
         self.element, self.id = group, group.get("id", "")

@@ -98,8 +98,8 @@ BLOCKS = System(
 SERVO = System(
     "two-mass servo",
     bodies=(
-        Body("motor", inertia="J_m", force="k_t * i", x="q_m", v="w_m"),
-        Body("load", inertia="J_l", x="q_l", v="w_l"),
+        Body("motor", inertia="J_m", force="k_t * i", x="q_m", v="w_m", motion="turning"),
+        Body("load", inertia="J_l", x="q_l", v="w_l", motion="turning"),
     ),
     contacts=(
         Contact("bearing", STICTION, DRY, v="w_m"),
@@ -118,7 +118,7 @@ SERVO = System(
 )
 
 
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SCENARIOS = Path(__file__).parents[2] / "gms_fsm" / "scenarios"
 
 NUMBERS = dict.fromkeys(("m", "k", "k_c", "k_l", "P", "w", "d", "J", "r", "k_f"), 1.0)
 TRAIN = System(

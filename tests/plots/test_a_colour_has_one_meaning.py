@@ -13,10 +13,11 @@ pytest.importorskip("matplotlib")
 
 import plots
 from plots import style
-from plots.style import CHART_THEMES, PAGE_THEMES, ROLES, Theme, ramp
+from plots.style import CHART_THEMES, PAGE_THEMES, ROLES, THEMES, Theme, ramp
+from tests.helpers import open_loop, stick_slip
+from tests.page_blocks import blocks_of
 from tests.plots.vision import contrast, deuteranopia, luminance
 
-THEMES: tuple[Theme, ...] = ("light", "dark")
 PACKAGE = Path(plots.__file__).parent
 DOCS = Path(__file__).parents[2] / "docs" / "colours.md"
 # Hexadecimal, or a named or numbered colour of matplotlib or CSS where a colour is expected.
@@ -24,6 +25,9 @@ HEXADECIMAL = re.compile(r"(?<!&)#(?:[0-9a-fA-F]{6}|[0-9a-fA-F]{3})\b(?![\w-])")
 NAMED = re.compile(
     r"""(?:colou?rs?|facecolor|edgecolor|fill|stroke|fillStyle|strokeStyle)["']?\s*[=:]\s*\[?["']"""
     r"(?:tab:\w+|C\d|0?\.\d+|white|black|red|blue|green|gr[ae]y|orange|purple)"
+)
+IN_A_TERMINAL = re.compile(
+    r"[\"' ](?:(?:1;)?[39][0-7]|(?:bold )?(?:green|blue|yellow|magenta|cyan|dark_\w+))[\"']"
 )
 CSS_NAMED = re.compile(r"(?:color|fill|stroke|background)\s*:\s*(?:white|black|red|blue|gr[ae]y)\b")
 
@@ -47,6 +51,85 @@ def test_no_other_module_has_colours() -> None:
     assert not HEXADECIMAL.search("url(#hatch0)")
     assert NAMED.search('ax.plot(x, color="0.6")')
     assert CSS_NAMED.search("color: white")
+
+
+def test_faces_in_a_terminal_have_no_colours_of_their_own() -> None:
+    rooms = [PACKAGE.parent / "gms_fsm" / name for name in ("app", "debugger")]
+    found = [
+        f"{path.name}: {match[0]}"
+        for room in rooms
+        for path in room.rglob("*")
+        if path.suffix in (".py", ".tcss")
+        for pattern in (HEXADECIMAL, IN_A_TERMINAL)
+        for match in pattern.finditer(path.read_text(encoding="utf-8"))
+    ]
+    assert not found
+    assert IN_A_TERMINAL.search('style="bold dark_orange3"')
+    assert IN_A_TERMINAL.search('{"fired": "1;33"}')
+
+
+def test_code_in_the_docs_draws_in_these_colours() -> None:
+    drawing = [
+        block.body
+        for path in DOCS.parent.rglob("*.md")
+        for block in blocks_of(path.read_text(encoding="utf-8"))
+        if block.kind == "python" and ".plot(" in block.body
+    ]
+    assert drawing
+    assert all("rc_context(RC)" in code for code in drawing)
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_the_full_screen_debugger_has_the_colours_of_the_roles(theme: Theme) -> None:
+    pytest.importorskip("textual")
+    from gms_fsm.debugger.tui._spans import DARK, LIGHT
+
+    seen = {
+        role: {_hue(each) for each in HEXADECIMAL.findall(look)} - {None}
+        for role, look in {"light": LIGHT, "dark": DARK}[theme].items()
+    }
+    states = {role for role in seen if role.startswith("state")} | {"active"}
+    assert {role for role, hues in seen.items() if hues == {"blue"}} == states
+    assert {role for role, hues in seen.items() if hues == {"orange"}} == {"fired", "now"}
+    assert {role for role, hues in seen.items() if hues == {"green"}} == {"true"}
+    used = {each for look in (LIGHT, DARK) for text in look.values() for each in text.split()}
+    known = {each for role in ROLES.values() for each in (*role.light, *role.dark)}
+    assert used - {"bold", "on"} <= known
+
+
+def test_prompt_and_live_view_show_states_in_the_colour_of_the_active_state() -> None:
+    """Whichever state comes first: the default one is plain, the others are bold."""
+    from rich.console import Console
+
+    from gms_fsm import simulate
+    from gms_fsm.app.live import LiveView
+    from gms_fsm.debugger._terminal import WORDS
+    from gms_fsm.run.simulate import Moment
+
+    assert WORDS["true"] == style.ansi("holds")
+    assert WORDS["false"] == style.ansi("fails")
+    assert WORDS["fired"] == WORDS["FIRED"] == style.ansi("now", bold=True)
+    screen = Console(force_terminal=True, color_system="standard", width=100)
+    looks: list[tuple[str, int | None, bool | None]] = []
+
+    def note(moment: Moment) -> None:
+        for table in LiveView(screen, 0.0, 1.0, detail=True).tables(moment):
+            looks.extend(
+                (
+                    each.text.strip(),
+                    each.style.color and each.style.color.number,
+                    bool(each.style.bold),
+                )
+                for each in screen.render(table)
+                if each.style is not None and each.text.strip() in ("stick", "SLIP")
+            )
+
+    initial = {"states": ["slip", "stick", "stick", "stick"]}
+    simulate(stick_slip("signed"), open_loop(), 0.1, initial=initial, progress=note)
+    assert set(looks) == {
+        ("stick", style.ANSI["active"], False),
+        ("SLIP", style.ANSI["active"], True),
+    }
 
 
 def test_the_docs_list_every_role() -> None:

@@ -239,6 +239,8 @@ CANNOT_BE_READ = [
     ("min(F) > 1", 1, "min got 1 arguments"),
     ("F > 1_000", 5, "cannot read"),  # formats that only Python has
     ("F > 0x10", 5, "cannot read"),
+    ("v > 3 mm", 5, "3 mm is not in m/s"),
+    ("F > 1 N and z1 > 3 mm/s", 18, "3 mm/s is not in m"),
 ]
 
 
@@ -286,6 +288,10 @@ def test_breakpoints_and_conditions_stop_where_they_become_true(open_page: Open)
     until(page, "F > 1")
     assert page.evaluate("runs[0].names.F(frame) > 1 && runs[0].names.F(frame - 1) <= 1")
     assert "F > 1 became true" in said(page)
+    here = frame(page)
+    page.click("#start")
+    until(page, "F > 1000 mN")
+    assert frame(page) == here
     page.fill("#until", "state(2) == slip and not z1 < 0")
     page.click("#continue")
     assert page.evaluate("runs[0].contacts[0].modes[1][frame]") == 1

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
+from gms_fsm.foundation.quantities import scale_of
 from gms_fsm.language import evaluate
 from gms_fsm.session.explain import explain, values_at
 from tests.plots.browser import (
@@ -118,7 +119,7 @@ def test_chart_table_and_crosshair_follow_every_firing(open_page: Open) -> None:
             f"#{element}-state-{record.source}.active": 0,
             ".guard.fired": 1,
             f"#{element}-guard-{record.edge}.fired": 1,
-            f"#{element}-edge-{record.edge}-2.fired": 1,
+            f"#{element}-edge-{record.edge}.fired": 1,
         }
         texts = "(each) => [...document.querySelectorAll(each)].map((node) => node.textContent)"
         *found, marks = page.evaluate(
@@ -130,9 +131,10 @@ def test_chart_table_and_crosshair_follow_every_firing(open_page: Open) -> None:
     page, trace = open_page("mass", "laptop"), run("mass")
     box = page.locator(".u-over").nth(1).bounding_box()
     assert box is not None
-    assert page.locator(".hair").is_hidden()
+    hair = page.locator(".hair").first
+    assert hair.is_hidden()
     page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 10)
-    assert page.locator(".hair").is_visible()
+    assert hair.is_visible()
     row, t = page.evaluate("[frames.rows[0][pointed], frames.t[pointed]]")
     assert t == pytest.approx(0.6 * 60.0, abs=0.2)
     force = float(trace.sample([t]).F[0])
@@ -210,17 +212,98 @@ def test_of_many_elements_the_one_that_fires_is_in_view(open_page: Open, size: s
     assert page.locator(".who").inner_text() == f"Guards of element {n}"
 
 
+OVERLAPS = """([one, other]) => {
+    const of = (q) => $$(q).map((node) => node.getBoundingClientRect());
+    const meet = (a, b) => a.bottom > b.top && b.bottom > a.top
+        && a.right > b.left && b.right > a.left;
+    return of(one).flatMap((a) => of(other).filter((b) => meet(a, b)));
+}"""
+BELOW_ITS_BOX = """(all) => $$(all).map((node) => Math.max(0,
+    node.getBoundingClientRect().bottom - node.parentNode.getBoundingClientRect().bottom))"""
+# What is wider than its box.
+CUT_OFF = """([box, all]) => $$(box).flatMap((outer) => {
+    const { left, right } = outer.getBoundingClientRect();
+    return $$(all, outer).map((node) => node.getBoundingClientRect())
+        .filter((inner) => inner.left < left - 1 || inner.right > right + 1);
+})"""
+# Of texts of a chart that are seen, the height of the smallest.
+SMALLEST = """() => Math.min(...$$(".chart text").map((text) => {
+    const { a } = text.getScreenCTM();
+    return a * Number(text.getAttribute("font-size"));
+}))"""
+
+
+def test_the_cursor_begins_below_the_titles_and_covers_no_reading(open_page: Open) -> None:
+    page = open_page("mass", "laptop")
+    for row in events(page)[:6]:
+        page.evaluate(f"go({row})")
+        for reading in (".plots h3", ".time-unit", ".ribbon b"):
+            assert page.evaluate(OVERLAPS, [".cursor", reading]) == [], reading
+    below = page.evaluate(BELOW_ITS_BOX, ".plot .cursor")  # where the numbers of the axis are
+    assert below == [0] * 4
+    front, line = (
+        page.locator(q).last.evaluate("node => Number(getComputedStyle(node).zIndex)")
+        for q in (".ribbon i span", ".cursor")
+    )
+    assert front > line
+
+
+def test_two_runs_are_drawn_in_the_same_plots(open_page: Open) -> None:
+    page = open_page("two", "laptop")
+    assert page.locator(".plots h3").count() == 4
+    assert box_of(page, ".u-over")["height"] > 60
+    press(page, *["Shift+ArrowRight"] * 12)
+    force = "runs[{0}].contacts[0].value('F', 0, views[{0}].row)"
+    wanted = [f"{k + 1}: {page.evaluate(f'eng({force.format(k)}, `N`, 5)')}" for k in range(2)]
+    assert page.locator(".plots output").first.inner_text().startswith("  ".join(wanted))
+    inner = "views[0].open.right.inner.series.filter((each) => each.show).length"
+    for element in ("1", "3"):  # time, two bounds, and the chosen element of each run
+        press(page, element)
+        assert page.evaluate(inner) == 1 + 2 + 2
+    open_tab(page, "Landscape")
+    one, other = (box_of(page, f".run:nth-child({k}) .pane.landscape") for k in (1, 2))
+    assert one["y"] + one["height"] <= other["y"]
+    names = page.locator(".right .of")
+    assert names.all_inner_texts() == ["Run 1", "Run 2"]
+    open_tab(page, "Time")
+    assert names.first.is_hidden()
+    page.set_viewport_size({"width": 1100, "height": 700})  # no room for three columns
+    first, second = (box_of(page, f".run:nth-child({k}) .left") for k in (1, 2))
+    assert first["y"] + first["height"] <= second["y"]
+    assert page.evaluate(CUT_OFF, [".chart.pane", "svg"]) == []
+
+
+def test_on_a_phone_chart_texts_are_11_px_high_and_guards_are_cards(open_page: Open) -> None:
+    page = open_page("published", "phone")
+    for _ in range(4):
+        press(page, "Shift+ArrowRight")
+        assert page.evaluate(SMALLEST) >= 11.0
+        assert page.evaluate(CUT_OFF, [".why", "th:not(thead th), td"]) == []
+    cells = page.locator("tr.fired").first.locator("td")
+    names = cells.nth(2).evaluate("node => getComputedStyle(node, '::before').content")
+    assert names == '"margin "'
+
+
+@pytest.mark.parametrize("name", ["published", "two", "dahl"])
+def test_zooming_a_browser_enlarges_the_text_of_charts(open_page: Open, name: str) -> None:
+    page = open_page(name, "laptop")
+    for width, height in ((1366, 657), (1920, 950)):
+        sizes = []
+        for factor in (1.0, 1.5):  # a browser that zooms has a smaller window of larger pixels
+            page.set_viewport_size({"width": int(width / factor), "height": int(height / factor)})
+            page.wait_for_timeout(50)
+            sizes.append(factor * page.evaluate(SMALLEST))
+        assert sizes[1] > 1.05 * sizes[0], (width, sizes)
+
+
 # --------------------------------------------------------------------------- two runs, systems
 def test_two_runs_are_shown_at_the_same_time_with_their_first_difference(open_page: Open) -> None:
     page, laws = open_page("two", "laptop"), ("published", "signed")
-    first, second = (box_of(page, f".run:nth-child({place})") for place in (1, 2))
+    first, second = (box_of(page, f".run:nth-child({place}) .left") for place in (1, 2))
     assert first["y"] == second["y"]
     assert first["x"] < second["x"]
-    for place in (1, 2):  # margins and the time axis are in view
-        for inner, outer in (("thead th:nth-child(4)", ".why"), (".time-unit", ".pane.time")):
-            a, b = (box_of(page, f".run:nth-child({place}) {q}") for q in (inner, outer))
-            assert a["x"] + a["width"] <= b["x"] + b["width"] + 1
-            assert a["y"] + a["height"] <= b["y"] + b["height"] + 1
+    assert page.evaluate(CUT_OFF, [".why", "td, th:not(thead th)"]) == []
+    assert page.evaluate(CUT_OFF, [".pane.time", ".time-unit"]) == []
     press(page, *["Shift+ArrowRight"] * 12)
     t = page.evaluate("frames.t[frame]")
     for place, law in enumerate(laws):
@@ -241,7 +324,7 @@ def test_two_runs_are_shown_at_the_same_time_with_their_first_difference(open_pa
         assert f"run {place + 1}: element {record.element + 1} {record.source} → " in said(page)
     t = min(run(law).transitions.t[k] for law in laws)
     assert page.evaluate("frames.t[frame]") == t
-    assert page.locator(".pin").count() == 2
+    assert page.locator(".pin").count() == 5  # in four plots, and over the ribbons
     pin, plot = box_of(page, ".pin"), box_of(page, ".u-over")
     assert pin["x"] == pytest.approx(plot["x"] + plot["width"] * t / 100.0, abs=3)
     press(page, "Home", "d")
@@ -319,6 +402,7 @@ DRAWN = """() => [
             x: element.querySelector(".foot").getCTM().e, peg: seen(".peg"), arrow: seen(".way"),
             way: element.querySelector(".way").getAttribute("transform") ? -1 : 1,
             springs: element.querySelectorAll(".link path").length,
+            ground: element.querySelector(".block").style.fill,
             end: element.querySelector(".link").getBoundingClientRect().right,
             texts: [...element.querySelectorAll("text")].map((node) => node.textContent),
         };
@@ -336,22 +420,28 @@ def test_bristles_are_where_z_puts_them_and_move_with_the_ground_while_they_stic
     rows = some_rows(page, 40)
     drawn = at_rows(page, [row for row, _ in rows], DRAWN)
     wanted: list[str] = []
+    # One unit for all rows of a quantity, as Python chooses it.
+    speed, force, place = (
+        scale_of(np.ravel(values).tolist(), unit)
+        for values, unit in ((trace.v, "m/s"), (trace.F, "N"), (trace.z, "m"))
+    )
     for (_, number), (elements, _, motion) in zip(rows, drawn, strict=True):
         places.append([element["x"] for element in elements])
         ends |= {round(element["end"]) for element in elements}
         z.append(trace.z[number])
         v, F = float(trace.v[number]), float(np.float32(trace.F[number]))
         texts += [*motion, *(element["texts"][1] for element in elements)]
-        wanted += [f"'v = ' + eng({v!r}, 'm/s', 4)", f"'F = ' + eng({F!r}, 'N', 4)"]
-        wanted += [f"'z ' + eng({float(each)!r}, 'm', 4)" for each in trace.z[number]]
+        wanted += [f"v = {speed.text(v)}", f"F = {force.text(F)}"]
+        wanted += [f"z {place.text(float(each))}" for each in trace.z[number]]
         for element, state in zip(elements, trace.states[number], strict=True):
             held = bool(state == "stick")
             counts[held] += 1
             assert element["peg"] == held
+            assert f"-state{int(not held)}" in element["ground"]  # plain and pale, or hatched
             assert element["arrow"] == (not held and v != 0)
             assert element["texts"][0].split()[1] == state
             assert not element["arrow"] or element["way"] == np.sign(v)
-    assert texts == page.evaluate(f"[{', '.join(wanted)}]")
+    assert texts == [each.replace("-", "−") for each in wanted]
     slope, rest = np.polyfit(np.ravel(z), np.ravel(places), 1)
     np.testing.assert_allclose(np.ravel(places), rest + slope * np.ravel(z), atol=0.05)
     assert slope < 0  # the slider moves to the right, away from its contacts

@@ -23,6 +23,7 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -373,11 +374,40 @@ def test_window_and_elements_reach_every_panel() -> None:
     low, high = margins.get_xlim()
     assert 3.0 <= low < high <= 7.0
     crowded = simulate(stick_slip("signed"), Prescribed("sin(2*pi*t/5)"), 200.0)
-    first = figures.ribbons_figure(crowded).axes[0]  # a crowded run shows its last cycles
-    begin, end = first.get_xlim()
+    figure = figures.ribbons_figure(crowded)  # a crowded run shows its last cycles
+    begin, end = figure.axes[0].get_xlim()
     assert end == 200.0
     assert 12.0 < end - begin < 18.0
-    assert "last" in first.get_title(loc="left")
+    assert figure.get_suptitle().endswith(f"; last {end - begin:.3g} s of 200 s")
+
+
+def test_panels_of_an_overview_share_their_time_span() -> None:
+    trace = run("pulled mass")
+    *time, loop, portrait, _ = figures.overview(trace).axes
+    ((begin, end),) = {ax.get_xlim() for ax in time}
+    assert 20.0 < begin < end == 60.0
+    x = trace.sample([begin, end]).x - trace.x[0]
+    shown = loop.lines[0].get_xdata()
+    assert [shown[0], shown[-1]] == pytest.approx(x, rel=1e-6)
+    F = np.vstack(portrait.collections[0].get_segments())[:, 1]
+    assert F.min() > 0.5  # the run begins at 0
+
+
+def test_names_of_states_leave_most_of_their_ribbons_in_view() -> None:
+    trace, drawn = run("pulled mass"), 0
+    for name, window in (("slide", None), ("slide", (30.0, 34.0)), ("screen", None)):
+        with plots.preset(name):
+            figure = figures.overview(trace, window=window)
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        figure.draw_without_rendering()
+        (ax,) = (each for each in figure.axes if each.get_title() == "c")
+        lane = abs(np.diff(ax.transData.transform([(0, 0.6), (0, 1.4)])[:, 1])[0])
+        for text in (each for each in ax.texts if each.get_text() in ("stick", "slip")):
+            if text.fits(renderer):  # type: ignore[attr-defined]
+                drawn += 1
+                box = text.get_bbox_patch().get_window_extent(renderer)  # type: ignore[union-attr]
+                assert box.height < 0.9 * lane, name
+    assert drawn > 10
 
 
 def test_a_measurement_is_shown_with_the_model() -> None:

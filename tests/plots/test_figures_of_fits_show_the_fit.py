@@ -46,15 +46,15 @@ def drawn(ax: Any, label: str) -> Any:
 def test_curves_are_those_of_the_fit_with_units() -> None:
     (part,) = small().residuals()
     over_time, residual, loop, over_x, bars = lettered(fit_figure(small(), window=(2.0, 4.0)))
-    assert [ax.get_xlabel() for ax in (over_time, loop)] == ["t [s]", "x [mm]"]
-    assert (over_time.get_ylabel(), over_x.get_ylabel()) == ("F [N]", "measured − model [N]")
+    assert [ax.get_xlabel() for ax in (over_time, loop)] == ["$t$ [s]", "$x$ [µm]"]
+    assert (over_time.get_ylabel(), over_x.get_ylabel()) == ("$F$ [N]", "measured − model [mN]")
     assert bars.get_xlabel() == "interval relative to the value [%]"
     inside = (part.t >= 2.0) & (part.t <= 4.0)
     assert np.array_equal(drawn(over_time, "measured").get_xdata(), part.t[inside])
     assert np.array_equal(drawn(over_time, "measured").get_ydata(), part.measured[inside])
     assert np.array_equal(drawn(over_time, "model").get_ydata(), part.modelled[inside])
     assert np.array_equal(drawn(loop, "model").get_ydata(), part.modelled)
-    difference = part.measured - part.modelled
+    difference = 1e3 * (part.measured - part.modelled)
     (line,) = (each for each in residual.lines if len(each.get_xdata()) == part.t.size)
     assert np.array_equal(line.get_ydata(), difference)
     forward, backward = over_x.lines[:2]
@@ -79,9 +79,10 @@ def test_directions_differ_without_colour_and_held_out_rows_are_shaded() -> None
     assert floor is not None
     assert held is not None
     flat = [each.get_ydata() for each in residual.lines if len(each.get_xdata()) == 2]
-    assert sorted(y[0] for y in flat) == pytest.approx([-floor, floor])
+    assert sorted(y[0] for y in flat) == pytest.approx([-1e3 * floor, 1e3 * floor])
     name = residual.get_title(loc="left")
-    assert name == f"residual; RMSE {small().training['rmse']:.3g}, held out {held['rmse']:.3g} N"
+    sizes = [f"{1e3 * each['rmse']:.3g}" for each in (small().training, held)]
+    assert name == f"residual; RMSE {sizes[0]}, held out {sizes[1]} mN"
 
 
 def test_what_cannot_be_told_has_words_and_no_bar() -> None:

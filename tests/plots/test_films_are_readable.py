@@ -8,6 +8,7 @@ All texts have room and a size of at least 7 points, also for 12 elements; every
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -66,7 +67,7 @@ def test_texts_and_chart_say_what_happens_and_what_sticks_stays_on_the_ground(
         film, trace, places = movie.film, movie.film.trace, list[np.ndarray]()
         for frame in film.pace.frames:
             film.show(frame)
-            said.append([text.get_text() for text in film.texts])
+            said.append([text.get_text() for text in film.figure.texts])
             film.chart.paint(frame)
             texts = {node.text or "" for node in film.chart.root.iter("text")}
             counts.append(tuple(sorted(text for text in texts if " of " in text)))
@@ -84,12 +85,14 @@ def test_texts_and_chart_say_what_happens_and_what_sticks_stays_on_the_ground(
             sticks = (trace.states[rows] == "stick").all(axis=0)
             assert moved[sticks] == pytest.approx(ground, abs=1e-6)
 
-    with_movie(cascade(), tmp_path, use, **WINDOW)
-    assert {title for title, _, _ in said} == {"GMS, 4 elements, published law"}
-    assert [note for _, _, note in said if note][::7][:4] == [
+    with_movie(replace(cascade(), heading="Four at once"), tmp_path, use, **WINDOW)
+    assert {tuple(about) for *about, _, _ in said} == {
+        ("Four at once", f"GMS, 4 elements, published law; {cascade().rig.title}")
+    }
+    assert [note for *_, note in said if note][::7][:4] == [
         f"micro-step {k} of 4: E{k} break_away_forward, stick → slip" for k in range(1, 5)
     ]
-    marks = {clock.partition(" N")[2].strip() for _, clock, _ in said}
+    marks = {clock.partition(" N")[2].strip() for *_, clock, _ in said}
     assert marks == {"", "slowed ×4", "held"}
     assert list(dict.fromkeys(counts)) == [
         ("0 of 4", "4 of 4"),

@@ -15,6 +15,8 @@ pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
 from matplotlib import rc_context
 
 import plots
+from gms_fsm import Prescribed, simulate
+from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.registry import registered
 from gms_fsm.systems.models import ChartModel, Model, demonstration
@@ -104,10 +106,22 @@ def test_at_the_command_line_also_of_a_contact_of_a_system(gms_fsm: CommandLine)
 
 @pytest.mark.slow
 def test_a_motion_of_ones_own_and_one_that_is_seen_without_a_length() -> None:
-    figure = handout_figure(stick_slip("signed"), velocity="0.1*cos(t)", t_end=7.0)
-    assert "v(t) = 0.1*cos(t) m/s" in [text.get_text() for text, _ in drawn_texts(figure)]
+    figure = handout_figure(simulate(stick_slip("signed"), Prescribed("0.1*cos(t)"), 7.0))
+    texts = [text.get_text() for text, _ in drawn_texts(figure)]
+    assert "prescribed velocity: v = 0.1*cos(t)" in texts
     clutch = demonstration(registered()["dog-clutch"], "")
-    assert ", A = 0.1 m, " in excited(clutch, None, None).about
+    assert ", A = 100 mm, " in excited(clutch).about
+
+
+@pytest.mark.slow
+def test_a_run_of_a_scenario_has_its_title_and_its_rig() -> None:
+    trace = load_scenario("pulled_mass").simulate()
+    figure = handout_figure(trace)
+    texts = [text.get_text() for text, _ in drawn_texts(figure)]
+    assert "Pulled mass" in texts
+    assert any(text.startswith("slider pulled through a spring: mass = 1.00 kg") for text in texts)
+    loop = figure.axes[-1].lines[0]
+    assert loop.get_ydata()[[0, -1]] == pytest.approx(trace.F[[0, -1]])
 
 
 @pytest.mark.slow
@@ -119,7 +133,7 @@ def test_the_force_of_a_whole_contact_is_written() -> None:
         outputs={"F": "z"},
         contact_outputs={"F": "2*F"},
     )
-    figure = handout_figure(ChartModel(chart, {}), velocity="0.1*cos(t)", t_end=7.0)
+    figure = handout_figure(simulate(ChartModel(chart, {}), Prescribed("0.1*cos(t)"), 7.0))
     texts = [text.get_text() for text, _ in drawn_texts(figure)]
     assert "contact" in texts
     assert any(r"2" in text and r"\sum_i" not in text for text in texts if "F =" in text)

@@ -86,7 +86,7 @@ def test_dot_path_ranges_and_arrows_are_those_of_the_row(run: Trace) -> None:
     here = run.v[row], MM * run.z[row, 2]
     (dot,) = (each for each in drawn if getattr(each, "get_marker", lambda: "")() == "o")
     assert dot.get_xydata()[0] == pytest.approx(here)  # type: ignore[attr-defined]
-    assert ax.get_ylabel() == "z [mm]"
+    assert ax.get_ylabel() == "$z$ [mm]"
     low, high = ax.get_ylim()
     assert low < -MM * run.s[:, 2].max() < MM * run.s[:, 2].max() < high
     assert ax.get_xlim()[1] > np.abs(run.v).max()
@@ -183,6 +183,23 @@ def test_names_of_one_line_stand_side_by_side_and_those_without_a_place_are_left
     assert not any(b.overlaps(a) for k, b in enumerate(boxes) for a in boxes[:k])
 
 
+def test_names_are_off_all_lines() -> None:
+    figure = Figure()
+    ax = figure.subplots()
+    names, even = LineNames(ax), np.linspace(0.0, 1.0, 2000)
+    level, upright = (
+        np.column_stack(each) for each in ((even, 0.3 + 0 * even), (0.6 + 0 * even, even))
+    )
+    wave = np.column_stack((even, 0.7 + 0.2 * np.sin(9.0 * even)))
+    lines = {"level": level, "upright": upright, "wave": wave}
+    names.lines += [NamedLine(name, "black", (line,)) for name, line in lines.items()]
+    placed = names.placed(FigureCanvasAgg(figure).get_renderer())
+    assert [text.get_text() for text in placed] == [*lines]
+    for text in placed:
+        box = text.get_window_extent()
+        assert not any(box.count_contains(ax.transData.transform(each)) for each in lines.values())
+
+
 @pytest.mark.slow
 def test_counterexamples_are_pins() -> None:
     pytest.importorskip("z3", reason="needs z3 (extra: proof)")
@@ -205,7 +222,7 @@ def test_forces_are_drawn_where_there_are_no_variables() -> None:
     row = int(np.flatnonzero((trace.states[:, 0] == "stuck") & (np.abs(trace.F) > 0.7))[0])
     ax = Figure().subplots()
     found = regions(panels.landscape(ax, trace, 0, row=row))
-    assert ax.get_ylabel() == "F [N]"
+    assert ax.get_ylabel() == "$F$ [N]"
     lowest = {name: min(p.vertices[:, 1].min() for p in c.get_paths()) for name, c in found.items()}
     assert lowest["release_forward"] == pytest.approx(1.5, abs=0.02)  # F_s
 

@@ -7,18 +7,22 @@ layout serves all frames.
 
 from __future__ import annotations
 
+import math
+import re
 import shutil
 import sys
 from functools import cache
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import plots.charts.live_chart
 from gms_fsm import Prescribed, Stribeck, Trace, simulate
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import MissingExtraError, OutputError
+from gms_fsm.foundation.quantities import scale_of, trimmed
 from gms_fsm.session.explain import explain, explain_state, values_at
 from gms_fsm.systems.models import ChartModel
 from plots.charts.live_chart import LiveChart, live_statechart
@@ -73,9 +77,9 @@ def marks(guard: Group) -> list[str]:
     ]
 
 
-def last_fired(trace: Trace, row: int, element: int) -> str:
-    """Replay the log up to a row."""
-    edge, at_once = "", 0
+def just_fired(trace: Trace, row: int, element: int) -> str:
+    """Replay the log from the time of the row before up to a row."""
+    edge, at_once, earlier = "", 0, trace.t[trace.t < trace.t[row]]
     steps = trace.microstep[trace.t == trace.t[row]].any()
     for record in trace.transitions:
         if record.t == trace.t[row]:
@@ -84,7 +88,7 @@ def last_fired(trace: Trace, row: int, element: int) -> str:
                 break
         if record.t > trace.t[row]:
             break
-        if record.element == element:
+        if record.element == element and record.t > earlier.max(initial=-math.inf):
             edge = str(record.edge)
     return edge
 
@@ -120,7 +124,7 @@ def assert_explained(trace: Trace, row: int, look: Any) -> int:
     """Compare a look with the log and the explanation; return whether it shows a firing."""
     i, edges = look.element, {edge.name: edge for edge in trace.model.chart.transitions}
     assert look.active == trace.states[row, i]
-    assert look.fired == last_fired(trace, row, i)
+    assert look.fired == just_fired(trace, row, i)
     assert not look.fired or edges[look.fired].target == look.active
     here = explain_state(trace.model.chart, look.active, values_at(trace, row, i))
     expected = {e.edge.name: tuple(c.holds for c in e.clauses) for e in here}
@@ -150,16 +154,16 @@ def assert_drawn(chart: Chart, drawn: dict[str, Group], look: Any) -> None:
         assert (dot.get("visibility") == "visible") == active
     for edge in chart.transitions:
         guard = drawn[f"{element}-guard-{edge.name}"]
-        halves = [drawn[f"{element}-edge-{edge.name}-{half}"] for half in (1, 2)]
+        line = drawn[f"{element}-edge-{edge.name}"]
         expected = [{True: "✓", False: "✗"}[m] for m in look.marks.get(edge.name, ())]
         assert marks(guard) == expected
         fired, leaving = edge.name == look.fired, edge.name in look.leaving
         pale = not fired and not leaving
-        for group in (guard, *halves):
+        for group in (guard, line):
             assert ("fired" in classes(group)) == fired
             assert ("leaving" in classes(group)) == leaving
         colour = colours.fired if fired else colours.ink if leaving else colours.pale
-        lines = [s for half in halves for s in half.iter() if s.get("stroke-width")]
+        lines = [shape for shape in line.iter() if shape.get("stroke-width")]
         assert {s.get("stroke") for s in lines} == {colour}
         assert {s.get("stroke-width") for s in lines} == {"2.6" if fired else "1.1"}
         shown = [t for t in guard.iter("text") if t.get("visibility") != "hidden"]
@@ -198,9 +202,14 @@ def test_values_are_those_of_the_row_and_elements_may_be_chosen() -> None:
         assert CHART_THEMES["dark"].active in svg
         for i in (0, 2):
             texts = [t.text or "" for t in drawn[f"element{i + 1}"].findall("text")]
-            shown = dict(part.split(" = ") for part in texts[2].replace("\xa0", " ").split("   "))
-            for name, column in (("z", trace.z[:, i]), ("v", trace.v), ("s", trace.s[:, i])):
-                assert float(shown[name]) == pytest.approx(column[row], rel=1e-3, abs=1e-300)
+            shown = dict(re.findall(r"(\w+) = (\S+ \S+)", texts[2].replace("\xa0", " ")))
+            place, speed = scale_of(np.ravel(trace.z).tolist(), "m"), scale_of(trace.v, "m/s")
+            for name, column, scale in (
+                ("z", trace.z[:, i], place),
+                ("v", trace.v, speed),
+                ("s", trace.s[:, i], place),
+            ):
+                assert shown[name].strip() == trimmed(scale.text(float(column[row])))
         (foot,) = drawn["graph0"].findall("text")
         assert foot.text == f"t = {trace.t[row]:.6g} s"
     one = groups(LiveChart(run("one"), values=True).frame(3))

@@ -130,8 +130,8 @@ def test_charts_models_systems_and_contacts_are_svg_and_text_without_graphviz(
     curve, chart = Stribeck(1.0, 1.5, 1e-3), GMS_ELEMENT["signed"]
     for shown, kind, count in (
         (chart, "region", 0),
-        (stick_slip("signed"), "region", 4),
-        (ChartModel(chart, values, n=9, stribeck=curve), "region", 0),  # too many to show
+        (stick_slip("signed"), "region", 1),  # all alike
+        (ChartModel(chart, values, n=9, stribeck=curve), "region", 1),
         (SERVO, "body", 2),
         (SERVO.contact("gear"), "state", 3),
     ):

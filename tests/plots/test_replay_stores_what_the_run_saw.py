@@ -25,6 +25,7 @@ from gms_fsm.language import InState
 from gms_fsm.systems.models import ChartModel, LuGre
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.verification.prove import prove
+from plots import figures
 from plots.page import _rows, chart
 from plots.page._trees import tree_of
 from plots.page.replay import replay, replay_html, write_replay
@@ -217,6 +218,19 @@ def test_two_runs_of_one_model_are_distinguished_by_their_names() -> None:
     trace = fig4("signed")
     runs = data_of(replay_html(trace, trace, names=["coarse", "fine"]))["runs"]
     assert [run["title"].partition(":")[0] for run in runs] == ["coarse", "fine"]
+
+
+def test_the_page_of_a_scenario_has_its_title() -> None:
+    model, titles = fig4("signed").model.title, ("Sine", "Sine", "Ramp", "")
+    one, other, third, none = (replace(fig4("signed"), heading=each) for each in titles)
+    pairs = (
+        ((one, other), "Sine"),
+        ((one, third), "Sine and Ramp"),
+        ((one, none), f"Sine and {model}"),
+    )
+    for runs, expected in pairs:
+        assert data_of(replay_html(*runs))["title"] == expected
+    assert figures.overview(one).get_suptitle() == f"Sine: {model}"
 
 
 def test_a_notebook_shows_it_in_a_sandbox(tmp_path: Path) -> None:

@@ -105,7 +105,7 @@ def test_lugre_is_one_bristle_that_neither_sticks_nor_slips() -> None:
     run = simulate(model, Prescribed("0.01"), 0.1)
     drawn = elements.elements_at(Figure().subplots(), run)
     shown = texts(drawn)
-    assert r"$\sigma_0$ = 1000 N/m" in shown
+    assert r"$\sigma_0$ = 1 kN/m" in shown
     assert r"$\sigma_1$ = 31.6 Ns/m" in shown
     assert "E1 bristle" in shown
     (box,) = parts(drawn, "contact")

@@ -1,8 +1,8 @@
 """A drawn chart shows every state, edge, guard and priority, and nothing in it overlaps.
 
-Checked by geometry: an edge counts only if its first half begins at its source, its second half
-ends with an arrow at its target, and both meet its guard. Boxes of texts are from the widths of the
-fonts. A picture is at most two A4 pages wide.
+Checked by geometry: an edge counts only if it is one line from its source to an arrow at its target
+that passes its guard, at a small distance. Boxes of texts are from the widths of the fonts. A
+picture is at most two A4 pages wide.
 """
 
 from __future__ import annotations
@@ -17,13 +17,17 @@ import pytest
 import gms_fsm.charts.chart
 from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
+from plots.charts.drawing import graph_drawing
 from plots.charts.labels import edge_id, part_id
-from plots.charts.statechart import statechart
+from plots.charts.layout.layers import BESIDE
+from plots.charts.statechart import ChartSheet, layout, statechart
 from tests.helpers import matrix
 from tests.plots.charts_to_draw import (
     HOSTILE,
     LONG_GUARDS,
     MANY_EDGES,
+    RING,
+    THERE_AND_BACK,
     THREE_LOOPS,
     THREE_STATES,
     any_chart,
@@ -35,15 +39,20 @@ from tests.plots.pictures import Box, Picture, chart_picture, overlaps, squeezed
 pytestmark = pytest.mark.slow
 
 A4 = 595  # points
+PLACES = {"stick": (0, 0), "creep": (320, 20), "slip": (150, 240)}
+MOVED = THREE_STATES.placed(PLACES)
 AXIS = {"TB": 0, "LR": 1}
 # Chart, number of elements, options.
-OWN: dict[str, tuple[Chart, int, dict[str, Any]]] = {
-    "GMS signed, 4 elements": (GMS_ELEMENT["signed"], 4, {}),
+OWN: dict[str, tuple[Chart, int | range, dict[str, Any]]] = {
+    "GMS signed, 4 elements": (GMS_ELEMENT["signed"], range(4), {}),
     "LuGre": (LUGRE, 1, {}),
     "3 states": (THREE_STATES, 1, {}),
-    "hostile": (HOSTILE, 2, {}),
+    "hostile": (HOSTILE, range(2), {}),
+    "ring": (RING, 1, {}),
+    "ring there and back": (THERE_AND_BACK, 1, {}),
+    "by hand": (MOVED, 1, {}),
 }
-HARD: dict[str, tuple[Chart, int, dict[str, Any]]] = {
+HARD: dict[str, tuple[Chart, int | range, dict[str, Any]]] = {
     "12 elements": (GMS_ELEMENT["published"], 12, {}),
     "40 edges": (MANY_EDGES, 1, {"notation": "math"}),
     "40 edges, graph": (MANY_EDGES, 1, {"form": "graph"}),
@@ -53,7 +62,7 @@ HARD: dict[str, tuple[Chart, int, dict[str, Any]]] = {
     **{f"random {seed}": (any_chart(seed), 1, {}) for seed in range(5)},
     **{f"random {seed}": (any_chart(seed), 1, {"form": "graph"}) for seed in range(5, 9)},
 }
-ZOO: dict[str, tuple[Chart, int, dict[str, Any]]] = {
+ZOO: dict[str, tuple[Chart, int | range, dict[str, Any]]] = {
     name: (chart, 1, {"notation": ("stateflow", "math")[k % 2]})
     for k, (name, chart) in enumerate(CHARTS.items())
 }
@@ -95,7 +104,8 @@ def test_the_check_finds_an_overlap() -> None:
 @pytest.mark.parametrize(("name", "direction"), [each for each in KEPT if each[0] in OWN])
 def test_every_state_guard_edge_and_default_dot_is_there(name: str, direction: str) -> None:
     drawn, (chart, elements, _) = picture(name, direction), OWN[name]
-    for element in (f"element{k}" for k in range(1, elements + 1)):
+    count = elements if isinstance(elements, int) else len(elements)
+    for element in (f"element{k}" for k in range(1, count + 1)):
         for state in chart.states:
             shown = drawn[f"{element}-state-{state.name}"]
             assert squeezed(*shown.texts) == squeezed(*state_lines(chart, state.name))
@@ -106,11 +116,10 @@ def test_every_state_guard_edge_and_default_dot_is_there(name: str, direction: s
         start = drawn[f"{element}-default-edge"]
         (arrow,) = start.polygons
         assert start.touches(drawn[f"{element}-state-{chart.default_state.name}"], arrow)
-    count = elements * len(chart.transitions)
-    assert len(drawn.of_class("state")) == elements * len(chart.states)
-    assert len(drawn.of_class("guard")) == count
-    assert len(drawn.of_class("edge")) == 2 * count + elements
-    assert len(drawn.of_class("default")) == 2 * elements
+    assert len(drawn.of_class("state")) == count * len(chart.states)
+    assert len(drawn.of_class("guard")) == count * len(chart.transitions)
+    assert len(drawn.of_class("edge")) == count * (len(chart.transitions) + 1)
+    assert len(drawn.of_class("default")) == 2 * count
 
 
 def state_lines(chart: Chart, name: str) -> list[str]:
@@ -130,14 +139,16 @@ def assert_guard(chart: Chart, drawn: Picture, name: str, priority: int, edge: s
 def assert_line(drawn: Picture, element: str, edge: Transition) -> None:
     source, target = (drawn[f"{element}-state-{name}"] for name in (edge.source, edge.target))
     guard = drawn[f"{element}-guard-{edge.name}"]
-    first, second = (drawn[f"{element}-edge-{edge.name}-{half}"] for half in (1, 2))
-    assert not first.polygons, "no arrow before the guard"
-    assert first.touches(source, first.ends)
-    assert first.touches(guard, first.ends)
-    (arrow,) = second.polygons
-    assert second.touches(target, arrow)
-    assert second.touches(guard, second.ends)
-    assert not second.touches(guard, arrow)
+    name = f"{element}-edge-{edge.name}"
+    line = drawn[name]
+    (arrow,) = line.polygons
+    assert line.touches(source, line.line[:1])
+    assert line.touches(target, arrow)
+    assert not line.touches(guard, arrow)
+    (points,) = (points for each, points in drawn.lines if each == name)
+    distances = [guard.box.distance(point) for point in points]
+    assert 1.0 < min(distances) < BESIDE + 1.0, "beside the guard, and not through it"
+    assert guard.box.distance(line.line[0]) > min(distances)
 
 
 @pytest.mark.parametrize("notation", ["stateflow", "math"])
@@ -153,7 +164,7 @@ def test_invalid_names_are_shown_literally(notation: str, monkeypatch: pytest.Mo
         outputs={"F": "v"},
     )
     drawn = chart_picture(chart, notation=notation)
-    assert len(drawn.of_class("node")) == len(drawn.of_class("edge")) == 3
+    assert (len(drawn.of_class("node")), len(drawn.of_class("edge"))) == (3, 2)
     (state,) = drawn.of_class("state")
     assert squeezed(drawn[state].texts[0]) == squeezed(bad.replace("\x01", ""))
     if notation == "stateflow":
@@ -163,7 +174,7 @@ def test_invalid_names_are_shown_literally(notation: str, monkeypatch: pytest.Mo
 # --------------------------------------------------------------------------- in order
 def places(drawn: Picture, chart: Chart, element: str, direction: str) -> dict[str, list[float]]:
     """Return the places of labels and of ends, by source and side, in the order of priority."""
-    side = ("left", "right") if direction == "TB" else ("top", "bottom")
+    side = "left" if direction == "TB" else "bottom"  # of a label, where its line is
     boxes, found = dict(drawn.states), dict[str, list[float]]()
     for state in chart.states:
         box = boxes[part_id(element, "state", state.name)]
@@ -173,23 +184,27 @@ def places(drawn: Picture, chart: Chart, element: str, direction: str) -> dict[s
                 continue
             guard = edge_id(chart, element, "guard", edge)
             texts = [box for name, box in drawn.texts if name == guard]
-            ends = [
-                f(getattr(b, name) for b in texts) for f, name in zip((min, max), side, strict=True)
-            ]
-            (line,) = (p for n, p in drawn.lines if n == guard.replace("guard", "edge", 1) + "-1")
+            (line,) = (p for n, p in drawn.lines if n == guard.replace("guard", "edge", 1))
             beyond = line[0][1 - AXIS[direction]] > middle[1 - AXIS[direction]]
-            found.setdefault(f"{state.name} labels", []).append(sum(ends) / 2)
+            found.setdefault(f"{state.name} labels", []).append(
+                (min if direction == "TB" else max)(getattr(box, side) for box in texts)
+            )
             found.setdefault(f"{state.name} ends {beyond}", []).append(line[0][AXIS[direction]])
     return found
 
 
-GRAPHS = [name for name in CASES if name not in ("40 edges", "12 elements", *ZOO)]
+PLACED = ("ring", "ring there and back", "by hand")  # states where they are put
+GRAPHS = [name for name in CASES if name not in ("40 edges", "12 elements", *PLACED, *ZOO)]
 GRAPHS = [name for name in GRAPHS if "random" not in name or "form" in CASES[name][2]]
 GRAPHS += [name for name in ZOO if len(CHARTS[name].transitions) > 2]
 
 
 @pytest.mark.parametrize(
-    ("name", "direction"), matrix(BOTH, [each for each in KEPT if each[0] in GRAPHS])
+    ("name", "direction"),
+    matrix(
+        [each for each in BOTH if each[0] not in PLACED],
+        [each for each in KEPT if each[0] in GRAPHS],
+    ),
 )
 def test_edges_that_leave_a_state_are_in_the_order_of_priority(name: str, direction: str) -> None:
     """From left to right or from top to bottom; numbered graphs have no labels to compare."""
@@ -201,6 +216,39 @@ def test_edges_that_leave_a_state_are_in_the_order_of_priority(name: str, direct
             assert all(a < b for a, b in pairwise(given)), what
 
 
+# --------------------------------------------------------------------------- places of states
+def test_a_long_ring_goes_around_a_rectangle() -> None:
+    for name in ("ring", "ring there and back"):
+        for direction in ("TB", "LR"):
+            drawn = picture(name, direction)
+            assert max(drawn.width, drawn.height) < 850
+            assert not drawn.of_class("legend")
+
+
+def test_states_are_where_the_layout_of_the_chart_says() -> None:
+    for direction in ("TB", "LR"):
+        drawn = picture("by hand", direction)
+        found = {
+            name.rpartition("-")[2]: ((box.left + box.right) / 2, (box.top + box.bottom) / 2)
+            for name, box in drawn.states
+        }
+        left, top = (found["stick"][k] - PLACES["stick"][k] for k in (0, 1))
+        for state, (x, y) in PLACES.items():
+            assert found[state] == pytest.approx((x + left, y + top), abs=1.0)
+    live = ChartSheet(MOVED, live=True).fitted()
+    assert live.form == "graph"
+    assert graph_drawing(live, 0).nodes[1].at[0] < graph_drawing(live, 0).nodes[2].at[0] - 300
+
+
+def test_the_layout_of_a_picture_is_a_layout_to_begin_with() -> None:
+    found = layout(THREE_STATES)
+    assert [*found] == [state.name for state in THREE_STATES.states]
+    again = layout(THREE_STATES.placed(found))
+    (x, y), (to_x, to_y) = found["stick"], again["stick"]
+    for state, at in found.items():
+        assert again[state] == pytest.approx((at[0] - x + to_x, at[1] - y + to_y), abs=0.2)
+
+
 # --------------------------------------------------------------------------- several elements
 @pytest.mark.parametrize(
     ("elements", "direction", "rows"),
@@ -210,7 +258,7 @@ def test_several_elements_are_a_grid_of_parallel_regions(
     elements: int, direction: str, rows: int
 ) -> None:
     """The grid is as wide as a printed page, with type of at least 7 points."""
-    drawn = chart_picture(GMS_ELEMENT["signed"], elements, direction=direction)
+    drawn = chart_picture(GMS_ELEMENT["signed"], range(elements), direction=direction)
     regions = [drawn[f"element{element}"] for element in range(1, elements + 1)]
     assert drawn.of_class("region") == {region.id for region in regions}
     for element, region in enumerate(regions, start=1):
@@ -222,6 +270,31 @@ def test_several_elements_are_a_grid_of_parallel_regions(
     assert reading_order == sorted(reading_order)
     assert len({top for top, _ in reading_order}) == rows
     assert Box.around([p for r in regions for p in r.line]).right < 482 * 10 / 7  # 170 mm
+
+
+def test_a_number_of_elements_that_are_alike_is_one_region() -> None:
+    for elements, region in ((4, "Elements 1 to 4"), (range(4), "Element 1")):
+        drawn = chart_picture(GMS_ELEMENT["signed"], elements)
+        assert drawn["element1"].texts[0] == region
+        assert len(drawn.of_class("region")) == (1 if elements == 4 else 4)
+
+
+@pytest.mark.parametrize("direction", ["TB", "LR"])
+def test_the_text_of_a_state_is_in_the_middle_of_its_room(direction: str) -> None:
+    """Also where the box is larger than its text, because many edges end there."""
+    drawn = chart_picture(CHARTS["karnopp"], direction=direction)
+    larger = 0
+    for name, box in drawn.states:
+        (rule,) = drawn[name].polygons  # under the title
+        own = [text for group, text in drawn.texts if group == name]
+        rows = [text for text in own if text.top > rule[0][1]]
+        above = min(text.top for text in rows) - Box.around(rule).bottom
+        below = box.bottom - max(text.bottom for text in rows)
+        assert above == pytest.approx(below, abs=4.0)
+        left = min(text.left for text in own) - box.left
+        assert left == pytest.approx(box.right - max(text.right for text in own), abs=4.0)
+        larger += above > 10
+    assert larger or direction == "TB"
 
 
 def test_elements_are_chosen_from_0_and_shown_from_1() -> None:

@@ -14,6 +14,8 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
+from matplotlib.patches import FancyBboxPatch, Rectangle
+
 from gms_fsm import Body, Chart, Contact, PulledSlider, State, System
 from gms_fsm.language import MATLAB_LIKE, spell
 from gms_fsm.systems.system import system_of
@@ -29,7 +31,13 @@ A4 = 8.27  # inches
 
 def items(system: System) -> list[Item]:
     layout = arranged(system)
-    return [*layout.over, *(each for gap in layout.gaps.values() for each in gap)]
+    legs = (
+        Item(column.body.name, "", links=slot.links)
+        for column in layout.columns
+        for slot in column.slots
+        if slot.links
+    )
+    return [*layout.over, *(each for gap in layout.gaps.values() for each in gap), *legs]
 
 
 def forces(system: System) -> dict[str, str]:
@@ -67,7 +75,8 @@ def test_contacts_have_the_symbols_of_their_charts() -> None:
     def symbols(name: str) -> dict[str, str]:
         layout = arranged(systems()[name])
         touches = [each.touch for each in items(systems()[name]) if each.touch is not None]
-        touches += [slot.touch for column in layout.columns for slot in column.slots]
+        slots = [slot for column in layout.columns for slot in column.slots]
+        touches += [slot.touch for slot in slots if slot.touch is not None]
         return {each.contact.name: each.symbol for each in touches}
 
     assert symbols("ball_screw_table") == {
@@ -125,6 +134,44 @@ def bodies(ax: Any) -> dict[str, Any]:
     }
 
 
+def test_what_turns_has_round_corners_and_bent_arrows() -> None:
+    screw, table = ("body screw", "position screw", "force screw"), ("body table", "position table")
+    drawn = parts("ball_screw_table")
+    assert isinstance(drawn["body screw"], FancyBboxPatch)
+    assert isinstance(drawn["body table"], Rectangle)
+    for name in (*screw[1:], table[1]):
+        (x0, y0), (x1, y1), *_ = drawn[name].get_path().vertices
+        assert (y1 - y0 > 0.1 * abs(x1 - x0)) == (name in screw), name
+
+
+def test_a_play_between_what_turns_is_an_angle() -> None:
+    texts = {
+        name: " ".join(text.get_text() for text in schematic(systems()[name]).axes[0].texts)
+        for name in ("two-mass servo", "friction_damper")
+    }
+    assert "= 0.02 rad" in texts["two-mass servo"]
+    assert "= 0.002 m " in f"{texts['friction_damper']} "
+
+
+def test_what_moves_normal_to_the_ground_has_upright_arrows_and_springs() -> None:
+    drawn = parts("brake_squeal")
+    for name in ("position normal", "force normal"):
+        start, *_, end = drawn[name].get_path().vertices[:3]
+        assert start[0] == pytest.approx(end[0])
+        assert end[1] > start[1]
+    box = drawn["body normal"]
+    x, y = drawn["spring k_y"].get_data()
+    assert box.get_x() < min(x)
+    assert max(x) < box.get_x() + box.get_width()
+    assert max(y) == pytest.approx(box.get_y())
+
+
+def parts(name: str) -> dict[str, Any]:
+    """Return the artists of a schematic by name."""
+    children = schematic(systems()[name]).axes[0].get_children()
+    return {each.get_gid(): each for each in children if each.get_gid()}
+
+
 def test_twelve_elements_are_one_contact_and_belts_are_below_what_rubs_on_them() -> None:
     figure = schematic(system_of(GMS12, PulledSlider(1.0, 2.0, 0.1)))
     below = " ".join(text.get_text() for text in figure.axes[0].texts)
@@ -142,7 +189,8 @@ def test_exponents_and_shares_are_formulas() -> None:
     values = dict.fromkeys(PLANAR.parameter_names, 1.0)
     floor = Contact("floor", PLANAR, values, v=("-(r * v)", "r * w - v"))
     layout = arranged(replace(PLANE, contacts=(floor,), numbers={"r": 1.0}))
-    touches = [slot.touch for column in layout.columns for slot in column.slots]
+    slots = [slot for column in layout.columns for slot in column.slots]
+    touches = [slot.touch for slot in slots if slot.touch]
     touches += [each.touch for gap in layout.gaps.values() for each in gap if each.touch]
     touches += [each.touch for each in layout.over if each.touch]
     signs = [{name: sign for name, (sign, _) in touch.shares.items()} for touch in touches]

@@ -204,3 +204,9 @@ def test_titles_cannot_end_the_text() -> None:
     chart = Chart("a\n@enduml\n\\end{tikzpicture}", states=(State("a"),), outputs={"F": "v"})
     assert plantuml(chart).count("@enduml") == 1
     assert tikz(chart).splitlines()[0] == r"% a @enduml \end{tikzpicture}"
+
+
+def test_tikz_keeps_the_layout_of_a_chart() -> None:
+    moved = THREE_STATES.placed({"stick": (0, 0), "creep": (720, 0), "slip": (0, 72)})
+    places = re.findall(r"\(s\d\) at \((\S+), (\S+)\)", tikz(moved))
+    assert [(float(x), float(y)) for x, y in places] == [(0.0, 0.0), (25.4, 0.0), (0.0, -2.54)]

@@ -82,7 +82,7 @@ def test_stairs_are_the_forces_of_the_log_and_columns_have_its_order(
     ax = Figure(figsize=(10, 4)).subplots()
     drawn = panels.unfolded_force(ax, part)
     stairs = [each for each in drawn if isinstance(each, Line2D)][: part.times.size]
-    factor = {"F [N]": 1.0, "F [mN]": 1e3}[ax.get_ylabel()]
+    factor = {"$F$ [N]": 1.0, "$F$ [mN]": 1e3}[ax.get_ylabel()]
     assert part.times.tolist() == np.unique(log.t).tolist()
     for t, line in zip(part.times, stairs, strict=True):
         mine = log[log.t == t]

@@ -97,7 +97,7 @@ def test_branches_are_made_compared_named_exported_and_deleted(host: Host) -> No
     assert differs == [True, False, False, False]
     second = host.inner.locator(".run").nth(1)
     assert second.locator(".region.differs").count() == 1
-    expect(second.locator("h3", has_text="F [N]")).to_contain_text("Δ")
+    expect(host.inner.locator("h3", has_text="F [N]")).to_contain_text("Δ")
     branches.first.click()
     settle(host, 1)
     assert (host.widget.shown, host.widget.current) == ((0,), 0)

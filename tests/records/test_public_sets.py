@@ -10,7 +10,6 @@ import pytest
 
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.records import damper, tribometer
-from tests.helpers import ROOT
 from tests.scenario_files import data_folder
 
 
@@ -37,7 +36,7 @@ def test_the_damper_has_thirteen_tests() -> None:
 def test_the_tribometer_is_read_as_the_scenario_reads_it(monkeypatch: pytest.MonkeyPatch) -> None:
     folder = data_folder()
     monkeypatch.setenv("GMS_FSM_DATA", str(folder))
-    loaded = load_scenario(ROOT / "scenarios" / "tribometer.toml")
+    loaded = load_scenario("tribometer")
     record = tribometer(folder)
     assert loaded.record is not None
     for name, value in loaded.record.columns.items():

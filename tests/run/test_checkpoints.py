@@ -463,7 +463,7 @@ def test_a_killed_process_can_be_resumed(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_command_line_resumes(tmp_path: Path, gms_fsm: Any) -> None:
     """`gms-fsm run --checkpoint`, interrupted, then the same command again."""
-    loaded = load_scenario(ROOT / "scenarios" / "pulled_mass.toml", [])
+    loaded = load_scenario("pulled_mass", [])
     told = itertools.count(1)
 
     def stop(_: object) -> None:

@@ -214,7 +214,7 @@ def test_a_session_ends_with_the_same_message_and_a_scenario_takes_the_limit() -
     session = Session(stiff(200.0), SLOW, 10.0, engine=FASTEST)
     session.proceed()
     assert session.branch.failure.reason.startswith("stiff: the flow has a rate")
-    path = ROOT / "scenarios" / "pulled_mass.toml"
+    path = ROOT / "gms_fsm/scenarios" / "pulled_mass.toml"
     assert load_scenario(path, ["run.max_steps=777"]).arguments["max_steps"] == 777
 
 

@@ -248,7 +248,8 @@ def test_a_forced_state_is_an_error_that_keeps_the_run_so_far(
     machines.machine.on_enter_slip(force)
     with pytest.raises(CallbackError, match=said) as caught:
         ran(machines, engine)
-    assert f"element 1, edge 'break_away_forward' at t = {float(first.t)!r} s" in str(caught.value)
+    place = f"element 1, edge 'break_away_forward' at t = {float(first.t)!r} s"
+    assert str(caught.value).startswith(place)
     trace = caught.value.trace
     assert len(trace.transitions) == 0, "the edge was not taken"
     assert trace.t.tolist() == whole.t[: len(trace)].tolist()

@@ -51,10 +51,11 @@ from gms_fsm.lowering.generated import load
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import Run
+from gms_fsm.scenarios import shipped
 from gms_fsm.session.explain import explain
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import dwell_times
-from tests.helpers import ROOT, pulled_mass, stick_slip
+from tests.helpers import pulled_mass, stick_slip
 from tests.scenario_files import MEASURED, OPEN_LOOP, sine_table
 
 Option = TypeVar("Option")
@@ -418,8 +419,8 @@ CELLS = [
 
 @functools.cache
 def _valid_scenarios() -> list[str]:
-    shipped = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "scenarios").iterdir())]
-    return [OPEN_LOOP, MEASURED, CLOSED_LOOP, BENCH, *shipped]
+    included = [path.read_text(encoding="utf-8") for path in shipped().values()]
+    return [OPEN_LOOP, MEASURED, CLOSED_LOOP, BENCH, *included]
 
 
 def toml_of(value: Any, top: bool = True) -> str:

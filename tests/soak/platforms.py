@@ -85,7 +85,7 @@ def scenario(path: Path) -> Case:
 
 def scenarios() -> list[Case]:
     """Return the shipped scenarios; one needs a measured record."""
-    paths = sorted((ROOT / "scenarios").glob("*.toml"))
+    paths = sorted((ROOT / "gms_fsm/scenarios").glob("*.toml"))
     data = "GMS_FSM_DATA" in os.environ
     return [scenario(path) for path in paths if data or path.stem != "tribometer"]
 

@@ -70,7 +70,7 @@ PLACE = "<!-- measured table: begin; made by `python benchmarks/{}.py --write` -
 @pytest.mark.parametrize(
     ("page", "script", "row"),
     [
-        ("README.md", "compare", "| C loop, hand-written for this model "),
+        ("docs/performance.md", "compare", "| C loop, hand-written for this model "),
         ("docs/numerics.md", "compare", "| C loop, hand-written for this model "),
         ("docs/howto/own-loops.md", "own_loops", "| MuJoCo, Euler  "),
     ],

@@ -80,7 +80,6 @@ FEWER = {
     "export.name": (None, -1, ""),
     "export.initial": (object(), "x", -1, math.nan),
     "export.t_start": (object(), "x", math.nan),
-    "handout.velocity": (object(), math.nan),
     "Fit.report.folder": (object(), -1),
 }
 # These take long to draw; landscape, animate and the methods of LiveChart stand for them.
@@ -249,7 +248,7 @@ def _by_entry() -> dict[str, dict[str, Any]]:
         | {"sliders": {"v_c": (1e-9, 2.0)}},
         "export": {"folder": Path("c99"), "format": "c99", "name": "friction"},
         "fit": {"fixed": {"v_c": 1e-3}, "free": ["k"], "search": "local"},
-        "handout": {"path": Path("a.pdf"), "velocity": "0.1", "t_end": 1.0},
+        "handout": {"path": Path("a.pdf")},
         "initial_bank": {"n": 2, "v_c": None},
         "live_statechart": {"row": 0},
         "measure_phenomena": {"models": ["stiction"], "phenomena": ["stick-slip"]},

@@ -8,7 +8,7 @@ import pytest
 from gms_fsm import simulate
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.systems.system import Body, Contact, Sampled, System
-from tests.helpers import ROOT, stick_slip
+from tests.helpers import stick_slip
 
 
 def counting(period: float = 0.1) -> System:
@@ -45,16 +45,16 @@ def test_a_run_that_starts_later_ticks_from_its_start() -> None:
 
 def servo() -> System:
     """Two masses on a shaft, friction on the load, a PID controller on the motor's position."""
-    system = load_scenario(ROOT / "scenarios" / "servo.toml").system
+    system = load_scenario("servo").system
     assert system is not None
     return system
 
 
 @pytest.mark.slow
 def test_the_servo_is_where_an_independent_loop_has_it() -> None:
-    """SciPy with a hand-written loop gave 1.32993 mm at 0.2 s."""
+    """A Runge-Kutta loop written by hand in C tends to 1.32149 mm at 0.2 s."""
     trace = simulate(servo(), 0.2, engine="ifelse")
-    assert trace.body("load").x[-1] == pytest.approx(1.32993e-3, abs=1e-8)
-    assert len(trace.transitions) == 24
+    assert trace.body("load").x[-1] == pytest.approx(1.32149e-3, abs=1e-8)
+    assert len(trace.transitions) == 30
     close = simulate(servo(), 0.2, engine="ifelse", rtol=1e-9)
     assert close.body("load").x[-1] == pytest.approx(trace.body("load").x[-1], rel=1e-6)

@@ -56,7 +56,7 @@ def system_with(contacts: list[str], signal: Any = "0.5 * sin(t)", m: float = 1.
         "two masses on a belt",
         bodies=(
             Body("one", inertia=m, force="4 * r + i", x="q1", v="w1"),
-            Body("two", inertia="2 * k / k", x="q2", v="w2"),
+            Body("two", inertia="2 * k / k", x="q2", v="w2", motion="turning"),
             Body("belt", velocity="A * r", x="q_b", v="w_b"),
         ),
         springs=(

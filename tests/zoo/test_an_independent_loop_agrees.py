@@ -16,7 +16,6 @@ import pytest
 from gms_fsm import Body, Contact, System, Trace, simulate
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import CHARTS
-from tests.helpers import ROOT
 from tests.hybrid_reference import Modes, Switch, Way, reference
 from tests.systems_cases import PUCK, puck
 from tests.zoo.zoo_cases import CURVE, ELASTO, KARNOPP, MODELICA, elasto_plastic, karnopp, modelica
@@ -260,7 +259,7 @@ SIGNS = {"stuck": 0.0, "forward": 1.0, "backward": -1.0}
 
 def drill_string() -> Trace:
     """Run the scenario."""
-    loaded = load_scenario(ROOT / "scenarios" / "drill_string.toml", ["run.rtol=1e-10"])
+    loaded = load_scenario("drill_string", ["run.rtol=1e-10"])
     return loaded.simulate(engine="ifelse")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from gms_fsm.charts.zoo.bristles.lugre import BENCHMARK
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.foundation.files import output_folder, write_text
 from gms_fsm.language import evaluate
+from gms_fsm.lowering.program import lower
 from gms_fsm.systems.signals import Formula
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace
@@ -28,8 +29,21 @@ if TYPE_CHECKING:
 
 __all__ = ["claims_text", "held_figure", "write"]
 
-CHARTS = ("chart_element", "chart_bank", "chart_lugre", "block_diagram")
-FIGURES = ("fig3", "fig3_slipping", "fig4", "fig4_laws", "residual", "residual_held")
+CHARTS = ("fig2a", "fig2b", "chart_bank", "chart_lugre")
+FIGURES = (
+    "fig1",
+    "fig2c",
+    "fig3",
+    "fig3_slipping",
+    "fig4",
+    "fig4_laws",
+    "residual",
+    "residual_held",
+)
+ELEMENTS = 3  # in Fig. 1 and 2a
+USED = "switch", "flow"  # in Fig. 2c
+LISTED = "Fig. 2c: the switching as if-else code, generated from the chart of Fig. 2b"
+LINE = 1.35  # distance of its lines, in sizes of the font
 
 
 def write(
@@ -47,7 +61,7 @@ def write(
     force, velocity : str
         The signals that the paper does not print, in the expression language.
     progress : callable, optional
-        ``progress(name, done)``.
+        ``progress(name, done)``, with the share of everything done.
 
     Returns
     -------
@@ -71,20 +85,28 @@ def write(
     output_folder(folder / "transitions", [f"{experiment.name}.csv" for experiment in chosen])
     traces: dict[str, Trace] = {}
     files: list[Path] = []
+    stages = len(chosen) + 1
+
+    def reached(name: str, done: float) -> None:
+        if progress is not None:
+            progress(name, (len(traces) + done) / stages)
+
     for experiment in chosen:
         name = experiment.name
         try:
-            traces[name] = run_one(experiment, progress)
+            traces[name] = run_one(experiment, reached)
         except SimulationError as error:
             kept = error.trace.save(folder / "partial.npz")
             raise error.replaced(kept=kept).inside(name) from error.__cause__
         files += _keep(folder, name, traces[name])
+    reached("claims and figures", 0.0)
     claims = write_text(folder / "claims.md", claims_text(traces, force, velocity))
     files += _draw_charts(folder)
     try:
         files += _draw_figures(folder, traces, force)
     except MissingExtraError as error:
         warnings.warn(f"no figures were drawn: {error}", stacklevel=2)
+    reached("claims and figures", 1.0)
     return [claims, *files]
 
 
@@ -99,10 +121,10 @@ def _draw_charts(folder: Path) -> list[Path]:
     from plots.output import formats
 
     pictures = {
-        "chart_element": plots.statechart(GMS_ELEMENT["published"]),
+        "fig2a": plots.block_diagram(ELEMENTS),
+        "fig2b": plots.statechart(GMS_ELEMENT["published"]),
         "chart_bank": plots.statechart(GMS_ELEMENT["published"], elements=4),
         "chart_lugre": plots.statechart(LUGRE),
-        "block_diagram": plots.block_diagram(4),
     }
     files = [
         plots.render(graph, folder / f"{name}{ending}")
@@ -115,6 +137,7 @@ def _draw_charts(folder: Path) -> list[Path]:
 def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list[Path]:
     from plots import figures
     from plots.output import formats
+    from plots.systems.mechanism import schematic_figure
 
     def applied(trace: Trace) -> NDArray[np.float64]:
         tree = Formula(force).tree
@@ -133,6 +156,8 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         )
 
     pictures = {
+        "fig1": schematic_figure(elements=ELEMENTS),
+        "fig2c": _listing(traces["fig4_ifelse"]),
         "fig3": fig3("fig3", "Fig. 3, non-drifting: a force below break-away"),
         "fig3_slipping": fig3(
             "fig3_slipping",
@@ -164,6 +189,30 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         for name, figure in pictures.items()
         for file in formats.files(name, "figure")
     ]
+
+
+def _listing(trace: Trace) -> Figure:
+    """Draw the functions of the if-else program of a run that decide and that move z."""
+    from plots.style import INK, TEXT_GREY
+    from plots.style.fonts import width
+    from plots.style.matplotlib import Figure
+
+    functions = lower(trace.model, trace.rig).source.split("\n\n\n")
+    texts = [next(each for each in functions if f"def {name}(" in each) for name in USED]
+    wide = [max(map(len, text.splitlines())) + 6 for text in texts]
+    tall = max(len(text.splitlines()) for text in texts) + 4
+    size = 7.0  # points
+    figure = Figure(figsize=(width("m", size) / 72 * sum(wide), LINE * size / 72 * tall))
+    figure.suptitle(LISTED, x=0.01, y=1 - 0.6 / tall, ha="left", size=9.0)
+    look: dict[str, Any] = {"size": size, "family": "monospace", "va": "top", "linespacing": LINE}
+    for text, x in zip(texts, (0.01, 0.01 + wide[0] / sum(wide)), strict=True):
+        code = [each.partition("#")[0] for each in text.splitlines()]
+        comments = [
+            " " * len(a) + b[len(a) :] for a, b in zip(code, text.splitlines(), strict=True)
+        ]
+        figure.text(x, 1 - 3 / tall, "\n".join(code), color=INK, **look)
+        figure.text(x, 1 - 3 / tall, "\n".join(comments), color=TEXT_GREY, **look)
+    return figure
 
 
 def held_figure(traces: Mapping[str, Trace], force: str) -> Figure:

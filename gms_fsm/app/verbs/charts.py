@@ -16,7 +16,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.files import output_folder, write_text
 
 if TYPE_CHECKING:
-    from gms_fsm import Model, Report, Rig
+    from gms_fsm import Model, Report, Rig, Trace
     from gms_fsm.app._own_files import OwnFile
     from gms_fsm.run.problem import Problem
 
@@ -59,7 +59,7 @@ def chart_command(
     ] = Path("chart.svg"),
     law: Law = "",
     elements: Annotated[
-        int, typer.Option(help="Number of elements, drawn as parallel states.")
+        int, typer.Option(help="Number of elements; they are alike and drawn once.")
     ] = 1,
     notation: Annotated[Notation, typer.Option(help="Notation of guards.")] = Notation.stateflow,
     direction: Annotated[Direction, typer.Option(help="Layout direction.")] = Direction.TB,
@@ -105,20 +105,24 @@ def handout_command(
 ) -> None:
     """Print a model on one A4 page: chart, equations, parameters, a hysteresis loop.
 
-    An included chart has the numbers of its demonstration; a scenario file
-    has its own.
+    An included chart has the numbers of its demonstration; of a scenario
+    its numbers and its run.
     """
     import plots
     from gms_fsm.app._own_files import own_file
+    from gms_fsm.app.scenario import load_scenario
     from gms_fsm.app.verbs.catalogue import chosen
     from gms_fsm.systems.models import demonstration
 
     own = own_file(name, law)
     no_contact(contact, own)
     if own is None:
-        model: Model = demonstration(chosen("handout", name, law)[0], law)
+        model: Model | Trace = demonstration(chosen("handout", name, law)[0], law)
     else:
         model = own.only_model(contact)
+        if own.run:
+            trace = load_scenario(own.path).simulate()
+            model = trace.contact(contact or trace.contacts[0])
     typer.echo(str(plots.handout(model, output)))
 
 

@@ -13,7 +13,7 @@ from gms_fsm.foundation.quantities import WIDTH, wrapped
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress, TaskID
+    from rich.progress import Progress
 
 
 def messages(**options: Any) -> Console:
@@ -37,19 +37,17 @@ def progress_bars(*columns: Any) -> Iterator[Progress]:
 
 
 @contextlib.contextmanager
-def named_bars() -> Iterator[Callable[[str, float], None]]:
-    """Provide a function that is told a name and how much of it is done: a bar for each name."""
+def named_bar() -> Iterator[Callable[[str, float], None]]:
+    """Provide a function that is told what is being done, and how much of everything is done."""
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
+    columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     with progress_bars(*columns) as bars:
-        tasks: dict[str, TaskID] = {}
+        task = bars.add_task("", total=1.0)
 
         def show(name: str, done: float) -> None:
-            if name not in tasks:
-                bars.start()
-                tasks[name] = bars.add_task(name, total=1.0)
-            bars.update(tasks[name], completed=done)
+            bars.start()
+            bars.update(task, description=name, completed=done)
 
         yield show
 
@@ -61,7 +59,7 @@ def error_line(text: str) -> None:
 
 def note(message: Warning | str, *_: object, **__: object) -> None:
     """Print a note; a replacement for `warnings.showwarning`."""
-    _line("note:", "bold yellow", str(message))
+    _line("note:", "bold", str(message))
 
 
 def say(text: str) -> None:

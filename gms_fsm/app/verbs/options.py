@@ -12,7 +12,8 @@ INTERRUPTED = 130  # the conventional exit code after Ctrl-C
 ScenarioFile = Annotated[
     Path,
     typer.Argument(
-        help="Scenario file, for example scenarios/pulled_mass.toml or scenarios/servo.toml.",
+        help="Scenario file, or the name of one of the package, such as pulled_mass or servo "
+        "(`gms-fsm run --list` shows all).",
         show_default=False,
     ),
 ]
@@ -34,8 +35,8 @@ End = Annotated[float | None, typer.Option(help="End time in s.")]
 ChartName = Annotated[
     str,
     typer.Argument(
-        help="Name of an included chart (--list shows all), or a chart file, a system file or a "
-        "scenario file (.toml).",
+        help="Name of an included chart (--list shows all) or scenario, or a chart file, a system "
+        "file or a scenario file (.toml).",
         show_default=False,
     ),
 ]

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import messages, named_bars, note, say
+from gms_fsm.app.verbs.console import messages, named_bar, note, say
 from gms_fsm.app.verbs.options import (
     INTERRUPTED,
     ContactName,
@@ -21,6 +21,10 @@ from gms_fsm.app.verbs.options import (
     PresetName,
     ScenarioFile,
 )
+from gms_fsm.errors import OutputError, ParameterError
+from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.files import write_text
+from gms_fsm.scenarios import shipped, titles
 
 
 class EngineName(enum.StrEnum):
@@ -45,9 +49,15 @@ def paper_command(
     import plots
     from gms_fsm.app.paper import writing
 
-    with plots.preset(preset), named_bars() as show:
+    with plots.preset(preset), named_bar() as show:
         files = writing.write(output, force, velocity, show)
     say(f"{len(files)} files in {output}; start with {files[0]}")
+
+
+def _list(wanted: bool) -> None:
+    if wanted:
+        say("\n".join(f"{name:<24} {title}" for name, title in titles().items()))
+        raise typer.Exit
 
 
 def run_command(
@@ -76,6 +86,12 @@ def run_command(
         ),
     ] = False,
     preset: PresetName = "screen",
+    _listed: Annotated[
+        bool,
+        typer.Option(
+            "--list", callback=_list, is_eager=True, help="List the scenarios of the package."
+        ),
+    ] = False,
 ) -> None:
     """Run a scenario; write the trace, transition log, overview figure and summary."""
     import plots
@@ -105,6 +121,31 @@ def run_command(
     for each in note_lines(trace):
         say(f"note: {each}")
     say(f"start with {files[0]}")
+
+
+def copy_command(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="Scenario of the package; `gms-fsm run --list` shows all.", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="File to write; NAME.toml by default."),
+    ] = None,
+) -> None:
+    """Copy a scenario of the package to a file of your own, to change it."""
+    known = shipped()
+    if name not in known:
+        raise unknown("scenario", name, known, ParameterError)
+    path = Path(f"{name}.toml") if output is None else output
+    if path.exists():
+        raise OutputError(
+            "there is a file of this name", place=str(path), advice="give another with -o"
+        )
+    write_text(path, known[name].read_text(encoding="utf-8"))
+    say(f"{path}; run it with: gms-fsm run {path}")
 
 
 def sweep_command(
@@ -191,7 +232,7 @@ def phenomena_command(
 
     own = room.own_models(files or (), contact, room.numbers_given("--value", value or []))
     models: dict[str, Any] | None = {**{name: name for name in model or ()}, **own} or None
-    with named_bars() as show:
+    with named_bar() as show:
         numbers = Bench.of(room.numbers_given("--set", bench or []))
         table, written = room.write(output, models, phenomenon, bench=numbers, progress=show)
     counts = collections.Counter(cell.measured.verdict for cell in table)

@@ -85,6 +85,7 @@ class ChartTable(Table):
     contact_outputs: dict[str, str] = Field({})
     states: list[StateTable] = Field(alias="state")
     transitions: list[EdgeTable] = Field([], alias="edge")
+    layout: dict[str, list[float]] = Field({})
 
     @model_validator(mode="before")
     @classmethod
@@ -97,6 +98,8 @@ class ChartTable(Table):
     def _plain_names(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Write plain names of parameters as one list; else each as a table."""
         data: dict[str, Any] = write(self)
+        if not self.layout:  # most charts have none
+            data.pop("layout", None)
         given = data.get("parameter", [])
         if not all(isinstance(each, str) for each in given):
             data["parameter"] = [
@@ -133,6 +136,7 @@ class ChartTable(Table):
                 "contact_outputs": chart.contact_outputs,
                 "states": [dict(vars(state)) for state in chart.states],
                 "transitions": list(edges.values()),
+                "layout": {name: list(place) for name, place in chart.layout.items()},
             }
         )
 

@@ -32,14 +32,18 @@ from gms_fsm.debugger.tui._keys import KEYS, help_rows, with_number
 from gms_fsm.debugger.tui._spans import DARK, LIGHT, PanelLine, line, painted
 from gms_fsm.debugger.tui._widgets import Help, Keys, Panel, Prompt, Ribbon
 from gms_fsm.session.session import Session
+from plots.style import THEMES, colour
 
 GROUNDS = {
-    "gms-dark": Theme(
-        "gms-dark", primary="#6cc4f5", background="#10151b", surface="#171d25", dark=True
-    ),
-    "gms-light": Theme(
-        "gms-light", primary="#00558f", background="#fbfbf9", surface="#f1f1ec", dark=False
-    ),
+    f"gms-{theme}": Theme(
+        f"gms-{theme}",
+        primary=colour("soft", theme),
+        foreground=colour("ink", theme),
+        background=colour("paper", theme),
+        surface=colour("panel", theme),
+        dark=theme == "dark",
+    )
+    for theme in THEMES
 }
 TITLES = {"events": "transitions", "why": "why (margins: log scale)"}
 LARGE = (120, 36)  # columns and rows from which all panels are shown at once
@@ -79,7 +83,7 @@ class FullScreen(App[int]):
 
     def __init__(self, session: Session, title: str = "", *, light: bool = False) -> None:
         super().__init__()
-        self.commands = Commands(session, DRAWN)
+        self.commands = Commands(session, DRAWN, follow=True)
         self.heading = title
         self.number = ""  # typed before a key
         self.page = self.highest = 0  # the page shown; the most rows of the upper panels
@@ -204,7 +208,7 @@ class FullScreen(App[int]):
             panel.show(rows(panel.columns), self.palette)
         except Exception as error:  # a value that cannot be computed must not end the session
             text = f"cannot be shown here: {error}"
-            panel.show([PanelLine(line((text, "error")))], self.palette)
+            panel.show([PanelLine(line((text, "head")))], self.palette)
         if name == "answers":
             self.call_after_refresh(self.call_after_refresh, self._show_last_answer, panel)
         elif name != "chart":
@@ -257,9 +261,7 @@ class FullScreen(App[int]):
         self.status.update(painted(lines, self.palette))
         lead = f"{self.number}" if self.number else self.commands.prompt
         if not self.busy:
-            self.lead.update(
-                painted([line((lead, "fired" if self.number else "command"))], self.palette)
-            )
+            self.lead.update(painted([line((lead, "head"))], self.palette))
 
     def _draw_ribbons(self) -> None:
         panel = self.ribbon
@@ -365,7 +367,7 @@ class FullScreen(App[int]):
         prompt = self.prompt
         text = message.value.strip() or self.commands.last_move
         prompt.remember(message.value.strip())
-        prompt.value = ""
+        prompt.action_leave()
         if text:
             self.give(text)
 
@@ -439,6 +441,11 @@ class FullScreen(App[int]):
         lead = f"{bank.name}." if elements.named else ""
         name = (*elements.chart(element).variables, "state")[0]
         self.action_prompt(f"poke {lead}{name}{element - bank.first + 1}=")
+
+    def action_follow(self) -> None:
+        """Keep the chosen element at firings of others, or follow them again."""
+        self.commands.follow = not self.commands.follow
+        self.notify("follows what fires" if self.commands.follow else "keeps this element")
 
     def action_branch(self) -> None:
         """Switch to the next branch."""

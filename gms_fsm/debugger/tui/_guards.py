@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from gms_fsm.debugger.tui._chart import MARKS
 from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line
-from gms_fsm.foundation.quantities import quantity, wrapped
+from gms_fsm.foundation.quantities import trimmed, wrapped
 from gms_fsm.session.explain import Clause, Why
 from gms_fsm.session.session import Breakpoint
 
@@ -102,11 +102,11 @@ class ClauseTable(NamedTuple):
             value = [Span("  true" if clause.holds else "  false", role)]
         else:
             if self.sides:
-                both = (quantity(side, clause.unit) for side in (clause.left, clause.right))
-                value += [Span(f"{side:>{VALUE}}") for side in both]
-            margin = quantity(clause.margin, clause.unit) if clause.relative else "0, rounding"
+                both = (trimmed(clause.scale.text(side)) for side in (clause.left, clause.right))
+                value += [Span(f" {side:>{VALUE - 1}}") for side in both]
+            margin = trimmed(clause.scale.text(clause.margin)) if clause.relative else "0, rounding"
             bar = margin_bar(clause.relative, self.half)
-            value += [Span(f"{margin:>{VALUE}} "), Span(bar, role)]
+            value += [Span(f" {margin:>{VALUE - 1}} "), Span(bar, role)]
         if not self.apart:
             return [[Span(f"{mark} ", role), Span(f"{clause.text:<{self.wide}}"), *value]]
         texts = textwrap.wrap(clause.text, self.wide)

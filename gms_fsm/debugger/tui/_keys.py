@@ -39,6 +39,7 @@ KEYS = (
     Key("u", "u", "until", "prompt('until ')", "to where a condition becomes true"),
     Key("up", "↑", "", "element(-1)", "the element before"),
     Key("down,e", "e", "element", "element(1)", "the next element; 3e chooses element 3"),
+    Key("f", "f", "follow", "follow", "follow the element that fires, or keep this one"),
     Key("N,shift+left", "N", "prev", "command('prev')", "to the transition before"),
     Key("o", "o", "other branch", "branch", "switch to the next branch"),
     Key("plus,equals_sign", "+", "zoom", "zoom(0.25)", "show a shorter time in the ribbons"),
@@ -70,7 +71,7 @@ def with_number(number: str) -> list[tuple[str, str, str]]:
 def help_rows(overview: str) -> list[PanelLine]:
     """Return the page of the help: the keys, then the commands of the prompt."""
     rows = [PanelLine(line(("Keys. A number before a key is its argument.", "head")))]
-    rows += [PanelLine(line((f"  {each.shown:<4}", "command"), each.says)) for each in KEYS]
+    rows += [PanelLine(line((f"  {each.shown:<4}", "head"), each.says)) for each in KEYS]
     rows += [
         PanelLine(
             line("Esc stops a long move, or leaves the command line. The mouse: an element,")

@@ -29,23 +29,26 @@ def status_lines(
     parts = [
         Span(f"t = {view.t:.9g} s", "head"),
         Span(f"{place}{step}"),
-        *([Span(f"branch {view.branch}", "fired")] if several else []),
+        *([Span(f"branch {view.branch}", "head")] if several else []),
     ]
     for contact in view.contacts:
         lead = f"{contact.name}: " if contact.name else ""
-        values = {"v": (contact.v, "m/s"), "F": (contact.F, "N")}
-        text = ", ".join(f"{name} = {quantity(*value)}" for name, value in values.items())
-        parts.append(Span(f"{lead}{text}"))
+        parts.append(Span(f"{lead}{contact.here.written('v', 'F')}"))
     if view.ending == "end":
-        parts.append(Span("end of the run", "fired"))
+        parts.append(Span("end of the run", "head"))
     elif view.ending:
-        parts.append(Span("the run cannot continue", "error"))
+        parts.append(Span("the run cannot continue", "head"))
     if busy:
         parts.append(Span("… working, Esc stops it", "now"))
     found = fitted(parts, width)
+    for text in _forms(view.fired) if view.fired else ():  # the chart says it too
+        more = fitted([*parts[:2], Span(f"FIRED {text}", "fired"), *parts[2:]], width)
+        if len(more) == len(found):
+            found = more
+            break
     left = width - sum(len(span.text) for span in found[0]) - 4
     if len(title) <= left:
-        found[0] = [Span(f"{title} ", "command"), *found[0]]
+        found[0] = [Span(f"{title} ", "head"), *found[0]]
     return found
 
 
@@ -89,6 +92,7 @@ def element_rows(view: Screen, chosen: int, width: int) -> list[PanelLine]:
 def _table(contact: ContactView, chosen: int, width: int) -> list[PanelLine]:
     """Return the elements of a contact: columns as far as there is room, edges last."""
     chart, lead = contact.chart, f"{contact.name} " if contact.name else ""
+    scales = contact.scales
     names = [state.name for state in chart.states]
     heads = ["  el", "state", *chart.variables, "s", f"|{(*chart.variables, '')[0]}|/s", "F"]
     cells = [
@@ -96,12 +100,12 @@ def _table(contact: ContactView, chosen: int, width: int) -> list[PanelLine]:
             f"{'▶' if i == chosen else ' '} E{each.number}",
             each.state,
             *(
-                quantity(value, chart.unit(name))
+                scales[name].text(value)
                 for name, value in zip(chart.variables, each.variables, strict=True)
             ),
-            "" if each.s is None else quantity(each.s, "m"),
+            "" if each.s is None else scales["s"].text(each.s),
             "" if each.ratio is None else _ratio(each.ratio),
-            quantity(each.F, "N"),
+            scales["F"].text(each.F),
         ]
         for i, each in enumerate(contact.elements, start=contact.first)
     ]
@@ -206,7 +210,7 @@ def session_rows(
         rows += [PanelLine(line((part, "dim")), command) for part in wrapped(detail, width)]
     for number, point in enumerate(points, start=1):
         text = f"● {number} {breakpoint_text(point)}; hits: {point.seen}"
-        rows += [PanelLine(line((part, "false"))) for part in wrapped(text, width)]
+        rows += [PanelLine(line((part, "head"))) for part in wrapped(text, width)]
     rows += [PanelLine(line(part)) for text in watches for part in wrapped(text, width)]
     return rows
 
@@ -219,6 +223,6 @@ def answer_rows(lines: Sequence[str], width: int) -> list[PanelLine]:
     """Return lines of a transcript, wrapped; commands and errors stand out."""
     rows = []
     for each in lines:
-        role = "command" if each.startswith("(t=") else "error" if each.startswith("error:") else ""
+        role = "head" if each.startswith(("(t=", "error:")) else ""
         rows += [PanelLine(line((part, role))) for part in wrapped(each, width)]
     return rows

@@ -10,7 +10,9 @@ from typing import NamedTuple
 
 from rich.text import Text
 
-STATES = 6  # colours of states; the ribbons' marks repeat in the same rhythm
+from plots.style import ROLES, Theme, colour
+
+STATES = 6  # looks of states; the ribbons' marks repeat in the same rhythm
 
 
 class Span(NamedTuple):
@@ -30,45 +32,24 @@ class PanelLine(NamedTuple):
     command: str = ""
 
 
-# The colours of states are those of Okabe and Ito, darker on a light ground.
-DARK: Mapping[str, str] = {
-    "": "#e2e6ea",
-    "dim": "#9aa5b1",
-    "head": "bold #e2e6ea",
-    "true": "#7ddc9c",
-    "false": "#ff9d8a",
-    "fired": "bold #ffd75e",
-    "active": "bold #6cc4f5",
-    "now": "bold #ffffff on #b3400f",
-    "chosen": "bold #ffffff on #1f4e79",
-    "error": "bold #ff9d8a",
-    "command": "bold #6cc4f5",
-    "state0": "#6cc4f5",
-    "state1": "#f0b040",
-    "state2": "#4fd0a5",
-    "state3": "#e59ac5",
-    "state4": "#f0e05a",
-    "state5": "#b8a9ff",
-}
-LIGHT: Mapping[str, str] = {
-    "": "#1b2530",
-    "dim": "#55606c",
-    "head": "bold #1b2530",
-    "true": "#0b6b33",
-    "false": "#a52a12",
-    "fired": "bold #7a4b00",
-    "active": "bold #00558f",
-    "now": "bold #ffffff on #b3400f",
-    "chosen": "bold #ffffff on #1f4e79",
-    "error": "bold #a52a12",
-    "command": "bold #00558f",
-    "state0": "#00558f",
-    "state1": "#8a5200",
-    "state2": "#00664a",
-    "state3": "#8f2f6b",
-    "state4": "#6b5f00",
-    "state5": "#5a46b8",
-}
+def _palette(theme: Theme) -> Mapping[str, str]:
+    """Return the looks of the roles, in the colours of all pictures (`docs/colours.md`)."""
+    ink, now = colour("ink", theme), colour("now text", theme)
+    states = ROLES["hatches"].colours(theme)
+    return {
+        "": ink,
+        "dim": colour("soft", theme),
+        "head": f"bold {ink}",
+        "true": colour("holds", theme),
+        "false": colour("fails", theme),
+        "fired": f"bold {now}",
+        "active": f"bold {colour('active', theme)}",
+        "now": f"bold {colour('paper', theme)} on {now}",
+        **{f"state{i}": states[min(i, len(states) - 1)] for i in range(STATES)},
+    }
+
+
+DARK, LIGHT = _palette("dark"), _palette("light")
 
 
 def line(*parts: str | tuple[str, str]) -> Line:

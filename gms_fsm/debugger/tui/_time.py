@@ -9,7 +9,7 @@ from gms_fsm.debugger._over_time import Ribbons
 from gms_fsm.debugger._text import DRAWN, labels, short
 from gms_fsm.debugger._view import Screen
 from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line, state_role
-from gms_fsm.foundation.quantities import quantity, sparkline
+from gms_fsm.foundation.quantities import scale_of, sparkline
 
 UNITS = {"v": "m/s", "F": "N"}
 
@@ -61,7 +61,7 @@ def ribbon_rows(
             "≠" if None not in (a, b) and a != b else " "
             for a, b in zip(ribbons.modes, parent.modes, strict=True)
         ]
-        rows.append(PanelLine(line((f"{' differs':<{lead}}", "dim"), ("".join(differs), "fired"))))
+        rows.append(PanelLine(line((f"{' differs':<{lead}}", "dim"), ("".join(differs), "head"))))
     return rows
 
 
@@ -80,13 +80,14 @@ def ranges(values: Mapping[str, Sequence[float | None]]) -> str:
     """Return the ranges of velocity and force.
 
     >>> ranges({"v": (0.0, None, 0.15), "F": (1.0, 2.0)})
-    'v 0 m/s to 150.0 mm/s  F 1.000 N to 2.000 N'
+    'v 0 to 150.0 mm/s  F 1.000 to 2.000 N'
     """
     found = []
     for name, each in values.items():
         known = [value for value in each if value is not None and math.isfinite(value)]
         if known:
-            low, high = (quantity(value, UNITS[name]) for value in (min(known), max(known)))
+            scale = scale_of(known, UNITS[name])
+            low, high = scale.number(min(known)), scale.text(max(known))
             found.append(f"{name} {low} to {high}")
     return "  ".join(found)
 

@@ -114,7 +114,7 @@ class Keys(Static):
             kept.append(each)
         text, self.places, column = Text(no_wrap=True, end=""), [], 0
         for key, label, action in [*kept, *keys[len(keys) - last :]]:
-            text.append(f" {key}", palette["command"])
+            text.append(f" {key}", palette["head"])
             text.append(f" {label} ", palette[""])
             self.places.append((column, column + _long((key, label, action)), action))
             column = self.places[-1][1]

@@ -90,12 +90,19 @@ class Moment:
     @property
     def states(self) -> list[str]:
         """Active state of each element."""
-        start, (_, _, mode) = self._recording.start, self._row
+        start, places = self._recording.start, iter(self.modes)
         return [
-            start.system.contact(bank.name).chart.states[each].name
+            start.system.contact(bank.name).chart.states[next(places)].name
             for bank in start.program.layout.banks
-            for each in mode[bank.elements]
+            for _ in range(bank.n)
         ]
+
+    @property
+    def modes(self) -> list[int]:
+        """The place of the active state of each element in its chart, from 0."""
+        mode = self._row[2]
+        banks = self._recording.start.program.layout.banks
+        return [each for bank in banks for each in mode[bank.elements]]
 
     @property
     def values(self) -> dict[str, Any]:

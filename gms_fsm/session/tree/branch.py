@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gms_fsm.errors import SessionError
+from gms_fsm.foundation.quantities import Scale, scale_of
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.lowering.observing import sigmas
 from gms_fsm.lowering.program import Program
@@ -35,6 +36,8 @@ from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from integrators import Firing, Stop
+
+SCALED = {"x": "m", "v": "m/s", "F": "N"}
 
 
 class BranchRow(NamedTuple):
@@ -99,6 +102,7 @@ class Branch:
         self.between: BranchRow | None = None  # a located point after the cursor row
         self.stops: set[int] = set()  # rows at which the guards were evaluated
         self.firings: list[int] = []  # rows made by firings in this branch
+        self.largest: dict[tuple[str, str], float] = {}  # of x, v and F of each contact so far
         self.on_row: Callable[[], object] = _nothing  # called at each row of a move; may interrupt
 
     def __repr__(self) -> str:
@@ -137,6 +141,24 @@ class Branch:
                         self.firings.append(self.offset + len(rows) - 1)
                 except SimulationError as error:
                     self.failure = error.with_traceback(None)
+        for i in range(before, len(rows)):
+            recorded = run.recorder.rows
+            row = BranchRow(rows[i], recorded.microstep[i], recorded.y[i], recorded.mode[i])
+            for contact, scope in self.system_scope(row).contacts.items():
+                for name in SCALED:
+                    size = abs(getattr(scope, name))
+                    if size > self.largest.get((contact, name), 0.0):
+                        self.largest[contact, name] = size
+
+    def scales(self, contact: str) -> dict[str, Scale]:
+        """Return how x, v and F of a contact are written: as suits the largest so far."""
+        past = {} if self.past is None else self._shared().largest
+        return {
+            name: scale_of(
+                (past.get((contact, name), 0.0), self.largest.get((contact, name), 0.0)), unit
+            )
+            for name, unit in SCALED.items()
+        }
 
     def complete(self) -> None:
         """Compute all rows to the end, or until the run cannot continue."""

@@ -20,7 +20,7 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import SignalError
 from gms_fsm.foundation.tables import ONE, TABLE, TEXT, Numbers, Table, Texts, Value, built
 from gms_fsm.systems.models import ChartModel, Model
-from gms_fsm.systems.parts import Body, Contact, Sampled
+from gms_fsm.systems.parts import Body, Contact, Motion, Sampled
 from gms_fsm.systems.signals import Corners, Formula, Function, Signal, as_signal
 from gms_fsm.systems.springs import Spring
 
@@ -197,6 +197,7 @@ class BodyTable(Table):
     velocity: Value | None = Field(None, description="of a driven body, instead of an inertia")
     x: str = "x"
     v: str = "v"
+    motion: Motion = Field("along", description="along the surface, normal to it, or turning")
 
 
 class SpringTable(Table):
@@ -308,6 +309,7 @@ def plain(system: System) -> dict[str, Any]:
                 velocity=None if each.velocity is None else value_table(each.velocity),
                 x=each.x,
                 v=each.v,
+                motion=each.motion,
             )
             for each in system.bodies
         ],

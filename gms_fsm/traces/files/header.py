@@ -82,6 +82,7 @@ class Header(BaseModel):
     model: ModelTable | None = None
     rig: RigTable | None = None
     system: SystemTable | None = None
+    heading: str = ""
     settings: dict[str, str | float | dict[str, float | list[float]] | None]
     log: str = ""  # in a CSV file: the hash of its transition log
     monitors: dict[str, Annotated[Verdict, Field(discriminator="kind")]] = {}
@@ -99,9 +100,11 @@ class Header(BaseModel):
         what: Mounted,
         settings: Mapping[str, Setting],
         monitors: Mapping[str, Verdict] | None = None,
+        heading: str = "",
     ) -> Header:
         """Describe a run."""
         rest: Any = {"settings": dict(settings), "monitors": dict(monitors or {})}
+        rest["heading"] = heading
         if what.named:
             return cls(system=SystemTable.of(what.system), **rest)
         return cls(model=ModelTable.of(what.model), rig=RigTable.of(what.rig), **rest)

@@ -52,23 +52,27 @@ function written(u, digits = 5) {
   return (plain ? u.toPrecision(digits) : u.toExponential(digits - 2)).replaceAll("-", "−");
 }
 
-const PREFIXES = { "-12": "p", "-9": "n", "-6": "µ", "-3": "m", 0: "", 3: "k", 6: "M", 9: "G" };
-const SCALED = new Set(["s", "m", "m/s", "m/s^2", "N", "N/m", "N s/m", "W", "J"]);
+// Prefixes by power of ten, and the units that take one: those of gms_fsm.foundation.quantities, as is the rule below.
+const { prefixes: PREFIXES, smallest: LEAST_POWER } = data.quantities, PREFIXED = new RegExp(`^(?:${data.quantities.prefixed})`);
 
-// The exponent, a multiple of 3, that suits a size in a unit; 0 for units without prefixes.
+// The power of ten, a multiple of 3, that suits a size in a unit; 0 for units without prefixes, and beyond the prefixes.
 function powerOf(size, unit) {
-  if (!SCALED.has(unit) || !(size > 0) || !Number.isFinite(size)) return 0;
-  return clamp(3 * Math.floor(Math.log10(size * (1 + 1e-12)) / 3), -12, 9);
+  if (!PREFIXED.test(unit) || !(size > 0) || !Number.isFinite(size)) return 0;
+  const power = 3 * Math.floor((Math.log10(Number(size.toPrecision(4))) + 1e-12) / 3);
+  return power in PREFIXES ? power : 0;
 }
 
-// A value in engineering units: 3.2140 mm.
-function eng(u, unit = "", digits = 4) {
-  if (!Number.isFinite(u) || u === 0 || !SCALED.has(unit)) return `${u === 0 ? "0" : written(u, digits)} ${unit}`.trim();
-  const rounded = Number(u.toPrecision(digits)), power = powerOf(Math.abs(rounded), unit);
-  const scaled = rounded / 10 ** power;
-  if (Math.abs(scaled) < 1 || Math.abs(scaled) >= 1000) return `${written(u, digits)} ${unit}`; // beyond the prefixes
-  return `${scaled.toPrecision(digits).replace("-", "−")} ${PREFIXES[power]}${unit}`;
+// A value in the unit of its place, with the prefix of a power of ten: 3.214 mm.
+function inUnit(u, unit, power, digits = 4) {
+  const named = `${PREFIXES[power]}${unit}`;
+  if (!Number.isFinite(u) || u === 0) return `${u === 0 ? "0" : written(u)} ${named}`.trim();
+  const scaled = Number(u.toPrecision(digits)) / 10 ** power, size = Math.floor(Math.log10(Math.abs(scaled)) + 1e-12);
+  const plain = size >= LEAST_POWER && size < Math.max(digits, power ? 3 : 0);
+  return `${plain ? scaled.toFixed(Math.max(0, digits - 1 - size)) : scaled.toExponential(digits - 1)} ${named}`.replaceAll("-", "−").trim();
 }
+
+// A value that stands alone, in the unit that suits it.
+const eng = (u, unit = "", digits = 4) => inUnit(u, unit, powerOf(Math.abs(u), unit), digits);
 
 // Names of elements count from 1, as in the log and the debugger.
 const nameOf = (contact, element) => `${contact.name || "element"} ${element + 1}`;

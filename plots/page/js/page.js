@@ -5,6 +5,8 @@ const whole = {}, span = {};
 const breakpoints = new Map();
 let frame = 0, following = true, zooming = false;
 const views = [];
+// A wide screen: the page fills it and does not scroll; two runs need more of it than one.
+const isWide = () => innerHeight >= 520 && innerWidth >= (runs.length > 1 ? 1240 : 1000);
 const keyOf = (view, contact, element, edge) => `${view.place}/${contact.name}/${element}/${edge}`;
 
 function show(k, words = "") {
@@ -12,7 +14,7 @@ function show(k, words = "") {
   const t = frames.t[frame], half = (span.max - span.min) / 2;
   if (t < span.min || t > span.max) zoomTo(t - half, t + half); // a zoomed window follows
   for (const view of views) view.show(frames.rows[view.place][frame]);
-  const place = `t = ${written(t, 9)} s`;
+  const place = `t = ${timeText(t, 9)}`;
   $("#now").textContent = place;
   const scrubber = $("#scrubber");
   scrubber.value = inTime ? t : frame;
@@ -40,6 +42,7 @@ function chooseElement(element) {
 
 function openPane(side, key) {
   for (const view of views) view.openPane(side, key);
+  for (const view of views) view.fit(); // once all are in place
 }
 
 function nextPane(side) {
@@ -227,7 +230,7 @@ function difference() {
   while (k < Math.min(a.length, b.length) && text(a[k]) === text(b[k])) k += 1;
   if (k === Math.max(a.length, b.length)) return { frame: null, told: "both runs make the same transitions in the same order" };
   const entries = [a[k], b[k]], at = entries.map((entry, i) => (entry ? frames.of[i][entry.row] : Infinity)), least = Math.min(...at);
-  const told = entries.map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${written(entry.t, 7)} s` : "no further transition"}`);
+  const told = entries.map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${timeText(entry.t, 7)}` : "no further transition"}`);
   // Why the later run did not do the same then; of two at one time, the one that was held back.
   const words = entries.map((entry, i) => (frames.t[at[i]] === frames.t[least] ? heldInOther(entry, i, at[i]) : ""));
   const why = words.find((each) => each && !each.endsWith("fires next")) ?? words.find(Boolean);
@@ -246,6 +249,9 @@ function firstDifference() {
 }
 
 // ------------------------------------------------------------------ start
+// A time, in the unit of the time axis.
+function timeText(t, digits) { return inUnit(t, "s", TIME_POWER, digits); }
+
 // Shows other data in the place of those shown, if any; time, zoom, selection, breakpoints and open tabs stay.
 function load(given) {
   const t = frames?.t[frame] ?? -Infinity, zoomed = frames && (span.min !== whole.min || span.max !== whole.max) && { ...span };
@@ -270,6 +276,7 @@ function load(given) {
   }
   document.title = $("#title").textContent = data.title;
   $("#runs").className = runs.length > 1 ? "two" : "one";
+  document.documentElement.classList.toggle("wide", isWide());
   $("#names").textContent = `${Object.keys(runs[0].names).join(", ")}, state(1) == ${runs[0].contacts[0].states.at(-1)}`;
   $("#facts").textContent = runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" ");
   for (const run of runs) views.push(new RunView(run));
@@ -286,5 +293,6 @@ function load(given) {
 
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) $("#speed").value = "rows";
 load(data);
+addEventListener("resize", () => document.documentElement.classList.toggle("wide", isWide()));
 new ResizeObserver(() => { for (const view of views) view.fit(); }).observe($("#runs"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => eachPlots((pane) => pane.recolour()));

@@ -1,12 +1,12 @@
 "use strict";
-// The plots over time. All share one time axis, a cursor at the row shown and a crosshair under the mouse; the head of
-// each plot tells its value at the crosshair, or else at the cursor.
+// The plots over time, of one run or of two in the same plots. All share one time axis, a cursor at the row shown and a
+// crosshair under the mouse; the head of each plot tells its value at the crosshair, or else at the cursor.
 const AXIS = 58, GAP = 10, TIME_AXIS = 20; // px to the left and to the right of the plots, and below them
-const LEAST = { 1: 46, 2: 34 }; // px, of a plot of one run or of two, so that the time axis stays in view
+const LEAST = 46; // px, of a plot
 const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
 const elementStep = (i, n) => (n > 1 ? Math.round((i * (COLOURS - 1)) / (n - 1)) : 0); // of the ramp from the first element to the last
-const WIDE = matchMedia("(min-width: 1000px)"); // there the page fills the screen and does not scroll
+const RUNS = [{ stroke: "--ink" }, { stroke: "--soft", dash: [7, 4] }]; // lines of the first run and of the second
 const MOST_POINTS = 60000; // of lines that are drawn again when another element is selected
 let pointed = null, pinned = null; // frames: under the mouse, and where two runs first differ
 
@@ -17,17 +17,13 @@ function decimals(step) {
 }
 
 // A stack of plots and ribbons over time. A plot is { title, unit, lines, at, band }: lines as { get, stroke, dash, run },
-// at(row), its value for the head, and whether the area between its two lines is filled.
+// at(), what its head says, and whether the area between its two lines is filled.
 class TimePlots {
   constructor(view, box) {
-    Object.assign(this, { view, box, plots: [], tracks: [], wanted: [] });
+    Object.assign(this, { view, box });
+    this.clear();
     box.classList.add("plots");
     this.body = make("div", box, "", { class: "stack" });
-    this.cursor = make("div", box, "", { class: "cursor" });
-    this.hair = make("div", box, "", { class: "hair" });
-    this.hair.hidden = true;
-    this.pin = make("div", box, "≠", { class: "pin" });
-    this.pin.hidden = pinned === null;
     box.addEventListener("mousemove", (event) => {
       const left = this.body.getBoundingClientRect().left + AXIS, part = (event.clientX - left) / this.width();
       pointAt(part >= 0 && part <= 1 ? lastAt(frames.t, span.min + part * (span.max - span.min)) : null);
@@ -35,7 +31,20 @@ class TimePlots {
     box.addEventListener("mouseleave", () => pointAt(null));
   }
 
+  clear() { Object.assign(this, { plots: [], tracks: [], wanted: [], marks: { cursor: [], hair: [], pin: [] } }); }
+
   width() { return this.body.clientWidth - AXIS - GAP; }
+
+  // The cursor, the crosshair and the pin in a plot or over ribbons: not where readings stand.
+  mark(box) {
+    for (const [name, all] of Object.entries(this.marks)) all.push(make("div", box, name === "pin" && !all.length ? "≠" : "", { class: name }));
+  }
+
+  // A plot of a value of both runs: `of` finds it in a run, undefined where there is none.
+  compare(title, unit, of, { band = false, ...options } = {}) {
+    const lines = runs.map((run, k) => ({ ...RUNS[k], run, get: of(run) })).filter(({ get }) => get);
+    this.add({ title, unit, lines, band: band && lines.length > 1, at: (power) => readings(lines, unit, power), ...options });
+  }
 
   add(plot) { this.wanted.push(plot); }
 
@@ -45,7 +54,7 @@ class TimePlots {
     this.wanted = [];
   }
 
-  made({ title, note = "", unit = "", lines, at, digits = 5, step = false, band = false }, isLast) {
+  made({ title, note = "", unit = "", lines, at, step = false, band = false }, isLast) {
     const head = make("h3", this.body, ""), name = make("span", head), value = make("output", head);
     const power = powerOf(largest(extent(lines.map(({ get, run }) => ({ get, rows: run.rows })))), unit);
     name.textContent = unit ? `${title} [${PREFIXES[power]}${unit}]` : title;
@@ -65,23 +74,28 @@ class TimePlots {
     if (span.min !== whole.min || span.max !== whole.max) plot.setScale("x", { ...span }); // made while zoomed
     if (isLast) make("span", plot.root, `t [${PREFIXES[TIME_POWER]}s]`, { class: "time-unit" });
     let down = 0;
+    this.mark(plot.over);
     plot.over.addEventListener("mousedown", (event) => { down = event.clientX; });
     plot.over.addEventListener("click", (event) => { // the end of a drag is also a click
       if (Math.abs(event.clientX - down) < 4) go(Math.max(lastAt(frames.t, plot.posToVal(event.offsetX, "x")), 0));
     });
     if (note) make("small", head, note);
-    return { plot, value, at, unit, digits };
+    return { plot, value, at: () => at(power) };
   }
 
+  // The states of every element; of two runs both, one under the other.
   addRibbons(contacts) {
-    this.ribbons = make("div", this.body, "", { class: "ribbons", tabindex: 0, role: "group", "aria-label": "Active states over time" });
-    for (const contact of contacts) {
-      if (contact.states.length < 2) continue;
-      contact.pieces.forEach((pieces, i) => {
-        const ribbon = make("div", this.ribbons, "", { class: "ribbon", role: "img", "aria-label": `States of ${nameOf(contact, i)} over time` });
-        make("b", ribbon, contacts.length > 1 ? `${contact.name}${contact.n > 1 ? ` ${i + 1}` : ""}` : `E${i + 1}`);
-        this.tracks.push({ contact, i, pieces, ribbon, track: make("div", ribbon) });
-      });
+    const frame = make("div", this.body, "", { class: "ribbon-frame" }), several = contacts.length > runs.length;
+    this.ribbons = make("div", frame, "", { class: "ribbons", tabindex: 0, role: "group", "aria-label": "Active states over time" });
+    this.mark(make("div", frame, "", { class: "over-ribbons" }));
+    const tracks = contacts.filter(({ states }) => states.length > 1).flatMap((contact) => contact.pieces.map((pieces, i) => ({ contact, i, pieces })));
+    const names = contacts.map(({ name }) => name);
+    tracks.sort((a, b) => names.indexOf(a.contact.name) - names.indexOf(b.contact.name) || a.i - b.i);
+    for (const { contact, i, pieces } of tracks) {
+      const { place } = contact.run, [short, long] = runs.length > 1 ? [`${place + 1}: `, `run ${place + 1}, `] : ["", ""];
+      const ribbon = make("div", this.ribbons, "", { class: "ribbon", role: "img", "aria-label": `States of ${long}${nameOf(contact, i)} over time` });
+      make("b", ribbon, `${short}${several ? `${contact.name}${contact.n > 1 ? ` ${i + 1}` : ""}` : `E${i + 1}`}`);
+      this.tracks.push({ contact, i, pieces, ribbon, track: make("div", ribbon) });
     }
   }
 
@@ -91,7 +105,7 @@ class TimePlots {
     if (!width || !this.plots.length) return;
     const heads = this.plots.reduce((sum, { value }) => sum + value.parentNode.offsetHeight, 0);
     const left = this.box.clientHeight - heads - (this.ribbons?.offsetHeight ?? 0) - TIME_AXIS - 2;
-    const height = WIDE.matches ? Math.max(Math.floor(left / this.plots.length), LEAST[runs.length]) : 92;
+    const height = isWide() ? Math.max(Math.floor(left / this.plots.length), LEAST) : 92;
     for (const each of this.plots) {
       const own = each === last ? height + TIME_AXIS : height;
       if (each.plot.width !== width || each.plot.height !== own) each.plot.setSize({ width, height: own });
@@ -114,17 +128,12 @@ class TimePlots {
 
   point() { this.show(); }
 
-  tell() {
-    const row = pointed === null ? this.view.row : frames.rows[this.view.place][pointed];
-    for (const { value, at, unit, digits } of this.plots) {
-      const u = at(row), text = typeof u === "string" ? u : eng(u, unit, digits);
-      say(value, text);
-    }
-  }
+  tell() { for (const { value, at } of this.plots) say(value, at()); }
 
   drawRibbons() {
-    const wide = span.max - span.min, { run } = this.view;
+    const wide = span.max - span.min;
     for (const { contact, pieces, track } of this.tracks) {
+      const { run } = contact;
       track.replaceChildren();
       for (let k = 0, to = 0; k < pieces.length; k++) {
         const from = Math.max(k ? run.t(pieces[k].from) : -Infinity, span.min);
@@ -140,18 +149,19 @@ class TimePlots {
     }
   }
 
-  // x of a time, px from the left of the pane; nothing is laid out, so that a film can move it in every frame.
+  // Nothing is laid out, so that a film can move it in every frame.
   placeCursor(t = frames.t[frame]) {
-    this.put(this.cursor, t);
-    this.hair.hidden = pointed === null;
-    if (pointed !== null) this.put(this.hair, frames.t[pointed]);
-    if (pinned !== null) this.put(this.pin, frames.t[pinned]);
+    this.put("cursor", t);
+    this.put("hair", frames.t[pointed]);
+    this.put("pin", frames.t[pinned]);
   }
 
-  put(line, t) {
-    const part = (t - span.min) / (span.max - span.min);
-    line.style.visibility = part < 0 || part > 1 ? "hidden" : "visible";
-    line.style.transform = `translateX(${AXIS + part * this.width()}px)`;
+  put(name, t) {
+    const part = (t - span.min) / (span.max - span.min), seen = part >= 0 && part <= 1; // no time is NaN
+    for (const line of this.marks[name]) {
+      line.style.visibility = seen ? "visible" : "hidden";
+      if (seen) line.style.transform = `translateX(${part * this.width()}px)`;
+    }
   }
 }
 
@@ -191,55 +201,58 @@ function valueAt({ get, run }, frame, t) {
   return to > from && t > from ? get(row) + ((get(next) - get(row)) * (t - from)) / (to - from) : get(row);
 }
 
+// The value of each run at the row shown, in the unit of the plot, and how far the second is from the first.
+function readings(lines, unit, power) {
+  const k = pointed ?? frame, t = frames.t[k], at = lines.map(({ get, run }) => inUnit(get(frames.rows[run.place][k]), unit, power, 5));
+  if (runs.length < 2) return at[0];
+  const texts = at.map((text, i) => `${lines[i].run.place + 1}: ${text}`);
+  if (lines.length < 2 || runs.some((each) => each.ended(t))) return texts.join("  ");
+  const [one, two] = lines.map((line) => valueAt(line, k, t));
+  return `${texts.join("  ")}  Δ ${inUnit(two - one, unit, power, 3)}`;
+}
+
 class TimePane extends TimePlots {
-  static side = "right"; static key = "time"; static title = "Time";
+  static side = "right"; static key = "time"; static title = "Time"; static shared = true;
 
   constructor(view, box) { super(view, box); this.fill(); }
 
   fill() {
-    const { view } = this, { contact, run } = view;
     this.body.replaceChildren();
-    Object.assign(this, { tracks: [], lit: -1 });
-    const others = views.filter((each) => each !== view).map((each) => ({
-      run: each.run, contact: each.run.contacts.find(({ name }) => name === contact.name) ?? each.run.contacts[0],
-    }));
-    const column = (of, name) => { const each = of.columns[name === "v" ? of.velocity : name]; return Array.isArray(each) ? each[0] : each; };
-    const one = (title, name, unit) => {
-      const own = { get: column(contact, name), run, stroke: "--ink" };
-      const lines = [...others.map((each) => ({ get: column(each.contact, name), run: each.run, stroke: "--soft", dash: [2, 3] })), own];
-      const band = others.length > 0 && name !== "v";
-      const at = (row) => { // of the second run also how far it is from the first
-        const k = pointed ?? frame, t = frames.t[k];
-        if (!band || view.place === 0 || runs.some((each) => each.ended(t))) return own.get(row);
-        return `${eng(own.get(row), unit, 5)}  Δ ${eng(valueAt(own, k, t) - valueAt(lines[0], k, t), unit, 3)}`;
-      };
-      this.add({ title, note: others.length ? "dotted: the other run" : "", unit, lines, at, band });
+    this.clear();
+    this.lit = -1;
+    const name = this.view.contact.name;
+    this.contacts = runs.map(({ contacts }) => contacts.find((each) => each.name === name) ?? contacts[0]);
+    const column = (each) => (run) => {
+      const contact = this.contacts[run.place], found = contact.columns[each === "v" ? contact.velocity : each];
+      return Array.isArray(found) ? found[0] : found;
     };
-    one("F", "F", "N");
+    this.compare("F", "N", column("F"), { band: true, note: runs.length > 1 ? "dashed: run 2" : "" });
     const inner = this.addInner();
-    one("v", "v", "m/s");
-    one("x", "x", "m");
+    this.compare("v", "m/s", column("v"));
+    this.compare("x", "m", column("x"), { band: true });
     this.addAll();
     this.inner = inner && this.plots[1].plot;
-    this.addRibbons([contact]);
+    this.addRibbons(this.contacts);
     this.highlight();
   }
 
-  // The first variable of every element, over its threshold if that is what its edges turn at.
+  // The first variable of every element, over its threshold if that is what its edges turn at; of two runs those of the
+  // element chosen.
   addInner() {
-    const { contact, run } = this.view, [name] = contact.variables;
+    const { contact } = this.view, [name] = contact.variables;
     if (!name) return false;
     const over = contact.threshold && contact.columns.s;
-    const get = (i) => (over ? (row) => contact.value(name, i, row) / contact.value("s", i, row) : (row) => contact.value(name, i, row));
-    const lines = contact.modes.map((_, i) => ({ get: get(i), run, stroke: `--e${elementStep(i, contact.n)}`, dash: DASHES[i % DASHES.length] }));
-    const bounds = over ? [1, -1].map((u) => ({ get: () => u, run, stroke: "--line" })) : [];
+    const get = (of, i) => (over ? (row) => of.value(name, i, row) / of.value("s", i, row) : (row) => of.value(name, i, row));
+    const lines = this.contacts.flatMap((of) => of.modes.map((_, i) => ({
+      get: get(of, i), run: of.run, of, i, ...(runs.length > 1 ? RUNS[of.run.place] : { stroke: `--e${elementStep(i, of.n)}`, dash: DASHES[i % DASHES.length] }),
+    })));
+    const { run } = contact, bounds = over ? [1, -1].map((u) => ({ get: () => u, run, stroke: "--line" })) : [];
+    const unit = over ? "" : contact.units[name] ?? "";
     this.add({
-      title: over ? `${name} / s(v), lines at ±1` : name, unit: over ? "" : contact.units[name] ?? "", lines: [...bounds, ...lines],
-      at: (row) => {
-        const i = this.view.element, u = get(i)(row);
-        return `${contact.n > 1 ? `E${i + 1}: ` : ""}${over ? written(u) : eng(u, contact.units[name] ?? "", 5)}`;
-      },
+      title: over ? `${name} / s(v), lines at ±1` : name, unit, lines: [...bounds, ...lines],
+      at: (power) => `${contact.n > 1 ? `E${this.view.element + 1}: ` : ""}${readings(lines.filter(({ i }) => i === this.view.element), unit, power)}`,
     });
+    this.innerLines = lines;
     return true;
   }
 
@@ -247,11 +260,15 @@ class TimePane extends TimePlots {
 
   highlight() {
     const { element, contact } = this.view;
-    if (this.inner && contact.n > 1 && this.lit !== element) {
+    if (this.inner && this.lit !== element) {
       this.lit = element;
-      const { series } = this.inner, first = series.length - contact.n;
-      for (let i = 0; i < contact.n; i++) series[first + i].width = i === element ? 2.6 : 1.2;
-      if (frames.t.length * contact.n < MOST_POINTS) this.inner.redraw(false, false); // else with the next zoom
+      const { series } = this.inner, first = series.length - this.innerLines.length;
+      this.innerLines.forEach(({ i, of }, k) => {
+        const on = i === element, each = series[first + k];
+        if (runs.length < 2 && of.n > 1) each.width = on ? 2.6 : 1.2;
+        else if (runs.length > 1 && each.show !== on) this.inner.setSeries(first + k, { show: on });
+      });
+      if (runs.length < 2 && contact.n > 1 && frames.t.length * contact.n < MOST_POINTS) this.inner.redraw(false, false); // else with the next zoom
     }
     this.tracks.forEach(({ ribbon, i }) => {
       const on = i === element;
@@ -263,30 +280,32 @@ PANES.push(TimePane);
 
 // Bodies, further states, signals and sampled values of a system, and the states of all its contacts.
 class SystemPane extends TimePlots {
-  static side = "right"; static key = "system"; static title = "System";
-  static of(view) { return view.run.system !== null; }
+  static side = "right"; static key = "system"; static title = "System"; static shared = true;
+  static of() { return runs.some(({ system }) => system); }
 
   constructor(view, box) {
     super(view, box);
-    const { run } = view, { bodies, values } = run.system;
-    const one = (title, number, unit, step) => {
-      const get = run.column(number);
-      this.add({ title, unit, lines: [{ get, run, stroke: "--ink" }], at: get, step });
+    const systems = runs.map(({ system }) => system ?? { bodies: [], values: [] });
+    // What has a name in either run, and a column of it in each.
+    const every = (list, act) => {
+      const names = new Set(systems.flatMap((each) => each[list].map(({ name }) => name)));
+      for (const name of names) {
+        const found = systems.map((each) => each[list].find((one) => one.name === name));
+        act(name, found.find(Boolean), (part) => ({ place }) => found[place] && runs[place].column(found[place][part]));
+      }
     };
-    for (const body of bodies) {
-      one(`${body.name}: x`, body.x, "m");
-      one(`${body.name}: v`, body.v, "m/s");
-    }
-    for (const { name, column, kind } of values) {
-      const sampled = kind !== "signal" && kind !== "state";
-      one(sampled ? `${name}, sampled by ${kind}` : `${name}, ${kind}`, column, "", sampled);
-    }
-    for (const contact of run.contacts) {
-      const get = contact.columns.F;
-      this.add({ title: `${contact.name}: F`, unit: "N", lines: [{ get, run, stroke: "--ink" }], at: get });
-    }
+    every("bodies", (name, { unit }, column) => {
+      this.compare(`${name}: x`, unit, column("x"));
+      this.compare(`${name}: v`, `${unit}/s`, column("v"));
+    });
+    every("values", (name, { kind }, column) => {
+      const step = kind !== "signal" && kind !== "state";
+      this.compare(step ? `${name}, sampled by ${kind}` : `${name}, ${kind}`, "", column("column"), { step });
+    });
+    const contacts = runs.flatMap((run) => run.contacts), force = (name) => (run) => run.contacts.find((each) => each.name === name)?.columns.F;
+    for (const name of new Set(contacts.map((each) => each.name))) this.compare(`${name}: F`, "N", force(name));
     this.addAll();
-    this.addRibbons(run.contacts);
+    this.addRibbons(contacts);
   }
 }
 PANES.push(SystemPane);

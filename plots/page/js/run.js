@@ -89,6 +89,17 @@ class Contact {
     this.away = (row) => this.modes.reduce((count, mode) => count + (mode[row] !== 0), 0);
   }
 
+  // A value of a quantity as text, in one unit for all rows and runs: a threshold in that of the variable it bounds.
+  tell(name, u, digits) {
+    this.powers ??= {};
+    const key = name === "s" ? this.variables[0] ?? name : name, unit = unitOf(this, name);
+    this.powers[key] ??= powerOf(largest(extent(runs.flatMap(({ contacts, rows }) => {
+      const found = contacts.filter((each) => each.name === this.name).flatMap((each) => each.columns[key] ?? []);
+      return found.map((get) => ({ get, rows }));
+    }))), unit);
+    return inUnit(u, unit, this.powers[key], digits);
+  }
+
   parameter(name, element) {
     const value = this.parameters[name];
     return Array.isArray(value) ? value[element] : value;

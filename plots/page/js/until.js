@@ -2,8 +2,11 @@
 // The `until` box: a condition on stored values, in the expression language of gms-fsm. It is the only text that
 // Python has not seen. It becomes a tree like those that Python stores, so both are evaluated by the same function.
 // Precedence, functions and constants come from Python; nothing is ever passed to `eval`.
-function parse(text, { levels, negation, sign, functions, constants }, names, owners) {
-  const pattern = /\s*(?:(?<digits>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?!\w)|(?<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)|\*\*|[<>=!]=|[-+*/()<>,])/y;
+function parse(text, { levels, negation, sign, functions, constants, units }, names, owners, unitIn) {
+  const known = Object.keys(units).sort((a, b) => b.length - a.length).join("|"); // mm/s before m
+  const number = `(?<digits>(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][+-]?\\d+)?)(?:\\s*(?<unit>${known}))?(?!\\w)`;
+  const pattern = new RegExp(`\\s*(?:${number}|(?<name>[A-Za-z_]\\w*(?:\\.[A-Za-z_]\\w*)*)|\\*\\*|[<>=!]=|[-+*/()<>,])`, "y");
+  text = text.replace(/[µμ]/g, "u");
   const fail = (at, reason) => { throw new SyntaxError(`until, column ${at + 1}: ${reason}`); };
   const end = text.trimEnd().length, tokens = [];
   while (pattern.lastIndex < end) {
@@ -12,6 +15,16 @@ function parse(text, { levels, negation, sign, functions, constants }, names, ow
     const word = found[0].trim();
     tokens.push({ word, ...found.groups, at: pattern.lastIndex - word.length });
   }
+  // A unit must be one of the quantity that its clause compares.
+  const ends = (k) => !tokens[k] || ["and", "or", "not"].includes(tokens[k].word);
+  tokens.forEach(({ unit, word, at }, k) => {
+    if (!unit) return;
+    let from = k, to = k;
+    while (!ends(from - 1)) from -= 1;
+    while (!ends(to + 1)) to += 1;
+    const wanted = tokens.slice(from, to + 1).map(({ name }) => name && unitIn(name)).find(Boolean);
+    if (wanted && wanted !== units[unit][1]) fail(at, `${word} is not in ${wanted}`);
+  });
   let next = 0;
   const here = () => tokens[next] ?? { word: "", at: end };
   const take = (words, wanted) => (words.includes(here().word) ? tokens[next++].word : wanted && fail(here().at, `expected ${wanted}`));
@@ -34,9 +47,9 @@ function parse(text, { levels, negation, sign, functions, constants }, names, ow
   }
 
   function prefix() {
-    const { word, digits, name, at } = here();
+    const { word, digits, unit, name, at } = here();
     next += 1;
-    if (digits) return { at, tree: Number(digits) };
+    if (digits) return { at, tree: Number(digits) * (unit ? units[unit][0] : 1) };
     if (word === "-" || word === "+") {
       const tree = as(false, expression(sign));
       return { at, tree: word === "-" ? ["-", tree] : tree };
@@ -84,7 +97,11 @@ function condition(text, run) {
     owners[name ? `${name}.state` : "state"] = { place, n, states };
     if (run.contacts.length === 1) owners.state = { place, n, states };
   });
-  const f = compiled(parse(text, data.language, run.names, owners));
+  const unitIn = (name) => { // of bodies it is not declared
+    const [last, ...owner] = name.split(".").reverse(), contact = run.contacts.find((each) => each.name === owner.join("."));
+    return run.system && !owner.length ? "" : contact ? unitOf(contact, last) || unitOf(contact, last.replace(/\d+$/, "")) : "";
+  };
+  const f = compiled(parse(text, data.language, run.names, owners, unitIn));
   const scope = (row) => (name) => {
     const state = /^state\((\d+)\/(\d+)\)$/.exec(name);
     if (!state) return run.names[name](row);

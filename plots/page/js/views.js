@@ -20,7 +20,7 @@ class LogPane {
       this.first = first;
       this.entries = run.log.slice(first, first + MOST_OPTIONS);
       this.list.replaceChildren();
-      for (const entry of this.entries) make("option", this.list, `${written(entry.t, 8)} s  ${entry.contact.sentence(entry)}`);
+      for (const entry of this.entries) make("option", this.list, `${timeText(entry.t, 8)}  ${entry.contact.sentence(entry)}`);
     }
     this.list.selectedIndex = run.log[at]?.row === row ? at - first : -1;
   }

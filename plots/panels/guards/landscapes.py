@@ -11,6 +11,7 @@ from scipy.ndimage import distance_transform_edt
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, SignalError
+from gms_fsm.foundation.quantities import in_words
 from gms_fsm.language import (
     MATLAB_LIKE,
     Comparison,
@@ -19,16 +20,17 @@ from gms_fsm.language import (
     Value,
     clauses,
     comparisons,
+    latex_name,
     raised,
     spell,
     split,
 )
-from gms_fsm.traces.scope import guard_columns
+from gms_fsm.traces.scope import guard_columns, unit_of
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.findings import Finding, Report
 from plots.panels.guards.line_names import LineNames, NamedLine
-from plots.panels.parts.axes import Artists, beside
-from plots.panels.parts.selection import checked_row, checked_window, one_element, scaled, shown
+from plots.panels.parts.axes import Artists, axis_title, beside
+from plots.panels.parts.selection import checked_row, checked_window, one_element, shown
 from plots.style import (
     EDGE_COLOURS,
     EDGE_HATCHES,
@@ -86,7 +88,7 @@ def view_of(trace: Trace, element: int, plane: Plane) -> PlaneWindow:
         reach = np.concatenate([reach, s, -s])
     low, high = float(reach.min()), float(reach.max())
     pad = 0.14 * (high - low) or 0.5 * abs(high) or 1.0
-    factor, title = _axis_title(chart, second, np.array([low - pad, high + pad]))
+    factor, title = axis_title(second, unit_of(chart, second), np.array([low - pad, high + pad]))
     return PlaneWindow(linear, speed, low - pad, high + pad, factor, title)
 
 
@@ -106,28 +108,9 @@ def _column(trace: Trace, name: str, element: int) -> Floats:
     return np.asarray(every[element])
 
 
-def _axis_title(chart: Chart, name: str, values: Floats) -> tuple[float, str]:
-    unit = unit_of(chart, name)
-    if not unit:
-        return 1.0, name
-    factor, prefixed = scaled(values, unit)
-    return factor, f"{name} [{prefixed}]"
-
-
-def unit_of(chart: Chart, name: str) -> str:
-    """Return the unit of a name in guards; empty if it is unknown."""
-    known = dict.fromkeys(chart.force_names, "N") | dict.fromkeys(chart.rate_names, "m/s²")
-    known |= dict.fromkeys(chart.velocities, "m/s") | {"t": "s", "x": "m", "age": "s"}
-    return chart.unit(name) or known.get(name, "")
-
-
 def quantity(chart: Chart, name: str, value: float) -> str:
     """Return a value as text, with a prefixed unit where the unit is known."""
-    unit = unit_of(chart, name)
-    if not unit or "/" in unit or not np.isfinite(value):
-        return f"{value:.4g} {unit}".rstrip().replace("-", "−")
-    factor, prefixed = scaled(np.array([value]), unit)
-    return f"{factor * value:.4g} {prefixed}".replace("-", "−")
+    return in_words(value, unit_of(chart, name), 4).replace("-", "−").replace("^2", "²")
 
 
 def path_window(trace: Trace, row: int, element: int) -> Window:
@@ -201,7 +184,7 @@ def landscape(
     ax.set(
         xlim=(-view.speed, view.speed),
         ylim=(view.factor * view.low, view.factor * view.high),
-        xlabel=f"{plane.names[0]} [m/s], linear below {_power(view.linear)}",
+        xlabel=f"${latex_name(plane.names[0])}$ [m/s], linear below {_power(view.linear)}",
         ylabel=view.title,
     )
     ax.grid(visible=False)

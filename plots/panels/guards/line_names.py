@@ -1,8 +1,9 @@
-"""Names written on lines, placed when the picture is drawn so that none covers another."""
+"""Names beside lines, placed when the picture is drawn so that none covers another."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from plots.style.matplotlib import Artist, Axes, Bbox, IdentityTransform, Render
 from plots.style.presets import font
 
 Floats = NDArray[np.float64]
-STEP, PAD, CLEAR = 7.0, 1.5, 9.0  # points: between candidates, around a name, around the dot
+STEP, PAD, CLEAR = 6.0, 1.5, 9.0  # points: between candidates, around a name, around the dot
+BESIDE = 2.5  # points from a line to the ground of its name
 CROSSING, OUTSIDE = 1.0, 0.6  # costs: of a covered point of a line, of the distance from an edge
 
 
@@ -99,11 +101,8 @@ class LineNames(Artist):
         dense = [[_dense(ax, piece, unit) for piece in line.pieces] for line in self.lines]
         others = [_dense(ax, curve, unit) for curve in self.curves]
         found: list[Text] = []
+        taken.points = [*others, *(points for each in dense for points in each)]
         for number, line in enumerate(self.lines):
-            taken.points = [
-                *others,
-                *(p for k, each in enumerate(dense) if k != number for p in each),
-            ]
             text = self._text(line)
             spots = self._spots(text, dense[number], taken, renderer)
             if not spots:
@@ -136,7 +135,7 @@ class LineNames(Artist):
     def _spots(
         self, text: Text, pieces: list[Floats], taken: _Taken, renderer: RendererBase
     ) -> list[_Spot]:
-        """Return the free places on the pieces of a line."""
+        """Return the free places beside the pieces of a line."""
         whole = self._owner.bbox
         unit = float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
         extent = text.get_window_extent(renderer)
@@ -147,9 +146,12 @@ class LineNames(Artist):
             if len(piece) < 2:
                 continue
             slope = np.abs(np.gradient(piece, axis=0))
-            for (x, y), (dx, dy) in zip(piece.tolist(), slope.tolist(), strict=True):
+            places = product(zip(piece.tolist(), slope.tolist(), strict=True), (1.0, -1.0))
+            for ((x, y), (dx, dy)), way in places:
                 upright = dy > 1.5 * dx
                 w, h = (tall, long) if upright else (long, tall)
+                away = way * (tall / 2 + BESIDE * unit)
+                x, y = (x - away, y) if upright else (x, y + away)
                 box = Bbox.from_bounds(x - w / 2, y - h / 2, w, h)
                 inside = whole.x0 <= box.x0 and box.x1 <= whole.x1
                 if not inside or not (whole.y0 <= box.y0 and box.y1 <= whole.y1):
@@ -160,8 +162,7 @@ class LineNames(Artist):
                 # Names are easiest to find at the ends of their lines, next to the frame.
                 edge = min(x - whole.x0, whole.x1 - x) / whole.width
                 side = min(y - whole.y0, whole.y1 - y) / whole.height
-                away = min(edge, side)
-                cost = CROSSING * float(hit.all(axis=1).sum()) + OUTSIDE * away
+                cost = CROSSING * float(hit.all(axis=1).sum()) + OUTSIDE * min(edge, side)
                 spots.append(_Spot(x, y, upright, box, cost))
         return spots
 

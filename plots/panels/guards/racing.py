@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
+from gms_fsm.foundation.quantities import trimmed
 from gms_fsm.session.explain import ROUNDING, Clause, Explanation, Why, explain
 from gms_fsm.traces.trace import Trace
 from plots.charts.labels import FALSE, TRUE
 from plots.panels.parts.axes import Artists, note
-from plots.panels.parts.selection import checked_row, one_element, scaled
+from plots.panels.parts.selection import checked_row, one_element
 from plots.style import EDGE_COLOURS, EDGE_HATCHES, INK, LINE_GREY, PAPER, TEXT_GREY
 from plots.style.matplotlib import Axes, Rectangle
 from plots.style.presets import font, pt
@@ -177,7 +176,5 @@ def _amount(clause: Clause) -> str:
         return ""
     if relative_margin(clause) == 0.0:
         return "0 (rounding)"
-    factor, unit = scaled(np.array([clause.margin]), clause.unit or "")
-    if not clause.unit:
-        factor, unit = 1.0, ""
-    return f"{factor * clause.margin:+.3g} {unit}".rstrip().replace("-", "−")
+    sign = "+" if clause.margin > 0.0 else ""
+    return sign + trimmed(clause.scale.text(clause.margin, 3)).replace("-", "−")

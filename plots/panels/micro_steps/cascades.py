@@ -185,7 +185,7 @@ def margins(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
         if mine.size:
             dots += ax.plot(mine.t, factor * (1 - np.abs(mine.z / mine.s)), "o", color=ink, **look)
     lines.append(ax.axhline(0.0, color=LINE_GREY, linewidth=pt(0.8), zorder=1))
-    ax.set_ylabel(f"10$^{power}$ (1 − |z|/s) [–]" if power else "1 − |z|/s [–]")
+    ax.set_ylabel(f"10$^{power}$ $(1 − |z|/s)$ [–]" if power else "$1 − |z|/s$ [–]")
     time_axis(ax, *this.window)
     return [*lines, *dots, *marks(ax, trace, window=this.window, elements=this.elements)]
 
@@ -228,6 +228,6 @@ def cascade(
         *ax.plot(log.t, log.F_before, "o", label="F before", **before),
         *ax.plot(log.t, log.F_after, "o", label="F after", **after),
     ]
-    ax.set_ylabel("F [N]")
+    ax.set_ylabel("$F$ [N]")
     time_axis(ax, *this.window)
     return [*lines, *dots, *marks(ax, trace, window=this.window, elements=this.elements)]

@@ -251,7 +251,7 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
     for each, text in zip(part.columns, texts, strict=True):
         at = each.left + 0.5, factor * each.F
         drawn.append(beside(ax, text, at, (0, pt(4)), rotation=90 if upright else 0))
-    ax.set(ylabel=f"F [{unit}]", xlim=(-0.1, part.width + 0.1))
+    ax.set(ylabel=f"$F$ [{unit}]", xlim=(-0.1, part.width + 0.1))
     ax.set_xticks([])
     low, high = float(np.nanmin(factor * F)), float(np.nanmax(factor * F))
     tall = (high - low) or abs(high) or 1.0

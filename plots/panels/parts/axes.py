@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm.language import latex_name
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.selection import RunPart, scaled
 from plots.style import ELEMENT_DASHES, INK, TEXT_GREY, element_colour
@@ -22,12 +23,17 @@ VECTOR_ROWS = 6_000  # longer curves are rasterized in an SVG or PDF, which keep
 
 def first_variable(trace: Trace, values: NDArray[np.float64]) -> tuple[float, str]:
     """Return factor and title of the chart's first variable, with its unit if it is known."""
-    name = trace.model.chart.variables[0]
-    known = trace.model.chart.unit(name)
-    if not known:
-        return 1.0, name
-    factor, unit = scaled(values, known)
-    return factor, f"{name} [{unit}]"
+    chart = trace.model.chart
+    return axis_title(chart.variables[0], chart.unit(chart.variables[0]), values)
+
+
+def axis_title(name: str, unit: str | None, values: NDArray[np.float64]) -> tuple[float, str]:
+    """Return factor and title of a quantity: its symbol, and a unit in which its values fit."""
+    symbol = f"${latex_name(name)}$"
+    if not unit:
+        return 1.0, symbol
+    factor, prefixed = scaled(values, unit)
+    return factor, f"{symbol} [{prefixed}]"
 
 
 def element_look(i: int, n: int) -> dict[str, Any]:
@@ -54,7 +60,7 @@ def element_curves(ax: Axes, part: RunPart, values: NDArray[np.float64], label: 
 
 def time_axis(ax: Axes, begin: float, end: float) -> None:
     """Label the time axis; in a very narrow window, ticks are relative to a time inside it."""
-    ax.set_xlabel("t [s]")
+    ax.set_xlabel("$t$ [s]")
     width = end - begin
     if not width > 0:
         return
@@ -68,7 +74,7 @@ def time_axis(ax: Axes, begin: float, end: float) -> None:
     ticks = np.asarray(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
     ticks = ticks[(ticks >= low) & (ticks <= high)]
     ax.set_xticks(origin + ticks / factor, [f"{tick:g}".replace("-", "−") for tick in ticks])
-    ax.set_xlabel(f"t − {origin:.12g} s [{unit}]")
+    ax.set_xlabel(f"$t$ − {origin:.12g} s [{unit}]")
 
 
 def log_axis(ax: Axes, values: NDArray[np.float64], axis: str) -> None:

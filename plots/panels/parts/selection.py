@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
+from gms_fsm.foundation.quantities import scale_of
 from gms_fsm.traces.trace import Trace, check_trace
 from gms_fsm.traces.views import picked
 from plots.views.window import Window, window_of
 
 __all__ = ["has_threshold", "shown"]
 
-SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 SMOOTH = 2000  # points per curve
 MOST_ROWS = 20_000  # a longer run is thinned
 
@@ -223,11 +223,8 @@ def scaled(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
     Examples
     --------
     >>> scaled(np.array([0.0, 2e-4]), "m/s")
-    (1000.0, 'mm/s')
+    (1000000.0, 'µm/s')
     """
     finite = np.abs(values[np.isfinite(values)])
-    largest = float(finite.max()) if finite.size else 0.0
-    for factor, prefix in SCALES:
-        if largest * factor >= 0.1 or largest == 0.0:
-            return factor, prefix + unit
-    return SCALES[-1][0], SCALES[-1][1] + unit
+    scale = scale_of(float(finite.max(initial=0.0)), unit)
+    return scale.factor, scale.unit

@@ -85,11 +85,11 @@ def inner_loop(b):
     ax = figure.subplots()
     ax.plot(1e6 * trace.x, trace.F)
     ax.plot(1e6 * turn.x, turn.F, "o", markersize=9, markerfacecolor="none")
-    ax.set(xlabel="x [um]", ylabel="F [N]", title=f"reversals at 20 um and at {b:g} um")
+    ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]", title=f"reversals at 20 um and at {b:g} um")
     return figure
 
 
-vary(inner_loop, 0, -20, 18, 1, "b [um]")
+vary(inner_loop, 0, -20, 18, 1, "b [µm]")
 ```
 
 ## Try
@@ -244,7 +244,7 @@ def _opened(ax: Any, r: Any) -> str:
 
 def _motion(ax: Any, r: Any) -> str:
     ax.plot(r.gms.t, 1e6 * r.gms.x, color=INK)
-    ax.set(xlim=(0, r.turn_times[-1]), ylabel="x [µm]")
+    ax.set(xlim=(0, r.turn_times[-1]), ylabel="$x$ [µm]")
     ax.margins(y=0.25)
     for name, t, x in zip(NAMES, r.turn_times, 1e6 * TURNS, strict=True):
         side = "right" if name == "E" else "center"

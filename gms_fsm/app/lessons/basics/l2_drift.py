@@ -85,7 +85,7 @@ def shaken(amplitude):
         t, x = cycle_means(trace)
         drift = 1e3 * (x[-1] - x[0]) / (t[-1] - t[0])
         ax.plot(trace.t, 1e3 * trace.x, label=f"{name}: {drift:.2f} mm/s")
-    ax.set(xlabel="t [s]", ylabel="x [mm]", title=f"force amplitude {amplitude:g} N")
+    ax.set(xlabel="$t$ [s]", ylabel="$x$ [mm]", title=f"force amplitude {amplitude:g} N")
     ax.legend()
     return figure
 
@@ -166,7 +166,7 @@ def _place(ax: Any, r: Any) -> str:
         ax.plot(GRID, x, color=INK, linewidth=0.9)
         last = x[-200:].max() if up > 0 else x[-200:].min()
         note(ax, text, (0.995 * END, last), (-1, up), fontsize=9)
-    ax.set(xlim=(0, END), ylim=(0, 19), xlabel="t [s]", ylabel="x [mm]")
+    ax.set(xlim=(0, END), ylim=(0, 19), xlabel="$t$ [s]", ylabel="$x$ [mm]")
     return "position"
 
 

@@ -81,7 +81,7 @@ def with_step(ms):
     ax = figure.subplots()
     ax.plot(ROWS, result.located.F, color="0.6", linewidth=3, label="located")
     ax.plot(ROWS, trace.F, linestyle="--", label="once per step")
-    ax.set(xlabel="t [s]", ylabel="F [N]")
+    ax.set(xlabel="$t$ [s]", ylabel="$F$ [N]")
     ax.set_title(
         f"{ms:g} ms: {len(trace.transitions)} of 48 switches, "
         f"{samples_in_window(1e-3 * ms)} of {REVERSALS.size} reversals hit"
@@ -199,7 +199,7 @@ def _reversal(ax: Any, _: Any) -> str:
     ax.axhspan(-1e6 * V_C, 1e6 * V_C, color=LINE_GREY, linewidth=0.8, zorder=1)
     ax.plot(1e3 * (line - turn), 1e6 * _velocity(line), color=INK)
     ax.plot(1e3 * (t - turn), 1e6 * _velocity(t), **DOTS | {"markersize": 7})
-    ax.set(xlabel=f"t − {turn:g} s [ms]", ylabel="v [µm/s]", xlim=(-2, 2))
+    ax.set(xlabel=f"$t$ − {turn:g} s [ms]", ylabel="$v$ [µm/s]", xlim=(-2, 2))
     below = -4 if _velocity(line)[1] > 0 else 4
     note(ax, f"|v| ≤ $v_c$, {1e6 * window_width():.0f} µs long", (1.95, 0), (-1, below), fontsize=9)
     return f"samples of {1e3 * STEP:g} ms at a reversal"

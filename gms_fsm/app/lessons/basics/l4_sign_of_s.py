@@ -181,7 +181,7 @@ def _balance(ax: Any, r: Any, law: str) -> str:
     height = {"where": falls, "transform": ax.get_xaxis_transform(), "zorder": 0}
     look = {"facecolor": PALE_GREY, "edgecolor": LINE_GREY, "hatch": "////", "alpha": 0.6}
     ax.fill_between(balance.t, 0, 1, **height, **look, linewidth=0.0)
-    ax.set(xlabel="t [s]", ylabel="energy [J]", xlim=(0, FIG4_END))
+    ax.set(xlabel="$t$ [s]", ylabel="energy [J]", xlim=(0, FIG4_END))
     if law == "published":
         return "energy (hatched: heat turns back)"
     ax.legend(loc="upper left")

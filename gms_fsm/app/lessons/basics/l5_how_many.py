@@ -76,7 +76,7 @@ def chain(n):
     ax = figure.subplots()
     ax.plot(1e6 * fine.x, parabola(fine.x), color="0.75", linewidth=6, label="smooth curve")
     ax.plot(1e6 * fine.x, fine.F, label=f"n = {n}")
-    ax.set(xlabel="x [um]", ylabel="F [N]", title=f"error at most {100 * error:.2f} % of F_c")
+    ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]", title=f"error at most {100 * error:.2f} % of F_c")
     ax.legend()
     return figure
 
@@ -181,7 +181,7 @@ def _curves(ax: Any, traces: list[Trace]) -> None:
     for n, trace, colour, dash in zip(COUNTS, traces, COLOURS, ELEMENT_DASHES, strict=False):
         look = {"color": colour, "linestyle": dash, "linewidth": 1.6}
         ax.plot(1e6 * trace.x, trace.F, label=f"n = {n}", **look)
-    ax.set(xlabel="x [µm]", ylabel="F [N]")
+    ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]")
 
 
 def _loading(ax: Any, r: Any) -> str:
@@ -211,7 +211,7 @@ def _error(ax: Any, r: Any) -> str:
     for n, colour, error in zip(COUNTS, COLOURS, r.errors, strict=True):
         ax.plot(n, 100 * error / F_c, **DOTS | {"color": colour, "markersize": 7, "zorder": 3})
     ticks(ax, "x", COUNTS)
-    ax.set(xlabel="elements n", ylabel="largest error [% of $F_c$]")
+    ax.set(xlabel="elements $n$", ylabel="largest error [% of $F_c$]")
     return "error of the first loading"
 
 
@@ -224,7 +224,7 @@ def _damping(ax: Any, r: Any) -> str:
         note(ax, f"{at[1]:.1f} %", at, shift, ha="center", color=INK, fontsize=9)
     note(ax, "smooth curve", (-0.3, 100), (0, -4), fontsize=9)
     ticks(ax, "x", places, [str(n) for n in COUNTS])
-    ax.set(xlabel="elements n", ylabel="energy per loop [%]", ylim=(0, 112))
+    ax.set(xlabel="elements $n$", ylabel="energy per loop [%]", ylim=(0, 112))
     return "damping of the small loop"
 
 

@@ -83,7 +83,7 @@ def pulled(V):
     ax = figure.subplots()
     ax.plot(trace.t, trace.v)
     ax.axhline(V, color="0.6", linestyle="--", linewidth=1)
-    ax.set(xlabel="t [s]", ylabel="v [m/s]", title=f"V = {V:g} m/s (dashed): {arrests} arrests")
+    ax.set(xlabel="$t$ [s]", ylabel="$v$ [m/s]", title=f"V = {V:g} m/s (dashed): {arrests} arrests")
     return figure
 
 
@@ -236,7 +236,7 @@ def _parts(ax: Any, r: Any) -> str:
         note(ax, name, (V[-1], times[-1]), (7, 0), va="center", color=ink, fontsize=9)
     ticks(ax, "x", (0.01, 0.02, 0.05, 0.1, 0.2))
     ticks(ax, "y", (1, 2, 5, 10, 20, 50))
-    ax.set(xlabel="pulling speed V [m/s]", ylabel="time [s]", xlim=(0.009, 0.33))
+    ax.set(xlabel="pulling speed $V$ [m/s]", ylabel="time [s]", xlim=(0.009, 0.33))
     return "a cycle and its parts"
 
 

@@ -130,13 +130,13 @@ def nested(n):
     figure = Figure(figsize=(6.4, 3.6), layout="constrained")
     ax = figure.subplots()
     ax.plot(found.curves[0].x, found.curves[0].y)
-    ax.set(xlabel="x [µm]", ylabel="applied force [N]")
+    ax.set(xlabel="$x$ [µm]", ylabel="applied force [N]")
     verdict = f"n = {n}, {found.verdict}: {found.said}; gap {found.numbers[0]}"
     ax.set_title(verdict, fontsize=9)
     return figure
 
 
-vary(nested, 4, 1, 8, 1, "elements n")
+vary(nested, 4, 1, 8, 1, "elements $n$")
 ```
 
 ## Try
@@ -247,7 +247,7 @@ def _drift(ax: Any, r: Any) -> str:
     note(ax, NAMES["lugre"], (6.5, 55.0))
     note(ax, NAMES["gms-signed"], (10.5, 14.0), color=INK)
     note(ax, "elasto-plastic", (10.5, -6.5))
-    ax.set(xlabel="t [s]", ylabel="x [µm]", xlim=(0, 24), ylim=(-10, 95))
+    ax.set(xlabel="$t$ [s]", ylabel="$x$ [µm]", xlim=(0, 24), ylim=(-10, 95))
     return "bias and ripple: LuGre drifts"
 
 
@@ -259,7 +259,7 @@ def _memory(ax: Any, r: Any) -> str:
     ax.annotate("", (end, 1.55), (end - gap, 1.55), arrowprops=arrow)
     note(ax, f"LuGre: gap {gap:.1f} µm", (end, 1.68), ha="right")
     note(ax, NAMES["gms-signed"], (17.0, -1.38), color=INK)
-    ax.set(xlabel="x [µm]", ylabel="applied force [N]", xlim=(-15, 66), ylim=(-1.5, 1.95))
+    ax.set(xlabel="$x$ [µm]", ylabel="applied force [N]", xlim=(-15, 66), ylim=(-1.5, 1.95))
     return "reversals: GMS remembers"
 
 
@@ -269,7 +269,7 @@ def _energy(ax: Any, r: Any) -> str:
     note(ax, NAMES["gms-published"], (10.0, -3.6))
     note(ax, NAMES["gms-signed"], (10.0, 0.75), color=INK)
     ax.axhline(0, **GUIDE)
-    ax.set(xlabel="t [ms]", ylabel="energy taken [mJ]", xlim=(0, 450), ylim=(-4.2, 1.3))
+    ax.set(xlabel="$t$ [ms]", ylabel="energy taken [mJ]", xlim=(0, 450), ylim=(-4.2, 1.3))
     return "energy in three cycles"
 
 

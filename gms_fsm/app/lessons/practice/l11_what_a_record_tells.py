@@ -125,7 +125,7 @@ def known(amplitude):
     (each,) = told.residuals()
     ax.plot(1e6 * each.x, each.measured, ".", color="0.7", markersize=4)
     ax.plot(1e6 * each.x, each.modelled, color="0.1", linewidth=0.8)
-    ax.set(xlabel="x [µm]", ylabel="F [N]")
+    ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]")
     interval = f"{1e6 * second.low:.1f} to {1e6 * second.high:.1f} µm/N"
     value = interval if second.told else second.note
     ax.set_title(f"R² = {told.training['r2']:.4f}; weights2: {value}", fontsize=9)
@@ -333,7 +333,7 @@ def _loop(ax: Any, r: Any, name: str, title: str) -> str:
     (each,) = found.residuals()
     ax.plot(1e6 * each.x, each.measured, ".", color=PALE_GREY, markersize=4, label="record")
     ax.plot(1e6 * each.x, each.modelled, color=INK, linewidth=0.8, label="fit")
-    ax.set(xlabel="x [µm]", ylabel="F [N]", xlim=(-560, 560), ylim=(-3.2, 3.9))
+    ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]", xlim=(-560, 560), ylim=(-3.2, 3.9))
     never = [f"element {i} never slips" for i in found.never_slipped] or ["all elements slip"]
     note(ax, "\n".join([f"R² = {found.training['r2']:.4f}", *never]), (0.03, 0.97), inside=True)
     if name == "on_sine":
@@ -377,7 +377,7 @@ def _residuals(ax: Any, r: Any) -> str:
     marks = (-50, 0, 50)
     places = [middle + mark for middle in (0.0, GAP) for mark in marks]
     ticks(ax, "y", places, [f"{mark}" for mark in 2 * marks])
-    ax.set(xlabel="t [s]", ylabel="residual [mN], twice", ylim=(-80, GAP + 100))
+    ax.set(xlabel="$t$ [s]", ylabel="residual [mN], twice", ylim=(-80, GAP + 100))
     return "how many rows count"
 
 

@@ -75,7 +75,7 @@ def loop(w):
     ax = figure.subplots()
     ax.plot(1e3 * cycle.v, STRIBECK(cycle.v) + SIGMA_2 * cycle.v, color="0.75", linewidth=5)
     ax.plot(1e3 * cycle.v, cycle.F)
-    ax.set(xlabel="v [mm/s]", ylabel="F [N]", title=f"w = {w:.3g} rad/s (grey: steady sliding)")
+    ax.set(xlabel="$v$ [mm/s]", ylabel="$F$ [N]", title=f"w = {w:.3g} rad/s (grey: steady sliding)")
     return figure
 
 
@@ -149,7 +149,7 @@ def last_period(trace: Trace, w: float) -> Trace:
 
 def _loops(ax: Any, r: Any) -> str:
     v = np.linspace(MEAN - SWING, MEAN + SWING, 300)
-    ax.plot(1e3 * v, STRIBECK(v) + SIGMA_2 * v, **BROAD, label=r"steady: s(v) + $\sigma_2$ v")
+    ax.plot(1e3 * v, STRIBECK(v) + SIGMA_2 * v, **BROAD, label=r"steady: $s(v) + \sigma_2 v$")
     for (w, colour), dash in zip(SHADES.items(), ELEMENT_DASHES, strict=False):
         loop = r.loops[w]
         path = np.column_stack([1e3 * loop.v, loop.F])
@@ -160,7 +160,7 @@ def _loops(ax: Any, r: Any) -> str:
             ax.annotate("", path[row + 4], path[row - 4], arrowprops=head)
     note(ax, "accelerating", (1.55, 1.235), fontsize=9)
     note(ax, "decelerating", (0.75, 0.99), fontsize=9)
-    ax.set(xlabel="v [mm/s]", ylabel="F [N]", ylim=(0.96, None))
+    ax.set(xlabel="$v$ [mm/s]", ylabel="$F$ [N]", ylim=(0.96, None))
     ax.legend(loc="upper right", handlelength=3.2)
     return f"loops, {MODEL.title}"
 
@@ -173,7 +173,7 @@ def _widths(ax: Any, r: Any) -> str:
     ax.axvline(r.corner, **GUIDE, linestyle="--")
     note(ax, "C/F$_c$", (r.corner, 4), (4, 0), fontsize=9)
     ticks(ax, "x", (1, 3, 10, 30, 100, 300))
-    ax.set(xlabel="w [rad/s]", ylabel=f"width at {1e3 * MEAN:g} mm/s [mN]", ylim=(0, 200))
+    ax.set(xlabel="$w$ [rad/s]", ylabel=f"width at {1e3 * MEAN:g} mm/s [mN]", ylim=(0, 200))
     return "width of the loop"
 
 

@@ -209,7 +209,7 @@ def _breakaway(ax: Any, r: Any) -> str:
     rows = r.ifelse_once
     near = (rows.t > window[0]) & (rows.t < window[1]) & (rows.microstep == 0)
     ax.plot(1e3 * (rows.t[near] - r.first), rows.F[near], **DOTS | {"color": TEXT_GREY})
-    ax.set(xlabel=f"t − {r.first:.4f} s [ms]", ylabel="F [N]", xlim=(-0.8, 1.2))
+    ax.set(xlabel=f"$t$ − {r.first:.4f} s [ms]", ylabel="$F$ [N]", xlim=(-0.8, 1.2))
     note(ax, "dots: ends of steps", (0.03, 0.4), inside=True)
     return "the break-away: late if once per step"
 

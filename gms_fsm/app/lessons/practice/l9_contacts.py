@@ -109,7 +109,7 @@ def with_gap(gap):
     ax = figure.subplots()
     ax.plot(trace.t, trace.body("motor").x, "--", color="0.3", label="motor")
     ax.plot(trace.t, trace.body("load").x, label="load")
-    ax.set(xlabel="t [s]", ylabel="angle [rad]")
+    ax.set(xlabel="$t$ [s]", ylabel="angle [rad]")
     measured = f"{(dead[:, 1] - dead[:, 0]).mean():.4f}"
     ax.set_title(f"dead time {measured} s; formula {dead_time(gap):.4f} s")
     ax.legend()
@@ -143,6 +143,7 @@ from gms_fsm.app.lessons.basics.l6_stick_slip import SIGMA_2, F_c, F_s, bank
 from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.systems.parts import Motion
 from plots.style import INK, LINE_GREY
 
 MASS, STIFFNESS, SPEED = 1.0, 2.0, 0.1  # kg, N/m, m/s: the pulled mass
@@ -185,8 +186,10 @@ def gear(gap: float = FLANK["gap"]) -> System:
     return System(
         "gear with backlash",
         bodies=(
-            Body("motor", velocity="V * sgn(sin(2 * pi * t / T))", x="q_m", v="w_m"),
-            Body("load", inertia="J", x="q_l", v="w_l"),
+            Body(
+                "motor", velocity="V * sgn(sin(2 * pi * t / T))", x="q_m", v="w_m", motion="turning"
+            ),
+            Body("load", inertia="J", x="q_l", v="w_l", motion="turning"),
         ),
         contacts=(
             Contact("gear", CHARTS["backlash"], {**FLANK, "gap": gap}, v="w_m - w_l"),
@@ -204,7 +207,8 @@ def impact(e: float = STOP["e"]) -> System:
     >>> impact().contacts[0].v
     ('v_1 - v_2',)
     """
-    return _pair(Contact("stop", CHARTS["end-stop"], {**STOP, "e": e}, v="v_1 - v_2"), MASSES)
+    stop = Contact("stop", CHARTS["end-stop"], {**STOP, "e": e}, v="v_1 - v_2")
+    return _pair(stop, MASSES, "along")
 
 
 def clutch() -> System:
@@ -215,12 +219,13 @@ def clutch() -> System:
     >>> clutch().contacts[0].chart.locks
     True
     """
-    return _pair(Contact("dog", CHARTS["dog-clutch"], DOG, v="v_1 - v_2"), INERTIAS)
+    dog = Contact("dog", CHARTS["dog-clutch"], DOG, v="v_1 - v_2")
+    return _pair(dog, INERTIAS, "turning")
 
 
-def _pair(contact: Contact, inertias: tuple[float, float]) -> System:
+def _pair(contact: Contact, inertias: tuple[float, float], motion: Motion) -> System:
     bodies = (
-        Body(name, inertia=f"m_{i}", x=f"x_{i}", v=f"v_{i}")
+        Body(name, inertia=f"m_{i}", x=f"x_{i}", v=f"v_{i}", motion=motion)
         for i, name in enumerate(("one", "two"), 1)
     )
     numbers = dict(zip(("m_1", "m_2"), inertias, strict=True))
@@ -289,7 +294,7 @@ def _mass(ax: Any, r: Any, end: float, name: str, factor: float) -> None:
 
 def _moving(ax: Any, r: Any) -> str:
     _mass(ax, r, r.stiction.t[-1], "v", 1.0)
-    ax.set(xlabel="t [s]", ylabel="v [m/s]", xlim=(0, r.stiction.t[-1]))
+    ax.set(xlabel="$t$ [s]", ylabel="$v$ [m/s]", xlim=(0, r.stiction.t[-1]))
     return f"pulled mass; dashed: {r.title}"
 
 
@@ -303,7 +308,7 @@ def _before(ax: Any, r: Any) -> str:
     _mass(ax, r, r.released, "x", 1e3)
     note(ax, "bank: the bristles yield", (3.0, 600 * r.crept[1]))
     note(ax, "stiction: x = 0", (3.0, 1.0), color=INK)
-    ax.set(xlabel="t [s]", ylabel="x [mm]", xlim=(0, 8))
+    ax.set(xlabel="$t$ [s]", ylabel="$x$ [mm]", xlim=(0, 8))
     return "before stiction lets go"
 
 
@@ -316,7 +321,7 @@ def _gear(ax: Any, r: Any) -> str:
     begin, end = r.dead[0]
     note(ax, f"dead time {end - begin:.3f} s", (end, 0.005), (4, 0))
     ax.legend(loc="upper right")
-    ax.set(xlabel="t [s]", ylabel="angle [rad]", xlim=(0, 2 * PERIOD))
+    ax.set(xlabel="$t$ [s]", ylabel="angle [rad]", xlim=(0, 2 * PERIOD))
     return "gear with backlash; shaded: no contact"
 
 
@@ -329,7 +334,7 @@ def _both(ax: Any, r: Any, pair: tuple[str, ...]) -> str:
     total = r.values[kept] / sum(MASSES if name == "hit" else INERTIAS)
     ax.plot(trace.t, total, ":", color=LINE_GREY, linewidth=2, label=mean)
     ax.legend(loc="upper right")
-    ax.set(xlabel="t [s]", ylabel=unit, xlim=(0, trace.t[-1]))
+    ax.set(xlabel="$t$ [s]", ylabel=unit, xlim=(0, trace.t[-1]))
     return title
 
 

@@ -32,7 +32,7 @@ class BristlesPane {
     const z = this.deflection(), label = Math.max(...contact.states.map((state) => textWidth(`E${contact.n} ${state}`))) * BOLD + 12;
     const value = z ? textWidth(`${z} −000.0 mm`) + 12 : 0;
     const room = Math.floor((box.clientHeight - BRISTLE.head - (this.note() ? 20 : 2)) / contact.n);
-    this.height = WIDE.matches ? clamp(room, BRISTLE.least, BRISTLE.most) : contact.n > 6 ? BRISTLE.least + 4 : BRISTLE.page;
+    this.height = isWide() ? clamp(room, BRISTLE.least, BRISTLE.most) : contact.n > 6 ? BRISTLE.least + 4 : BRISTLE.page;
     const two = this.height >= BRISTLE.two, forces = contact.n > 1 && width > 520;
     const right = forces ? 84 : BRISTLE.arrow;
     Object.assign(this, { z, two, left: two ? Math.max(label, value) : label + value, wall: width - right - BRISTLE.slider - 4, looks: [] });
@@ -70,9 +70,17 @@ class BristlesPane {
       width, height: tall, role: "img", class: "elements",
       "aria-label": `${this.z ? "Springs, dampers and contacts" : "Contacts"} of ${contact.name || "the elements"} on the ground`,
     });
-    this.pattern = draw("pattern", draw("defs", this.svg), { id: ground, width: BRISTLE.period, height: 8, patternUnits: "userSpaceOnUse" });
+    const defs = draw("defs", this.svg);
+    this.pattern = draw("pattern", defs, { id: ground, width: BRISTLE.period, height: 8, patternUnits: "userSpaceOnUse" });
     draw("path", this.pattern, { class: "stroke", d: [0, 1, 2, 3, 4, 5].map((k) => `M${k * 10} 8L${k * 10 + 6} 0`).join("") });
     draw("path", this.pattern, { class: "stone", d: "M3 8L9 0H16L10 8Z" }); // one in six tells how far it has moved
+    // Grounds of states, as in the ribbons: the default one is plain and pale, the others are hatched.
+    this.grounds = data.hatches.map((angle, k) => {
+      const look = draw("pattern", defs, { id: `${ground}-state${k}`, width: 5, height: 5, patternUnits: "userSpaceOnUse", patternTransform: `rotate(${angle ?? 0})` });
+      draw("rect", look, { width: 5, height: 5 }).style.fill = `var(--fill${k})`;
+      if (angle !== null) draw("path", look, { d: "M0 0H5", "stroke-width": 1.6 }).style.stroke = `var(--hatch${k})`;
+      return `url(#${look.id})`;
+    });
     this.elements = contact.modes.map((_, i) => this.element(i, ground, forces));
     draw("path", this.svg, { class: "slider", d: `M${wall} 0V${tall - 2}H${wall + BRISTLE.slider}V0` });
     draw("text", this.svg, { class: "name", "text-anchor": "middle", transform: `translate(${middle + 4} ${Math.min(tall, this.box.clientHeight || tall) / 2}) rotate(-90)` }, tall > 60 ? "slider" : "");
@@ -98,7 +106,7 @@ class BristlesPane {
     else draw("path", found.link, { d: "M0 0H100" });
     Object.assign(found, { y, tall });
     found.contact = draw("g", inside, { class: "foot" });
-    draw("rect", found.contact, { class: "block", x: -half, y: y - 9 * tall, width: BRISTLE.contact, height: floor - y + 9 * tall });
+    found.block = draw("rect", found.contact, { class: "block", x: -half, y: y - 9 * tall, width: BRISTLE.contact, height: floor - y + 9 * tall });
     draw("path", found.contact, { class: "peg", d: `M0 ${y + 3}V${floor + earth - 1}` });
     found.way = draw("path", found.contact, { class: "way", d: `M${-half + 3} ${y + 2}H${half - 3}m-4 -4l4 4l-4 4` });
     return found;
@@ -109,10 +117,9 @@ class BristlesPane {
     if (!this.elements) return;
     const { view } = this, { contact, row, run } = view, v = contact.value(contact.velocity, 0, row), F = contact.value("F", 0, row);
     const fired = run.fired.get(row), shift = (-this.scale * contact.value("x", 0, row)) % BRISTLE.period;
-    this.arrow(this.speed, `${contact.velocity} = ${eng(v, "m/s", 4)}`, v, this.largest.v);
-    this.arrow(this.push, `F = ${eng(F, "N", 4)}`, -F, this.largest.F); // positive friction pulls the slider back
+    this.arrow(this.speed, `${contact.velocity} = ${contact.tell(contact.velocity, v)}`, v, this.largest.v);
+    this.arrow(this.push, `F = ${contact.tell("F", F)}`, -F, this.largest.F); // positive friction pulls the slider back
     if (Number.isFinite(shift)) place(this.pattern, { patternTransform: `translate(${shift.toFixed(2)} 0)` });
-    const unit = contact.units[this.z] ?? "";
     this.elements.forEach((each, i) => {
       const mode = contact.modes[i][row], now = fired && fired.contact === contact && fired.element === i;
       const look = `${mode}/${Boolean(now)}/${i === view.element}/${Math.sign(v)}`;
@@ -125,8 +132,8 @@ class BristlesPane {
         each.contact.setAttribute("transform", `translate(${at.toFixed(2)} 0)`);
         each.link.setAttribute("transform", `translate(${from.toFixed(2)} ${each.y}) scale(${((this.wall - from) / 100).toFixed(5)} ${each.tall})`);
       }
-      if (each.value) say(each.value, `${this.z} ${eng(z, unit, 4)}`);
-      if (each.force) say(each.force, eng(contact.forces[i](row), "N", 4));
+      if (each.value) say(each.value, `${this.z} ${contact.tell(this.z, z)}`);
+      if (each.force) say(each.force, contact.tell("F", contact.forces[i](row)));
     });
     this.reveal(fired?.contact === contact ? fired.element : view.element);
   }
@@ -135,11 +142,12 @@ class BristlesPane {
   // a block on a belt, only a state that locks the motion holds it.
   held(mode) { return this.z ? mode === 0 : this.view.contact.locked[mode]; }
 
-  restyle({ group, label, way }, i, mode, now, v) {
+  restyle({ group, label, way, block }, i, mode, now, v) {
     const { contact, element } = this.view, held = this.held(mode);
     group.setAttribute("class", ["element", `mode${mode % STATES}`, held ? "held" : "open", now && "fired", i === element && "chosen",
       !contact.edges.length && "alone"].filter(Boolean).join(" "));
     say(label, `E${i + 1} ${contact.states[mode]}`);
+    Object.assign(block.style, contact.edges.length ? { fill: this.grounds[mode % STATES], stroke: `var(--hatch${mode % STATES})` } : {});
     way.setAttribute("visibility", held || v === 0 ? "hidden" : "inherit");
     way.setAttribute("transform", v < 0 ? "scale(-1 1)" : "");
   }

@@ -2,7 +2,8 @@
 // The view of one run: its head, the chart with marks, the tokens of the elements, the table of guards, the tabs.
 // A pane is what a tab shows. It is a class with: static side ("left" or "right"), static key and title,
 // constructor(view, box), show() for the row view.row and the element view.element, fit() after a change of size,
-// theme, contact or zoom, close() before it is thrown away. Only the pane in view is called. `static of(view)` is false where it has nothing to show.
+// theme, contact or zoom, close() before it is thrown away. Only the pane in view is called. `static of()` is false where it has nothing to show;
+// a pane that is `static shared` shows both runs.
 const PANES = [];
 const MARKS = { 1: "✓", 0: "✗", "-1": "?" };
 
@@ -12,6 +13,7 @@ class RunView {
     this.root = $("#run").content.cloneNode(true).firstElementChild;
     $("#runs").append(this.root);
     $("h2", this.root).textContent = (data.runs.length > 1 ? `Run ${this.place + 1}: ` : "") + run.title;
+    $(".of", this.root).textContent = `Run ${this.place + 1}`;
     const which = $(".contact", this.root);
     run.contacts.forEach(({ name }) => make("option", which, name));
     $(".which", this.root).hidden = run.contacts.length < 2;
@@ -23,7 +25,7 @@ class RunView {
   addTabs() {
     for (const side of ["left", "right"]) {
       const list = $(`.${side} .tabs`, this.root), boxes = $(`.${side} .panes`, this.root);
-      for (const Pane of PANES.filter((each) => each.side === side && (each.of?.(this) ?? true))) {
+      for (const Pane of PANES.filter((each) => each.side === side && (each.of?.() ?? true) && !(each.shared && this.place))) {
         const id = `run${this.place + 1}-${Pane.key}`, number = list.children.length;
         const tab = make("button", list, Pane.title, { role: "tab", id: `${id}-tab`, "aria-controls": id, "data-key": Pane.key });
         const box = make("div", boxes, "", { role: "tabpanel", id, "aria-labelledby": `${id}-tab`, class: `pane ${Pane.key}`, tabindex: 0 });
@@ -40,13 +42,16 @@ class RunView {
         });
         this.panes[Pane.key] = { Pane, tab, box };
       }
-      list.hidden = list.children.length < 2;
+      list.hidden = list.children.length < 2 || (side === "right" && this.place > 0); // there the tabs of the first run are for both
     }
   }
 
   openPane(side, key) {
     const each = this.panes[key];
-    if (!each || each.Pane.side !== side) return;
+    if (!each && !this.place) return;
+    $(`.${side}`, this.root).hidden = !each; // shared, and shown by the first run
+    if (side === "right") $(".of", this.root).hidden = runs.length < 2 || Boolean(each?.Pane.shared);
+    delete this.open[side];
     for (const { Pane, tab, box } of Object.values(this.panes)) {
       if (Pane.side !== side) continue;
       const on = Pane.key === key;
@@ -54,15 +59,12 @@ class RunView {
       tab.tabIndex = on ? 0 : -1;
       box.hidden = !on;
     }
-    each.pane ??= new each.Pane(this, each.box); // made when first opened
-    this.open[side] = each.pane;
-    each.pane.fit?.();
-    each.pane.show();
+    if (each) this.open[side] = each.pane ??= new each.Pane(this, each.box); // made when first opened
   }
 
   fit() {
     this.fitTable();
-    for (const pane of Object.values(this.open)) pane.fit?.();
+    for (const pane of Object.values(this.open)) { pane.fit?.(); pane.show(); }
   }
 
   close() { for (const { pane } of Object.values(this.panes)) pane?.close?.(); }
@@ -85,10 +87,10 @@ class RunView {
     const { run } = this, fired = run.fired.get(row);
     if (fired && following) this.choose(fired.contact, fired.element);
     const { contact } = this;
-    const get = (name, unit) => eng(contact.value(name, 0, row), unit, 5);
-    const ended = run.ended(frames.t[frame]) && `ended at ${eng(run.t(row), "s", 5)}`;
+    const get = (name) => contact.tell(name, contact.value(name, 0, row), 5);
+    const ended = run.ended(frames.t[frame]) && `ended at ${timeText(run.t(row), 5)}`;
     $(".values", this.root).textContent = [
-      `F = ${get("F", "N")}`, `v = ${eng(contact.value(contact.velocity, 0, row), "m/s", 5)}`, `x = ${get("x", "m")}`,
+      `F = ${get("F")}`, `v = ${get(contact.velocity)}`, `x = ${get("x")}`,
       run.rowName(row) + (run.between[row] ? "" : ` of ${run.of}`),
       ended || (run.between[row] ? "" : `micro-step ${run.microstep[row]}`),
     ].filter(Boolean).join("   ");
@@ -156,11 +158,12 @@ class RunView {
 
   // ---------------------------------------------------------------- guards
   listEdges() { // once per contact, so that the focus stays in the table
-    const body = $("tbody", this.root), { contact } = this;
+    const table = $("table", this.root), { contact } = this;
     this.listed = contact;
-    body.replaceChildren();
+    for (const body of $$("tbody", table)) body.remove();
+    const bodies = contact.edges.map(() => make("tbody", table)); // a card each where the table has no room
     this.lines = contact.edges.map((edge, k) => edge.clauses.map((clause, c) => {
-      const line = make("tr", body), found = { line };
+      const line = make("tr", bodies[k]), found = { line };
       if (c === 0) {
         const head = make("th", line, "", { rowspan: edge.clauses.length, scope: "rowgroup" });
         found.button = make("button", head, "○", { "aria-label": `Breakpoint on ${edge.name}` });
@@ -171,10 +174,10 @@ class RunView {
       }
       make("td", line, clause.text);
       found.truth = make("td", line);
-      found.sides = [0, 1, 2].map(() => make("td", line, "", { class: "number" }));
+      found.sides = ["margin", "left", "right"].map((name) => make("td", line, "", { class: "number", "data-name": clause.compares ? name : "" }));
       return found;
     }));
-    if (!contact.edges.length) make("td", make("tr", body), "this chart has no edges", { colspan: 6 });
+    if (!contact.edges.length) make("td", make("tr", make("tbody", table)), "this chart has no edges", { colspan: 6 });
     this.explained = "";
   }
 
@@ -196,7 +199,7 @@ class RunView {
         button.textContent = on ? "●" : "○";
         word.textContent = k === fired ? "FIRED" : asked ? "" : "not checked";
       }
-      const texts = [marginText(clause), eng(clause.left, clause.unit), eng(clause.right, clause.unit)];
+      const texts = [marginText(clause), inClause(clause, clause.left), inClause(clause, clause.right)];
       sides.forEach((cell, i) => { cell.textContent = edge.clauses[c].compares ? texts[i] : ""; });
       truth.textContent = { 1: "✓ true", 0: "✗ false" }[clause.truth] ?? "? unknown";
       truth.className = clause.truth === 1 ? "true" : "";
@@ -242,14 +245,16 @@ function relative(clause) {
 // A margin due to the clock and floats is zero, as in the debugger.
 function isZero({ left, right, margin }) { return Number.isFinite(margin) && Math.abs(margin) <= data.rounding * Math.max(Math.abs(left), Math.abs(right)); }
 function marginText(clause) {
-  const { margin, unit } = clause;
+  const { margin } = clause;
   if (isZero(clause)) return "0";
-  return `${margin > 0 ? "+" : ""}${eng(margin, unit)}`;
+  return `${margin > 0 ? "+" : ""}${inClause(clause, margin)}`;
 }
+// Both sides and the margin of a clause have one unit: that of the larger side, as in the debugger.
+function inClause({ left, right, unit }, u, digits) { return inUnit(u, unit, powerOf(Math.max(Math.abs(left), Math.abs(right)), unit), digits); }
 // In words, of the edge that is nearest to firing.
 function heldBack(contact, leaving, scope) {
   const each = leaving.map((k) => ({ k, worst: worstClause(contact.clauses(k, scope)) })).sort((a, b) => relative(b.worst) - relative(a.worst));
-  const { k, worst } = each[0], by = Number.isNaN(worst.margin) ? "" : ` by ${eng(Math.abs(worst.margin), worst.unit, 3)}`;
+  const { k, worst } = each[0], by = Number.isNaN(worst.margin) ? "" : ` by ${inClause(worst, Math.abs(worst.margin), 3)}`;
   return `${contact.edges[k].name} does not fire: ${worst.text} is ${worst.truth < 0 ? "not computable" : `false${by}`}`;
 }
 
@@ -271,6 +276,7 @@ class ChartPane {
     this.svg = $("svg", box);
     this.svg?.setAttribute("aria-label", `Chart of ${contact.name || "an element"}`);
     this.whole = this.svg?.getAttribute("viewBox");
+    this.least = SMALLEST / Math.min(...$$("text", box).map((text) => Number(text.getAttribute("font-size")))); // scale
     this.parts = [];
     for (const node of $$("[data-slot]", box)) (this.parts[node.dataset.slot] ??= []).push(node);
     for (const guard of $$(".guard", box)) {
@@ -290,7 +296,10 @@ class ChartPane {
   // A large bank is drawn as one chart, which shows the selected element.
   elementIn(slot) { return this.parts.length === this.view.contact.n ? slot : this.view.element; }
 
-  show() { for (let slot = 0; slot < this.parts.length; slot++) this.light(slot); }
+  show() {
+    for (let slot = 0; slot < this.parts.length; slot++) this.light(slot);
+    if (this.scrolls) for (const node of $$(".state.active, .guard.fired", this.region ?? this.box)) reveal(node, this.box);
+  }
 
   light(slot) {
     const { view } = this, { contact } = view, element = this.elementIn(slot), { fired, row } = contact.asked(element, view.row);
@@ -327,20 +336,26 @@ class ChartPane {
     }
   }
 
-  // Where the whole chart would be too small to read, only the selected element is in view.
+  // Where all elements would be too small to read, only the selected one is in view; where that would be, too, the pane
+  // scrolls, or on a narrow screen the page.
   fit() {
     if (!this.svg) return;
+    const { least } = this, across = this.box.clientWidth, high = isWide() ? this.box.clientHeight : SHARE * innerHeight;
     const region = $(`.region[data-slot="${this.view.element}"]`, this.svg), [, , width, height] = this.whole.split(" ").map(Number);
-    const room = Math.min(this.box.clientWidth / width, this.box.clientHeight / height);
+    const enough = region && isWide() ? OVERVIEW : least;
     let shown = this.whole;
-    if (region && room < READABLE) {
+    this.region = region && Math.min(across / width, high / height) < enough ? region.parentNode : null;
+    if (this.region) {
       const box = region.getBBox(), { e, f } = region.parentNode.transform.baseVal.consolidate().matrix;
       shown = [box.x + e - 4, box.y + f - 4, box.width + 8, box.height + 8].join(" ");
     }
     this.svg.setAttribute("viewBox", shown);
-    const [, , w, h] = shown.split(" ").map(Number), scale = Math.min(LARGEST, this.box.clientWidth / w, this.box.clientHeight / h || LARGEST);
+    const [, , w, h] = shown.split(" ").map(Number), scale = clamp(Math.min(across / w, high / h), this.region ? least : enough, LARGEST);
     place(this.svg, { width: w * scale, height: h * scale });
+    this.scrolls = w * scale > across + 1 || (isWide() && h * scale > high + 1);
   }
 }
-const READABLE = 0.85, LARGEST = 1.7; // px per point of the chart
+const SMALLEST = 11; // px of text
+const OVERVIEW = 0.85, LARGEST = 1.5; // px per point of the chart: of all elements on a wide screen, and of any chart
+const SHARE = 0.4; // of the height of a narrow screen
 PANES.push(ChartPane);

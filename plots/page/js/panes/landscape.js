@@ -91,10 +91,10 @@ class LandscapePane {
     this.none.hidden = this.known;
     body.hidden = !this.known;
     if (!this.known) return;
-    const beside = box.clientWidth >= 560, width = beside ? Math.floor(box.clientWidth * 0.6) : box.clientWidth;
+    const across = box.clientWidth, beside = across >= 540, width = beside ? Math.floor(Math.min(across * 0.6, across - 250)) : across;
     body.classList.toggle("narrow", !beside);
     plane.svg.parentNode.style.width = `${width}px`;
-    const height = WIDE.matches && beside ? Math.max(box.clientHeight - 4, 180) : Math.min(width * 0.85, 400), key = `${view.contact.name}/${width}/${height}`;
+    const height = isWide() && beside ? Math.max(box.clientHeight - 4, 180) : Math.min(width * 0.85, 400), key = `${view.contact.name}/${width}/${height}`;
     if (this.fitted !== key) { // a page that scrolls also asks when only its texts grow
       Object.assign(this, { fitted: key, size: [width, height], laid: "" });
       this.layouts.clear();
@@ -173,7 +173,7 @@ class LandscapePane {
     const { view, points, asked, state, moved } = this, { contact, element } = view, [v, z] = moved ?? [points.v0, points.z0];
     const scope = moved ? contact.scopeWith(element, asked.row, { [points.v]: v, [points.z]: z }) : contact.scope(element, asked.row);
     const next = contact.firesNext(state, scope), leaving = points.edges, name = (k) => contact.edges[k].name;
-    const texts = [`${points.v} = ${eng(v, unitOf(contact, points.v), 4)}`, `${points.z} = ${eng(z, unitOf(contact, points.z), 4)}`];
+    const texts = [`${points.v} = ${contact.tell(points.v, v)}`, `${points.z} = ${contact.tell(points.z, z)}`];
     say(this.ask, !moved ? "" : next >= 0 ? `${name(next)} would fire` : leaving.length ? `nothing would fire: ${heldBack(contact, leaving, scope)}` : `no edge leaves ${contact.states[state]}`);
     say(this.fact, moved ? `at ${texts.join(", ")}; Esc puts the dot back`
       : asked.fired >= 0 ? `${name(asked.fired)} has fired; shown as it was checked, in ${contact.states[state]}`
@@ -266,7 +266,7 @@ class LandscapePane {
   // What is computed at each point and what is as at the row.
   tellHeld(faster) {
     const { points, view, state } = this, { contact } = view, { z } = points;
-    const held = points.held.map((name) => `${name} = ${eng(points.given[name], unitOf(contact, name), 4)}`);
+    const held = points.held.map((name) => `${name} = ${contact.tell(name, points.given[name])}`);
     say(this.caption, [
       points.again.length ? `${points.again.join(", ")} computed at each point.` : "",
       points.flow ? `Arrows: d${z}/dt of ${contact.states[state]} at each point, d${points.v}/dt = ${eng(faster, "m/s^2", 3)} of the run near the row.` : `No arrows: the chart has no flow of ${z}.`,
@@ -307,7 +307,7 @@ class LandscapePane {
       draw("title", mark, {}, `${status}: ${text}`);
       draw("circle", mark, { r: 8 });
       draw("text", mark, { y: 4, "text-anchor": "middle" }, `${k + 1}`);
-      const at = `${plane.across.name} = ${eng(v, plane.across.unit)}, ${plane.up.name} = ${eng(z, plane.up.unit)}`, out = Math.abs(plane.x(v) - x) + Math.abs(plane.y(z) - y) > 0.1;
+      const at = `${plane.across.name} = ${contact.tell(plane.across.name, v)}, ${plane.up.name} = ${contact.tell(plane.up.name, z)}`, out = Math.abs(plane.x(v) - x) + Math.abs(plane.y(z) - y) > 0.1;
       make("li", pinList, `${status}: ${text} (${[where.join(", "), at, out ? "outside of the plane" : ""].filter(Boolean).join("; ")})`);
     });
   }

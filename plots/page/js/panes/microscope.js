@@ -146,11 +146,11 @@ class MicroscopePane {
     const count = this.lines.length, rest = this.box.clientHeight - COLUMN.foot - 14; // 14: the bar to scroll
     const { least, two, most, page } = LINE_HEIGHT, fits = Math.floor((rest - STAIRS.page) / count);
     const height = fits < two && rest - count * two >= STAIRS.least ? two : clamp(fits, least, most);
-    this.height = WIDE.matches ? height : page;
-    this.top = WIDE.matches ? clamp(rest - count * this.height, STAIRS.least, STAIRS.most) : STAIRS.page;
+    this.height = isWide() ? height : page;
+    this.top = isWide() ? clamp(rest - count * this.height, STAIRS.least, STAIRS.most) : STAIRS.page;
     this.unfold(this.height >= LINE_HEIGHT.two);
     for (const [name, value] of [["--row", this.height], ["--top", this.top], ["--foot", COLUMN.foot]]) this.scroller.style.setProperty(name, `${value}px`);
-    this.scroller.style.height = WIDE.matches ? "" : `${this.top + COLUMN.foot + 14 + Math.min(count, LINE_HEIGHT.count) * this.height}px`;
+    this.scroller.style.height = isWide() ? "" : `${this.top + COLUMN.foot + 14 + Math.min(count, LINE_HEIGHT.count) * this.height}px`;
     this.across = this.scroller.clientWidth - this.labels;
     this.down = this.scroller.clientHeight - this.top - COLUMN.foot;
     place(this.svg, { width: this.scroller.clientWidth, height: this.top });
@@ -268,7 +268,7 @@ class MicroscopePane {
     const { strip, view: { run } } = this, at = contact.columns.F;
     const node = make("button", this.foot, `${BETWEEN[run.between[row]]}${run.number[row]}\n${run.microstep[row]}`, {
       tabindex: -1, "aria-label": `Row ${run.number[row]}, micro-step ${run.microstep[row]}: ${contact.sentence({ element, edge })}, `
-        + `F ${eng(at(row - 1), "N", F_DIGITS)} before, ${eng(at(row), "N", F_DIGITS)} after`,
+        + `F ${contact.tell("F", at(row - 1), F_DIGITS)} before, ${contact.tell("F", at(row), F_DIGITS)} after`,
     });
     node.style.left = `${this.labels + strip.lefts[k]}px`;
     node.style.width = `${strip.pitch}px`;
@@ -285,7 +285,7 @@ class MicroscopePane {
     for (let k = first; k <= last; k++) {
       const apart = strip.apart(k), { run } = view, t = run.t(strip.rows[k] ?? run.rows - 1);
       if (apart) tell(`+${eng(t - run.t(strip.rows[k - 1] ?? 0), "s", 3)}`, strip.gaps[k] + COLUMN.gap / 2, 13, "time");
-      if (k < strip.rows.length) tell(apart ? eng(t, "s", 7) : "+0", strip.middle(k), 13, apart ? "time first" : "time");
+      if (k < strip.rows.length) tell(apart ? timeText(t, 7) : "+0", strip.middle(k), 13, apart ? "time first" : "time");
     }
     this.drawStairs(left, strip.levels(first, last), tell);
     const here = strip.place(view.row) - left;
@@ -302,7 +302,7 @@ class MicroscopePane {
     const { contact } = this.view, F = contact.columns.F, title = `F ${contact.name}`;
     this.title.textContent = textWidth(title) * BOLD < this.labels ? title : "F";
     const values = levels.map(({ row }) => F(row));
-    const texts = values.map((u) => eng(u, "N", F_DIGITS)), floor = this.top - STAIRS.below;
+    const texts = values.map((u) => contact.tell("F", u, F_DIGITS)), floor = this.top - STAIRS.below;
     // Values that are written alike are drawn alike.
     const known = new Map(texts.map((text, k) => [text, values[k]]).filter(([, u]) => Number.isFinite(u)));
     const sorted = [...known].sort((a, b) => a[1] - b[1]), found = heights(sorted.map(([, u]) => u), floor - COLUMN.head - STAIRS.above);
@@ -314,7 +314,7 @@ class MicroscopePane {
       if (begins && before) through += `M${x(before.to)} ${before.level.toFixed(1)}L${x(from)} ${level.toFixed(1)}`;
       path += begins || !before ? `M${x(from)} ${level.toFixed(1)}H${x(to)}` : `V${level.toFixed(1)}H${x(to)}`;
       before = { to, level };
-      const shown = [texts[k], eng(values[k], "N", F_DIGITS - 1)].find((text) => textWidth(text) <= to - from - 4);
+      const shown = [texts[k], contact.tell("F", values[k], F_DIGITS - 1)].find((text) => textWidth(text) <= to - from - 4);
       if (shown) tell(shown, (from + to) / 2, level - 4, "value");
     });
     place(this.path, { d: path });

@@ -21,7 +21,7 @@ class PhasePane {
     this.told = make("output", this.legend);
     const width = box.clientWidth, beside = width >= 560, head = this.legend.offsetHeight;
     const each = beside ? Math.floor(width / 2) - 4 : width;
-    const height = WIDE.matches ? Math.max(box.clientHeight - head - 6, 150) / (beside ? 1 : 2) : Math.min(each * 0.8, 420);
+    const height = isWide() ? Math.max(box.clientHeight - head - 6, 150) / (beside ? 1 : 2) : Math.min(each * 0.8, 420);
     for (const plot of plots) plot.fit(each, Math.floor(height));
     this.show();
   }
@@ -51,7 +51,7 @@ class PhasePane {
   point() {
     const { contact, run, place: at } = this.view, row = pointed === null ? -1 : frames.rows[at][pointed];
     for (const plot of this.plots) plot.show();
-    say(this.told, row < 0 ? "" : `t = ${written(run.t(row), 6)} s, F = ${eng(contact.value("F", 0, row), "N")}`);
+    say(this.told, row < 0 ? "" : `t = ${timeText(run.t(row), 6)}, F = ${contact.tell("F", contact.value("F", 0, row))}`);
   }
 }
 PANES.push(PhasePane);

@@ -1,11 +1,12 @@
 """Layout of a chart in layers: states in rows, and the labels of edges in rows between them.
 
-Every edge runs through its label. Lines are vertical within a row, each at a place of its own, and
-curve only in the channels between two rows, where there are no boxes. So no line crosses a box, no
-label touches another or an arrowhead, and no two edges end at the same point of a state. The labels
-of the edges that leave a state are ordered by priority, from left to right.
+Every edge is one line, and its label is right of it. Lines are vertical within a row, each at a
+place of its own, and curve only in the channels between two rows, where there are no boxes. So no
+line crosses a box, no label touches another or an arrowhead, and no two edges end at the same point
+of a state. The labels of the edges that leave a state are ordered by priority, from left to right.
 
-A layout from left to right is the same with x and y exchanged. Lengths are points; y points down.
+A layout from left to right is the same with x and y exchanged, but labels are above their lines.
+Lengths are points; y points down.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from plots.charts.places import Segment, places
+from plots.charts.layout.places import Segment, places
 
 Point = tuple[float, float]
 Size = tuple[float, float]
@@ -23,13 +24,15 @@ Size = tuple[float, float]
 ARROW = 7.0  # length of an arrowhead
 STUB = 3.0  # straight part of a line at a state, between an arrowhead and the curve
 PORT = 13.0  # least distance of two ends at a state
-WIDEST_PORT = 58.0
-CORNER = 10.0  # of a state, where no line ends
-STATES_APART, LABELS_APART, LINES_APART = 26.0, 12.0, 9.0
+WIDEST_PORT = 90.0
+WIDER = 16.0  # how much a state may grow at its sides, to make lines straight
+CORNER = 14.0  # of a state, where no line ends
+STATES_APART, LABELS_APART, LINES_APART = 26.0, 9.0, 9.0
 LINE = 2.0  # room of a line in a row
+BESIDE = 4.0  # between a line and its label
 LONELY = 640.0  # width of a row of states without edges
 DEFAULT, DOT = 30.0, 4.0  # from the dot to the default state; radius of the dot
-LOOP_OUT, LOOP_UP = 28.0, 9.0  # from a state to the label of its loop; from the label to the line
+LOOP_OUT, LOOP = 26.0, 8.0  # from a state to the line of its loop; half of the loop's height
 SWEEPS = 12
 
 
@@ -62,9 +65,9 @@ class Laid:
         Centres.
     sizes : list of (float, float)
         Of the states; at least the given ones.
-    lines : list of (list, list)
-        For every edge the line to its label, and the one from it to the tip of the arrow: a point,
-        then three more for each Bezier curve.
+    lines : list of list
+        For every edge the line to the tip of the arrow: a point, then three more for each Bezier
+        curve.
     dot : (float, float)
         Centre of the dot at the default state.
     """
@@ -74,7 +77,7 @@ class Laid:
     states: list[Point] = field(default_factory=list)
     sizes: list[Size] = field(default_factory=list)
     labels: list[Point] = field(default_factory=list)
-    lines: list[tuple[list[Point], list[Point]]] = field(default_factory=list)
+    lines: list[list[Point]] = field(default_factory=list)
     dot: Point = (0.0, 0.0)
 
 
@@ -85,19 +88,19 @@ def layered(sizes: Sequence[Size], links: Sequence[LayerEdge], direction: str = 
     --------
     >>> laid = layered([(80, 40), (80, 40)], [LayerEdge(0, 1, (60, 20)), LayerEdge(1, 0, (60, 20))])
     >>> [x for x, _ in laid.states], [x for x, _ in laid.labels]
-    ([66.0, 66.0], [30.0, 102.0])
+    ([51.0, 51.0], [48.0, 122.0])
     """
     if direction == "TB":
-        return _Layers(sizes, links).laid()
+        return _Layers(sizes, links, 1).laid()
     turned = [LayerEdge(each.source, each.target, _turned(each.size)) for each in links]
-    laid = _Layers([_turned(size) for size in sizes], turned).laid()
+    laid = _Layers([_turned(size) for size in sizes], turned, -1).laid()
     return Laid(
         width=laid.height,
         height=laid.width,
         states=[_turned(each) for each in laid.states],
         sizes=[_turned(each) for each in laid.sizes],
         labels=[_turned(each) for each in laid.labels],
-        lines=[([_turned(p) for p in one], [_turned(p) for p in two]) for one, two in laid.lines],
+        lines=[[_turned(point) for point in line] for line in laid.lines],
         dot=_turned(laid.dot),
     )
 
@@ -108,19 +111,21 @@ def _turned(point: Point) -> Point:
 
 @dataclass(frozen=True)
 class _Loop:
-    """A self-loop: at which side of its state; its label and its ends, from the centre down."""
+    """A self-loop: at which side of its state, and how far below the centre."""
 
     link: int
     side: int
     below: float
-    port: float
 
 
 class _Layers:
-    """The steps of a layout from top to bottom; even rows have states, odd rows labels."""
+    """The steps of a layout from top to bottom; even rows have states, odd rows labels.
 
-    def __init__(self, sizes: Sequence[Size], links: Sequence[LayerEdge]) -> None:
-        self.links = links
+    The side of labels is 1 if they are right of their lines, -1 if left.
+    """
+
+    def __init__(self, sizes: Sequence[Size], links: Sequence[LayerEdge], side: int) -> None:
+        self.links, self.side = links, side
         self.crossing = [k for k, each in enumerate(links) if each.source != each.target]
         self.layer = _layer_of(sizes, [links[k] for k in self.crossing])
         self.sizes = list(sizes)
@@ -161,16 +166,16 @@ class _Layers:
             here = [
                 k for k in own if k not in others and (side < 0) == (k < min(others, default=-1))
             ]
-            levels = [self.links[k].size[1] + 2 * LOOP_UP + 6 for k in here]
+            levels = [max(self.links[k].size[1] + 6, 2 * PORT) for k in here]
             at = -sum(levels) / 2
-            for place, (k, level) in enumerate(zip(here, levels, strict=True)):
-                port = (place - (len(here) - 1) / 2) * 2 * PORT
-                loops.append(_Loop(k, side, at + level / 2, port))
+            for k, level in zip(here, levels, strict=True):
+                loops.append(_Loop(k, side, at + level / 2))
                 at += level
-            height = max(height, 2 * PORT * len(here) + 2 * CORNER * bool(here))
+            # The line of every loop ends within its own level.
+            height = max(height, sum(levels) + 2 * (CORNER + LOOP - PORT) * bool(here))
             tallest = max(tallest, sum(levels))
             if here:
-                room[side > 0] = LOOP_OUT + max(self.links[k].size[0] for k in here) + 4
+                room[side > 0] = LOOP_OUT + BESIDE + max(self.links[k].size[0] for k in here)
         self.sizes[state] = width, height
         self.block.append(tallest)
         self.loops.append(loops)
@@ -186,8 +191,9 @@ class _Layers:
             for row in range(2 * self.layer[upper] + 1, 2 * self.layer[lower]):
                 chain.append(len(self.row))
                 self.row.append(row)
-                half = self.links[k].size[0] / 2 if row == gap else LINE / 2
-                self.wide.append((half, half))
+                label = BESIDE + self.links[k].size[0] if row == gap else LINE / 2
+                right = self.side > 0
+                self.wide.append((LINE / 2, label) if right else (label, LINE / 2))
                 if row == gap:
                     self.label[k] = chain[-1]
             self.chain[k] = [*chain, lower]
@@ -263,7 +269,7 @@ class _Layers:
         """Return the least distance of the centres of two neighbours."""
         if left < len(self.sizes) and right < len(self.sizes):
             gap = STATES_APART
-        elif self.wide[left][1] > LINE and self.wide[right][0] > LINE:
+        elif max(self.wide[left][1], self.wide[right][0]) > LINE:
             gap = LABELS_APART
         else:
             gap = LINES_APART
@@ -289,7 +295,7 @@ class _Layers:
         offset: dict[Segment, float] = {}  # of the ends at a state from its centre
         for state, (width, _) in enumerate(self.sizes):
             for others, lower in ((self.above[state], False), (self.below[state], True)):
-                step = min((width - 2 * CORNER) / max(len(others), 1), WIDEST_PORT)
+                step = min((width - 2 * CORNER) / max(len(others) - 1, 1), WIDEST_PORT)
                 for i, other in enumerate(sorted(others, key=place.__getitem__)):
                     segment = (state, other) if lower else (other, state)
                     offset[segment] = (i - (len(others) - 1) / 2) * step
@@ -305,9 +311,31 @@ class _Layers:
             if len(others) > 1
         ]
         self.x = places(self.wide, apart, self.segments, offset, sides, len(self.sizes))
-        self.offset = offset
+        self.offset = self._straightened({row[0] for row in rows if len(row) == 1})
         self._set_rows(rows)
         return self._drawn()
+
+    def _straightened(self, alone: set[int]) -> dict[Segment, float]:
+        """Return ends at the states that make lines straight where there is room for that.
+
+        A state that is alone in its row becomes a little wider for it.
+        """
+        offset: dict[Segment, float] = {}
+        for state, (width, height) in enumerate(self.sizes):
+            both = self.above[state], self.below[state]
+            wanted = [abs(self.x[other] - self.x[state]) + CORNER for own in both for other in own]
+            near = max((each for each in wanted if each <= width / 2 + WIDER), default=0.0)
+            if state in alone and near > width / 2:
+                left, right = self.beside[state]
+                self.sizes[state] = 2 * near, height
+                self.wide[state] = near + left, near + right
+            room = self.sizes[state][0] / 2 - CORNER
+            for others, lower in ((both[0], False), (both[1], True)):
+                others = sorted(others, key=self.x.__getitem__)
+                ends = _ends([self.x[other] - self.x[state] for other in others], room)
+                for other, end in zip(others, ends, strict=True):
+                    offset[(state, other) if lower else (other, state)] = end
+        return offset
 
     def _set_rows(self, rows: Sequence[Sequence[int]]) -> None:
         """Set the upper and lower end of every row; channels are higher where lines are flatter."""
@@ -342,40 +370,29 @@ class _Layers:
         loops = {loop.link: loop for own in self.loops for loop in own}
         for k in range(len(self.links)):
             if k in loops:
-                centre, lines = self._loop(laid.states[self.links[k].source], loops[k])
+                centre, line = self._loop(laid.states[self.links[k].source], loops[k])
             else:
-                centre = self.x[self.label[k]], middle[self.label[k]]
-                lines = self._lines(k)
+                item = self.label[k]
+                beside = self.side * (BESIDE + self.links[k].size[0] / 2)
+                centre = self.x[item] + beside, middle[item]
+                line = self._line(k)
             laid.labels.append(centre)
-            laid.lines.append(lines)
+            laid.lines.append(line)
         return laid
 
-    def _lines(self, k: int) -> tuple[list[Point], list[Point]]:
-        chain, label = self.chain[k], self.label[k]
-        cut = chain.index(label)
+    def _line(self, k: int) -> list[Point]:
+        """Return the line of an edge: straight in the rows and, for a stub, at the states."""
+        chain = self.chain[k]
         down = self.links[k].source == chain[0]
-        upper = self._half(chain[: cut + 1], STUB if down else STUB + ARROW)
-        lower = self._half(chain[cut:], STUB + ARROW if down else STUB)
-        if down:
-            return upper, lower
-        return lower[::-1], upper[::-1]
-
-    def _half(self, chain: Sequence[int], stub: float) -> list[Point]:
-        """Return the line from the lower end of the first item to the upper end of the last.
-
-        At a state it is straight for the length of the stub.
-        """
+        stubs = (STUB, STUB + ARROW) if down else (STUB + ARROW, STUB)
         spans = []
         for i, item in enumerate(chain):
             x, (top, bottom) = self.x[item], self.span[self.row[item]]
             middle, half = (top + bottom) / 2, self.tall.get(item, 0.0) / 2
-            state = item < len(self.sizes)
             if i == 0:
-                x += self.offset[item, chain[1]] if state else 0.0
-                spans.append((x, middle + half, bottom + stub * state))
+                spans.append((x + self.offset[item, chain[1]], middle + half, bottom + stubs[0]))
             elif i == len(chain) - 1:
-                x += self.offset[chain[-2], item] if state else 0.0
-                spans.append((x, top - stub * state, middle - half))
+                spans.append((x + self.offset[chain[-2], item], top - stubs[1], middle - half))
             else:
                 spans.append((x, top, bottom))
         points = [(spans[0][0], spans[0][1])]
@@ -384,29 +401,59 @@ class _Layers:
                 x_before, y_before = points[-1]
                 bend = (y_before + top) / 2
                 points += [(x_before, bend), (x, bend), (x, top)]
-            if bottom > top:
-                points += [(x, top + (bottom - top) * part) for part in (1 / 3, 2 / 3, 1)]
-        return points
+            points += straight((x, top), (x, bottom))[1:]
+        return points if down else points[::-1]
 
-    def _loop(self, state: Point, loop: _Loop) -> tuple[Point, tuple[list[Point], list[Point]]]:
-        """Return the centre of a loop's label, and its lines: out, and back."""
-        width, height = self.links[loop.link].size
+    def _loop(self, state: Point, loop: _Loop) -> tuple[Point, list[Point]]:
+        """Return the centre of a loop's label, and its line."""
         edge = state[0] + loop.side * self.sizes[self.links[loop.link].source][0] / 2
-        x, y = edge + loop.side * (LOOP_OUT + width / 2), state[1] + loop.below
-        high, low = y - height / 2 - LOOP_UP, y + height / 2 + LOOP_UP
-        leaves, enters = state[1] + loop.port - PORT / 2, state[1] + loop.port + PORT / 2
-        corner, stub = edge + loop.side * LOOP_OUT, edge + loop.side * (ARROW + STUB)
-        bend = (stub + corner) / 2
-        out = [(edge, leaves), (bend, leaves), (bend, high), (corner, high)]
-        out += [(x, high), (x, high), (x, y - height / 2)]
-        back = [(x, y + height / 2), (x, low), (x, low), (corner, low)]
-        back += [(bend, low), (bend, enters), (stub, enters)]
-        return (x, y), (out, back + _straight((stub, enters), (edge, enters))[1:])
+        return loop_line((edge, state[1] + loop.below), loop.side, self.links[loop.link].size[0])
 
 
-def _straight(a: Point, b: Point) -> list[Point]:
-    """Return a straight line as a curve."""
-    return [tuple(p + (q - p) * t / 3 for p, q in zip(a, b, strict=True)) for t in range(4)]  # type: ignore[misc]
+def _ends(wanted: Sequence[float], room: float) -> list[float]:
+    """Return places of lines at a state, from its centre: as wanted, or else evenly spread.
+
+    Examples
+    --------
+    >>> _ends([-90.0, -70.0, 10.0, 30.0], 60.0)
+    [-60.0, -25.0, 10.0, 30.0]
+    """
+    before = sum(each < -room for each in wanted)
+    after = sum(each > room for each in wanted)
+    ends = list(wanted[before : len(wanted) - after])
+    low, high = -room + before * PORT, room - after * PORT
+    for i, end in enumerate(ends):
+        ends[i] = max(end, ends[i - 1] + PORT if i else low)
+    for i in reversed(range(len(ends))):
+        ends[i] = min(ends[i], ends[i + 1] - PORT if i + 1 < len(ends) else high)
+    if not ends:
+        step = 2 * room / max(before + after - 1, 1)
+        return [-room + i * step for i in range(before + after)]
+    left = [-room + i * (ends[0] + room) / before for i in range(before)]
+    right = [room - i * (room - ends[-1]) / after for i in range(after)]
+    return [*left, *ends, *reversed(right)]
+
+
+def loop_line(at: Point, side: int, width: float) -> tuple[Point, list[Point]]:
+    """Return the centre of a label, and the line of its loop at a place on the side of a state."""
+    (edge, y), corner = at, at[0] + side * LOOP_OUT
+    leaves, enters = y - LOOP, y + LOOP
+    stub = edge + side * (ARROW + STUB)
+    out = [(edge, leaves), (corner, leaves), (corner, leaves), (corner, y)]
+    back = [(corner, enters), (corner, enters), (stub, enters)]
+    label = corner + side * (BESIDE + width / 2), y
+    return label, out + back + straight((stub, enters), (edge, enters))[1:]
+
+
+def straight(a: Point, b: Point) -> list[Point]:
+    """Return a straight line as a Bezier curve.
+
+    Examples
+    --------
+    >>> straight((0.0, 0.0), (3.0, 6.0))
+    [(0.0, 0.0), (1.0, 2.0), (2.0, 4.0), (3.0, 6.0)]
+    """
+    return [(a[0] + (b[0] - a[0]) * t / 3, a[1] + (b[1] - a[1]) * t / 3) for t in range(4)]
 
 
 def _layer_of(sizes: Sequence[Size], links: Sequence[LayerEdge]) -> list[int]:
