@@ -568,6 +568,7 @@ rows = {
     "plot of a missing trace": ("none.npz", ..., "plot none.npz"),
     "plot of no trace": ("own.toml", ..., "plot own.toml"),
     "replay of a scenario": ("pulled.toml", ..., "replay pulled.toml"),
+    "replay of a scenario of the package": ("servo", ..., "replay servo"),
 }
 group("command", TraceFileError, command, rows)
 rows = {"data that are missing": ("nowhere", ..., "benchmark --data nowhere -o out")}
