@@ -552,6 +552,7 @@ group("command", ParameterError, command, rows)
 rows = {
     "debug of a missing scenario": ("none.toml", ..., "debug none.toml"),
     "run of a trace": ("t.npz", ..., "run t.npz"),
+    "number that there is not": ("", ..., "run pair.toml --set numbers.k=3"),
     "debug of a program": ("mine.py", ..., "debug mine.py"),
     "debug of a trace": ("t.CSV", ..., "debug t.CSV"),
     "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),

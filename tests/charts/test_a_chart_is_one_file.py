@@ -116,7 +116,7 @@ def test_sweep_varies_it(copy: Copy) -> None:
 def test_debug_steps_through_it(copy: Copy) -> None:
     told = copy.gms_fsm("debug", "x.toml", said="next\nstep\nwhy 1\nquit\n")
     assert "element 1: elastic -> forward by yield_forward" in told
-    assert "unload_forward does not fire: v < 0 is false by 0.0" in told
+    assert "unload_forward does not fire: v < 0 is false by 49.2 mm/s" in told
 
 
 def test_the_zoo_makes_its_page(copy: Copy) -> None:
