@@ -552,6 +552,7 @@ group("command", ParameterError, command, rows)
 rows = {
     "debug of a missing scenario": ("none.toml", ..., "debug none.toml"),
     "run of a trace": ("t.npz", ..., "run t.npz"),
+    "number that there is not": ("", ..., "run pair.toml --set numbers.k=3"),
     "debug of a program": ("mine.py", ..., "debug mine.py"),
     "debug of a trace": ("t.CSV", ..., "debug t.CSV"),
     "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),
@@ -568,6 +569,7 @@ rows = {
     "plot of a missing trace": ("none.npz", ..., "plot none.npz"),
     "plot of no trace": ("own.toml", ..., "plot own.toml"),
     "replay of a scenario": ("pulled.toml", ..., "replay pulled.toml"),
+    "replay of a scenario of the package": ("servo", ..., "replay servo"),
 }
 group("command", TraceFileError, command, rows)
 rows = {"data that are missing": ("nowhere", ..., "benchmark --data nowhere -o out")}
@@ -779,6 +781,8 @@ rows = {
     },
 }
 group("Record.from_csv", ParameterError, lambda given: read(**given), rows)
+rows = {"unit in the name alone": ("position", "x_mm", from_csv(position="x_mm"))}
+group("Record.from_csv", ParameterError, lambda given: read(**given), rows)
 rows = {
     "unit of something else": ("", ..., from_csv(force=("F_N", "mm"))),
 }
@@ -968,7 +972,7 @@ rows = {
     "interval reversed": ("train", ..., {"train": (3.0, 1.0)}),
     "seed": ("seed", 0.5, {"seed": 0.5}),
     "no records": ("records", [], {"records": []}),
-    "name for a record": ("records", "r", {"records": "rig"}),
+    "name for a record": ("records", "rig", {"records": "rig"}),
     "one record for a fold of records": ("fold", "record", {"fold": "record"}),
     "candidates that cannot be run": ("candidates", ..., {"cycles": 2.0, "most_steps": 1}),
 }
@@ -992,7 +996,7 @@ rows = {
     **{f"n is {n!r}": ("n", n, {"n": n}) for n in (0, 2.5, True, None, "4", 61)},
     **{f"train is {train!r}": ("train", train, {"train": train}) for train in ((5.0, 5.0), "all")},
     **{f"records is {each!r}": ("records", each, {"records": each}) for each in ([], None)},
-    "name for a record": ("records[0]", "r", {"records": "rig.csv"}),
+    "name for a record": ("records", "rig.csv", {"records": "rig.csv"}),
     "records with none": ("records[1]", None, {"records": [arrays(), None]}),
     "law": ("law", "fair", {"law": "fair"}),
     "v_c": ("v_c", 0.0, {"v_c": 0.0}),
@@ -1391,12 +1395,14 @@ rows = {
     "pushed with mass = 0": ("mass", 0.0, pushed, {"mass": 0}),
     "pulled with mass = -1": ("mass", -1.0, pulled, {"mass": -1}),
     "pulled with stiffness = 0": ("stiffness", 0.0, pulled, {"stiffness": 0}),
+    "model of a name": ("chart", "dahl", ChartModel, {"chart": "dahl", "values": {}}),
     "GMS without parameters": ("parameters", {}, GMS, {"parameters": {}, "law": "signed"}),
 }
 group("parameter", ParameterError, lambda make, given: make(**given), rows)
 rows = {
     "curve with F_s = 0.5": (curve, {"F_s": 0.5}),
     "bank replaced with q = 1": (lambda **new: bank().replaced(**new), {"q": 1.0}),
+    "bank replaced with Fs = 1": (lambda **new: bank().replaced(**new), {"Fs": 1.0}),
     "bank with k = []": (bank, {"k": []}),
     "bank with k = None": (bank, {"k": None}),
     "bank with sigma = 1": (bank, {"sigma": 1}),

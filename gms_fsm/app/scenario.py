@@ -266,10 +266,20 @@ def read_system(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, S
     def build(table: SystemScenario) -> tuple[SystemScenario, System]:
         return table, table.chosen(path.parent, System)
 
+    _check_numbers(path, overrides)
     try:
         return read_file(path, SystemScenario, ScenarioError, build, overrides)
     except GMSError as error:
         raise ScenarioError.of(error) from None
+
+
+def _check_numbers(path: Path, overrides: Sequence[str]) -> None:
+    """Refuse an override of a number that there is not: it would be a new one, never read."""
+    numbers = parsed(path).get("numbers", {})
+    for each in overrides:
+        table, _, name = each.partition("=")[0].strip().partition(".")
+        if table == "numbers" and isinstance(numbers, dict) and name not in numbers:
+            raise unknown("number", name, numbers, ScenarioError, place=f"--set {cut(each)}")
 
 
 def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:

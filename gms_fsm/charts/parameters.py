@@ -17,7 +17,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm.errors import ChartError, ParameterError, shown
+from gms_fsm.errors import ChartError, GMSError, ParameterError, shown
+from gms_fsm.foundation.arguments import unknown
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -226,6 +227,23 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
         if not isinstance(bound.limit, str) and not bound.holds(number, bound.limit):
             raise ParameterError(f"it must be {bound.text}", place=name, value=number)
     return number
+
+
+def check_names(
+    parameters: Iterable[Parameter],
+    given: Iterable[str],
+    place: str,
+    kind: type[GMSError] = ParameterError,
+) -> None:
+    """Refuse values of which one has no parameter, or of which a parameter has none."""
+    known, names = {each.name: each for each in parameters}, [*given]
+    for name in names:
+        if name not in known:
+            raise unknown("parameter", name, known, kind, place=place)
+    lacking = [f"{name} [{each.unit}]" for name, each in known.items() if name not in names]
+    if lacking:
+        text = ", ".join(each.removesuffix(" []") for each in lacking)
+        raise kind(f"no value is given for {text}", place=place, advice="give each one")
 
 
 def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> FloatArray:

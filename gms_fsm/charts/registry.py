@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import Parameter, checked_values
+from gms_fsm.charts.parameters import Parameter, check_names, checked_values
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ChartError, GMSError, ParameterError, shown, why
 from gms_fsm.foundation.arguments import unknown
@@ -122,13 +122,7 @@ class Entry:
 
     def _check_demonstration(self) -> None:
         here, given = f"entry {shown(self.name)}, demonstration", self.demonstration
-        wanted, names = {*self._any.parameter_names}, {*given.values}
-        if wanted != names:
-            raise ChartError(
-                f"missing values: {sorted(wanted - names) or 'none'}, unknown: "
-                f"{sorted(names - wanted) or 'none'}",
-                place=here,
-            )
+        check_names(self._any.parameters, given.values, here, ChartError)
         if self.curve != (given.stribeck is not None):
             raise ChartError(
                 f"stribeck is {shown(given.stribeck)}",

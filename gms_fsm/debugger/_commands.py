@@ -386,15 +386,19 @@ class Commands:
             arg,
         )
         if form is None:
-            raise SessionError(f"{arg!r} is not a breakpoint", advice=f"{self._usage('break')}")
+            usage = self._usage("break")
+            if re.search("[<>]", arg):
+                usage = f"until {arg} goes there; of a breakpoint, a condition follows if: {usage}"
+            raise SessionError(f"{arg!r} is not a breakpoint", advice=usage)
         kind, name, element, condition, hits = form.groups()
         states, edges = self.states, self._edges
         asked = {None: states + edges, "enter": states, "leave": states}.get(kind, edges)
         name = spelled(name, asked)
         if name not in states + edges:
             raise SessionError(
-                f"no edge or state {name!r}",
-                advice=f"edges: {', '.join(edges) or 'none'}; states: {', '.join(states)}",
+                f"there is no edge or state {name!r}",
+                advice=f"{meant(name, states + edges)}edges: {', '.join(edges) or 'none'}; "
+                f"states: {', '.join(states)}",
             )
         point = self.session.break_on(
             kind or ("enter" if name in states else "fires"),

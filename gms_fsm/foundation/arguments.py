@@ -72,7 +72,16 @@ def checked_integer(
 
 
 def listed(name: str, value: Any, wanted: str) -> list[Any]:
-    """Return an iterable as a list; raise a `ParameterError` for anything else."""
+    """Return an iterable as a list; raise a `ParameterError` for anything else, and for a text.
+
+    Examples
+    --------
+    >>> listed("records", "rig.csv", "records")
+    Traceback (most recent call last):
+    gms_fsm.errors.ParameterError: records is 'rig.csv'; it must be records
+    """
+    if isinstance(value, str):
+        raise ParameterError(f"it must be {wanted}", place=name, value=value)
     return list(checked_kind(name, value, Iterable, wanted))
 
 

@@ -218,8 +218,8 @@ def _instead(
 ) -> str:
     """Return the key that is meant by an unknown one.
 
-    That is the key of this name in a table within, the most similar one here, the one of this name
-    elsewhere, the one that is described by this name, or the most similar one elsewhere.
+    That is the key of this name in a table within or elsewhere, the one that is described by this
+    name, or the most similar one: here, in a table within, elsewhere.
     """
     inner = {
         name: f"{each}.{name}" for each in valid for name in _fields_at((*table, each), data, root)
@@ -237,11 +237,13 @@ def _instead(
     places = {name: f"{each}.{name}" for each in tables for name in _fields_at((each,), data, root)}
     found = (
         inner.get(key),
-        nearest(key, valid),
         places.get(key),
         described[0] if len(described) == 1 else "",
+        nearest(key, valid),
+        inner.get(nearest(key, inner, 0.75)),
+        places.get(nearest(key, places, 0.75)),
     )
-    return next(filter(None, found), places.get(nearest(key, places, 0.75), ""))
+    return next(filter(None, found), "")
 
 
 def _written_key(loc: tuple[int | str, ...], data: Any) -> Key:

@@ -212,8 +212,8 @@ def line_of(text: str, key: Key) -> int:
     while key and not _has(whole, key):
         key = key[:-1]
     lines, left = text.split("\n"), MOST_PREFIXES
-    if not key:
-        return 1
+    if not key:  # what is missing stands on no line
+        return 0
 
     def valid_end(last: int) -> tuple[int, bool]:
         """Return the end of the longest valid prefix up to a line, and whether it has the key."""

@@ -167,7 +167,7 @@ def choose(
 
 # --------------------------------------------------------------------------- arguments
 def _checked_records(records: Any) -> list[Record]:
-    wanted = "a Record or a sequence of them"
+    wanted = "a Record, for example Record.from_csv(path), or several"
     given = [records] if isinstance(records, Record) else listed("records", records, wanted)
     if not given:
         raise ParameterError(f"it must be {wanted}", place="records", value=records)

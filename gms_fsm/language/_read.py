@@ -234,7 +234,7 @@ def _parsed(text: str) -> ast.expr:
         column = min(error.offset + lead, len(text) + 1) if error.offset else len(text) + 1
         reason = "the text ends too early" if column > len(text) else "cannot be read from here"
         factors = _NO_SIGN_BETWEEN.search(text, max(0, column - 3), column + 1)
-        allowed = "a sign between factors, as in 2*pi*t" if factors else _GRAMMAR
+        allowed = "a sign between factors, as in 2*pi*t, and no unit" if factors else _GRAMMAR
         raise ExpressionError(reason, text, column, allowed) from None
     except (ValueError, RecursionError, MemoryError):
         raise ExpressionError("cannot be read (nested too deeply)", text, 1, _GRAMMAR) from None

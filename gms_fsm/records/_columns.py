@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.records.units import FACTORS, factor
+from gms_fsm.records.units import FACTORS, factor, plain
 
 if TYPE_CHECKING:
     from gms_fsm.charts.parameters import FloatArray
@@ -78,6 +79,7 @@ def _column(quantity: str, given: Any) -> Column:
         given = (given.name, given.unit, given.sign)
     match given:
         case str() as name:
+            _check_named_unit(quantity, name)
             return Column(name, _si(quantity))
         case (str() as name, str() as unit):
             return Column(name, unit)
@@ -89,6 +91,19 @@ def _column(quantity: str, given: Any) -> Column:
         place=quantity,
         value=given,
     )
+
+
+def _check_named_unit(quantity: str, name: str) -> None:
+    """Refuse a name that ends in another unit than that in which the column would be read."""
+    before, *parts = re.split(r"[\s_(\[]+", name.rstrip(" )]"))
+    unit = plain(parts[-1]) if before and parts else ""
+    if FACTORS[quantity].get(unit, 1.0) != 1.0:
+        raise ParameterError(
+            f"its values would be read in {_si(quantity)}",
+            place=quantity,
+            value=name,
+            advice=f"give the unit, too: ({name!r}, {unit!r})",
+        )
 
 
 def _si(quantity: str) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.charts.gms import TABLE_I
 from gms_fsm.foundation.quantities import in_words
 from gms_fsm.language import Call, Name, Relation, Value, clauses, evaluate
 from gms_fsm.lowering.scales import scales_of
@@ -62,8 +63,8 @@ def _weight(trace: Trace) -> Iterator[str]:
         return
     cure = f"if the mass is in g, give {mass / 1e3:g}" if ratio < least else "if F is in mN, give N"
     yield (
-        f"a friction of {friction:.3g} N is {ratio:.2g} times the weight of {mass:g} kg; masses "
-        f"are in kg, forces in N: {cure}"
+        f"a friction of {in_words(friction, 'N', 3)} is {ratio:.2g} times the weight of "
+        f"{mass:g} kg; masses are in kg, forces in N: {cure}"
     )
 
 
@@ -86,11 +87,12 @@ def _sizes(trace: Trace) -> Iterator[str]:
                 f"no transition: the speed stays below {bound} (largest |v| "
                 f"{in_words(fastest, 'm/s', 3)}, {bound} {in_words(scales.speed, 'm/s', 3)})"
             )
-        elif model.stribeck is not None and (model.weights == 1.0).all():
+        elif model.stribeck is not None and (model.weights == 1.0).all() and not _of_table_1(model):
             yield (
                 f"no transition: an element breaks away at its weight times the Stribeck curve, "
-                f"here {thresholds.min():.3g} m or more, because all weights are 1 m/N, as in "
-                "Table I of the paper; give shares of the friction, which sum to 1, or weights"
+                f"here {in_words(float(thresholds.min()), 'm', 3)} or more, because all weights "
+                "are 1 m/N, as in Table I of the paper; give shares of the friction, which sum to "
+                "1, or weights"
             )
         elif 0.0 < deflected < NEAR:
             smallest = in_words(float(thresholds.min()), model.chart.unit(name), 3)
@@ -106,6 +108,11 @@ def _sizes(trace: Trace) -> Iterator[str]:
             "all of it is gross sliding; if pre-sliding is intended, check the unit of the motion "
             "(m)"
         )
+
+
+def _of_table_1(model: Model) -> bool:
+    stiffness = np.asarray(model.values.get("k", 0.0))
+    return any(np.array_equal(stiffness, column.values["k"]) for column in TABLE_I.values())
 
 
 def _scaling(model: Model) -> str:

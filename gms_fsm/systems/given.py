@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import FloatArray, checked_values
+from gms_fsm.charts.parameters import FloatArray, check_names, checked_values
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import (
     CONSTANTS,
@@ -92,14 +92,7 @@ def checked_numbers(
             place=f"{here}: values",
             value=values,
         )
-    wanted, given = set(chart.parameter_names), set(values)
-    if wanted != given:
-        raise ParameterError(
-            f"chart {chart.name!r} has the parameters {sorted(wanted)}",
-            place=here,
-            advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
-            f"{sorted(given - wanted) or 'none'}",
-        )
+    check_names(chart.parameters, values, here)
     return checked_values(chart.parameters, values, n)
 
 

@@ -20,7 +20,7 @@ from gms_fsm.charts.parameters import (
 )
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.arguments import nearest, unknown
 from gms_fsm.foundation.display import displayed, short_repr
 
 RULES = {each.name: each.rule for each in PARAMETERS}
@@ -118,7 +118,11 @@ class GMSParameters:
         """
         for name in given:
             if name not in EVERY and name != "stribeck":
-                raise unknown("parameter", name, vars(self))
+                error = unknown("parameter", name, vars(self))
+                if own := nearest(name, self.stribeck.numbers):
+                    cure = f"{own} is a number of the curve: give stribeck=Stribeck(...)"
+                    raise error.replaced(advice=cure)
+                raise error
         new = object.__new__(GMSParameters)
         vars(new).update(vars(self) | _checked(given, self.n))
         return new

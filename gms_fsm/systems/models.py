@@ -21,6 +21,7 @@ from gms_fsm.charts.parameters import (
     WEIGHTS,
     FloatArray,
     Parameter,
+    check_names,
     checked_array,
     checked_scalar,
     checked_values,
@@ -268,6 +269,9 @@ class ChartModel:
                 "ElementMachines(model).machine)",
                 place="chart",
                 value=self.chart,
+                advice=f"an included one is gms_fsm.charts.CHARTS[{self.chart!r}]"
+                if isinstance(self.chart, str)
+                else "",
             )
         if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
             raise ParameterError(
@@ -295,13 +299,7 @@ class ChartModel:
                 place="values",
                 value=self.values,
             )
-        wanted, given = set(self.chart.parameter_names), set(self.values)
-        if wanted != given:
-            raise ParameterError(
-                f"chart {self.chart.name!r} has the parameters {sorted(wanted)}",
-                advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
-                f"{sorted(given - wanted) or 'none'}",
-            )
+        check_names(self.chart.parameters, self.values, f"chart {self.chart.name!r}")
         check_bank(self.chart, self.n, f"chart {self.chart.name!r}")
         if len(self.chart.velocities) > 1:
             raise ParameterError(

@@ -116,7 +116,7 @@ def test_usage_errors_and_terminal_codes(broken: CommandLine) -> None:
             assert answer.code == 2
             assert "Usage" in answer.err
             assert "Traceback" not in answer.err
-    one_message(broken("run", "--", "--debug"), "--debug: no such file")
+    one_message(broken("run", "--", "--debug"), "there is no file or scenario '--debug'")
     answer = broken("run", "escape.toml")
     one_message(answer, r"\x1b[31m[bold]\x07")
     assert "\x1b[31m" not in answer.message

@@ -22,6 +22,7 @@ PRINTED = [
     "chart --list",
     "check --list",
     "export --list",
+    "run --list",
     "lesson",
     "check gms --law published",
     "check broken:overlap",

@@ -110,13 +110,13 @@ def test_sweep_varies_it(copy: Copy) -> None:
     assert found.parameters["F_y"].tolist() == [0.5, 0.5, 1.25, 1.25, 2.0, 2.0]
     assert found.outcome.tolist() == ["ok"] * 6
     said = copy.gms_fsm("sweep", "x.toml", "--over", "F_c=1:2:2", code=2)
-    assert "k [N/m], H [N/m], F_y [N], sigma_2 [Ns/m]\n" in said
+    assert "there are k, H, F_y, sigma_2\n" in said
 
 
 def test_debug_steps_through_it(copy: Copy) -> None:
     told = copy.gms_fsm("debug", "x.toml", said="next\nstep\nwhy 1\nquit\n")
     assert "element 1: elastic -> forward by yield_forward" in told
-    assert "unload_forward does not fire: v < 0 is false by 0.0" in told
+    assert "unload_forward does not fire: v < 0 is false by 49.2 mm/s" in told
 
 
 def test_the_zoo_makes_its_page(copy: Copy) -> None:

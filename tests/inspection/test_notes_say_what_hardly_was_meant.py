@@ -39,6 +39,7 @@ def test_a_motion_that_fits_has_none():
     model, rig = pulled_mass()
     assert notes_on(simulate(model, rig, 20.0)) == ()
     assert notes_on(simulate(stick_slip("signed"), open_loop(), 20.0)) == ()
+    assert notes_on(simulate(stick_slip("signed"), Prescribed("0.1"), 1.0)) == ()
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def test_other_files_say_what_they_are(arrays: dict[str, Any], tmp_path: Path) -
     other = {"format": np.array("gms-fsm sweep 9"), "program": np.array("4.2")}
     with pytest.raises(TraceFileError, match=r"format 'gms-fsm sweep 9' of gms-fsm 4\.2"):
         _load(arrays | other, tmp_path)
-    with pytest.raises(TraceFileError, match="there is no such file"):
+    with pytest.raises(TraceFileError, match=r"no such file; in .* there is runs.npz"):
         Sweep.load(tmp_path / "none.npz")
     content = whole().save(tmp_path / "whole.npz").read_bytes()
     trace = simulate(*pulled_mass(), 1.0).save(tmp_path / "trace.npz").read_bytes()

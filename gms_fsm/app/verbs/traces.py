@@ -32,8 +32,9 @@ def _of_contact(path: Path, contact: str) -> Trace:
 
 def _loaded(path: Path) -> Trace:
     from gms_fsm import Trace
+    from gms_fsm.scenarios import scenario_path
 
-    if path.suffix == ".toml":
+    if scenario_path(path).suffix == ".toml":
         raise TraceFileError(
             "it is not a trace",
             place=str(path),

@@ -195,8 +195,8 @@ class BodyTable(Table):
     inertia: Value | None = Field(None, description="mass in kg, or moment of inertia in kg m^2")
     force: Value = Field("0", description="sum of forces in N, or torques in Nm")
     velocity: Value | None = Field(None, description="of a driven body, instead of an inertia")
-    x: str = "x"
-    v: str = "v"
+    x: str = Field("x", description="what texts call its position")
+    v: str = Field("v", description="what texts call its velocity")
     motion: Motion = Field("along", description="along the surface, normal to it, or turning")
 
 
@@ -263,7 +263,7 @@ class SampledTable(Table):
     """A sampled controller."""
 
     name: str
-    period: float
+    period: float = Field(description="time between samples, s; elsewhere sample_time")
     updates: dict[str, Value]
     initial: dict[str, float] = Field({})
     offset: float = 0.0
@@ -275,7 +275,7 @@ class SystemTable(Table):
     model_config = ConfigDict(populate_by_name=True)
 
     name: str
-    numbers: dict[str, float] = Field({})
+    numbers: dict[str, float] = Field({}, description="parameters that texts name")
     signals: dict[str, SignalField] = Field({})
     flow: dict[str, Value] = Field({})
     bodies: list[BodyTable] = Field(alias="body")
