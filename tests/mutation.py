@@ -46,13 +46,14 @@ NEAR = {  # module: its tests, those that detect most first
         "run/test_own_machines",
     ],
     "gms_fsm/run/machines.py": [
+        "laws/test_engines_agree",
         "run/test_own_machines",
         "systems/test_locks_and_impacts",
-        "laws/test_engines_agree",
         "laws/test_files_give_back_what_was_saved",
         "charts/test_gms_chart_is_the_papers",
     ],
     "integrators/advance.py": [
+        "laws/test_the_bits_are_the_approved_ones",
         "integrators/test_steps_and_stops",
         "integrators/test_the_first_change_is_found",
         *PHYSICS,
@@ -60,6 +61,7 @@ NEAR = {  # module: its tests, those that detect most first
         "integrators/test_convergence_orders",
     ],
     "integrators/crossings.py": [
+        "laws/test_the_bits_are_the_approved_ones",
         "integrators/test_the_first_change_is_found",
         "integrators/test_steps_and_stops",
         *PHYSICS,

@@ -1,0 +1,45 @@
+"""Runs have the bits of their last approval, on every machine.
+
+The digests cover times, values, states and the log. A change of the engine that is meant changes
+them: ``python -m tests.laws.test_the_bits_are_the_approved_ones`` approves them anew.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+
+from tests.corpus import CORPUS, each, trace
+from tests.helpers import ROOT
+
+APPROVED = ROOT / "tests" / "bits.approved.txt"
+
+
+def digest(name: str) -> str:
+    """Return a digest of the run of that name."""
+    run, found = trace(name), hashlib.sha256()
+    for part in (run.rows.t, run.rows.y, run.rows.mode, run.transitions.t, run.transitions.element):
+        found.update(part.astype(part.dtype.newbyteorder("<")).tobytes())
+    found.update(" ".join(map(str, run.transitions.edge)).encode())
+    return found.hexdigest()[:16]
+
+
+@functools.cache
+def approved() -> dict[str, str]:
+    """Return the approved digests by the names of the runs."""
+    lines = APPROVED.read_text(encoding="utf-8").splitlines()
+    return {name: bits for name, _, bits in (line.rpartition("  ") for line in lines)}
+
+
+@each(CORPUS)
+def test_the_bits_are_the_approved_ones(name: str) -> None:
+    assert digest(name) == approved()[name]
+
+
+def test_no_other_run_is_approved() -> None:
+    assert list(approved()) == list(CORPUS)
+
+
+if __name__ == "__main__":
+    rows = "".join(f"{name}  {digest(name)}\n" for name in CORPUS)
+    APPROVED.write_text(rows, encoding="utf-8")
