@@ -30,7 +30,7 @@ from plots.page.replay import replay_html
 from plots.style import INK, LINE_GREY, RC
 
 DPI = 120
-SETTLED = (0.3, 0.6)  # s, the part that is shown: the first cycle differs
+SETTLED = (0.4, 1.0)  # s, the part that is shown: the first cycle differs
 CYCLE = (0.22, 0.37)  # s, a little more than one cycle of the pulled mass
 ROWS = 60  # shown of that cycle
 REPLAYED = (0.0, 0.4)  # s, on the first page
@@ -88,7 +88,7 @@ class Slider:
 def pulled(F_s: float = 1.5, v_s: float = 5e-4) -> Trace:
     """Run the scenario with another Stribeck curve."""
     curve = f"model.stribeck={{F_c=1.0, F_s={F_s}, v_s={v_s}}}"
-    return load_scenario("pulled_mass", [curve]).simulate(engine="ifelse")
+    return load_scenario("pulled_mass", [curve, f"run.t_end={SETTLED[1]}"]).simulate(engine="ifelse")
 
 
 def cycles(runs: dict[str, Trace]) -> Iterator[Frame]:
@@ -103,7 +103,7 @@ def cycles(runs: dict[str, Trace]) -> Iterator[Frame]:
             speed, states = over_time.subplots(2, 1, sharex=True, height_ratios=(1.2, 1))
             panels.velocity(speed, trace, window=SETTLED)
             panels.ribbons(states, trace, window=SETTLED)
-            speed.set(xlabel="", ylim=(-0.08 * fastest, 1.06 * fastest), ylabel="v [m/s]")
+            speed.set(xlabel="", ylim=(-80 * fastest, 1060 * fastest), ylabel="$v$ [mm/s]")
             cycle = Figure(figsize=(3.0, 3.3), layout="constrained")
             orbit = cycle.subplots()
             orbit.plot(1e6 * extension(trace)[keep], 1e3 * trace.v[keep], color=INK)
@@ -111,7 +111,7 @@ def cycles(runs: dict[str, Trace]) -> Iterator[Frame]:
             orbit.axhline(1.0, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
             orbit.set(
                 xlabel="spring extension [µm]",
-                ylabel="v [mm/s]",
+                ylabel="$v$ [mm/s]",
                 title="limit cycle; dotted: pulling speed",
             )
             speed.set_title("speed of the mass")
@@ -134,13 +134,13 @@ def motion(trace: Trace) -> str:
     log = trace.transitions
     stops = log[(log.edge == "arrest") & (log.t >= SETTLED[0])]
     if not stops.size:
-        return "The mass slides: no element arrests in these 0.3 s."
+        return "The mass slides: no element arrests in these 0.6 s."
     late = settled(trace)
     t, v = trace.t[late], trace.v[late]
     rises = t[1:][(v[:-1] < v.max() / 2) & (v[1:] >= v.max() / 2)]
     period = float(np.diff(rises).mean())
     return (
-        f"Stick-slip: one cycle in {period:.3f} s, {stops.size} arrests of elements in 0.3 s; "
+        f"Stick-slip: one cycle in {period:.3f} s, {stops.size} arrests of elements in 0.6 s; "
         f"the mass reaches {1e3 * v.max():.1f} mm/s."
     )
 
@@ -180,7 +180,7 @@ def loops(counts: Sequence[int]) -> Iterator[Frame]:
             ax.plot(1e3 * (2 * way - STROKE), -back, **look)
             ax.plot(1e3 * trace.x, trace.F, color=INK, label=f"n = {n}")
             limits(ax, (-1e3 * STROKE, 1e3 * STROKE), (-1.0, 1.0))
-            ax.set(xlabel="x [mm]", ylabel="F [N]", title="pre-sliding hysteresis")
+            ax.set(xlabel="$x$ [mm]", ylabel="$F$ [N]", title="pre-sliding hysteresis")
             ax.legend(loc="upper left")
         corners = "one break-away" if n == 1 else f"{n} break-away points"
         said = f"{corners}; at most {error:.3f} N from the smooth curve on the first way."

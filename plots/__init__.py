@@ -127,7 +127,7 @@ def explore(
     >>> print(w.compare(0, 1))
     branches 0 and 1 until t = 30 s: 15 and 16 transitions
       first different transition at t = 25 s
-      largest difference: z 0.876 m, F 0.537 N
+      largest difference: z 876 mm, F 537 mN
     """
     require("anywidget", "jupyter")
     from plots.widget.explorer import Explorer

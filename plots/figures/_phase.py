@@ -67,7 +67,7 @@ def phase(
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> figure = phase(simulate(model, Prescribed("0.2*sin(t)"), 10.0))
     >>> [ax.get_xlabel() for ax in figure.axes[:2]]
-    ['$x$ [m]', '$v$ [m/s]']
+    ['$x$ [mm]', '$v$ [mm/s]']
     """
     check_trace(trace)
     limits = checked_window(trace, window)

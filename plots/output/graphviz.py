@@ -7,6 +7,7 @@ process, and pygraphviz cannot be told to be silent about labels that are wider 
 
 from __future__ import annotations
 
+import atexit
 import os
 import re
 import shutil
@@ -15,7 +16,7 @@ import sys
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from xml.sax.saxutils import escape
 
 import graphviz
@@ -82,7 +83,7 @@ def drawn(graph: graphviz.Digraph, form: str) -> bytes | None:
     else:
         name = "pygraphviz"
         command = [sys.executable, "-c", _PACKAGE, graph.engine, form, " ".join(args)]
-    fonts = {"FONTCONFIG_FILE": str(Path(_settings().name, "fonts.conf"))}
+    fonts = {"FONTCONFIG_FILE": str(_settings())}
     done = subprocess.run(
         command,
         input=graph.source.encode(),
@@ -106,11 +107,13 @@ def available() -> bool:
 
 
 @cache
-def _settings() -> TemporaryDirectory[str]:
-    """Return a folder with settings for fontconfig; it is removed when Python ends."""
-    folder = TemporaryDirectory(prefix="gms-fsm-fonts-")
+def _settings() -> Path:
+    """Return a file of settings for fontconfig; its folder is removed when Python ends."""
+    folder = Path(mkdtemp(prefix="gms-fsm-fonts-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     ours = escape(FOLDER.as_posix())
     folders = "\n  ".join([f"<dir>{ours}</dir>", *_OTHERS])
-    text = _FONTS.format(folders=folders, ours=ours, cache=escape(Path(folder.name).as_posix()))
-    Path(folder.name, "fonts.conf").write_text(text, encoding="utf-8")
-    return folder
+    text = _FONTS.format(folders=folders, ours=ours, cache=escape(folder.as_posix()))
+    file = folder / "fonts.conf"
+    file.write_text(text, encoding="utf-8")
+    return file

@@ -67,7 +67,7 @@ def _advances(name: str) -> dict[int, float]:
     (count,) = unpack_from(">L", data, segments + 12)
     groups = (unpack_from(">3L", data, segments + 16 + 12 * k) for k in range(count))
     return {
-        code: widths[min(glyph + code - first, full - 1)] / em
-        for first, last, glyph in groups
-        for code in range(first, last + 1)
+        code: widths[min(glyph + code - begin, full - 1)] / em
+        for begin, end, glyph in groups
+        for code in range(begin, end + 1)
     }
