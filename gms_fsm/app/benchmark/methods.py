@@ -90,7 +90,8 @@ def _static(records: Sequence[Record], smoothing: float | None, _: Predictor | N
         found: FloatArray = curve(v, p) - force
         return found
 
-    with np.errstate(over="ignore"):  # a curve that is flat at all speeds
+    # A curve that is flat at all speeds, or steps at zero: trials that the search leaves again.
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         best = least_squares(left, start).x
     return Predictor(6, lambda record: curve(record.motion(smoothing).velocity, best))
 
