@@ -87,8 +87,8 @@ class Slider:
 # --------------------------------------------------------------------------- the pulled mass
 def pulled(F_s: float = 1.5, v_s: float = 5e-4) -> Trace:
     """Run the scenario with another Stribeck curve."""
-    curve = f"model.stribeck={{F_c=1.0, F_s={F_s}, v_s={v_s}}}"
-    return load_scenario("pulled_mass", [curve, f"run.t_end={SETTLED[1]}"]).simulate(engine="ifelse")
+    changes = f"model.stribeck={{F_c=1.0, F_s={F_s}, v_s={v_s}}}", f"run.t_end={SETTLED[1]}"
+    return load_scenario("pulled_mass", changes).simulate(engine="ifelse")
 
 
 def cycles(runs: dict[str, Trace]) -> Iterator[Frame]:
