@@ -69,7 +69,7 @@ from tests.helpers import (
     wear,
 )
 from tests.scenario_files import data_folder
-from tests.soak import random_systems
+from tests.soak import random_systems, trials
 from tests.zoo import zoo_cases
 
 ENGINES = ("ifelse", "machines", *(("compiled",) if importlib.util.find_spec("llvmlite") else ()))
@@ -134,6 +134,11 @@ class TwoForces:
         return {"mass": self.mass}
 
 
+def _trial(family: str, seed: int, index: int) -> Run:
+    one = trials.trial(family, seed, index)
+    return Run((one.model, one.rig), one.t_end)
+
+
 LUGRE = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4.0, stribeck=Stribeck(1.0, 1.5, 1e-3))
 JUMPS = [0, 1, 1, 2, 2.5, 2.5, 2.5, 10], [0.1, 0.2, -0.3, -0.3, 0.5, 0.6, 0.7, 0]
 _noise = np.random.default_rng(3)
@@ -155,6 +160,8 @@ GMS_RUNS: dict[str, Maker] = {
     "started": _on(*PULLED, 5.0, initial=STARTED),
     "lugre": _on(LUGRE, Prescribed("1e-3*(1.5+cos(10*t))"), 6.0),
     "lugre slider": _on(LUGRE, Slider(1.0, FIG3_FORCE), 6.0),
+    "close to s": lambda: _trial("literature", 202, 41),  # steps at the edge of stability
+    "close to s, often": lambda: _trial("literature", 306, 84),
     "four at once": _on(SIGNED, Prescribed(FIG4_SINE), 6.0),
     "velocity window": _on(one_element("signed", F_c=0.4, v_s=1e-3, k=0.7), open_loop(), 13.0),
 }
