@@ -244,7 +244,7 @@ def peaks(every: int) -> Slider:
 
 def velocities(every: int) -> Slider:
     """Change v_s over more than two decades."""
-    tried = (5e-6, 1e-5, 2e-5, 3e-5, 5e-5, 1e-4, 2e-4, 3e-4, 5e-4, 1e-3, 2e-3)
+    tried = (1e-5, 2e-5, 3e-5, 5e-5, 1e-4, 2e-4, 5e-4, 7e-4, 1e-3, 1.5e-3, 2e-3)
     start, values = spaced(tried, 5e-4, every)
     runs = {f"{1e3 * v_s:g} mm/s": pulled(v_s=v_s) for v_s in values}
     return Slider("v_s", start, tuple(cycles(runs)))
