@@ -85,6 +85,7 @@ from gms_fsm.records.units import factor
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.signals import as_signal
 from gms_fsm.systems.system import with_model
+from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.monitors import Chattering, Coverage, Passivity
 from tests import older_files, own_files, systems_cases
 from tests.corpus import run, trace
@@ -729,8 +730,10 @@ rows = {
     "no row where it is asked, and words": (
         from_csv(INSTRUMENT.replace(";4;2.0", ";4;off"), where="time > 1e3 s"),
     ),
+    "letter of a quantity": (from_csv(where="t > 4 s"),),
     "name without its unit": (from_csv(INSTRUMENT.replace("F_N", "F [N]")),),
     "no names": (from_csv(INSTRUMENT.partition("\n")[2]),),
+    "no names, and decimal commas": (from_csv(COMMAS.partition("\n")[2], decimal=","),),
     "spreadsheet": (from_csv(b"PK\x03\x04" + bytes(range(256))),),
     "unit beside a number": (from_csv(INSTRUMENT.replace("0.0;0;0.0", "s;0;0.0", 1)),),
 }
@@ -1253,6 +1256,9 @@ group("chart", ChartError, chart, rows, "")
 rows = {
     "unknown name in a guard": ("guard, column 12", ..., edge(guard="z >= s and u > v_c")),
     "guard of equality": ("chart 'rubber', edge 'go', guard, column 6", ..., edge(guard="z == s")),
+    "decimal comma in a guard": ("guard, column 7", ..., edge(guard="z >= 0,8 * s")),
+    "capitals in a guard": ("guard, column 8", ..., edge(guard="z >= s AND v > v_c")),
+    "parenthesis that stays open": ("guard, column 4", ..., edge(guard="abs(z >= s")),
     "flow that is a condition": ("flow of 'z', column 1", ..., state(flow={"z": "v > 0"})),
     "two operators": ("state 'slip', entry 'z', column 4", ..., state(entry={"z": "1 +* v"})),
     "two names": ("edge 'go', action 'z', column 3", ..., edge(actions={"z": "s s"})),
@@ -1638,6 +1644,10 @@ class Equal(Element):
 KICKED = Chart("kick", states=(State("on", entry={"v": "1"}, outputs={"F": "0"}),))
 rows = {
     "text for a model": ("model", "GMS", lambda: simulate("GMS", Prescribed("0"), 1.0)),
+    "class for a model": ("model", GMS, lambda: simulate(GMS, Prescribed("0"), 1.0)),
+    "class for a rig": ("rig", Slider, lambda: simulate(GIVEN, Slider, 1.0)),
+    "class for a model of a contact": ("contact 'pad': chart", GMS, lambda: Contact("pad", GMS)),
+    "end under another name": ("", ..., lambda: simulate(GIVEN, Prescribed("0"), tend=1.0)),  # type: ignore[call-arg]
     "text for a rig": ("rig", "0.1*t", lambda: simulate(GIVEN, "0.1*t", 1.0)),
     "argument of a session": ("", ..., lambda: Session(GIVEN, Prescribed("0"), 1.0, steps=3)),
     "elements of no class": ("element", dict, lambda: ElementMachines(GIVEN, dict)),
@@ -1870,6 +1880,7 @@ rows = {
     "poke of an unknown variable": (lambda s: s.poke({"w": {0: 0.1}}),),
     "poke of a number as a name": (lambda s: s.poke({0: 0.1}),),
     "poke of the state of an element below zero": (lambda s: s.poke(state={-1: "slip"}),),
+    "poke of a prescribed velocity": (lambda s: s.poke(v=0.1),),
     "poke of a parameter": (lambda s: s.poke({"F_s": {0: 2.0}}),),
     "branch below zero": (lambda s: s.switch(-1),),
     "branch that is missing": (lambda s: s.switch(1),),
@@ -1903,7 +1914,6 @@ rows = {
 }
 group("session", SessionError, unmoved, rows)
 rows = {
-    "poke of a prescribed velocity": (lambda s: s.poke(v=0.1),),
     "negative value of a fork": (lambda s: s.tree.set({"F_s": -1.0}),),
     "unknown value of a fork": (lambda s: s.tree.set({"q": 1.0}),),
     "value of several elements of a fork": (lambda s: s.tree.set({"sigma": 1.0}),),
@@ -2598,6 +2608,7 @@ rows = {repr(signal): (signal,) for signal in WRONG} | {
     "ramps to it": ([(0, HUGE), (1, 0)],),
     "a record of it": (([0, 1], [0, -HUGE]),),
     "very many words": (["x"] * 100_000,),
+    "a record": (Record.from_arrays(time=range(5), position=range(5)),),
 }
 group("signal", SignalError, Prescribed, rows, "signal")
 rows = {
@@ -2607,6 +2618,17 @@ rows = {
 group("signal", ExpressionError, Prescribed, rows)
 rows = {"of nothing": ("signal, column 1", ..., "")}
 group("signal", ExpressionError, Prescribed, rows)
+rows = {
+    "two numbers": (lambda t: np.array([0.1, 0.2]),),
+    "nothing": (lambda t: None,),
+}
+group(
+    "function of time",
+    SimulationError,
+    lambda v: simulate(GIVEN, Prescribed(v), 1.0),
+    rows,
+    "",
+)
 rows = {f"{t} s": (t,) for t in (0.999, 3.0)}
 group("start of a record", SignalError, starting, rows, "")
 
@@ -2778,6 +2800,21 @@ rows = {
 group("cell of a record", RecordError, cells, rows, "own.csv")
 rows = {repr(each): (each,) for each in (None, [], {}, "rig.csv", 5, {1, 2})}
 group("no data frame", RecordError, Record.from_dataframe, rows, "record 'frame'")
+
+
+class Frame(dict[str, list[Any]]):
+    """A data frame without pandas."""
+
+    columns = property(list)
+
+
+CELLS = {"t_s": [*range(6)], "x_mm": [*range(6)], "F_N": [*range(6)]}
+rows = {
+    "line of units": (Frame(CELLS | {"t_s": ["[s]", *"12345"]}),),
+    "decimal commas": (Frame(CELLS | {"x_mm": ["0,5", *"12345"]}),),
+    "word": (Frame(CELLS | {"F_N": [*range(5), "off"]}),),
+}
+group("data frame", RecordError, Record.from_dataframe, rows, "record 'frame'")
 rows = {
     "masked entry": ({"force": np.ma.masked_array(F, mask=T == 2.0)},),
 }

@@ -21,7 +21,7 @@ from gms_fsm.lowering.scales import Setting
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import Moment
-from gms_fsm.session.notes import notes_on
+from gms_fsm.session.notes import notes_on, notes_on_system
 from gms_fsm.systems.models import GMS
 from gms_fsm.systems.system import Contact, System, loaded
 from gms_fsm.traces.failures import SimulationError
@@ -269,6 +269,7 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
             f"- run: {settings}",
             result,
             *_held(trace),
+            *(f"- note: {note}" for note in notes_on_system(trace)),
             "",
             *_end_tables(trace, trace.system),
             *(line for name in trace.contacts for line in _contact_lines(trace.contact(name))),
@@ -368,9 +369,11 @@ def note_lines(trace: Trace) -> list[str]:
     list of str
         Lines for the user.
     """
+    whole = notes_on_system(trace)
     if len(trace.contacts) == 1:
-        return [*notes_on(trace)]
-    return [f"{name}: {note}" for name in trace.contacts for note in notes_on(trace.contact(name))]
+        return [*whole, *notes_on(trace)]
+    each = [f"{name}: {note}" for name in trace.contacts for note in notes_on(trace.contact(name))]
+    return [*whole, *each]
 
 
 def _parameters(trace: Trace) -> str:

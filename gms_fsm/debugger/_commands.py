@@ -253,6 +253,7 @@ class Commands:
 
     def _with_states(self, condition: str) -> str:
         """Return a condition with the states spelled as in the chart."""
+        condition = re.sub(r"\bstate(\d+)(?=\s*[=!]=)", r"state(\1)", condition)  # as in poke
         return re.sub(
             r"(\bstate\b\s*(?:\(\s*\d+\s*\)\s*)?[=!]=\s*)(\w+)",
             lambda found: found[1] + spelled(found[2], self.states),
@@ -388,7 +389,10 @@ class Commands:
         if form is None:
             usage = self._usage("break")
             if re.search("[<>]", arg):
-                usage = f"until {arg} goes there; of a breakpoint, a condition follows if: {usage}"
+                usage = (
+                    f"until {arg.removeprefix('if ')} goes there; of a breakpoint, a condition "
+                    f"follows if: {usage}"
+                )
             raise SessionError(f"{arg!r} is not a breakpoint", advice=usage)
         kind, name, element, condition, hits = form.groups()
         states, edges = self.states, self._edges
@@ -505,9 +509,13 @@ def _count(name: str, text: str, default: int = 1) -> int:
     return count
 
 
+_REMOVED = {"clear": "breakpoint", "unwatch": "watch"}
+
+
 def _nothing(name: str, arg: str) -> None:
     if arg:
-        raise SessionError(f"{name} takes no argument, but got {arg!r}")
+        cure = f"goto {arg} goes to a time" if name == "run" else ""
+        raise SessionError(f"{name} takes no argument, but got {arg!r}", advice=cure)
 
 
 def _remove(where: list[Breakpoint] | list[str], name: str, arg: str) -> None:
@@ -516,5 +524,6 @@ def _remove(where: list[Breakpoint] | list[str], name: str, arg: str) -> None:
         return
     number = integer(arg, COMMANDS[name].usage)
     if not 1 <= number <= len(where):
-        raise SessionError(f"there is no number {number}", advice=f"there are {len(where)}")
+        there = f"there are 1 to {len(where)}" if where else "none is set"
+        raise SessionError(f"there is no {_REMOVED[name]} {number}", advice=there)
     del where[number - 1]

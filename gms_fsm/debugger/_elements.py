@@ -10,6 +10,7 @@ from typing import Any
 from gms_fsm.charts.chart import Chart
 from gms_fsm.debugger._help import help_of
 from gms_fsm.errors import SessionError
+from gms_fsm.foundation.arguments import there_are
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.session.elements import chart_of, element_name
 from gms_fsm.session.session import Session
@@ -83,6 +84,8 @@ class Elements:
         if words and (contact := spelled(words[0], self.named)) in self.named:
             bank, named = self.named[contact], True
             words.pop(0)
+        if words[:1] == ["element"] and words[1:2] and words[1].isdigit():  # as break takes it
+            words.pop(0)
         if words and (words[0].isdigit() or (needed and not named)):
             number = integer(words.pop(0), help_of(command, self.session).usage)
             if not 1 <= number <= bank.n:
@@ -119,7 +122,7 @@ def read_edits(session: Session, arg: str, usage: str, states: Iterable[str]) ->
     named: dict[int | str, str] = {}
     v: float | None = None
     elements = Elements(session, 0)
-    for part in filter(None, re.split(r"\s+(?=[\w.]+=)", re.sub(r"\s*=\s*", "=", arg))):
+    for part in filter(None, re.split(r"[,\s]\s*(?=[\w.]+=)", re.sub(r"\s*=\s*", "=", arg))):
         name, _, value = part.partition("=")
         state = re.fullmatch(r"(?:(\w+)\.)?state(\d*)", name)
         if not value:
@@ -131,7 +134,7 @@ def read_edits(session: Session, arg: str, usage: str, states: Iterable[str]) ->
         elif name == "v":
             v = session.watch(in_si(session.start, value, name))
         else:
-            variable, i = _variable(session, name, part, usage)
+            variable, i = _variable(session, name, usage)
             variables.setdefault(variable, {})[i] = session.watch(in_si(session.start, value, name))
     return Edits(variables, v, named)
 
@@ -152,17 +155,20 @@ def _whose(elements: Elements, name: str, contact: str | None, number: str) -> i
     return elements.address(Elements(elements.session, bank.first).taken("poke", [number or "1"]))
 
 
-def _variable(session: Session, name: str, part: str, usage: str) -> tuple[str, int]:
+def _variable(session: Session, name: str, usage: str) -> tuple[str, int]:
     """Return variable and element of a name of a model on a rig."""
     known = session.model.chart.variables
     form = re.fullmatch(rf"({'|'.join(map(re.escape, known))})(\d*)", name) if known else None
     if form is None:
-        if name in parameter_names(session.model):
+        if name in parameter_names(session.model) or name in session.start.system.numbers:
             raise SessionError(
                 f"{name} is a parameter, which stays in a run",
                 advice="leave with quit and give the scenario another value (--set)",
             )
-        raise SessionError(f"{part!r} cannot be poked", advice=usage)
+        values = completions(session)[2]
+        raise SessionError(
+            f"{name!r} cannot be poked", advice=f"{there_are(name, values)}; {usage}"
+        )
     if not form[2] and session.model.n > 1:
         raise SessionError(f"{name!r} cannot be poked", advice=f"for element 1 write {name}1")
     return form[1], Elements(session, 0).taken("poke", [form[2] or "1"])

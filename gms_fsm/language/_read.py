@@ -74,17 +74,19 @@ _INSTEAD: Mapping[str, str] = {
     "−": "-",
 }
 _FOREIGN = re.compile(r"&&?|\|\|?|!(?!=)|(?<![<>=!:])=[<>]|(?<![<>=!:])=(?!=)|[∧∨¬≤≥^·×²³−]")
+_STATE = re.compile(r"\bstate\d*\s*(\(\s*\d+\s*\)\s*)?$")
+_WORDS = re.compile(r"\b(AND|OR|NOT)\b")
+_DECIMAL_COMMA = re.compile(r"(?<![\w.])(\d+),(\d+)")
 _NO_SIGN_BETWEEN = re.compile(r"[\w.)]\s+[\w(]|\)[\w(]|\d[^\W\d_eE]")  # 2 pi, 2pi, (a)(b)
+_QUANTITIES = {"time": "t", "position": "x", "velocity": "v", "force": "F"}  # of records, of runs
 _ALIASES: Mapping[str, str] = {
     "sign": "sgn",
     "signum": "sgn",
     "fabs": "abs",
     "π": "pi",
-    "time": "t",
-    "position": "x",
-    "velocity": "v",
     "speed": "v",
-    "force": "F",
+    **_QUANTITIES,
+    **{short: name for name, short in _QUANTITIES.items()},
 }
 _GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(FUNCTIONS) + " pi"
 
@@ -215,11 +217,12 @@ def _parsed(text: str) -> ast.expr:
     foreign = _FOREIGN.search(text)
     if foreign:
         mark = foreign[0]
+        state = mark == "=" and _STATE.search(text[: foreign.start()])
         raise ExpressionError(
             f"{mark} is not part of the language",
             text,
             foreign.start() + 1,
-            f"{_INSTEAD[mark]} instead",
+            f"{'==' if state else _INSTEAD[mark]} instead",
         )
     flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay correct
     lead = len(flat) - len(flat.lstrip())
@@ -230,11 +233,20 @@ def _parsed(text: str) -> ast.expr:
             warnings.simplefilter("error")  # Python only warns about "1and v"; here it is an error
             body = ast.parse(flat[lead:], mode="eval").body
     except SyntaxError as error:
+        if word := _WORDS.search(text):
+            raise ExpressionError(
+                f"{word[0]} is not part of the language",
+                text,
+                word.start() + 1,
+                f"{word[0].lower()} instead",
+            ) from None
         # Python reports offset 0 when it reached the end and expected more.
         column = min(error.offset + lead, len(text) + 1) if error.offset else len(text) + 1
         reason = "the text ends too early" if column > len(text) else "cannot be read from here"
         factors = _NO_SIGN_BETWEEN.search(text, max(0, column - 3), column + 1)
         allowed = "a sign between factors, as in 2*pi*t, and no unit" if factors else _GRAMMAR
+        if text.count("(") != text.count(")"):
+            allowed = "as many ( as )"
         raise ExpressionError(reason, text, column, allowed) from None
     except (ValueError, RecursionError, MemoryError):
         raise ExpressionError("cannot be read (nested too deeply)", text, 1, _GRAMMAR) from None
@@ -309,13 +321,24 @@ class _Reader:
                 return self.call(node, function, arguments, depth)
             case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
                 raise self.refuse("found a comparison where a number is needed", node)
+        raise self.foreign(node)
+
+    def foreign(self, node: ast.expr) -> ExpressionError:
+        """Return the error of what is not on the allow-list."""
         instead = _GRAMMAR
         match node:
+            case ast.Tuple() if comma := _DECIMAL_COMMA.search(self.text):
+                return ExpressionError(
+                    "a comma is not part of the language",
+                    self.text,
+                    comma.end(1) + 1,
+                    f"a decimal point: {comma[1]}.{comma[2]}",
+                )
             case ast.Call(func=ast.Attribute(attr=function)) if function in FUNCTIONS:
                 instead = f"{function}(...), without a module before it"
             case ast.IfExp():
                 instead = "min, max, abs, sgn; a case in a chart is a state of its own"
-        raise self.refuse(f"{_plain(node)} is not part of the language", node, instead)
+        return self.refuse(f"{_plain(node)} is not part of the language", node, instead)
 
     def name(self, node: ast.expr, name: str) -> Value:
         if name in self.names:
@@ -432,6 +455,8 @@ class _Reader:
                 "age" in self.names
             ):
                 return Relation(">=", Name("age"), self.value(time, depth))
+            case ast.Name(id="state") | ast.Call(func=ast.Name(id="state")) if self.own.states:
+                raise self.refuse("a state is compared with a name", node, self.compared())
             case ast.Constant() | ast.Name() | ast.BinOp() | ast.UnaryOp() | ast.Call():
                 match node:
                     case ast.Call(func=ast.Name(id=function)):  # after(0.2), for example
@@ -439,7 +464,7 @@ class _Reader:
                 raise self.refuse(
                     "found a number where a comparison is needed", node, "for example v > v_c"
                 )
-        raise self.refuse(f"{_plain(node)} is not part of the language", node)
+        raise self.foreign(node)
 
     def numbered(self, call: ast.Call, whose: Owner, lead: str = "") -> int:
         match call.args:
@@ -452,11 +477,15 @@ class _Reader:
             f"{lead}state(1) to {lead}state({whose.n})",
         )
 
+    def compared(self) -> str:
+        """Return how a state is compared, for example."""
+        return f"state(1) == {self.own.states[-1]}"
+
     def in_state(self, whose: Owner, element: int, op: ast.cmpop, name: ast.expr) -> Condition:
         if not isinstance(name, ast.Name) or name.id not in whose.states:
             raise self.refuse("unknown state", name, "the states " + ", ".join(whose.states))
         if not isinstance(op, ast.Eq | ast.NotEq):
-            raise self.refuse("states are compared by == or !=", name, "state(1) == slip")
+            raise self.refuse("states are compared by == or !=", name, self.compared())
         found = InState(element, name.id)
         return found if isinstance(op, ast.Eq) else Not(found)
 

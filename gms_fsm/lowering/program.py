@@ -34,7 +34,7 @@ from typing import Any
 
 import integrators
 from gms_fsm.charts.parameters import as_floats
-from gms_fsm.errors import SignalError
+from gms_fsm.errors import SignalError, shown
 from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
 from gms_fsm.lowering.adapting import Adaptive, adaptive
 from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful, quickened
@@ -328,12 +328,19 @@ def guarded(name: str, call: Callable[[float], float]) -> Callable[[float], floa
 
     def sampled(t: float) -> float:
         try:
-            return float(call(t))
+            given = call(t)
         except Exception as error:
             raise SignalError(
                 f"signal {name!r}: the function raised {type(error).__name__} at t = {t!r} s: "
                 f"{error}"
             ) from error
+        try:
+            return float(given)
+        except (TypeError, ValueError, OverflowError):
+            raise SignalError(
+                f"signal {name!r}: the function returned {shown(given)} at t = {t!r} s",
+                advice="it must return one number",
+            ) from None
 
     return sampled
 

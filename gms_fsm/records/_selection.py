@@ -246,6 +246,11 @@ def _check_words(origin: Origin, part: RecordRows, words: Words, missing: str) -
     advice = "correct it, or exclude the row with where = ..., a condition that is false there"
     if not text.strip():
         advice += ', or give missing = "drop" or "interpolate"'
+    if origin.kind == "frame" and row == 0:
+        advice += (
+            "; if it is a line of units, leave it out (pandas.read_csv(..., skiprows=[1])), or let "
+            "Record.from_csv read the file"
+        )
     raise origin.error(
         f"{origin.cells(quantity, np.array([row]))}: {shown(text)} is not a number", advice
     )
@@ -259,6 +264,8 @@ def _check_separator(origin: Origin, words: Words) -> None:
         what, advice = "a decimal comma", 'give decimal = ","'
         if found.group(1) == ".":
             what, advice = 'a decimal point, but decimal = ","', "leave that option out"
+        if origin.kind == "frame":
+            advice = 'read the table with decimal = ","'
         raise origin.error(
             f"{origin.cells(quantity, np.array([row]))}: {shown(words[row, quantity])} has {what}",
             advice,

@@ -171,14 +171,14 @@ def read_cells(path: Path, columns: Mapping[str, Column], form: TextFormat) -> C
     numbers: list[int] = []
     found: dict[str, list[float]] = {quantity: [] for quantity in columns}
     words: Words = {}
-    for number, row in rows:
-        numbers.append(number)
+    for at, row in rows:
+        numbers.append(at)
         for quantity, place in places.items():
             try:
-                found[quantity].append(_number(row[place], form.decimal))
+                found[quantity].append(number(row[place], form.decimal))
             except ValueError:
                 found[quantity].append(math.nan)
-                words[number, quantity] = cut(row[place])
+                words[at, quantity] = cut(row[place])
     if len(numbers) < 2:
         raise RecordError(
             f"{len(numbers)} row(s) of data", place=str(path), advice="at least 2 are needed"
@@ -301,7 +301,7 @@ def _places(path: Path, head: _Head, columns: Mapping[str, Column]) -> dict[str,
             )
             if column.name not in head.names:
                 advice = meant(column.name, head.names) + advice
-            if all(map(_is_number, head.names)):
+            if not any(each.isalpha() for each in "".join(head.names) if each not in "eE"):
                 advice = "the table has no names: write a line of names above the numbers"
             elif len(head.names) == 1:
                 advice = "if these are several columns, give their separator: delimiter = ..."
@@ -359,7 +359,8 @@ def _rows(
         yield number, row
 
 
-def _number(text: str, decimal: str) -> float:
+def number(text: str, decimal: str) -> float:
+    """Return the number of a cell; raise a `ValueError` for a word."""
     if "_" in text:  # 0.0_3 is a number in Python, but not in a record
         raise ValueError
     if decimal == ",":
@@ -400,7 +401,7 @@ def _units(
 
 def _is_number(text: str) -> bool:
     try:
-        _number(text.replace(",", "."), ".")
+        number(text.replace(",", "."), ".")
     except ValueError:
         return False
     return True

@@ -20,7 +20,7 @@ from gms_fsm.errors import RecordError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path
 from gms_fsm.records._columns import QUANTITIES, Column, ColumnLike, columns_of
 from gms_fsm.records._selection import FEWEST, Origin, selected
-from gms_fsm.records._table import TextFormat, read_cells
+from gms_fsm.records._table import TextFormat, Words, number, read_cells
 from gms_fsm.records._written import write_csv
 from gms_fsm.records.motion import Motion, motion_of
 from gms_fsm.records.parts import some_rows
@@ -345,7 +345,7 @@ class Record:
             if each is not None or quantity == "time"
         }
         origin = Origin(place, {quantity: quantity for quantity in values}, "arrays")
-        return cls._from_numbers(origin, values, "", missing, name)
+        return cls._from_numbers(origin, values, "", missing, name, {})
 
     @classmethod
     def from_dataframe(
@@ -390,16 +390,24 @@ class Record:
             raise RecordError(
                 "no column is given for 'time'", place=place, advice="give time = ..."
             )
+        words: Words = {}
         values = {
-            quantity: column.in_si(quantity, _frame_column(place, frame, quantity, column))
+            quantity: column.in_si(quantity, _frame_column(place, frame, quantity, column, words))
             for quantity, column in columns.items()
         }
         names = {quantity: column.name for quantity, column in columns.items()}
-        return cls._from_numbers(Origin(place, names, "frame"), values, where, missing, name)
+        origin = Origin(place, names, "frame")
+        return cls._from_numbers(origin, values, where, missing, name, words)
 
     @classmethod
     def _from_numbers(
-        cls, origin: Origin, values: dict[str, FloatArray], where: str, missing: str, name: str
+        cls,
+        origin: Origin,
+        values: dict[str, FloatArray],
+        where: str,
+        missing: str,
+        name: str,
+        words: Words,
     ) -> Record:
         size = values["time"].size
         for quantity, value in values.items():
@@ -411,7 +419,7 @@ class Record:
                 )
         if not size:
             raise RecordError("time is empty", place=origin.place, advice="give some rows")
-        part = selected(origin, values, np.arange(size), {}, where, missing)
+        part = selected(origin, values, np.arange(size), words, where, missing)
         return cls(name, part.columns, part.chosen, part.rows, tuple(part.notes))
 
 
@@ -439,7 +447,10 @@ def _numbers(place: str, quantity: str, given: Any) -> FloatArray:
     return values
 
 
-def _frame_column(place: str, frame: Any, quantity: str, column: Column) -> FloatArray:
+def _frame_column(
+    place: str, frame: Any, quantity: str, column: Column, words: Words
+) -> FloatArray:
+    """Return a column of a frame as floats; NaN where there is a word, which is noted."""
     try:
         names = list(frame.columns)
         found = frame[column.name] if names.count(column.name) == 1 else None
@@ -458,5 +469,14 @@ def _frame_column(place: str, frame: Any, quantity: str, column: Column) -> Floa
             f"{quantity}=(name, unit)" + (", or None" if quantity != "time" else ""),
         )
     if getattr(getattr(found, "dtype", None), "na_value", None) is not None:  # a nullable column
-        found = found.to_numpy(dtype=float, na_value=np.nan)
+        found = found.to_numpy(dtype=object, na_value=np.nan)
+    cells = np.asarray(found)
+    if cells.dtype.kind in "OU" and cells.ndim == 1 and not np.ma.isMaskedArray(found):
+        found = cells.astype(object)
+        for row, cell in enumerate(cells):
+            if isinstance(cell, str):
+                try:
+                    found[row] = number(cell, ".")
+                except ValueError:
+                    found[row], words[row, quantity] = np.nan, cut(cell)
     return _numbers(place, f"column {shown(column.name)}", found)

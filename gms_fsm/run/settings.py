@@ -245,7 +245,7 @@ class Settings:
         fields = [each.name for each in dataclasses.fields(cls)]
         for name in options:
             if name not in fields:
-                hint = meant(name, fields) or f"it takes {', '.join(fields)}"
+                hint = meant(name, [*fields, "t_end", "t_start"]) or f"it takes {', '.join(fields)}"
                 raise ParameterError(f"{whose} takes no argument {name!r}", advice=hint.strip())
         if settings is None:
             return cls(**options)

@@ -120,7 +120,6 @@ def simulate(
     >>> len(trace.transitions)
     48
     """
-    on, end = arguments_of("simulate", model, rig, t_end)
     if isinstance(engine, ElementMachines):
         if machines is not None:
             raise ParameterError(
@@ -129,6 +128,7 @@ def simulate(
         machines, engine = engine, "machines"
     given: SettingOptions = {**options} if engine is None else {**options, "engine": engine}  # type: ignore[typeddict-item]
     chosen = Settings.of(settings, "simulate", **given)
+    on, end = arguments_of("simulate", model, rig, t_end)
     if progress is not None and not callable(progress):
         raise ParameterError(
             "it must be a function of the moment reached", place="progress", value=progress

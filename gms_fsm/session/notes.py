@@ -13,14 +13,15 @@ import numpy as np
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.gms import TABLE_I
 from gms_fsm.foundation.quantities import in_words
-from gms_fsm.language import Call, Name, Relation, Value, clauses, evaluate
+from gms_fsm.language import Call, Name, Number, Relation, Value, clauses, evaluate, names_in
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.session.explain import holds, values_at
 from gms_fsm.systems.models import Model, parameters_of
+from gms_fsm.systems.system import System
 from gms_fsm.traces.scope import parameter_values
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["notes_on"]
+__all__ = ["notes_on", "notes_on_system"]
 
 FAR = 1e4  # a stroke of more thresholds than this is worth a note
 NEAR = 1e-2  # of the smallest threshold: smaller deflections are not near it
@@ -50,6 +51,55 @@ def notes_on(trace: Trace) -> tuple[str, ...]:
     ('no transition: the speed stays below v_c (largest |v| 84.1 nm/s, v_c 1 µm/s)',)
     """
     return (*_sizes(trace), *_weight(trace), *_windows(trace))
+
+
+def notes_on_system(trace: Trace) -> tuple[str, ...]:
+    """Return notes on what a system does not use, one sentence each; none of a model on a rig.
+
+    A value of a controller that no other text reads acts on nothing, and a body may have been left
+    without force, spring and contact.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, Body, Contact, GMSParameters, Sampled, System, simulate
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> system = System("servo", bodies=(Body("load", inertia=1.0),),
+    ...                 contacts=(Contact("pad", model),),
+    ...                 sampled=(Sampled("pid", period=0.1, updates={"u": "-x"}),))
+    >>> notes_on_system(simulate(system, 0.1))
+    ('nothing reads u of pid, so that it acts on nothing; if it is a force, give it to a body: force = "u"',)
+    """  # noqa: E501 (a message is one line)
+    if trace.system is None:
+        return ()
+    return (*_unread(trace.system), *_idle(trace.system))
+
+
+def _unread(system: System) -> Iterator[str]:
+    read = system.assembly
+    banks = [tree for bank in read.banks for tree in bank.means.values()]
+    defined = [each.tree for each in read.definitions if each.tree is not None]
+    trees = [*read.forces.values(), *read.inertias.values(), *read.flow.values(), *defined, *banks]
+    names = {name for tree in trees for name in names_in(tree)}
+    updates = {name: tree for each in read.updates.values() for name, tree in each.items()}
+    for sampled in system.sampled:
+        for name in sampled.updates:
+            others = (names_in(tree) for other, tree in updates.items() if other != name)
+            if name not in names.union(*others):
+                yield (
+                    f"nothing reads {name} of {sampled.name}, so that it acts on nothing; if it is "
+                    f'a force, give it to a body: force = "{name}"'
+                )
+
+
+def _idle(system: System) -> Iterator[str]:
+    read = system.assembly
+    rubbed = {name for bank in read.banks for each in bank.jacobian for name in each}
+    for body in read.free:
+        if read.forces[body.name] == Number(0.0) and body.name not in rubbed:
+            yield (
+                f"nothing acts on body {body.name}, which keeps its velocity: it has no force, "
+                "spring or contact"
+            )
 
 
 def _weight(trace: Trace) -> Iterator[str]:

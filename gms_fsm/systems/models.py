@@ -70,7 +70,8 @@ class Model(Protocol):
 
 def is_model(given: object) -> bool:
     """Tell whether an object has what marks a `Model`."""
-    return hasattr(given, "chart") and hasattr(given, "weights")
+    marked = hasattr(given, "chart") and hasattr(given, "weights")
+    return marked and not isinstance(given, type)
 
 
 @displayed("svg", "html")

@@ -180,7 +180,7 @@ def mounted(model: Model | System, rig: Rig | None = None, period: float | None 
         ("model", model, "chart", "GMS(parameters, law='signed')"),
         ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
     ):
-        if not hasattr(given, mark):
+        if isinstance(given, type) or not hasattr(given, mark):
             raise ParameterError(
                 f"it must be a {what}, for example {example}", place=what, value=given
             )

@@ -8,17 +8,21 @@ import pytest
 
 from gms_fsm import (
     GMS,
+    Body,
     Chart,
     ChartModel,
+    Contact,
     GMSParameters,
     Prescribed,
     PulledSlider,
+    Sampled,
     State,
     Stribeck,
+    System,
     Transition,
     simulate,
 )
-from gms_fsm.session.notes import notes_on
+from gms_fsm.session.notes import notes_on, notes_on_system
 from tests.helpers import ROOT, open_loop, pulled_mass, stick_slip
 
 
@@ -87,6 +91,31 @@ def test_weights_that_nobody_gave_are_named():
     (note,) = notes(GMS(p, law="signed"), "1e-4*sin(t)")
     assert "all weights are 1 m/N" in note
     assert "give shares of the friction" in note
+
+
+@pytest.mark.parametrize(
+    ("force", "spare", "said"),
+    [
+        ("u", "0.1", []),
+        ("0", "0.1", ["nothing reads u of pid"]),
+        ("e", "u", []),
+        ("u", "0", ["nothing acts on body spare"]),
+        ("e", 0.0, ["nothing reads u of pid", "nothing acts on body spare"]),
+    ],
+)
+def test_a_controller_or_a_body_that_is_connected_to_nothing(
+    force: str, spare: str | float, said: list[str]
+):
+    bodies = (
+        Body("load", inertia=1.0, force=force, x="x_l", v="v_l"),
+        Body("spare", inertia=1.0, force=spare, x="x_s", v="v_s"),
+    )
+    pid = Sampled("pid", period=0.1, updates={"e": "-x_l", "u": "u + e"})
+    pad = Contact("pad", bank(), v="v_l")
+    found = notes_on_system(
+        simulate(System("servo", bodies=bodies, contacts=(pad,), sampled=(pid,)), 0.1)
+    )
+    assert [note[: len(start)] for note, start in zip(found, said, strict=True)] == said
 
 
 @pytest.mark.parametrize("output", [{}, {"t_eval": np.linspace(0.0, 10.0, 11)}])

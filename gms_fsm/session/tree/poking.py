@@ -60,6 +60,8 @@ class Edits:
             own, v = _of_system(start, whole), None
         else:
             own = _of_model(start, variables or {})
+            if v is not None:
+                _check_free(start, "v")
         machines = {machine_of(element, start): name for element, name in (state or {}).items()}
         states: dict[int | str, str] = {
             element_name(start, machine) if start.what.named else machine: name
@@ -149,12 +151,16 @@ def _resolved(start: Problem, key: object) -> tuple[str, int | None]:
             plain = key.removeprefix(f"{contact.name}.")
             if plain in contact.chart.parameter_names:
                 raise _constant(key, "parameter", "system")
-        for body in start.system.bodies:
-            if body.driven and key in (body.v, f"{body.name}.v"):
-                raise SessionError(
-                    f"the velocity of {body.name} is given", advice="it cannot be poked"
-                )
+        _check_free(start, key)
     raise SessionError(f"{shown(key)} cannot be poked", advice=there_are(key, known))
+
+
+def _check_free(start: Problem, key: str) -> None:
+    """Refuse the velocity of a body that is moved."""
+    for body in start.system.bodies:
+        if body.driven and key in (body.v, f"{body.name}.v"):
+            whose = f"velocity of {body.name}" if start.what.named else "velocity v"
+            raise SessionError(f"the {whose} is given", advice="it cannot be poked")
 
 
 def _constant(name: str, kind: str, whole: str) -> SessionError:
