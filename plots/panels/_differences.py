@@ -74,7 +74,7 @@ def difference(
     if log:
         ax.set(yscale="log")
         values = np.maximum(np.abs(values), floor)
-    ax.set_ylabel("|difference of F| [N]" if log else "difference of F [N]")
+    ax.set_ylabel("|difference of $F$| [N]" if log else "difference of $F$ [N]")
     time_axis(ax, float(times[0]), float(times[-1]))
     look: dict[str, Any] = {"color": INK, "linewidth": pt(0.8)}
     if len(times) <= 2 * COLUMNS:
