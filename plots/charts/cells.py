@@ -97,7 +97,7 @@ class CellWriter:
     def state(
         self, rows: Sequence[Row], marked: bool = False, least: tuple[float, float] = (0, 0)
     ) -> Label:
-        """Set the box of a state: its title, and below a rule the other rows, all with one indent."""
+        """Set the box of a state: its title, and below a rule the other rows, with one indent."""
         heights = [self._height(row) for row in rows]
         small = PLAIN * self.scale <= LEAST
         text = ceil(max(map(self._width, rows)) * (WIDER if small else 1))

@@ -23,6 +23,7 @@ from plots.views.window import Window
 
 Floats = NDArray[np.float64]
 REACHED = "± s(v) away from reversals"
+INSET = (0.56, 0.82, 0.42, 0.17)  # of a panel: left, bottom, width, height
 ZOOM = 0.012  # half of the time of an inset, of the whole time
 FIG3_PHASES = (("rising", 2.0), ("falling", 4.0), ("oscillating", np.inf))
 
@@ -168,13 +169,15 @@ def _zoom(ax: Axes, trace: Trace) -> None:
     # A fall that is much larger than the rise to the peak leaves the inset.
     bottom = max(float(near.min()), high - 3 * float(high - near[0]))
     edge = 0.1 * (high - bottom) or 1.0
-    inset = ax.inset_axes((0.5, 0.65, 0.46, 0.28))
+    inset = ax.inset_axes(INSET)
     inset.plot(trace.t, values, color=ax.lines[0].get_color(), linewidth=pt(1.0))
     inset.set(xlim=(t0, t1), ylim=(bottom - edge, high + edge))
     inset.tick_params(labelsize=font(7), length=2)
     inset.locator_params(nbins=3, prune="both")
+    said = "first peak,\n$F$ [N] over $t$ [s]"
+    at = (0.02, INSET[1] + INSET[3] / 2)
+    ax.text(*at, said, transform=ax.transAxes, va="center", fontsize=font(8), color=TEXT_GREY)
     inset.spines[:].set(visible=True, color=LINE_GREY)
-    inset.set_title("first peak [N]", fontsize=font(7), pad=2)
     bounds = (t0, bottom - edge, t1 - t0, high - bottom + 2 * edge)
     frame = ax.indicate_inset(bounds, inset, edgecolor=LINE_GREY, alpha=1.0)
     for line in frame.connectors or ():
@@ -182,9 +185,10 @@ def _zoom(ax: Axes, trace: Trace) -> None:
 
 
 def _make_room(ax: Axes) -> None:
-    """Leave the upper part of a panel free for an inset."""
+    """Leave the upper part of a panel free for an inset; the axis of F ends below it."""
     bottom, top = ax.get_ylim()
-    ax.set_ylim(bottom, bottom + (top - bottom) / 0.58)
+    ax.set_yticks([tick for tick in ax.get_yticks() if bottom <= tick <= top])
+    ax.set_ylim(bottom, bottom + (top - bottom) / 0.76)
 
 
 def compare_laws(
@@ -270,6 +274,12 @@ def residuals(
         for ax, (times, difference) in zip(axes, runs.values(), strict=True):
             panels.difference(ax, times, difference, log=log)
         letter_panels(list(axes), list(runs))
+        entries = {}
+        for ax in axes:
+            handles, labels = ax.get_legend_handles_labels()
+            entries |= dict(zip(labels, handles, strict=True))
+        if entries:
+            legend_below(figure, list(entries.values()), list(entries))
         figure.suptitle(title, x=0.01, ha="left")
     return fitted(figure)
 

@@ -17,9 +17,9 @@ import pytest
 import gms_fsm.charts.chart
 from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
+from plots.charts.cells import SIDE
 from plots.charts.drawing import graph_drawing
 from plots.charts.labels import edge_id, part_id
-from plots.charts.cells import SIDE
 from plots.charts.layout.layers import BESIDE
 from plots.charts.statechart import ChartSheet, layout, statechart
 from tests.helpers import matrix
