@@ -176,8 +176,8 @@ def microstep_figure(trace: Trace) -> Figure:
         over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5))
         t = float(log.t[0])
         panels.force(over_time, trace, window=(t - 1.5, t + 1.5))
-        panels.lettered(over_time, "a", "over time: one jump of F")
-        panels.lettered(by_step, "b", f"at t = {t:.4f} s: four firings, five rows")
+        panels.lettered(over_time, "a", "over time: one jump of $F$")
+        panels.lettered(by_step, "b", f"at $t$ = {t:.4f} s: four firings, five rows")
         by_step.plot(trace.microstep[rows], trace.F[rows], "o--", color=INK, markersize=6)
         for record, number in zip(log, range(1, 5), strict=True):
             by_step.annotate(
@@ -342,7 +342,7 @@ def mujoco_figure() -> Figure:
         t = 1e-3 * np.arange(1, len(names["held"]) + 1)
         right.plot(t, 1e3 * names["native"], "--", color=TEXT_GREY, label="frictionloss of MuJoCo")
         right.plot(t, 1e3 * names["held"], color=INK, label="four elements")
-        right.set(xlabel="$t$ [s]", ylabel="angle [mrad]", title="Creep under a constant 1 N m")
+        right.set(xlabel="$t$ [s]", ylabel="angle [mrad]", title="Angle under a constant 1 N m")
         right.legend(loc="upper left")
     return figure
 

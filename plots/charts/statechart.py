@@ -447,10 +447,10 @@ class ChartSheet:
         for i, (line, clause) in enumerate(lines):
             last = i + 1 == len(lines) or lines[i + 1][1] != clause
             row = [Piece("[" if i == 0 else " ", "bracket"), Piece(line, "clause", clause)]
-            # A space is a separate text: some SVG readers drop leading spaces.
             if last and self.live and clause >= 0:
-                row += [Piece(" ", "bracket"), Piece(TRUE, "mark", clause)]
+                row.append(Piece(TRUE, "mark", clause))
             if last and i + 1 < len(lines):
+                # The space is a separate text: some SVG readers drop leading spaces.
                 row += [Piece(" ", "bracket"), Piece(self.write.words[Both], "bracket")]
             if i + 1 == len(lines):
                 row.append(Piece("]", "bracket"))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from functools import cache
 from itertools import chain, combinations, pairwise
+from math import dist
 from typing import Any
 
 import pytest
@@ -218,6 +219,13 @@ def test_edges_that_leave_a_state_are_in_the_order_of_priority(name: str, direct
 
 
 # --------------------------------------------------------------------------- places of states
+@pytest.mark.parametrize("name", ["karnopp", "stiction"])
+def test_lines_that_do_not_cross_are_not_mistaken_for_one(name: str) -> None:
+    lines = chart_picture(CHARTS[name]).lines
+    for (a, one), (b, other) in combinations(lines, 2):
+        assert min(dist(p, q) for p in one for q in other) > 6.0, (a, b)
+
+
 def test_a_long_ring_goes_around_a_rectangle() -> None:
     for name in ("ring", "ring there and back"):
         for direction in ("TB", "LR"):

@@ -169,7 +169,7 @@ def test_the_mark_of_a_clause_stands_beside_it_and_other_charts_have_no_gap_for_
         sheet = ChartSheet(SIGNED, live=live)
         for edge in SIGNED.transitions:
             rows = plain(sheet.guard_rows(edge, 1, 0))
-            mark = " ✓" * live
+            mark = "✓" * live
             assert re.search(r"\w" + mark + " &&$", rows[0])
             assert re.search(r"\w" + mark + r"\]$", rows[-1])
     numbered = ChartSheet(SIGNED, live=True, numbered={"arrest": 3})
