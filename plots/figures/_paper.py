@@ -22,8 +22,8 @@ from plots.style.presets import font, pt, settings, to_scale
 from plots.views.window import Window
 
 Floats = NDArray[np.float64]
-REACHED = "± s(v) away from reversals"
-INSET = (0.56, 0.82, 0.42, 0.17)  # of a panel: left, bottom, width, height
+REACHED = "$±s(v)$ away from reversals"
+INSET = (0.56, 0.81, 0.42, 0.18)  # of a panel: left, bottom, width, height
 ZOOM = 0.012  # half of the time of an inset, of the whole time
 FIG3_PHASES = (("rising", 2.0), ("falling", 4.0), ("oscillating", np.inf))
 
@@ -173,10 +173,12 @@ def _zoom(ax: Axes, trace: Trace) -> None:
     inset.plot(trace.t, values, color=ax.lines[0].get_color(), linewidth=pt(1.0))
     inset.set(xlim=(t0, t1), ylim=(bottom - edge, high + edge))
     inset.tick_params(labelsize=font(7), length=2)
-    inset.locator_params(nbins=3, prune="both")
-    said = "first peak,\n$F$ [N] over $t$ [s]"
+    inset.locator_params(axis="x", nbins=3, prune="both")
+    ticks = 1 if narrow() else 2
+    inset.locator_params(axis="y", nbins=ticks, min_n_ticks=ticks)
     at = (0.02, INSET[1] + INSET[3] / 2)
-    ax.text(*at, said, transform=ax.transAxes, va="center", fontsize=font(8), color=TEXT_GREY)
+    look: dict[str, Any] = {"va": "center", "fontsize": font(7), "color": TEXT_GREY}
+    ax.text(*at, "first peak", transform=ax.transAxes, **look)
     inset.spines[:].set(visible=True, color=LINE_GREY)
     bounds = (t0, bottom - edge, t1 - t0, high - bottom + 2 * edge)
     frame = ax.indicate_inset(bounds, inset, edgecolor=LINE_GREY, alpha=1.0)
@@ -188,7 +190,7 @@ def _make_room(ax: Axes) -> None:
     """Leave the upper part of a panel free for an inset; the axis of F ends below it."""
     bottom, top = ax.get_ylim()
     ax.set_yticks([tick for tick in ax.get_yticks() if bottom <= tick <= top])
-    ax.set_ylim(bottom, bottom + (top - bottom) / 0.76)
+    ax.set_ylim(bottom, bottom + (top - bottom) / 0.74)
 
 
 def compare_laws(
@@ -274,7 +276,7 @@ def residuals(
         for ax, (times, difference) in zip(axes, runs.values(), strict=True):
             panels.difference(ax, times, difference, log=log)
         letter_panels(list(axes), list(runs))
-        entries = {}
+        entries: dict[str, Any] = {}
         for ax in axes:
             handles, labels = ax.get_legend_handles_labels()
             entries |= dict(zip(labels, handles, strict=True))
@@ -328,7 +330,7 @@ def held_residuals(
                 "friction, at the ticks",
                 "position, at the ticks",
                 "friction; dots: at the ticks",
-                "largest at the ticks; lines: proportional to h",
+                "largest at the ticks; lines: proportional to $h$",
             ],
         )
         period.legend(loc="upper left", ncols=2)

@@ -180,7 +180,7 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
                     traces["fig3_step"], traces["fig3_chart"]
                 ),
             },
-            "Difference of $F$: guards checked once per step (at most 1 ms, rtol 1e-4), and located",
+            "Difference of $F$: guards once per step (at most 1 ms, rtol 1e-4) and located",
         ),
         "residual_held": held_figure(traces, force),
     }
