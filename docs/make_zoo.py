@@ -48,7 +48,7 @@ LOOPS = ("bouc-wen", "dahl")  # models of pre-sliding: strokes that grow, and F 
 WINDOWS = {  # s, shown of a run, and why
     "seven-parameter": (
         (6.5, 10.2),
-        "Shown is the first slip: later the mass vibrates on the stiffness `k_t`, at 50 Hz.",
+        "Shown is the first slip: later the mass vibrates on its spring `k_t`, at about 50 Hz.",
     )
 }
 CURVE = Stribeck(1.0, 1.0, 1.0).text
