@@ -176,8 +176,8 @@ def microstep_figure(trace: Trace) -> Figure:
         over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5))
         t = float(log.t[0])
         panels.force(over_time, trace, window=(t - 1.5, t + 1.5))
-        panels.lettered(over_time, "a", "over time: one jump of F")
-        panels.lettered(by_step, "b", f"at t = {t:.4f} s: four firings, five rows")
+        panels.lettered(over_time, "a", "over time: one jump of $F$")
+        panels.lettered(by_step, "b", f"at $t$ = {t:.4f} s: four firings, five rows")
         by_step.plot(trace.microstep[rows], trace.F[rows], "o--", color=INK, markersize=6)
         for record, number in zip(log, range(1, 5), strict=True):
             by_step.annotate(
@@ -197,7 +197,7 @@ def microstep_figure(trace: Trace) -> Figure:
             ha="center",
             fontsize=8,
         )
-        by_step.set(xlabel="micro-step", ylabel="F [N]", xticks=range(5), xlim=(-0.5, 5.3))
+        by_step.set(xlabel="micro-step", ylabel="$F$ [N]", xticks=range(5), xlim=(-0.5, 5.3))
         by_step.margins(y=0.25)
     return figure
 
@@ -223,7 +223,7 @@ def crossing_figure() -> Figure:
             keep = (trace.t > true - 1.9 * step) & (trace.t < true + 2.9 * step)
             ax.plot(
                 trace.t[keep],
-                trace.z[keep, 0] - trace.s[keep, 0],
+                1e3 * (trace.z[keep, 0] - trace.s[keep, 0]),
                 look,
                 color=colour,
                 label=name,
@@ -232,12 +232,12 @@ def crossing_figure() -> Figure:
             )
         ax.axhline(0, color=LINE_GREY, linewidth=0.9, zorder=0)
         for time, text, colour, height in (
-            (true, "z >= s becomes true", INK, 0.97),
+            (true, "$z \\geq s$ becomes true", INK, 0.97),
             (found, "detected", TEXT_GREY, 0.62),
         ):
             ax.axvline(time, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
             ax.annotate(
-                f"{text}\nt = {time:.2f} s",
+                f"{text}\n$t$ = {time:.2f} s",
                 (time, height),
                 (-6 if time == true else 6, 0),
                 xycoords=("data", "axes fraction"),
@@ -246,7 +246,8 @@ def crossing_figure() -> Figure:
                 va="top",
                 color=colour,
             )
-        ax.set(xlabel="t [s]", ylabel="z − s [m]", title=f"{model.title}: fixed step of {step:g} s")
+        ax.set(xlabel="$t$ [s]", ylabel="$z - s$ of element 1 [mm]")
+        ax.set_title(f"{model.title}: guards in fixed steps of {step:g} s")
         ax.legend(loc="lower right")
     return figure
 
@@ -333,13 +334,15 @@ def mujoco_figure() -> Figure:
         left, right = figure.subplots(1, 2)
         looks = (":", "--", "-")
         for (amplitude, (M, q)), look in zip(names["loops"].items(), looks, strict=True):
-            left.plot(1e3 * q, M, look, color=INK, label=f"{amplitude} Nm")
-        left.set(xlabel="angle [mrad]", ylabel="torque [Nm]", title="Below break-away (1.5 Nm)")
+            left.plot(1e3 * q, M, look, color=INK, label=f"{amplitude} N m")
+        left.set(
+            xlabel="angle [mrad]", ylabel="torque [N m]", title="Loops below break-away, 1.5 N m"
+        )
         left.legend(loc="upper left")
         t = 1e-3 * np.arange(1, len(names["held"]) + 1)
-        right.plot(t, names["native"], "--", color=TEXT_GREY, label="frictionloss of MuJoCo")
-        right.plot(t, names["held"], color=INK, label="four elements")
-        right.set(xlabel="t [s]", ylabel="angle [rad]", title="Under 1 Nm")
+        right.plot(t, 1e3 * names["native"], "--", color=TEXT_GREY, label="frictionloss of MuJoCo")
+        right.plot(t, 1e3 * names["held"], color=INK, label="four elements")
+        right.set(xlabel="$t$ [s]", ylabel="angle [mrad]", title="Angle under a constant 1 N m")
         right.legend(loc="upper left")
     return figure
 
@@ -353,8 +356,8 @@ def loops_figure(bilinear: Chart) -> Figure:
         for H, colour, look in ((1e4, INK, "-"), (0.0, TEXT_GREY, "--")):
             model = ChartModel(bilinear, {"k": 1e5, "H": H, "F_y": 1.0})
             trace = simulate(model, rig, 1.75)
-            ax.plot(1e6 * trace.x, trace.F, look, color=colour, label=f"H = {H:g} N/m")
-        ax.set(xlabel="x [µm]", ylabel="F [N]", title="k = 1e5 N/m, F_y = 1 N, X = 40 µm")
+            ax.plot(1e6 * trace.x, trace.F, look, color=colour, label=f"$H$ = {1e-3 * H:g} kN/m")
+        ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]", title="Bilinear hysteresis, strokes of ±40 µm")
         ax.legend(loc="upper left")
     return figure
 
@@ -384,7 +387,7 @@ def sweep_figure() -> Figure:
         image = ax.pcolormesh(
             1e3 * speed, 1e3 * v_s, counts, cmap=ListedColormap(ramp("heat", 256)), rasterized=True
         )
-        ax.set(yscale="log", xlabel="pulling speed [mm/s]", ylabel="v_s [mm/s]")
+        ax.set(yscale="log", xlabel="pulling speed [mm/s]", ylabel="$v_s$ [mm/s]")
         ax.set_title(f"arrests in 0.6 s, {len(result):,} runs; signed law")
         figure.colorbar(image, label="arrests")
     return figure

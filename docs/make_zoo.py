@@ -20,6 +20,7 @@ from typing import get_args
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 import plots
 from gms_fsm import Chart, Trace, prove
@@ -42,6 +43,14 @@ MOST_STEPS = 100_000  # of a run
 DRIVEN = "1e-3 * (1.5 + cos(t))"  # m/s
 PULLED = "0.1 * t"  # m, the end of the spring
 SWUNG = "2 * sin(0.7 * t)"  # m, for laws that differ for v < 0
+GROWING = "5e-6 * t * cos(2 * t)"  # m/s
+LOOPS = ("bouc-wen", "dahl")  # models of pre-sliding: strokes that grow, and F over x
+WINDOWS = {  # s, shown of a run, and why
+    "seven-parameter": (
+        (6.5, 10.2),
+        "Shown is the first slip: later the mass vibrates on its spring `k_t`, at about 50 Hz.",
+    )
+}
 CURVE = Stribeck(1.0, 1.0, 1.0).text
 INTRODUCTION = """# The friction zoo
 
@@ -234,20 +243,20 @@ def _short(value: object) -> str:
 
 
 # --------------------------------------------------------------------------- the run
-def system_file(item: Item, *, driven: bool = False) -> str:
+def system_file(item: Item, velocity: str = "") -> str:
     """Return a scenario file: a mass pulled through a spring, or driven at a given velocity."""
-    lines = [f'name = "{"driven" if driven else "pulled"} mass, {item.name}"']
-    for body, given in bodies(item, driven=driven).items():
+    lines = [f'name = "{"driven" if velocity else "pulled"} mass, {item.name}"']
+    for body, given in bodies(item, velocity).items():
         lines += ["", "[[body]]", f'name = "{body}"', *given]
     lines += ["", "[[contact]]", 'name = "pad"', *contact(item)]
     lines += ["", "[run]", f"t_end = {T_END}", "", "[output]", "figures = []"]
     return "\n".join(lines) + "\n"
 
 
-def bodies(item: Item, *, driven: bool) -> dict[str, tuple[str, ...]]:
+def bodies(item: Item, velocity: str) -> dict[str, tuple[str, ...]]:
     """Return the lines of each body; there is one for each velocity of the chart."""
-    if driven:
-        return {"mass": (f'velocity = "{DRIVEN}"',)}
+    if velocity:
+        return {"mass": (f'velocity = "{velocity}"',)}
     if len(item.chart.velocities) == 1:
         end = SWUNG if item.law else PULLED
         return {"mass": ("inertia = 1.0", f'force = "2 * ({end} - x)"')}
@@ -312,18 +321,25 @@ class Run:
 
 @functools.cache
 def run_of(item: Item) -> Run:
-    """Run a chart: pulled, or driven where a pulled mass would take too many steps."""
+    """Run a chart: pulled, or driven for loops and where a pulled mass would take many steps."""
+    if item.name in LOOPS:
+        text = system_file(item, GROWING)
+        about = f"The contact is driven at `v = {GROWING}`, in m/s: strokes that grow from"
+        about += "\nmicrometres, in pre-sliding, to sliding."
+        return Run("driven.toml", text, simulated(text), about)
     how = f"swings by {SWUNG}, in m: the laws differ for v < 0" if item.law else "moves at 0.1 m/s"
     about = f"A mass of 1 kg is pulled through a spring of 2 N/m, whose end {how}."
     if len(item.chart.velocities) > 1:
         about += "\nA second spring pulls it sideways, at 0.05 m/s."
     if item.chart.sets_velocity:
         about += "\nF has no value during an impact, which takes no time."
+    if item.name in WINDOWS:
+        about += "\n" + WINDOWS[item.name][1]
     text = system_file(item)
     try:
         return Run("pulled.toml", text, simulated(text), about)
     except StepLimitError:
-        text = system_file(item, driven=True)
+        text = system_file(item, DRIVEN)
         about = (
             f"The contact is driven at `v = {DRIVEN}`, in m/s. (A mass that is pulled makes this"
         )
@@ -343,20 +359,40 @@ def simulated(text: str) -> Trace:
 
 
 def run_figure(item: Item) -> Figure:
-    """Draw friction force, velocity and states of the run."""
+    """Draw friction force, velocity and states of the run; of loops the force over x instead."""
     trace = run_of(item).trace
-    pad = trace.sample(np.linspace(trace.t[0], trace.t[-1], 2001)).contact("pad")
+    window, _ = WINDOWS.get(item.name, ((0.0, T_END), ""))
+    sampled = trace.sample(np.linspace(*window, 2001))
+    pad = sampled.contact("pad")
     with rc_context(RC):
+        if item.name in LOOPS:
+            return loops_figure(pad, sampled.body("mass").x)
         tall = 0.5 + 0.2 * item.entry.demonstration.n  # inches, of the states
         figure = Figure(figsize=(6.4, 3.2 + tall), layout="constrained")
         force, velocity, states = figure.subplots(3, 1, sharex=True, height_ratios=(1.6, 1.6, tall))
         force.plot(pad.t, pad.F, color=INK)
-        force.set(ylabel="$F$ [N]", xlim=(0, T_END))
+        force.set(ylabel="$F$ [N]", xlim=window)
         velocity.plot(pad.t, pad.v, color=INK)
         velocity.set(ylabel="$v$ [m/s]")
-        panels.ribbons(states, trace)
+        panels.ribbons(states, trace, window=window)
         for ax in (force, velocity):
             ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
+    return figure
+
+
+def loops_figure(pad: Trace, x: NDArray[np.float64]) -> Figure:
+    """Draw velocity and friction force over time, and the force over the displacement."""
+    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+    axes = figure.subplot_mosaic([["v", "loop"], ["F", "loop"]], width_ratios=(1, 1.2))
+    axes["v"].plot(pad.t, 1e6 * pad.v, color=INK)
+    axes["v"].set(ylabel="$v$ [µm/s]", xlim=(0, T_END))
+    axes["v"].tick_params(labelbottom=False)
+    axes["F"].plot(pad.t, pad.F, color=INK)
+    axes["F"].set(xlabel="$t$ [s]", ylabel="$F$ [N]", xlim=(0, T_END))
+    axes["loop"].plot(1e6 * x, pad.F, color=INK)
+    axes["loop"].set(xlabel="$x$ [µm]", ylabel="$F$ [N]")
+    for ax in axes.values():
+        ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
     return figure
 
 
@@ -365,7 +401,10 @@ def example(item: Item) -> Iterator[str]:
     run = run_of(item)
     name, text, trace = run.name, run.text, run.trace
     yield run.about
-    yield from ("", f"![Force, velocity and states of the run](../images/zoo/{item.name}_run.png)")
+    loops = item.name in LOOPS
+    shown = "Velocity and force, and force over x" if loops else "Force, velocity and states"
+    digits = ".4g" if loops else ".4f"  # x is in micrometres
+    yield from ("", f"![{shown} of the run](../images/zoo/{item.name}_run.png)")
     yield from ("", f"<!-- file: {name} -->", "```toml", *text.splitlines(), "```")
     yield from (
         "",
@@ -384,7 +423,7 @@ def example(item: Item) -> Iterator[str]:
         "for r in trace.transitions[:5]:",
         '    print(f"{r.t:8.4f} s: {r.edge}")',
         'x, F = trace.body("mass").x[-1], trace.contact("pad").F[-1]',
-        'print(f"at {trace.t[-1]:g} s: x = {x:.4f} m, F = {F:.4f} N")',
+        f'print(f"at {{trace.t[-1]:g}} s: x = {{x:{digits}}} m, F = {{F:.4f}} N")',
         "```",
         "",
         "```text",
@@ -392,7 +431,7 @@ def example(item: Item) -> Iterator[str]:
     for r in trace.transitions[:5]:
         yield f"{r.t:8.4f} s: {r.edge}"
     x, F = trace.body("mass").x[-1], trace.contact("pad").F[-1]
-    yield f"at {trace.t[-1]:g} s: x = {x:.4f} m, F = {F:.4f} N"
+    yield f"at {trace.t[-1]:g} s: x = {x:{digits}} m, F = {F:.4f} N"
     yield "```"
 
 

@@ -134,7 +134,7 @@ PHENOMENA = (
         "Under a bias of half the break-away force, a vibration of 10 Hz grows by 5 % of the "
         "break-away force per second. Measured is the peak force (bias plus amplitude) when the "
         "slider has moved by 10 F_s / sigma_0, over the break-away force.",
-        ("amplitude of the vibration / break-away force [1]", "x [µm]"),
+        ("amplitude of the vibration / break-away force [–]", "$x$ [µm]"),
         _vibration,
         decimals=2,
     ),

@@ -168,7 +168,7 @@ PHENOMENA = (
         "frictional lag: width at 10 rad/s",
         "The speed is 1e-3 (1.5 + cos w t) m/s. Measured is the friction while the speed rises "
         "minus that while it falls, at the mean speed, for w = 1, 10 and 25 rad/s.",
-        ("v [mm/s]", "friction [N]"),
+        ("$v$ [mm/s]", "friction [N]"),
         _lag,
         decimals=1,
     ),
@@ -178,7 +178,7 @@ PHENOMENA = (
         "Stribeck curve: fall of friction",
         "The slider moves at fourteen constant speeds from 0.1 m/s down to 1e-5 m/s. Measured is "
         "the fall of the friction from the lowest speed to its minimum.",
-        ("v [mm/s]", "friction [N]"),
+        ("$v$ [mm/s]", "friction [N]"),
         _stribeck,
         log=True,
     ),
@@ -189,7 +189,7 @@ PHENOMENA = (
         "A spring of 2 N/m, whose end moves at 0.1 m/s, pulls the slider of 1 kg for 40 s. "
         "Measured are the period and the amplitude of the spring force in the last cycle, and "
         "the share of the period in stick.",
-        ("t [s]", "spring force [N]"),
+        ("$t$ [s]", "spring force [N]"),
         _stick_slip,
     ),
     Phenomenon(
@@ -199,7 +199,7 @@ PHENOMENA = (
         "The slider moves three times backward slowly (1e-3 m/s, 0.1 s) and forward fast "
         "(5e-3 m/s, 0.02 s), from rest without stored energy. Measured is the energy that it has "
         "given back at any time beyond what it had taken before.",
-        ("t [ms]", "energy taken [mJ]"),
+        ("$t$ [ms]", "energy taken [mJ]"),
         _passivity,
         decimals=2,
     ),

@@ -150,7 +150,7 @@ PHENOMENA = (
         "pre-sliding hysteresis",
         "The force goes to +0.95, -0.95 and +0.95 of the break-away force, with holds of 5 s. "
         "Measured is the width of the last loop at F = 0.",
-        ("x [µm]", "applied force [N]"),
+        ("$x$ [µm]", "applied force [N]"),
         _hysteresis,
         decimals=1,
     ),
@@ -161,7 +161,7 @@ PHENOMENA = (
         "The force goes smoothly to 0.95, -0.8, 0.8, -0.8 and 0.95 of the break-away force. A "
         "contact that remembers where it turned is then back at the same places. Measured is the "
         "larger of the two gaps, over the stroke of the inner loop.",
-        ("x [µm]", "applied force [N]"),
+        ("$x$ [µm]", "applied force [N]"),
         _memory,
         decimals=1,
     ),
@@ -172,7 +172,7 @@ PHENOMENA = (
         "The force rises to 0.6 of the break-away force, falls to 0.3, and then has a ripple of "
         "0.1 at 2 Hz. Measured is how far the mean of a period moves from period 20 to 40, per "
         "period.",
-        ("t [s]", "x [µm]"),
+        ("$t$ [s]", "$x$ [µm]"),
         _drift,
     ),
 )

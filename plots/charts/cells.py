@@ -97,7 +97,7 @@ class CellWriter:
     def state(
         self, rows: Sequence[Row], marked: bool = False, least: tuple[float, float] = (0, 0)
     ) -> Label:
-        """Set the box of a state: its title, and below a rule the other rows, in its middle."""
+        """Set the box of a state: its title, and below a rule the other rows, with one indent."""
         heights = [self._height(row) for row in rows]
         small = PLAIN * self.scale <= LEAST
         text = ceil(max(map(self._width, rows)) * (WIDER if small else 1))
@@ -107,9 +107,8 @@ class CellWriter:
         wide += 2 * border - 2
         wide, tall = max(wide, ceil(least[0])), max(tall, ceil(least[1]))
         inner = wide - 2 * border
-        left = max((inner - text) // 2, SIDE - 1)
         title, *more = (
-            self._row([Piece("", "pad"), *row], height, inner, left)
+            self._row([Piece("", "pad"), *row], height, inner)
             for row, height in zip(rows, heights, strict=True)
         )
         look = f'BORDER="{border}" COLOR="{ink}" BGCOLOR="{self.colours.paper}" STYLE="ROUNDED" '

@@ -297,7 +297,7 @@ class LiveChart:
         cells = []
         for name, scale in self._scales.items():
             widest = f"{WIDEST} {scale.unit}".rstrip()
-            text = trimmed(scale.text(numbers[name])) if at else widest
+            text = trimmed(scale.text(numbers[name])).replace("-", "−") if at else widest
             cells.append(f"{name} = {text.ljust(len(widest))}")
         return [
             [Piece("  ".join(cells[i : i + VALUES_PER_LINE]), "value")]

@@ -433,8 +433,8 @@ class ChartSheet:
     def _number_row(self, edge: Transition) -> list[Row]:
         marks = range(len(clauses(self.chart.guards[edge.name]))) if self.live else ()
         number = Piece(f"g{self.numbered[edge.name]}", "clause")
-        row = [Piece("[", "bracket"), number, Piece("]", "bracket")]
-        return [[*row, *(Piece(TRUE, "mark", c) for c in marks)]]
+        each = [Piece(TRUE, "mark", c) for c in marks]
+        return [[Piece("[", "bracket"), number, *each, Piece("]", "bracket")]]
 
     def _guard_lines(self, edge: Transition) -> list[Row]:
         guard = self.chart.guards[edge.name]
@@ -447,13 +447,13 @@ class ChartSheet:
         for i, (line, clause) in enumerate(lines):
             last = i + 1 == len(lines) or lines[i + 1][1] != clause
             row = [Piece("[" if i == 0 else " ", "bracket"), Piece(line, "clause", clause)]
+            if last and self.live and clause >= 0:
+                row.append(Piece(TRUE, "mark", clause))
             if last and i + 1 < len(lines):
                 # The space is a separate text: some SVG readers drop leading spaces.
                 row += [Piece(" ", "bracket"), Piece(self.write.words[Both], "bracket")]
             if i + 1 == len(lines):
                 row.append(Piece("]", "bracket"))
-            if last and self.live and clause >= 0:  # last: a hidden mark leaves no gap
-                row.append(Piece(TRUE, "mark", clause))
             rows.append(self._indexed(row))
         action = self.write.actions(self.chart.assignments["action", edge.name])
         lines_of_action = wrapped(action, LONGEST_LABEL)

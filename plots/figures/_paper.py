@@ -22,7 +22,8 @@ from plots.style.presets import font, pt, settings, to_scale
 from plots.views.window import Window
 
 Floats = NDArray[np.float64]
-REACHED = "± s(v) away from reversals"
+REACHED = "$±s(v)$ away from reversals"
+INSET = (0.56, 0.81, 0.42, 0.18)  # of a panel: left, bottom, width, height
 ZOOM = 0.012  # half of the time of an inset, of the whole time
 FIG3_PHASES = (("rising", 2.0), ("falling", 4.0), ("oscillating", np.inf))
 
@@ -168,13 +169,17 @@ def _zoom(ax: Axes, trace: Trace) -> None:
     # A fall that is much larger than the rise to the peak leaves the inset.
     bottom = max(float(near.min()), high - 3 * float(high - near[0]))
     edge = 0.1 * (high - bottom) or 1.0
-    inset = ax.inset_axes((0.5, 0.65, 0.46, 0.28))
+    inset = ax.inset_axes(INSET)
     inset.plot(trace.t, values, color=ax.lines[0].get_color(), linewidth=pt(1.0))
     inset.set(xlim=(t0, t1), ylim=(bottom - edge, high + edge))
     inset.tick_params(labelsize=font(7), length=2)
-    inset.locator_params(nbins=3, prune="both")
+    inset.locator_params(axis="x", nbins=3, prune="both")
+    ticks = 1 if narrow() else 2
+    inset.locator_params(axis="y", nbins=ticks, min_n_ticks=ticks)
+    at = (0.02, INSET[1] + INSET[3] / 2)
+    look: dict[str, Any] = {"va": "center", "fontsize": font(7), "color": TEXT_GREY}
+    ax.text(*at, "first peak", transform=ax.transAxes, **look)
     inset.spines[:].set(visible=True, color=LINE_GREY)
-    inset.set_title("first peak [N]", fontsize=font(7), pad=2)
     bounds = (t0, bottom - edge, t1 - t0, high - bottom + 2 * edge)
     frame = ax.indicate_inset(bounds, inset, edgecolor=LINE_GREY, alpha=1.0)
     for line in frame.connectors or ():
@@ -182,9 +187,10 @@ def _zoom(ax: Axes, trace: Trace) -> None:
 
 
 def _make_room(ax: Axes) -> None:
-    """Leave the upper part of a panel free for an inset."""
+    """Leave the upper part of a panel free for an inset; the axis of F ends below it."""
     bottom, top = ax.get_ylim()
-    ax.set_ylim(bottom, bottom + (top - bottom) / 0.58)
+    ax.set_yticks([tick for tick in ax.get_yticks() if bottom <= tick <= top])
+    ax.set_ylim(bottom, bottom + (top - bottom) / 0.74)
 
 
 def compare_laws(
@@ -270,6 +276,12 @@ def residuals(
         for ax, (times, difference) in zip(axes, runs.values(), strict=True):
             panels.difference(ax, times, difference, log=log)
         letter_panels(list(axes), list(runs))
+        entries: dict[str, Any] = {}
+        for ax in axes:
+            handles, labels = ax.get_legend_handles_labels()
+            entries |= dict(zip(labels, handles, strict=True))
+        if entries:
+            legend_below(figure, list(entries.values()), list(entries))
         figure.suptitle(title, x=0.01, ha="left")
     return fitted(figure)
 
@@ -318,7 +330,7 @@ def held_residuals(
                 "friction, at the ticks",
                 "position, at the ticks",
                 "friction; dots: at the ticks",
-                "largest at the ticks; lines: proportional to h",
+                "largest at the ticks; lines: proportional to $h$",
             ],
         )
         period.legend(loc="upper left", ncols=2)

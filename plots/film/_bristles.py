@@ -224,7 +224,8 @@ class Bristles:
 
     def told(self, which: int, value: float) -> str:
         """Return v or F as text, in one unit for the whole film."""
-        return f"{'+' if value > 0 else ''}{self.scales[which].text(value, 3)}"
+        text = self.scales[which].text(value, 3).replace("-", "−")
+        return f"{'+' if value > 0 else ''}{text}"
 
     def _point(self, which: int, name: str, value: float, share: float) -> None:
         """Draw the arrow and number of a quantity; a share of 1 points to the right."""

@@ -73,14 +73,16 @@ def difference(
         )
     if log:
         ax.set(yscale="log")
+        ax.minorticks_off()
         values = np.maximum(np.abs(values), floor)
-    ax.set_ylabel("|difference of F| [N]" if log else "difference of F [N]")
+    ax.set_ylabel("|difference of $F$| [N]" if log else "difference of $F$ [N]")
     time_axis(ax, float(times[0]), float(times[-1]))
     look: dict[str, Any] = {"color": INK, "linewidth": pt(0.8)}
     if len(times) <= 2 * COLUMNS:
         return draw_curve(ax, times, values, **look)
     middles, low, high = _envelope(times, values)
-    band = ax.fill_between(middles, low, high, color=PALE_GREY, linewidth=0.0)
+    label = f"lowest to highest in each 1/{COLUMNS} of the time"
+    band = ax.fill_between(middles, low, high, color=PALE_GREY, linewidth=0.0, label=label)
     ends = [high] if log else [high, low]
     return [band, *(line for end in ends for line in draw_curve(ax, middles, end, **look))]
 

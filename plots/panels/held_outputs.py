@@ -75,12 +75,12 @@ def lag_over_time(
     for number, lag in enumerate(lags):
         shown = (lag.t >= window[0]) & (lag.t <= window[1])
         values = factor * (lag.place if place else lag.force)[shown]
-        name = f"h = {MILLI * lag.period:g} ms"
+        name = f"$h$ = {MILLI * lag.period:g} ms"
         lines += draw_curve(ax, lag.t[shown], values, label=name, **to_scale(compared_look(number)))
     for sign in (1, -1):
         ax.axhline(sign * factor * paper, **to_scale(REPORTED))
     time_axis(ax, *window)
-    ax.set_ylabel("difference of x [µm]" if place else "difference of F [mN]")
+    ax.set_ylabel("difference of $x$ [µm]" if place else "difference of $F$ [mN]")
     return lines
 
 
@@ -112,7 +112,7 @@ def lag_between_ticks(ax: Axes, lags: Sequence[HeldLag], *, window: tuple[float,
         ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=pt(4))
     ax.set(
         xlabel=f"$t$ − {window[0]:g} s [ms]",
-        ylabel="difference of F [mN]",
+        ylabel="difference of $F$ [mN]",
         xlim=(0, MILLI * (window[1] - window[0])),
     )
     return lines
@@ -163,11 +163,14 @@ def lag_over_period(
                 color=(INK, TEXT_GREY)[quantity],
                 fillstyle=fill,
                 markersize=pt(6),
-                label=f"{'Fx'[quantity]}, {name}",
+                label=f"${'Fx'[quantity]}$, {name}",
             )
     ax.axhline(1.0, **to_scale(REPORTED))
     ax.set(
-        xscale="log", yscale="log", xlabel="sample time h [ms]", ylabel="largest / the paper's [1]"
+        xscale="log",
+        yscale="log",
+        xlabel="sample time $h$ [ms]",
+        ylabel="largest / the paper's [–]",
     )
     ax.set_ylim(0.7 * min([0.9, *found]), 1.5 * max([13.0, *found]))
     ax.set_xticks(periods, [f"{period:g}" for period in periods])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from math import hypot
 from typing import Any
 
 import graphviz
@@ -17,6 +18,7 @@ from plots.style import INK, PAPER, SANS
 Point = tuple[float, float]
 
 THIN, THICK = 1.1, 3.0  # lines of one value and of several
+CORNER = 1.5  # how far an arrowhead's corner is beyond its tip, in widths of its outline
 PLACED = {
     "layout": "neato",  # so that the DOT text is self-contained
     "inputscale": "72",  # positions are points, not inches
@@ -100,12 +102,31 @@ def draw_wire(
         )
 
 
-def draw_path(graph: graphviz.Digraph, name: str, path: Sequence[Point], **look: Any) -> None:
-    """Draw a wire between two places, where no node is."""
+def draw_path(
+    graph: graphviz.Digraph,
+    name: str,
+    path: Sequence[Point],
+    *,
+    arrow: str = "forward",
+    tip: float = THIN,
+    **look: Any,
+) -> None:
+    """Draw a wire between two places, where no node is; a tip ends before its place."""
     ends = f"{name}-first", f"{name}-last"
-    joint(graph, ends[0], path[0])
-    joint(graph, ends[1], path[-1])
-    draw_wire(graph, name, ends[0], path[1:-1], ends[1], **look)
+    # The outline of an arrowhead has a corner beyond its tip, which would be in the frame there.
+    back = CORNER * tip
+    first = _moved(path[0], path[1], back if arrow == "both" else 0.0)
+    last = _moved(path[-1], path[-2], back if arrow != "none" else 0.0)
+    joint(graph, ends[0], first)
+    joint(graph, ends[1], last)
+    draw_wire(graph, name, ends[0], path[1:-1], ends[1], arrow=arrow, tip=tip, **look)
+
+
+def _moved(at: Point, towards: Point, far: float) -> Point:
+    """Return a place moved towards another one."""
+    x, y = towards[0] - at[0], towards[1] - at[1]
+    part = far / (hypot(x, y) or 1.0)
+    return at[0] + part * x, at[1] + part * y
 
 
 def position(at: Point) -> str:

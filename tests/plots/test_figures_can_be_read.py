@@ -369,6 +369,9 @@ def test_window_and_elements_reach_every_panel() -> None:
     figure = figures.figure_4(signed, signed, signed, window=(10.0, 30.0), elements=[1])
     assert figure.axes[1].get_xlim() == (10.0, 30.0)
     assert len(figure.axes[1].lines) == 1
+    force = figure.axes[3]  # its axis ends below the inset
+    assert max(force.get_yticks()) <= 1.05 * np.nanmax(signed.F)
+    assert force.child_axes
     figure = figures.ribbons_figure(signed, window=(3.0, 7.0))  # the zoom is inside the window
     (margins,) = (ax for ax in figure.axes if ax.get_title() == "f")
     low, high = margins.get_xlim()

@@ -197,11 +197,11 @@ def test_each_panel_of_held_outputs_shows_its_numbers() -> None:
         np.testing.assert_allclose(line.get_ydata(), 1e6 * each.place)
     np.testing.assert_allclose(between.lines[0].get_ydata()[:4], [0.2, -0.2, 0.2, -0.2])
     marks = {line.get_label(): np.asarray(line.get_ydata()) for line in period.lines}
-    np.testing.assert_allclose(marks["F, ramp"], [2.0, 1.0, 0.5])
-    np.testing.assert_allclose(marks["x, rest"], [10.0, 5.0, 2.5])
+    np.testing.assert_allclose(marks["$F$, ramp"], [2.0, 1.0, 0.5])
+    np.testing.assert_allclose(marks["$x$, rest"], [10.0, 5.0, 2.5])
     assert all("[" in text for ax in sheet.axes for text in (ax.get_xlabel(), ax.get_ylabel()))
     shown = [text.get_text() for text in sheet.legends[0].get_texts()]
-    assert shown == ["h = 2 ms", "h = 1 ms", "h = 0.5 ms", "the paper's residual"]
+    assert shown == ["$h$ = 2 ms", "$h$ = 1 ms", "$h$ = 0.5 ms", "the paper's residual"]
 
 
 def test_one_record_is_chosen() -> None:

@@ -6,6 +6,7 @@ The region under the dot has the truth that the run saw, at random rows.
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -130,7 +131,21 @@ def test_a_row_made_by_a_firing_shows_the_row_before(run: Trace) -> None:
     assert all(text[0] == "✓" for text in lanes if text.endswith(("z >= s", " v > v_c")))
     title = figures.landscape(run, 0, t=5.0).get_suptitle()  # the last row at or before a time
     row = int(np.flatnonzero(run.t <= 5.0)[-1])
-    assert title.endswith(f"t = {run.t[row]:.9g} s, row {row}")
+    assert title.endswith(f"t = {run.t[row]:.6g} s, row {row}")
+
+
+@pytest.mark.slow
+def test_the_axis_of_v_has_the_unit_of_the_margins(run: Trace) -> None:
+    row = row_of(run, "break_away_forward", 1) - 30
+    left, right = figures.landscape(run, 1, row=row).axes
+    amounts = [text.get_text().split() for text in right.texts]
+    units = {words[-1] for words in amounts if words and words[-1].endswith("m/s")}
+    (unit,) = units
+    assert left.get_xlabel().startswith(f"$v$ [{unit}], linear below ")
+    (linear,) = re.findall(r"10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)$", left.get_xlabel())
+    power = int(linear.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
+    shift = {"m/s": 0, "mm/s": -3, "µm/s": -6}[unit]
+    assert left.xaxis.get_transform().linthresh == pytest.approx(10.0 ** (power + shift))
 
 
 def test_bars_are_relative_margins_and_what_holds_an_edge_back_is_bold(run: Trace) -> None:

@@ -209,7 +209,7 @@ def test_values_are_those_of_the_row_and_elements_may_be_chosen() -> None:
                 ("v", trace.v, speed),
                 ("s", trace.s[:, i], place),
             ):
-                assert shown[name].strip() == trimmed(scale.text(float(column[row])))
+                assert shown[name] == trimmed(scale.text(float(column[row]))).replace("-", "−")
         (foot,) = drawn["graph0"].findall("text")
         assert foot.text == f"t = {trace.t[row]:.6g} s"
     one = groups(LiveChart(run("one"), values=True).frame(3))

@@ -189,7 +189,8 @@ def test_differences_are_those_of_the_runs_and_of_many_points_the_envelope(run: 
     other = simulate(stick_slip("published"), open_loop(), 60.0)
     ax = Figure().subplots()
     band, line = panels.residual(ax, run, other)
-    assert (ax.get_yscale(), ax.get_ylabel()) == ("log", "|difference of F| [N]")
+    assert (ax.get_yscale(), ax.get_ylabel()) == ("log", "|difference of $F$| [N]")
+    assert band.get_label() == "lowest to highest in each 1/500 of the time"
     part = np.linspace(0.0, 60.0, 500)
     seen = np.abs(run.sample(part).F - other.sample(part).F).max()
     assert 0.9 * seen <= drawn(line)[1].max() == band.get_paths()[0].vertices[:, 1].max()

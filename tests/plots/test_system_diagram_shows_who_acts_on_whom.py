@@ -106,6 +106,19 @@ def test_the_parts_and_lines_of_a_servo() -> None:
     assert held == {"sampled-pid"}  # what is held has a staircase
 
 
+def test_tips_of_arrows_end_before_the_frames() -> None:
+    """By the corner of the outline of an arrowhead."""
+    found = nodes(SERVO)
+    blocks = [span(look) for look in found.values() if look.get("class") in KINDS]
+    ends = {f"{name}-last": 1.5 * 1.1 for name in pieces(SERVO)}
+    acts = [name for name in pieces(SERVO) if name.startswith("acts-")]
+    ends |= {f"{name}-{end}": 1.5 * 2.2 for name in acts for end in ("first", "last")}
+    for name, apart in ends.items():
+        joint = span(found[name])
+        middle = 0.5 * (joint.left + joint.right), 0.5 * (joint.top + joint.bottom)
+        assert min(each.distance(middle) for each in blocks) == pytest.approx(apart, abs=0.1), name
+
+
 def test_a_force_text_between_bodies_is_a_line_each_way() -> None:
     assert {("body-two", "body-one", "q2"), ("body-one", "body-two", "q1")} <= lines(BLOCKS)
     assert parts(BLOCKS)["body-belt"] == "belt  driven body | w_b = V"

@@ -180,7 +180,7 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
                     traces["fig3_step"], traces["fig3_chart"]
                 ),
             },
-            "Guards evaluated once per step (max step 1e-3 s, rtol 1e-4) and located switches",
+            "Difference of $F$: guards once per step (at most 1 ms, rtol 1e-4) and located",
         ),
         "residual_held": held_figure(traces, force),
     }

@@ -15,6 +15,7 @@ import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from math import inf
 
 from plots.charts.layout.places import Segment, places
 
@@ -29,6 +30,7 @@ WIDER = 16.0  # how much a state may grow at its sides, to make lines straight
 CORNER = 14.0  # of a state, where no line ends
 STATES_APART, LABELS_APART, LINES_APART = 26.0, 9.0, 9.0
 LINE = 2.0  # room of a line in a row
+LEVELS_APART = 8.0  # height of a channel for every further line beside another one
 BESIDE = 4.0  # between a line and its label
 LONELY = 640.0  # width of a row of states without edges
 DEFAULT, DOT = 30.0, 4.0  # from the dot to the default state; radius of the dot
@@ -344,20 +346,48 @@ class _Layers:
         self.tall = heights
         room = heights | {i: max(heights[i], block) for i, block in enumerate(self.block)}
         self.span: list[tuple[float, float]] = []
+        self.bend: dict[Segment, float] = {}
         at = DEFAULT + DOT
         for r, row in enumerate(rows):
             tall = max((room.get(item, 0.0) for item in row), default=0.0)
             if r == 0:  # above a default state that is lower than its row, the dot is in the row
                 at -= min((tall - heights[0]) / 2, DEFAULT)
             self.span.append((at, at + tall))
-            across = [self._slant(*each) for each in self.segments if self.row[each[0]] == r]
+            own = [each for each in self.segments if self.row[each[0]] == r]
+            across = [abs(end - start) for start, end in map(self._ends_of, own)]
             curve = 22.0 + min(max(0.12 * max(across, default=0.0), 4.0), 44.0)
+            curve += LEVELS_APART * self._set_bends(own)
             at += tall + (curve + STUB + ARROW if across else 24.0 * (r % 2 == 0))
 
-    def _slant(self, upper: int, lower: int) -> float:
-        offset = self.offset.get((upper, lower), 0.0)
-        ahead = self.x[upper] - self.x[lower]
-        return abs(ahead + offset if upper < len(self.sizes) else ahead - offset)
+    def _ends_of(self, segment: Segment) -> Point:
+        """Return where a line begins and ends across a channel."""
+        offset = self.offset.get(segment, 0.0)
+        upper, lower = (self.x[item] for item in segment)
+        return (upper + offset, lower) if segment[0] < len(self.sizes) else (upper, lower + offset)
+
+    def _set_bends(self, own: Sequence[Segment]) -> int:
+        """Set how far down in their channel lines turn; return the most beside another one.
+
+        Of lines that lean to the same side, the one farther to that side turns first. At one height
+        they would nearly touch.
+        """
+        most = 0
+        for side in (-1, 1):
+            group: list[Segment] = []
+            reach = -inf
+            ends = ((*self._ends_of(each), each) for each in own)
+            spans = sorted((-side * end, side * start, each) for start, end, each in ends)
+            for turned, start, each in spans:
+                if -turned - start < LINES_APART:
+                    continue
+                if -turned < reach:  # beside none of the others
+                    group, reach = [], inf
+                group.append(each)
+                reach = min(reach, start) if len(group) > 1 else start
+                for i, line in enumerate(group, start=1):
+                    self.bend[line] = i / (len(group) + 1)
+                most = max(most, len(group) - 1)
+        return most
 
     def _drawn(self) -> Laid:
         left = min(self.x[i] - self.wide[i][0] for i in range(len(self.x)))
@@ -399,7 +429,7 @@ class _Layers:
         for i, (x, top, bottom) in enumerate(spans):
             if i:
                 x_before, y_before = points[-1]
-                bend = (y_before + top) / 2
+                bend = y_before + self.bend.get((chain[i - 1], chain[i]), 0.5) * (top - y_before)
                 points += [(x_before, bend), (x, bend), (x, top)]
             points += straight((x, top), (x, bottom))[1:]
         return points if down else points[::-1]

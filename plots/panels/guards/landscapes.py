@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, SignalError
-from gms_fsm.foundation.quantities import in_words
+from gms_fsm.foundation.quantities import Scale, in_words, scale_of
 from gms_fsm.language import (
     MATLAB_LIKE,
     Comparison,
@@ -65,6 +65,7 @@ class PlaneWindow(NamedTuple):
     high: float
     factor: float  # from SI to the unit of the axis
     title: str  # of the axis of the second quantity
+    speeds: Scale  # of the axis of v, as in the race to fire
 
 
 # --------------------------------------------------------------------------- what is shown
@@ -89,7 +90,9 @@ def view_of(trace: Trace, element: int, plane: Plane) -> PlaneWindow:
     low, high = float(reach.min()), float(reach.max())
     pad = 0.14 * (high - low) or 0.5 * abs(high) or 1.0
     factor, title = axis_title(second, unit_of(chart, second), np.array([low - pad, high + pad]))
-    return PlaneWindow(linear, speed, low - pad, high + pad, factor, title)
+    told = (each.scale for edge in plane.why for each in edge.clauses if each.unit == "m/s")
+    speeds = next(told, scale_of(speed, "m/s"))
+    return PlaneWindow(linear, speed, low - pad, high + pad, factor, title, speeds)
 
 
 def _column(trace: Trace, name: str, element: int) -> Floats:
@@ -184,7 +187,8 @@ def landscape(
     ax.set(
         xlim=(-view.speed, view.speed),
         ylim=(view.factor * view.low, view.factor * view.high),
-        xlabel=f"${latex_name(plane.names[0])}$ [m/s], linear below {_power(view.linear)}",
+        xlabel=f"${latex_name(plane.names[0])}$ [{view.speeds.unit}], linear below "
+        f"{_power(view.linear * view.speeds.factor)}",
         ylabel=view.title,
     )
     ax.grid(visible=False)
@@ -222,9 +226,8 @@ def _speed_ticks(ax: Axes, view: PlaneWindow) -> None:
     step = -(-(last - first) // 3) or 1
     powers = range(last, first - 1, -step)
     ticks = [-(10.0**k) for k in powers] + [0.0] + [10.0**k for k in reversed(powers)]
-    labels = [f"−{_power(tick)}" for tick in ticks[len(powers) + 1 :]][::-1]
-    labels += ["0", *(_power(tick) for tick in ticks[len(powers) + 1 :])]
-    ax.set_xticks(ticks, labels)
+    above = [_power(tick * view.speeds.factor) for tick in ticks[len(powers) + 1 :]]
+    ax.set_xticks(ticks, [*(f"−{each}" for each in reversed(above)), "0", *above])
     ax.xaxis.set_minor_locator(NullLocator())
 
 
