@@ -60,6 +60,8 @@ _MEANT = {
     "step": "debug",
     "identify": "fit",
     "teach": "lesson",
+    "list": "run --list",
+    "scenarios": "run --list",
 }
 
 
@@ -95,12 +97,14 @@ class _Verb(TyperCommand):
         except _UsageError as error:
             param = getattr(error, "param", None)  # the missing one
             help_ = "" if error.message or param is None else str(getattr(param, "help", ""))
-            said = [error.message.rstrip("."), help_.rstrip("."), *self.cures(given)]
+            cures = self.cures(given, error.message)
+            said = [error.message.rstrip("."), help_.rstrip("."), *cures]
             error.message = ". ".join(filter(None, said))
             raise
 
-    def cures(self, args: list[str]) -> Iterator[str]:
+    def cures(self, args: list[str], message: str) -> Iterator[str]:
         """Yield what could be meant by arguments that are not taken."""
+        from gms_fsm.app._tables import RunTable
         from gms_fsm.charts.gms import LAWS
 
         known = {option for param in self.params for option in param.opts}
@@ -114,6 +118,20 @@ class _Verb(TyperCommand):
                 yield f"A key is changed by --set {each}"
             if "--law" in known and each in LAWS:
                 yield f"A law is chosen by --law {each}"
+        extra = re.search(r"unexpected extra argument.*\((\S+)\)", message)
+        if "--set" in known and (
+            parted := re.search(r"--set ([\w.]+)(?: = ?|= )([^\s=]+)", " ".join(args))
+        ):
+            yield f"A key is changed without blanks: --set {parted[1]}={parted[2]}"
+        elif (
+            "--output" in known and extra and re.search(r"[./\\]", extra[1]) and "=" not in extra[1]
+        ):
+            yield f"What is written is named by -o {extra[1]}"
+        option = re.match(r"No such option:? '?-+([\w-]+)", message)
+        name = option[1].replace("-", "_") if option else ""
+        keys = [each for each in RunTable.model_fields if name and each.startswith(name)]
+        if "--set" in known and keys:
+            yield f"A key of the run is changed by --set run.{keys[0]}=..."
         if {"-o", "--output"} & {*args} and "--output" not in known:
             yield f"It prints: gms-fsm {self.name} ... > FILE"
 
