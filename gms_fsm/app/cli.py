@@ -6,6 +6,7 @@ error messages appear at once.
 
 from __future__ import annotations
 
+import itertools
 import re
 import sys
 import warnings
@@ -118,20 +119,18 @@ class _Verb(TyperCommand):
                 yield f"A key is changed by --set {each}"
             if "--law" in known and each in LAWS:
                 yield f"A law is chosen by --law {each}"
-        extra = re.search(r"unexpected extra argument.*\((\S+)\)", message)
-        if "--set" in known and (
-            parted := re.search(r"--set ([\w.]+)(?: = ?|= )([^\s=]+)", " ".join(args))
-        ):
+        parted = re.search(r"--set ([\w.]+)(?: = ?|= )([^\s=]+)", " ".join(args))
+        extra = re.search(r"unexpected extra argument.*\(([^\s=]+[./\\][^\s=]*)\)", message)
+        if parted:
             yield f"A key is changed without blanks: --set {parted[1]}={parted[2]}"
-        elif (
-            "--output" in known and extra and re.search(r"[./\\]", extra[1]) and "=" not in extra[1]
-        ):
+        elif extra and "--output" in known:
             yield f"What is written is named by -o {extra[1]}"
-        option = re.match(r"No such option:? '?-+([\w-]+)", message)
-        name = option[1].replace("-", "_") if option else ""
+        option = re.match(r"No such option:? '?(-+([\w-]+))", message)
+        name = option[2].replace("-", "_") if option else ""
         keys = [each for each in RunTable.model_fields if name and each.startswith(name)]
-        if "--set" in known and keys:
-            yield f"A key of the run is changed by --set run.{keys[0]}=..."
+        if option and keys and "--set" in known:
+            value = dict(itertools.pairwise(args)).get(option[1], "...")
+            yield f"A key of the run is changed by --set run.{keys[0]}={value}"
         if {"-o", "--output"} & {*args} and "--output" not in known:
             yield f"It prints: gms-fsm {self.name} ... > FILE"
 

@@ -86,7 +86,7 @@ def axis(text: str) -> Axis:
         start, stop, count = *map(float, ends), int(number)
     except ValueError:
         meant = [in_si(each) for each in ends]
-        advice = f"write --over {name}={':'.join(meant)}:{number}"
+        advice = f"write --over {name}={':'.join(meant)}:{number}{logarithmic or ''}"
         raise ParameterError(
             "from and to must be numbers in SI units, and count an integer",
             place=here,

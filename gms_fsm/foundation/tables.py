@@ -143,7 +143,8 @@ def explained(
     places = _written_key(first["loc"], data)
     for each in findings:  # a table without its head gives its keys to none
         name = str(each["loc"][0]) if each["type"] == "missing" and len(each["loc"]) == 1 else ""
-        if len(places) == 1 and name and places[0] in _fields_at((name,), {name: data}, root):
+        unknown = first["type"] == "extra_forbidden" and len(places) == 1
+        if unknown and name and places[0] in _fields_at((name,), {name: data}, root):
             return places, f"{places[0]} is in no table; write its head, [{name}], above it"
     rest = len(findings) - 1
     sentence = _sentence(first, places, data, root) + (f" (and {rest} more)" if rest else "")

@@ -46,6 +46,11 @@ def _with_commas(found: re.Match[str]) -> str:
 
 _USUAL: Sequence[tuple[str, str | Callable[[re.Match[str]], str]]] = (
     (r"[“”„«»‘’]", "write straight quotes, \" or '"),
+    (
+        r"^([\w.]+)\s*=\s*([1-9]\d*),(\d{3})$",
+        "a number has no comma: write {1} = {2}{3} or {1} = {2}.{3}",
+    ),
+    (r"=\s*\[[^\]]*\b\d+,0\d", "a number has a decimal point: 0.05, not 0,05"),
     (r"^([\w.]+)\s*=\s*(\d+),(\d+)$", "a number has a decimal point: write {1} = {2}.{3}"),
     (rf"^([\w.]+)\s*=\s*({_NUMBER}(?:\s*[,;\s]\s*{_NUMBER})+)$", "write a list in brackets: [{2}]"),
     (rf"^([\w.]+)\s*=\s*({_NUMBER})\s*;$", "a line ends without ';': write {1} = {2}"),
