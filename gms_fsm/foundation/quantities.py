@@ -15,6 +15,7 @@ NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=[pnuµmkMGT]?(?:m/s|m|N|s)\b)")
 PREFIXES = {3 * i - 12: prefix for i, prefix in enumerate([*"pnµm", "", *"kMGT"])}
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
 TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns)(?=$|[/*·])")
+LONGEST_NUMBER = 60  # characters, with its unit: the search takes quadratic time
 FACTORS = {"g": 1e-3, "min": 60.0, "h": 3600.0, "%": 0.01}  # of units that are not of SI
 _ONE_UNIT = re.compile(r"([pnuµmckMGT]?)(Nm|Ns|Pa|Hz|rad|m|s|N|J|W|V|A|g)\^?(-?\d)?")
 _POWER_OF_TEN = re.compile(r"(?:([\d.,]+)\s*[*x×·]\s*)?\b10\s*(?:\^|\*\*)\s*\(?([+-]?\d+)\)?")
@@ -111,6 +112,8 @@ def in_si(text: str) -> str:
     >>> in_si("1,000"), in_si("1e-3*t"), in_si("5 apples")
     ('', '', '')
     """
+    if len(text) > LONGEST_NUMBER:
+        return ""
     plain = _POWER_OF_TEN.sub(lambda found: f"{found[1] or 1}e{found[2]}", text.strip())
     found = _WITH_UNIT.fullmatch(re.sub(r"(?<=\d),(?=\d)", ".", plain))
     if found is None or _THOUSANDS.search(plain):
@@ -125,9 +128,11 @@ def in_si(text: str) -> str:
         if factor is None:
             return ""
         scale *= 1.0 / factor if over else factor
-    if scale == 1.0 and re.fullmatch(r"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?", found[1]):
-        return found[1]
-    return f"{float(found[1]) * scale:.12g}"
+    number = float(found[1]) * scale
+    if not math.isfinite(number):
+        return ""
+    as_given = scale == 1.0 and re.fullmatch(r"[+-]?\d+(\.\d+)?([eE][+-]?\d+)?", found[1])
+    return found[1] if as_given else f"{number:.12g}"
 
 
 def _factor(unit: str) -> float | None:

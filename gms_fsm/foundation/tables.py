@@ -183,7 +183,10 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
         if kind == "list_type":
             return f"[{key}]: there may be several of it; write [[{key}]]"
         return f"[{key}] {text}" if key else text
-    return f"{key} = {shown(value)}: {_other_form(kind, value, _beside(places, data)) or text}"
+    field = _fields_at(places[:-1], data, root).get(str(places[-1]))
+    per_element = field is not None and "element" in (field.description or "")
+    elements = _beside(places, data) if per_element else 0
+    return f"{key} = {shown(value)}: {_other_form(kind, value, elements) or text}"
 
 
 def _other_form(kind: str, value: object, elements: int) -> str:
@@ -193,7 +196,7 @@ def _other_form(kind: str, value: object, elements: int) -> str:
         number = in_si(text)
         form = "it must be a number in SI units, without quotes, unit or formula"
         return f"{form}: {number}" if number else form
-    if kind == "list_type" and text:
+    if kind == "list_type" and 0 < len(text) <= LONGEST_SHOWN:
         return f"it must be a list: {_as_list(text)}"
     if kind == "list_type" and isinstance(value, int | float) and not isinstance(value, bool):
         every = ", ".join([repr(value)] * max(1, elements))

@@ -16,6 +16,7 @@ from gms_fsm.foundation.quantities import in_si
 Key = tuple[str | int, ...]  # names of keys, and places in arrays from 0
 
 LARGEST_FILE = 1_000_000  # bytes
+LONGEST_LINE = 2000  # characters that are searched for what is usual, in quadratic time
 MOST_PREFIXES = 60  # that are read to find a line
 DEEPEST_KEY = 6  # parts
 # tomllib takes quadratic time in the number of parts of a key, which can be hours.
@@ -156,6 +157,8 @@ def _refused(said: str, text: str) -> tuple[str, str]:
 
 def _usual(line: str) -> str:
     """Return the advice on what is usual in a line that is not TOML."""
+    if len(line) > LONGEST_LINE:
+        return ""
     plain = re.sub(r"\s*#[^\"']*$", "", line).strip()
     for pattern, advice in _USUAL:
         if not (found := re.search(pattern, plain)):
