@@ -63,6 +63,7 @@ from gms_fsm import (
     sweep,
 )
 from gms_fsm.app.cli import CliOptions, app
+from gms_fsm.app.scenario import load_system
 from gms_fsm.charts import CHARTS, gms_element
 from gms_fsm.charts.registry import Demonstration, Entry, entry
 from gms_fsm.errors import (
@@ -238,6 +239,7 @@ rows = {
     "of a table within": ("v_c = 1e-6", "v_c = 1e-6\nF_c = 1.0"),
     "of another program": (END, f"{END}\ndt = 1e-3"),
     "no C": (f"{ONE_C}\n", ""),
+    "no head of the model": ("[model]\n", ""),
 }
 group("key of a scenario", ScenarioError, edited, rows, "a.toml")
 rows = {
@@ -245,6 +247,13 @@ rows = {
     "model in other letters": ('"GMS"', '"gms"'),
     "model with a hyphen": ('"GMS"', '"lu-gre"'),
     "number with its unit": (END, 't_end = "60 s"'),
+    "number with another unit": ("v_c = 1e-6", 'v_c = "1e-3 mm/s"'),
+    "number with a unit below the line": ("v_c = 1e-6", 'v_c = "2 N/mm"'),
+    "number with an unknown unit": ("v_c = 1e-6", 'v_c = "5 apples"'),
+    "formula for a number": (END, 't_end = "2*t"'),
+    "number of zero": ("v_c = 1e-6", "v_c = 0"),
+    "list for a table": ("{ F_c = 1.0, F_s = 1.5, v_s = 1e-3 }", "[1.0, 1.5, 1e-3]"),
+    "decimal commas in a list": (ONE_C, "C = [0,1, 0,1]"),
     "numbers in a text": ("[100.0, 50.0]", '"100, 50"'),
     "unknown law": ('"signed"', '"singed"'),
     "unknown column of Table I": (MODEL, PAPER.replace("stick-slip", "stickslip")),
@@ -314,6 +323,7 @@ rows = {
     "a key twice": (OPEN_LOOP + "figures = []\n",),
     "binary": (bytes(range(256)) * 10,),
     "UTF-16": (OPEN_LOOP.encode("utf-16"),),
+    "Latin-1": (OPEN_LOOP.replace("[rig]", "# Gerät\n[rig]").encode("latin-1"),),
     "brackets without end": ("a = " + "[" * 5000,),
     "a line of 2 MB": ("title = '" + "a" * 2_000_000 + "'\n",),
     "no number at all": ("title = 1.2.3",),
@@ -327,12 +337,18 @@ group("file that is no scenario", ScenarioError, scenario, rows, "a.toml")
 rows = {
     "unit": (END, "t_end = 60 s"),
     "unit that is a quotient": ("v_c = 1e-6", "v_c = 1e-3 mm/s"),
+    "power of ten": ("v_c = 1e-6", "v_c = 10^-6"),
     "decimal comma": (END, "t_end = 1,5"),
+    "comma of thousands": (END, "t_end = 1,000"),
+    "decimal commas before zeros": (ONE_C, "C = [0,05, 0,05]"),
     "list without brackets": ("[100.0, 50.0]", "100.0, 50.0"),
     "list without commas": ("[100.0, 50.0]", "[100.0 50.0]"),
+    "list with semicolons": ("[100.0, 50.0]", "[100.0; 50.0]"),
     "colon": (END, "t_end: 1.0"),
     "semicolon": (END, "t_end = 1.0;"),
     "comment of another language": (END, "t_end = 1.0 // s"),
+    "comment of Matlab": ("[100.0, 50.0]", "[100.0, 50.0]  % N/m"),
+    "head of the second table left out": ("[rig]\n", ""),
     "word without quotes": ('"signed"', "signed"),
     "formula without quotes": (QUOTED, SIN),
     "truth of Python": ("[output]", "[output]\ncsv = True"),
@@ -368,6 +384,8 @@ rows = {
     "unknown table": (OPEN_LOOP, "modell.law=published"),
     "unknown law": (OPEN_LOOP, "model.law=singed"),
     "word for a number": (OPEN_LOOP, "run.t_end=soon"),
+    "decimal comma": (OPEN_LOOP, "run.t_end=1,5"),
+    "thousands": (OPEN_LOOP, "run.t_end=1,000"),
     "nothing for a number": (OPEN_LOOP, "run.t_end="),
     "half a list": (OPEN_LOOP, "model.k=[1.0"),
     "three elements": (OPEN_LOOP, "model.k=[1.0, 2.0, 3.0]"),
@@ -389,6 +407,16 @@ rows = {
 group("override", ScenarioError, scenario, rows)
 
 
+def system_of(text: str) -> None:
+    """Read the system of a scenario file with these contents."""
+    Path("a.toml").write_text(text)
+    load_system("a.toml")
+
+
+rows = {"model on a rig": (OPEN_LOOP,)}
+group("system of a scenario", ScenarioError, system_of, rows, "a.toml")
+
+
 def grid(*over: str) -> None:
     """Sweep the open loop over these."""
     Path("a.toml").write_text(OPEN_LOOP)
@@ -401,6 +429,8 @@ rows = {
     "no name": ("--over =1:2:3", ..., "=1:2:3"),
     "unknown spacing": ("--over F_s=1:2:3,lin", ..., "F_s=1:2:3,lin"),
     "word": ("--over F_s=a:2:3", ..., "F_s=a:2:3"),
+    "decimal comma": ("--over F_s=0,5:2:4,log", ..., "F_s=0,5:2:4,log"),
+    "unit": ("--over F_s=1 mN:5 mN:5", ..., "F_s=1 mN:5 mN:5"),
     "fraction of a run": ("--over F_s=1:2:3.5", ..., "F_s=1:2:3.5"),
     "infinity": ("--over F_s=1:inf:3", ..., "F_s=1:inf:3"),
     "one run": ("--over F_s=1:2:1", ..., "F_s=1:2:1"),
@@ -488,6 +518,9 @@ rows = {
     "scenario that is missing": ("gone.toml", ..., "run gone.toml"),
     "scenario that is a folder": (".", ..., "run ."),
     "name of no scenario": ("", ..., "debug pulledmass"),
+    "file without its ending": ("", ..., "run pair"),
+    "fit of a table": ("own.csv", ..., "fit own.csv"),
+    "fit of a scenario of the package": ("pulled_mass", ..., "fit pulled_mass"),
 }
 group("command", ScenarioError, command, rows)
 rows = {
@@ -832,6 +865,9 @@ rows = {
     "three bounds": ("a.toml", ..., "fit.bounds.k=[1.0, 2.0, 3.0]"),
     "bounds and not free": ("[fit]: bounds", ..., "fit.bounds.C=[1.0, 2.0]"),
     "search": ("a.toml", ..., "fit.search=genetic"),
+    "rows in a text": ("a.toml", ..., "fit.train=4-16"),
+    "names in a text": ("a.toml", ..., "fit.free=k, C"),
+    "text for a column": ("a.toml", ..., "record.time=t"),
     "measured": ("[fit]: measured", ..., "fit.measured=G"),
 }
 group("table of a fit", ScenarioError, fit_command, rows)
@@ -2701,9 +2737,12 @@ def no_trace(kind: str) -> None:
     if kind == "array":
         with Path("run.npz").open("wb") as file:
             np.save(file, np.zeros(3))
+    elif kind == "out":
+        Path("out/own").mkdir(parents=True)
+        Path("out/own/trace.npz").touch()
     else:
         Path(f"run.{kind}").mkdir()
-    Trace.load("run.npz" if kind == "array" else f"run.{kind}")
+    Trace.load({"array": "run.npz", "out": "out"}.get(kind, f"run.{kind}"))
 
 
 def watched(monitor: Any) -> None:
@@ -2731,6 +2770,7 @@ rows = {
     "array": ("run.npz", ..., "array"),
     "folder": ("run.npz", ..., "npz"),
     "CSV": ("run.csv", ..., "csv"),
+    "folder of runs": ("out", ..., "out"),
 }
 group("no trace", TraceFileError, no_trace, rows)
 rows = {"what one contact sees": ("pad",)}

@@ -9,7 +9,7 @@ from tests.refusals import REFUSALS, approved, place_of, refused, told
 
 INPUTS = {"a.toml", "own.csv", "in/a.toml", "in/own.csv", "own.toml", "pulled.toml", "pair.toml"}
 INPUTS |= {f"test{number:02d}.csv" for number in range(13)}
-TRACES = {"run.npz", ".npz", "run.txt", "run.csv", "run.transitions.csv"}
+TRACES = {"run.npz", ".npz", "run.txt", "run.csv", "run.transitions.csv", "out/own/trace.npz"}
 SESSIONS = {"s.json", "odd.json"}
 
 

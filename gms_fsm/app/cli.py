@@ -6,6 +6,7 @@ error messages appear at once.
 
 from __future__ import annotations
 
+import itertools
 import re
 import sys
 import warnings
@@ -60,6 +61,8 @@ _MEANT = {
     "step": "debug",
     "identify": "fit",
     "teach": "lesson",
+    "list": "run --list",
+    "scenarios": "run --list",
 }
 
 
@@ -95,12 +98,14 @@ class _Verb(TyperCommand):
         except _UsageError as error:
             param = getattr(error, "param", None)  # the missing one
             help_ = "" if error.message or param is None else str(getattr(param, "help", ""))
-            said = [error.message.rstrip("."), help_.rstrip("."), *self.cures(given)]
+            cures = self.cures(given, error.message)
+            said = [error.message.rstrip("."), help_.rstrip("."), *cures]
             error.message = ". ".join(filter(None, said))
             raise
 
-    def cures(self, args: list[str]) -> Iterator[str]:
+    def cures(self, args: list[str], message: str) -> Iterator[str]:
         """Yield what could be meant by arguments that are not taken."""
+        from gms_fsm.app._tables import RunTable
         from gms_fsm.charts.gms import LAWS
 
         known = {option for param in self.params for option in param.opts}
@@ -114,6 +119,18 @@ class _Verb(TyperCommand):
                 yield f"A key is changed by --set {each}"
             if "--law" in known and each in LAWS:
                 yield f"A law is chosen by --law {each}"
+        parted = re.search(r"--set ([\w.]+)(?: = ?|= )([^\s=]+)", " ".join(args))
+        extra = re.search(r"unexpected extra argument.*\(([^\s=]+[./\\][^\s=]*)\)", message)
+        if parted:
+            yield f"A key is changed without blanks: --set {parted[1]}={parted[2]}"
+        elif extra and "--output" in known:
+            yield f"What is written is named by -o {extra[1]}"
+        option = re.match(r"No such option:? '?(-+([\w-]+))", message)
+        name = option[2].replace("-", "_") if option else ""
+        keys = [each for each in RunTable.model_fields if name and each.startswith(name)]
+        if option and keys and "--set" in known:
+            value = dict(itertools.pairwise(args)).get(option[1], "...")
+            yield f"A key of the run is changed by --set run.{keys[0]}={value}"
         if {"-o", "--output"} & {*args} and "--output" not in known:
             yield f"It prints: gms-fsm {self.name} ... > FILE"
 

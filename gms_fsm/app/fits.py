@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gms_fsm.app._tables import FitTable, RecordTable, Scenario, SystemScenario
-from gms_fsm.app.scenario import find_file, kind_of, load_scenario, read_system
+from gms_fsm.app.scenario import find_file, kind_of, load_scenario, read_system, scenario_file
 from gms_fsm.errors import GMSError, RecordError, ScenarioError
 from gms_fsm.foundation.toml import parsed
 from gms_fsm.identification.fit import task_of
 from gms_fsm.identification.problem.task import Task
 from gms_fsm.records.record import Record
-from gms_fsm.scenarios import scenario_path
+from gms_fsm.scenarios import shipped
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
 
@@ -70,7 +70,7 @@ def load_fit(path: str | Path, overrides: Sequence[str] = ()) -> LoadedFit:
     RecordError
         If the record is invalid, or nothing can be found from it.
     """
-    path = scenario_path(path)
+    path = scenario_file(path)
     scenario: Scenario | SystemScenario
     model: Model | System
     if kind_of(parsed(path)) == "system":
@@ -90,6 +90,12 @@ def load_fit(path: str | Path, overrides: Sequence[str] = ()) -> LoadedFit:
 
 def _given(path: Path, scenario: Scenario | SystemScenario) -> tuple[FitTable, RecordTable]:
     """Return the tables [fit] and [record] of a file that has both."""
+    if scenario.fit is None and path in shipped().values():
+        raise ScenarioError(
+            "a scenario of the package has no [record] and no [fit]",
+            place=path.stem,
+            advice=f"copy it with `gms-fsm copy {path.stem}`, and add them to the copy",
+        )
     if scenario.fit is None:
         raise ScenarioError(
             "there is no table [fit]", place=str(path), advice=f"add one with {EXAMPLE}"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from gms_fsm.app._tables import (
     PrescribedTable,
@@ -28,8 +28,8 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
 from gms_fsm.foundation.arguments import no_file, unknown
 from gms_fsm.foundation.files import inside
-from gms_fsm.foundation.tables import explained, read_file
-from gms_fsm.foundation.toml import override, parsed
+from gms_fsm.foundation.tables import read_file
+from gms_fsm.foundation.toml import parsed
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import simulate
@@ -149,8 +149,7 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     RecordError
         If a record is invalid; the message names file, row and column.
     """
-    path = scenario_path(path)
-    _check_ending(path)
+    path = scenario_file(path)
     data = parsed(path)
     if not data:
         raise ScenarioError(
@@ -169,13 +168,7 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         )
     if kind_of(data) == "system":
         return _loaded_system(path, overrides)
-    for setting in overrides:
-        override(data, setting)
-    try:
-        scenario = Scenario.model_validate(data)
-    except ValidationError as error:
-        _, sentence = explained(error, data, Scenario)
-        raise ScenarioError(sentence, place=str(path)) from None
+    scenario = read_file(path, Scenario, ScenarioError, lambda table: table, overrides)
     try:
         return _loaded(path, scenario)
     except (RecordError, ScenarioError):
@@ -188,8 +181,9 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         raise ScenarioError.of(error).replaced(place=place).inside(path) from None
 
 
-def _check_ending(path: Path) -> None:
-    """Refuse a file that is none of ours, or a run."""
+def scenario_file(given: str | Path) -> Path:
+    """Return the path of a scenario; refuse a file that is none of ours, or a run."""
+    path = scenario_path(given)
     match path.suffix.lower():
         case ".py":
             raise ScenarioError(
@@ -202,11 +196,17 @@ def _check_ending(path: Path) -> None:
             raise ScenarioError(
                 "it is a trace or a table, and a scenario (.toml) is wanted",
                 place=str(path),
-                advice=f"`gms-fsm replay {path}` steps through a trace, `gms-fsm plot {path}` "
-                "draws it; a table is named in the [record] of a scenario",
+                advice="a table of measurements is named in the [record] of a scenario; a trace "
+                f"is drawn by `gms-fsm plot {path}`, and `gms-fsm replay {path}` steps through it",
             )
         case "" if len(path.parts) == 1 and not path.exists():
+            if path.with_suffix(".toml").is_file():
+                raise ScenarioError(
+                    f"there is no file or scenario {path.name!r}",
+                    advice=f"did you mean '{path.name}.toml'?",
+                )
             raise unknown("file or scenario", path.name, shipped(), ScenarioError)
+    return path
 
 
 def kind_of(data: Mapping[str, Any]) -> str:
@@ -257,7 +257,12 @@ def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
     ScenarioError
         Naming file, line, key and text.
     """
-    return read_system(scenario_path(path), overrides)[1]
+    path = scenario_file(path)
+    if kind_of(parsed(path)) == "rig":
+        raise ScenarioError(
+            "it is a model on a rig, not a system", place=str(path), advice="use load_scenario"
+        )
+    return read_system(path, overrides)[1]
 
 
 def read_system(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, System]:

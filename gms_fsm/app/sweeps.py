@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from gms_fsm.errors import ParameterError, cut
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.files import csv_text, output_folder, refuse_input, write_text
 from gms_fsm.foundation.markdown import plain, table_lines
+from gms_fsm.foundation.quantities import in_si
 from gms_fsm.run.sweep import Sweep, sweep
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in
@@ -72,19 +74,23 @@ def axis(text: str) -> Axis:
     """
     here = f"--over {cut(text)}"
     name, equals, form = (part.strip() for part in text.partition("="))
-    form, comma, word = (part.strip() for part in form.partition(","))
-    parts = form.split(":")
-    if not (name and equals) or len(parts) != 3 or (comma and word != "log"):
+    found = re.fullmatch(r"([^:]*):([^:]*):([^:,]*)(,\s*log)?", form)
+    if not (name and equals and found):
         raise ParameterError(
             "give it as name=from:to:count, for example F_s=1:2:11, and append "
             ",log for logarithmic spacing",
             place=here,
         )
+    *ends, number, logarithmic = found.groups()
     try:
-        start, stop, count = float(parts[0]), float(parts[1]), int(parts[2])
+        start, stop, count = *map(float, ends), int(number)
     except ValueError:
+        meant = [in_si(each) for each in ends]
+        advice = f"write --over {name}={':'.join(meant)}:{number}{logarithmic or ''}"
         raise ParameterError(
-            "from and to must be numbers, and count an integer", place=here
+            "from and to must be numbers in SI units, and count an integer",
+            place=here,
+            advice=advice if all(meant) and number.isdecimal() else "",
         ) from None
     if not (math.isfinite(start) and math.isfinite(stop)):
         raise ParameterError("from and to must be finite", place=here)
@@ -92,7 +98,7 @@ def axis(text: str) -> Axis:
         raise ParameterError(
             f"count is {count}", place=here, advice=f"it must be between 2 and {MOST_RUNS}"
         )
-    if not comma:
+    if not logarithmic:
         return Axis(name, np.linspace(start, stop, count), "linear")
     if not (start > 0.0 and stop > 0.0):
         raise ParameterError("with log, both from and to must be > 0", place=here)

@@ -15,6 +15,12 @@ NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=[pnuµmkMGT]?(?:m/s|m|N|s)\b)")
 PREFIXES = {3 * i - 12: prefix for i, prefix in enumerate([*"pnµm", "", *"kMGT"])}
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
 TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns)(?=$|[/*·])")
+LONGEST_NUMBER = 60  # characters, with its unit: the search takes quadratic time
+FACTORS = {"g": 1e-3, "min": 60.0, "h": 3600.0, "%": 0.01}  # of units that are not of SI
+_ONE_UNIT = re.compile(r"([pnuµmckMGT]?)(Nm|Ns|Pa|Hz|rad|m|s|N|J|W|V|A|g)\^?(-?\d)?")
+_POWER_OF_TEN = re.compile(r"(?:([\d.,]+)\s*[*x×·]\s*)?\b10\s*(?:\^|\*\*)\s*\(?([+-]?\d+)\)?")
+_WITH_UNIT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
+_THOUSANDS = re.compile(r"(?<!\d)[1-9]\d{0,2}(?:,\d{3})+(?!\d)")
 BLOCKS = "▁▂▃▄▅▆▇█"
 DIGITS = 4
 SMALLEST = -4  # power of ten of a value in the unit of its place, below which it has an exponent
@@ -96,6 +102,49 @@ def in_words(value: float, unit: str = "", digits: int = 6) -> str:
 def trimmed(text: str) -> str:
     """Return a number, with or without a unit, without zeros at its end."""
     return re.sub(r"(\.\d*[1-9])0+(?!\d)|\.0+(?!\d)", r"\1", text)
+
+
+def in_si(text: str) -> str:
+    """Return the number that a text means, in SI units; empty if it means none, or several.
+
+    >>> in_si("1 mm/s"), in_si("1,5"), in_si("10^-3"), in_si("2 N/mm"), in_si("3 kg")
+    ('0.001', '1.5', '1e-3', '2000', '3')
+    >>> in_si("1,000"), in_si("1e-3*t"), in_si("5 apples")
+    ('', '', '')
+    """
+    if len(text) > LONGEST_NUMBER:
+        return ""
+    plain = _POWER_OF_TEN.sub(lambda found: f"{found[1] or 1}e{found[2]}", text.strip())
+    found = _WITH_UNIT.fullmatch(re.sub(r"(?<=\d),(?=\d)", ".", plain))
+    if found is None or _THOUSANDS.search(plain):
+        return ""
+    scale, over = 1.0, False
+    unit = found[2].replace("μ", "µ").replace("²", "2").replace("³", "3")
+    for part in re.split(r"([/*·])", unit) if unit else []:
+        if part in "/*·":
+            over = part == "/"
+            continue
+        factor = _factor(part.strip())
+        if factor is None:
+            return ""
+        scale *= 1.0 / factor if over else factor
+    number = float(found[1]) * scale
+    if not math.isfinite(number):
+        return ""
+    as_given = scale == 1.0 and re.fullmatch(r"[+-]?\d+(\.\d+)?([eE][+-]?\d+)?", found[1])
+    return found[1] if as_given else f"{number:.12g}"
+
+
+def _factor(unit: str) -> float | None:
+    """Return the factor to SI of one unit, with its prefix and power."""
+    if unit in FACTORS:
+        return FACTORS[unit]
+    found = _ONE_UNIT.fullmatch(unit)
+    if found is None:
+        return None
+    prefixes = {prefix: power for power, prefix in PREFIXES.items()} | {"u": -6, "c": -2}
+    factor = 10.0 ** prefixes[found[1]] * FACTORS.get(found[2], 1.0)
+    return float(factor ** int(found[3] or 1))
 
 
 def _power(value: float) -> int:

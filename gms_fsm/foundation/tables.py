@@ -16,6 +16,7 @@ from pydantic.fields import FieldInfo
 from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, shown
 from gms_fsm.foundation.arguments import either, meant, nearest, some_of
 from gms_fsm.foundation.files import output_folder, write_whole
+from gms_fsm.foundation.quantities import in_si
 from gms_fsm.foundation.toml import LARGEST_FILE, Key, data_of, line_of, override, text_of, written
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
@@ -140,10 +141,17 @@ def explained(
     # An unknown key is often the cause of a missing one, so report it first.
     first = min(findings, key=lambda f: f["type"] != "extra_forbidden")
     places = _written_key(first["loc"], data)
+    for each in findings:  # a table without its head gives its keys to none
+        name = str(each["loc"][0]) if each["type"] == "missing" and len(each["loc"]) == 1 else ""
+        unknown = first["type"] == "extra_forbidden" and len(places) == 1
+        if unknown and name and places[0] in _fields_at((name,), {name: data}, root):
+            return places, f"{places[0]} is in no table; write its head, [{name}], above it"
     rest = len(findings) - 1
     sentence = _sentence(first, places, data, root) + (f" (and {rest} more)" if rest else "")
     tag = first.get("ctx", {}).get("discriminator", "").strip("'")
-    return (*places, tag) if tag else places, sentence
+    part = tag or getattr(first.get("ctx", {}).get("error"), "place", "").partition("[")[0]
+    value = first.get("input")
+    return (*places, part) if isinstance(value, dict) and part in value else places, sentence
 
 
 def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseModel]) -> str:
@@ -166,27 +174,69 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
         hint = meant(given, re.findall("'([^']+)'", allowed))
         return f"{key}.{tag} = {shown(given)}: {hint}it must be one of {allowed}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return f"{key} = {shown(value)}: it must be a table, [{key}]"
+        inner = _fields_at(places, data, root) if len(places) > 1 else {}
+        form = _as_table(value, inner) or f"[{key}]"
+        return f"{key} = {shown(value)}: it must be a table, {form}"
     text = first["msg"].removeprefix("Value error, ")
     text = text.replace("Input should be", "it must be")
     if isinstance(value, dict):
         if kind == "list_type":
             return f"[{key}]: there may be several of it; write [[{key}]]"
         return f"[{key}] {text}" if key else text
-    return f"{key} = {shown(value)}: {_other_form(kind, value) or text}"
+    field = _fields_at(places[:-1], data, root).get(str(places[-1]))
+    per_element = field is not None and "element" in (field.description or "")
+    elements = _beside(places, data) if per_element else 0
+    return f"{key} = {shown(value)}: {_other_form(kind, value, elements) or text}"
 
 
-def _other_form(kind: str, value: object) -> str:
+def _other_form(kind: str, value: object, elements: int) -> str:
     """Return how a value of another type is written; empty if the rule says it."""
-    number = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
     text = value.strip() if isinstance(value, str) else ""
-    if kind == "float_type" and (found := re.match(number, text)):
-        return f"it must be a number, without quotes and unit: {found[0]}, in SI units"
-    if kind == "list_type" and (several := re.findall(number, text)):
-        return f"it must be a list: [{', '.join(several)}]"
+    if kind == "float_type" and text:
+        number = in_si(text)
+        form = "it must be a number in SI units, without quotes, unit or formula"
+        return f"{form}: {number}" if number else form
+    if kind == "list_type" and 0 < len(text) <= LONGEST_SHOWN:
+        return f"it must be a list: {_as_list(text)}"
     if kind == "list_type" and isinstance(value, int | float) and not isinstance(value, bool):
-        return f"it must be a list, with one number for each element: [{value!r}]"
+        every = ", ".join([repr(value)] * max(1, elements))
+        return f"it must be a list{', one number for each element' * bool(elements)}: [{every}]"
     return ""
+
+
+def _as_list(text: str) -> str:
+    """Return a text as the list that it stands for.
+
+    >>> _as_list("4-16"), _as_list("100, 50"), _as_list("k, weights"), _as_list("coverage")
+    ('[4, 16]', '[100, 50]', '["k", "weights"]', '["coverage"]')
+    """
+    number = r"(?:(?<![\d.])[+-])?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+    if re.fullmatch(rf"\W*{number}(?:(?:[\s,;:\-]|\.\.|to)+{number})*\W*s?", text):
+        return f"[{', '.join(re.findall(number, text))}]"
+    words = filter(None, (each.strip() for each in re.split(r"[,;]", text.strip("[]"))))
+    return f"[{', '.join(f'{chr(34)}{cut(each, 40)}{chr(34)}' for each in words)}]"
+
+
+def _as_table(value: object, fields: Mapping[str, FieldInfo]) -> str:
+    """Return a value as the table in one line that it stands for; empty for a large table."""
+    needed = [name for name, field in fields.items() if field.is_required()]
+    if not 1 < len(needed) < 4:
+        return ""
+    given = value if isinstance(value, list) else [value] if isinstance(value, str) else []
+    plain = all(isinstance(each, str | int | float) for each in given)
+    parts = [shown(each).replace("'", '"') for each in given[: len(needed) * plain]]
+    parts += ["..."] * (len(needed) - len(parts))
+    return f"{{ {', '.join(map(' = '.join, zip(needed, parts, strict=True)))} }}"
+
+
+def _beside(places: Key, data: Any) -> int:
+    """Return the number of entries of the longest list of numbers beside a key."""
+    for part in places[:-1]:
+        data = data[part]
+    values = data.values() if isinstance(data, dict) else []
+    lists = [each for each in values if isinstance(each, list)]
+    numbers = [each for each in lists if all(isinstance(part, int | float) for part in each)]
+    return max(map(len, numbers), default=0)
 
 
 def _what(field: FieldInfo) -> str:

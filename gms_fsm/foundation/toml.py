@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from gms_fsm.errors import GMSError, ScenarioError, cut, scene, shown
 from gms_fsm.foundation.arguments import no_file, unknown
+from gms_fsm.foundation.quantities import in_si
 
 Key = tuple[str | int, ...]  # names of keys, and places in arrays from 0
 
 LARGEST_FILE = 1_000_000  # bytes
+LONGEST_LINE = 2000  # characters that are searched for what is usual, in quadratic time
 MOST_PREFIXES = 60  # that are read to find a line
 DEEPEST_KEY = 6  # parts
 # tomllib takes quadratic time in the number of parts of a key, which can be hours.
@@ -28,17 +30,41 @@ _HALF_A_NUMBER = re.compile(  # a digit on only one side of the point
 _AT = re.compile(r" \(at line (\d+), column (\d+)\)| \(at end of document\)")
 # What is usual in a line that is not TOML, without its comment, and the cure.
 _NUMBER = r"[+-]?\d[\d_]*(?:\.\d+)?(?:[eE][+-]?\d+)?"
-_USUAL: Sequence[tuple[str, str]] = (
+_VALUE = rf"\"[^\"]*\"|'[^']*'|\[[^\]]*\]|\{{[^}}]*\}}|{_NUMBER}|true|false"
+
+
+def _number_alone(found: re.Match[str]) -> str:
+    """Return the advice on a number that is written with a unit, or as a power."""
+    number = in_si(found[2])
+    return f"write the number alone, in SI units: {found[1]} = {number}" if number else ""
+
+
+def _with_commas(found: re.Match[str]) -> str:
+    """Return the advice on numbers of a list that have no commas between them."""
+    numbers = ", ".join(re.split(r"\s*[,;]\s*|\s+", found[1].strip()))
+    return f"write commas between the numbers of a list: [{numbers}]"
+
+
+_USUAL: Sequence[tuple[str, str | Callable[[re.Match[str]], str]]] = (
     (r"[“”„«»‘’]", "write straight quotes, \" or '"),
+    (
+        r"^([\w.]+)\s*=\s*([1-9]\d*),(\d{3})$",
+        "a number has no comma: write {1} = {2}{3} or {1} = {2}.{3}",
+    ),
+    (r"=\s*\[[^\]]*\b\d+,0\d", "a number has a decimal point: 0.05, not 0,05"),
     (r"^([\w.]+)\s*=\s*(\d+),(\d+)$", "a number has a decimal point: write {1} = {2}.{3}"),
     (rf"^([\w.]+)\s*=\s*({_NUMBER}(?:\s*[,;\s]\s*{_NUMBER})+)$", "write a list in brackets: [{2}]"),
     (rf"^([\w.]+)\s*=\s*({_NUMBER})\s*;$", "a line ends without ';': write {1} = {2}"),
-    (rf"^([\w.]+)\s*=\s*({_NUMBER})\s*//(.*)$", "a comment begins with #: write {1} = {2}  # {3}"),
+    (
+        rf"^([\w.]+)\s*=\s*({_VALUE})\s*(?://|%)\s*(\S.*)$",
+        "a comment begins with #: write {1} = {2}  # {3}",
+    ),
+    (r"^([\w.]+)\s*=\s*([^\"'\[{]+)$", _number_alone),
     (
         rf"^([\w.]+)\s*=\s*({_NUMBER})\s*([a-zA-Zµμ°%][\w/^²*·µ]*)$",
         "write the number alone, in SI units; {3} can stand behind a #",
     ),
-    (rf"=\s*\[\s*{_NUMBER}(?:,?\s+{_NUMBER})+", "write commas between the numbers of a list"),
+    (rf"=\s*\[\s*({_NUMBER}(?:\s*[,;]\s*{_NUMBER}|\s+{_NUMBER})+)\s*\]", _with_commas),
     (
         r"\"[A-Za-z]:\\",
         "in double quotes a \\ has a meaning: write the path with / or in single quotes",
@@ -90,8 +116,13 @@ def text_of(path: Path, kind: type[GMSError] = ScenarioError) -> str:
         )
     try:
         return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise kind("not UTF-8 text", place=str(path), advice="give a TOML file") from None
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise kind(
+            f"line {line} is not UTF-8 text",
+            place=str(path),
+            advice="give a TOML file, saved as UTF-8",
+        ) from None
 
 
 def data_of(text: str, path: Path, kind: type[GMSError] = ScenarioError) -> dict[str, Any]:
@@ -118,7 +149,7 @@ def _refused(said: str, text: str) -> tuple[str, str]:
     number, column = (int(at[1]), int(at[2])) if at[1] else (len(lines), 1)
     line = lines[number - 1].rstrip()
     if said.startswith("Cannot"):  # declare, overwrite, redefine: all of what is there already
-        advice = "the key, or its table, is given twice: join them"
+        advice = _twice(lines[:number])
     else:
         advice = _with_digits(line) or _usual(line) or cut(said.replace(at[0], ""))
     return f"line {number} is not valid TOML", f"{advice}\n{scene(line, column)}"
@@ -126,11 +157,34 @@ def _refused(said: str, text: str) -> tuple[str, str]:
 
 def _usual(line: str) -> str:
     """Return the advice on what is usual in a line that is not TOML."""
+    if len(line) > LONGEST_LINE:
+        return ""
     plain = re.sub(r"\s*#[^\"']*$", "", line).strip()
     for pattern, advice in _USUAL:
-        if found := re.search(pattern, plain):
-            return advice.format("", *(each.strip() for each in found.groups("")))
+        if not (found := re.search(pattern, plain)):
+            continue
+        if not isinstance(advice, str):
+            said = advice(found)
+        else:
+            said = advice.format("", *(each.strip() for each in found.groups("")))
+        if said:
+            return said
     return ""
+
+
+def _twice(lines: Sequence[str]) -> str:
+    """Return the advice on the last of some lines, whose key or table is given before."""
+    if key := re.match(r"\s*([\w-]+)\s*=", lines[-1]):
+        for i in range(len(lines) - 1, 0, -1):
+            before = lines[i - 1]
+            if re.match(rf"\s*{key[1]}\s*=", before):
+                return (
+                    f"{key[1]} is on line {i} already: remove one, or write the head of its "
+                    "table, such as [rig], above the second"
+                )
+            if before.lstrip().startswith("["):
+                break
+    return "the key, or its table, is given twice: join them"
 
 
 def _with_digits(line: str) -> str:

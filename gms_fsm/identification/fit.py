@@ -288,8 +288,8 @@ def _check_records(task: Task) -> None:
             raise RecordError(
                 f"it has no {column}, with which to compare",
                 place=record.place,
-                advice=f"give {column}=(name, unit) when reading it; it has "
-                f"{', '.join(record.columns)}",
+                advice=f"give {column} = {{ column = ..., unit = ... }} in a scenario, "
+                f"{column}=(name, unit) in Python; it has {', '.join(record.columns)}",
             )
     train, test = task.options.train, task.options.test
     if train is not None and test is not None and train[0] < test[1] and test[0] < train[1]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, why
-from gms_fsm.foundation.arguments import no_file
+from gms_fsm.foundation.arguments import no_file, some_of
 from gms_fsm.foundation.display import short_repr
 from gms_fsm.foundation.logs import Log
 from gms_fsm.lowering.observing import armed, rate, sigmas
@@ -180,8 +180,13 @@ def read_parts(path: Path) -> Parts:
     from gms_fsm.traces.files import csv_files, npz_files
 
     reader = {".npz": npz_files.read, ".csv": csv_files.read}.get(path.suffix)
-    if path.is_dir() and (inside := path / "trace.npz").is_file():
-        raise TraceFileError("it is a folder", place=str(path), advice=f"give {inside}")
+    if path.is_dir():
+        inside = sorted(path.glob("**/trace.npz"), key=lambda each: len(each.parts))
+        raise TraceFileError(
+            "it is a folder",
+            place=str(path),
+            advice=f"give {some_of(map(str, inside))}" if inside else "give a .npz or .csv file",
+        )
     if reader is None:
         raise TraceFileError(
             f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",

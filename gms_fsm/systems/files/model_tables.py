@@ -98,6 +98,7 @@ class GMSTable(Table):
         assert self.k is not None
         assert self.v_c is not None
         assert self.stribeck is not None
+        self._check_lengths()
         n, sigma_2 = len(self.k), self.sigma_2 or 0.0
         sigma = [0.0] * n if self.sigma is None else self.sigma
         if self.shares is not None:
@@ -115,8 +116,10 @@ class GMSTable(Table):
                     sigma_2=sigma_2,
                 )
             except ParameterError as error:
+                if not error.place.startswith("alpha"):
+                    raise
                 place = "shares" + error.place.removeprefix("alpha")
-                raise error.replaced(place=place) if error.place != place else error from None
+                raise error.replaced(place=place) from None
         else:
             if not isinstance(self.C, list):
                 raise ValueError(
@@ -133,6 +136,23 @@ class GMSTable(Table):
                 weights=self.weights,
             )
         return GMS(parameters, law=self.law)
+
+    def _check_lengths(self) -> None:
+        """Refuse lists of different lengths, with the cure of those with decimal commas."""
+        given = {name: getattr(self, name) for name in ("k", "sigma", "C", "weights", "shares")}
+        lists = {name: value for name, value in given.items() if isinstance(value, list)}
+        lengths = {len(value) for value in lists.values()}
+        if len(lengths) < 2:
+            return
+        advice = "give one number for each element"
+        for name, value in lists.items():
+            whole = all(each >= 0 and each.is_integer() for each in value)
+            if whole and len(value) == 2 * min(lengths):
+                pairs = zip(value[::2], value[1::2], strict=True)
+                numbers = ", ".join(f"{a:.0f}.{b:.0f}" for a, b in pairs)
+                advice = f"a number has a decimal point: {name} = [{numbers}]"
+        counts = " and ".join(f"{len(value)} in {name}" for name, value in lists.items())
+        raise ParameterError(f"there are {counts}", advice=advice)
 
 
 class LuGreTable(Table):

@@ -11,7 +11,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.files.tables import ChartTable
@@ -120,6 +120,11 @@ class StribeckTable(Table):
     F_s: float = Field(description=_DESCRIBED["F_s"])
     v_s: float = Field(description=_DESCRIBED["v_s"])
     delta: float = Field(2.0, description=_DESCRIBED["delta"])
+
+    @model_validator(mode="after")
+    def _fits(self) -> StribeckTable:
+        self.build()
+        return self
 
     @classmethod
     def of(cls, curve: Stribeck) -> StribeckTable:

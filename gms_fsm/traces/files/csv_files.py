@@ -108,9 +108,10 @@ def read(path: Path) -> Parts:
 def _header(path: Path, line: str) -> Header:
     if not line.startswith("# {"):
         reason = "line 1 must be '# ' followed by the trace header"
+        advice = "a table of measurements is no trace; name it in the [record] of a scenario"
         if line.startswith("t,element,"):
-            reason = "this is a transition log; pass the trace itself (.npz or .csv)"
-        raise TraceFileError(reason).inside(path)
+            reason, advice = "this is a transition log", "pass the trace itself (.npz or .csv)"
+        raise TraceFileError(reason, advice=advice).inside(path)
     return Header.model_validate_json(line[2:])
 
 
