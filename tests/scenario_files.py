@@ -19,6 +19,35 @@ from tests.helpers import ROOT
 
 PUBLIC_RECORD = "reciprocating_friction.tsv"
 
+STAGE = """\
+title = "stage"
+
+[model]
+kind = "GMS"
+law = "signed"
+k = [8000.0, 4000.0]
+shares = [0.6, 0.4]
+C = 20.0
+v_c = 1e-6
+stribeck = { F_c = 2.0, F_s = 2.1, v_s = 1e-3 }
+
+[rig]
+kind = "record"
+
+[record]
+file = "rig.csv"
+time = { column = "t", unit = "s" }
+position = { column = "x", unit = "mm" }
+force = { column = "F", unit = "N" }
+
+[fit]
+free = ["k"]
+train = [0.0, 8.0]
+test = [8.0, 12.0]
+cycles = 2.0
+search = "local"
+"""
+
 OPEN_LOOP = """\
 title = "open loop"
 

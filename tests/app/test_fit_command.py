@@ -12,38 +12,9 @@ from gms_fsm.app._tables import FitTable
 from gms_fsm.app.fits import load_fit
 from gms_fsm.identification import fit
 from tests.identification.fits_made import record, small
-from tests.scenario_files import CommandLine, changed, one_message, table
+from tests.scenario_files import STAGE, CommandLine, changed, one_message, table
 
 pytest.importorskip("matplotlib", reason="the report has a figure")
-
-SCENARIO = """\
-title = "stage"
-
-[model]
-kind = "GMS"
-law = "signed"
-k = [8000.0, 4000.0]
-shares = [0.6, 0.4]
-C = 20.0
-v_c = 1e-6
-stribeck = { F_c = 2.0, F_s = 2.1, v_s = 1e-3 }
-
-[rig]
-kind = "record"
-
-[record]
-file = "rig.csv"
-time = { column = "t", unit = "s" }
-position = { column = "x", unit = "mm" }
-force = { column = "F", unit = "N" }
-
-[fit]
-free = ["k"]
-train = [0.0, 8.0]
-test = [8.0, 12.0]
-cycles = 2.0
-search = "local"
-"""
 
 
 @pytest.fixture
@@ -52,7 +23,7 @@ def scenario(tmp_path: Path) -> Path:
     x = 1e3 * columns["position"]
     (tmp_path / "rig.csv").write_text(table(["t", "x", "F"], columns["time"], x, columns["force"]))
     path = tmp_path / "rig.toml"
-    path.write_text(SCENARIO)
+    path.write_text(STAGE)
     return path
 
 
@@ -95,7 +66,7 @@ def test_its_keys_and_defaults_are_those_of_the_function() -> None:
 @pytest.mark.slow
 def test_a_system_is_fitted(gms_fsm: CommandLine, scenario: Path, tmp_path: Path) -> None:
     system = small().save(tmp_path / "first.toml").read_text(encoding="utf-8")
-    record = "[record]" + SCENARIO.partition("[record]")[2].partition("[fit]")[0]
+    record = "[record]" + STAGE.partition("[record]")[2].partition("[fit]")[0]
     table = '[fit]\nfree = ["friction.k"]\nsearch = "local"\n'
     (tmp_path / "system.toml").write_text(f"{system}\n{record}\n{table}")
     done = gms_fsm("fit", "system.toml", "-o", "out")
@@ -113,11 +84,11 @@ def test_what_a_fit_does_not_use_is_said(scenario: Path) -> None:
 
 
 def test_a_file_without_the_table_or_a_record(gms_fsm: CommandLine, scenario: Path) -> None:
-    text = changed(SCENARIO, 'kind = "record"', 'kind = "prescribed"\nvelocity = "0.1"')
+    text = changed(STAGE, 'kind = "record"', 'kind = "prescribed"\nvelocity = "0.1"')
     head, _, rest = text.partition("[record]")
     scenario.write_text(head + "[run]\nt_end = 1.0\n[fit]" + rest.partition("[fit]")[2])
     one_message(gms_fsm("fit", scenario), "there is no table [record]", "measured force")
-    scenario.write_text(SCENARIO.partition("[fit]")[0])
+    scenario.write_text(STAGE.partition("[fit]")[0])
     one_message(gms_fsm("fit", scenario), "there is no table [fit]", "free = ")
 
 

@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 from gms_fsm.app.cli import app
-from tests.app.test_fit_command import SCENARIO
 from tests.identification.fits_made import record
-from tests.scenario_files import OPEN_LOOP, CommandLine, table
+from tests.scenario_files import OPEN_LOOP, STAGE, CommandLine, table
 
 VERBS = [each.name for each in app.registered_commands]
 PRINTED = [
@@ -55,7 +54,7 @@ def narrow(gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch) -> CommandLine
     columns = record().columns
     x, F = 1e3 * columns["position"], columns["force"]
     Path("rig.csv").write_text(table(["t", "x", "F"], columns["time"], x, F))
-    Path("rig.toml").write_text(SCENARIO)
+    Path("rig.toml").write_text(STAGE)
     Path("open.toml").write_text(OPEN_LOOP)
     return gms_fsm
 

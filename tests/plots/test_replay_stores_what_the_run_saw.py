@@ -25,7 +25,6 @@ from gms_fsm.language import InState
 from gms_fsm.systems.models import ChartModel, LuGre
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.verification.prove import prove
-from plots import figures
 from plots.page import _rows, chart
 from plots.page._trees import tree_of
 from plots.page.replay import replay, replay_html, write_replay
@@ -230,6 +229,7 @@ def test_the_page_of_a_scenario_has_its_title() -> None:
     )
     for runs, expected in pairs:
         assert data_of(replay_html(*runs))["title"] == expected
+    figures = pytest.importorskip("plots.figures", exc_type=ImportError)
     assert figures.overview(one).get_suptitle() == f"Sine: {model}"
 
 
