@@ -6,6 +6,7 @@ error messages appear at once.
 
 from __future__ import annotations
 
+import copy
 import itertools
 import re
 import sys
@@ -141,7 +142,7 @@ class _Drawing(_Verb):
     def get_params(self, ctx: Any) -> Any:
         from plots.output import formats
 
-        params = super().get_params(ctx)
+        params = [copy.copy(each) for each in super().get_params(ctx)]  # a command is asked again
         listed: dict[str, str] = {each: formats.listed(each) for each in get_args(formats.Written)}
         listed["chart"] = formats.listed("graph", "chart")
         for param in params:
