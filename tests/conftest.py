@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import gc
 import importlib.util
-import os
 from pathlib import Path
 
 import pytest
@@ -28,11 +27,6 @@ SLOW_EXAMPLES = (
     "gms_fsm/exporters/alone.py",
     "gms_fsm/exporters/_registry.py",
 )
-
-
-def pytest_xdist_auto_num_workers() -> int:
-    """Return one worker more than there are processors: tests wait for browsers and programs."""
-    return (os.cpu_count() or 1) + 1
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
