@@ -38,7 +38,8 @@ except (ValueError, OSError) as error:
 """
 
 # Not the file of the system, which old libraries complain of. Other fonts are for characters that
-# ours lack; DejaVu must be ours, because other versions of it may be installed.
+# ours lack; DejaVu must be ours, because other versions of it may be installed. Upright letters are
+# slanted where italics are wanted: symbols keep the widths that are measured.
 _FONTS = """<?xml version="1.0"?>
 <!DOCTYPE fontconfig SYSTEM "fonts.dtd">
 <fontconfig>
@@ -47,6 +48,17 @@ _FONTS = """<?xml version="1.0"?>
     <acceptfont><glob>{ours}/*</glob></acceptfont>
     <rejectfont><glob>*/DejaVuSans*</glob></rejectfont>
   </selectfont>
+  <match target="font">
+    <test name="slant"><const>roman</const></test>
+    <test target="pattern" name="slant" compare="not_eq"><const>roman</const></test>
+    <edit name="matrix" mode="assign">
+      <times>
+        <name>matrix</name>
+        <matrix><double>1</double><double>0.2</double><double>0</double><double>1</double></matrix>
+      </times>
+    </edit>
+    <edit name="slant" mode="assign"><const>oblique</const></edit>
+  </match>
   <cachedir prefix="xdg">fontconfig</cachedir>
   <cachedir>{cache}</cachedir>
 </fontconfig>

@@ -12,6 +12,8 @@ pytest.importorskip("textual", reason="needs the extra tui")
 from gms_fsm.debugger import Debugger, view
 from gms_fsm.debugger._text import DRAWN
 from gms_fsm.debugger.tui._app import FullScreen
+from gms_fsm.debugger.tui._guards import why_rows
+from gms_fsm.debugger.tui._spans import plain
 from gms_fsm.foundation.quantities import trimmed
 from tests.app.full_screen import LARGE, drive, session, settle
 from tests.app.test_debugger_is_plain_text import EVERYTHING
@@ -40,6 +42,16 @@ def test_every_command_has_the_same_answer() -> None:
         made.prompt = made.commands.prompt
         assert _lines("\n".join(app.said[begin + 1 : end])) == _lines(expected), command
     assert made.session.here == app.commands.session.here
+
+
+def test_bars_of_margins_share_their_zero_with_values_of_any_size() -> None:
+    """Also where v is 1e-14 m/s as the pad is arrested."""
+    made = session("brake_squeal")
+    made.goto(5.2)
+    made.next_transition()
+    rows = why_rows(made.why("pad 1"), "pad 1", (), 80)
+    zeros = {text.index("│") for text in (plain([row.line]) for row in rows) if "│" in text}
+    assert len(zeros) == 1
 
 
 @pytest.mark.slow

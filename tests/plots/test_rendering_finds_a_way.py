@@ -22,7 +22,7 @@ import pytest
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.errors import OutputError, ParameterError
 from plots.charts.statechart import statechart
-from plots.output.graphviz import picture
+from plots.output.graphviz import drawn, picture
 from plots.output.render import render
 from plots.style.fonts import FOLDER
 from plots.systems.block_diagram import block_diagram
@@ -202,3 +202,19 @@ def test_a_graph_that_cannot_be_drawn_is_an_error_and_the_old_picture_is_kept(
         render(graphviz.Digraph(body=[text]), old)
     assert old.read_text() == "the picture of yesterday"
     assert list(tmp_path.iterdir()) == [old]
+
+
+@pytest.mark.parametrize("hidden", [pytest.param("package", marks=needs_dot), "program"])
+def test_italics_are_slanted_though_no_slanted_font_is_shipped(
+    hidden: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if hidden == "program":
+        pytest.importorskip("pygraphviz", reason="pygraphviz is the optional extra 'render'")
+    hide(monkeypatch, hidden)
+    face = 'fontname="DejaVu Sans"'
+    upright, slanted = (
+        drawn(graphviz.Digraph(body=[f"a [{face} label=<{text}>]"]), "png")
+        for text in ("<B>v</B>", "<B><I>v</I></B>")
+    )
+    assert upright is not None
+    assert upright != slanted

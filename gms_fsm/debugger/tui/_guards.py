@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from gms_fsm.debugger.tui._chart import MARKS
 from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line
-from gms_fsm.foundation.quantities import trimmed, wrapped
+from gms_fsm.foundation.quantities import Scale, trimmed, wrapped
 from gms_fsm.session.explain import Clause, Why
 from gms_fsm.session.session import Breakpoint
 
@@ -63,6 +63,12 @@ def why_rows(why: Why, address: str, points: Sequence[Breakpoint], width: int) -
     return rows
 
 
+def _cell(scale: Scale, value: float) -> str:
+    """Return a value, with two digits if more would leave its column: bars share their zero."""
+    text = trimmed(scale.text(value))
+    return text if len(text) < VALUE else trimmed(scale.text(value, 2))
+
+
 class ClauseTable(NamedTuple):
     """How clauses are laid out: widths of the text and of half a bar, and what there is room for.
 
@@ -102,9 +108,9 @@ class ClauseTable(NamedTuple):
             value = [Span("  true" if clause.holds else "  false", role)]
         else:
             if self.sides:
-                both = (trimmed(clause.scale.text(side)) for side in (clause.left, clause.right))
+                both = (_cell(clause.scale, side) for side in (clause.left, clause.right))
                 value += [Span(f" {side:>{VALUE - 1}}") for side in both]
-            margin = trimmed(clause.scale.text(clause.margin)) if clause.relative else "0, rounding"
+            margin = _cell(clause.scale, clause.margin) if clause.relative else "0, rounding"
             bar = margin_bar(clause.relative, self.half)
             value += [Span(f" {margin:>{VALUE - 1}} "), Span(bar, role)]
         if not self.apart:
