@@ -9,6 +9,7 @@ from typing import Any
 
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ChartError, shown
+from gms_fsm.foundation.arguments import unknown
 
 
 @dataclass(frozen=True)
@@ -189,12 +190,7 @@ def places_of(given: object, parts: Sequence[State], here: str) -> dict[str, tup
         )
     for name in given:
         if name not in states:
-            raise ChartError(
-                f"{name!r} is not a state",
-                place=owner,
-                advice=f"states: {', '.join(states)}",
-                key=("layout", name),
-            )
+            raise unknown("state", name, states, ChartError, place=owner, key=("layout", name))
     missing = [name for name in states if name not in given] if given else []
     if missing:
         raise ChartError(
