@@ -11,7 +11,7 @@ from gms_fsm.verification.findings import Report
 from plots import panels
 from plots.figures._layout import fitted, low, sheet
 from plots.figures._parts import head
-from plots.panels.guards.landscapes import DASHED, acceleration, pinned, quantity
+from plots.panels.guards.landscapes import DASHED, acceleration, pinned, with_unit
 from plots.panels.guards.racing import rows_of
 from plots.panels.parts.selection import checked_row, one_element
 from plots.style import INK, LINE_GREY
@@ -171,7 +171,7 @@ def _caption(trace: Trace, plane: Plane) -> list[str]:
             "values that the guards saw."
         )
     held = ", ".join(
-        f"{name} = {quantity(chart, name, value)}" for name, value in plane.held.items()
+        f"{name} = {with_unit(chart, name, value)}" for name, value in plane.held.items()
     )
     again = [f"{name}({plane.names[0]})" if name == "s" else name for name in plane.again]
     lines.append(
@@ -187,7 +187,7 @@ def _caption(trace: Trace, plane: Plane) -> list[str]:
     else:
         lines.append(
             f"Arrows: direction of the flow; d{second}/dt is that of {plane.state}, "
-            f"d{plane.names[0]}/dt = {quantity(chart, 'a', dv)} as at this row everywhere."
+            f"d{plane.names[0]}/dt = {with_unit(chart, 'a', dv)} as at this row everywhere."
         )
     return lines
 

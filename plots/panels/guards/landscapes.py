@@ -111,7 +111,7 @@ def _column(trace: Trace, name: str, element: int) -> Floats:
     return np.asarray(every[element])
 
 
-def quantity(chart: Chart, name: str, value: float) -> str:
+def with_unit(chart: Chart, name: str, value: float) -> str:
     """Return a value as text, with a prefixed unit where the unit is known."""
     return in_words(value, unit_of(chart, name), 4).replace("-", "−").replace("^2", "²")
 
