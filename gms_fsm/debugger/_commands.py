@@ -323,6 +323,11 @@ class Commands:
         if len(found) > count:
             yield f"  ({len(found) - count} earlier ones)"
 
+    def do_trust(self, arg: str) -> Iterator[str]:
+        """Show the findings about the branch."""
+        _nothing("trust", arg)
+        yield from self.session.tree.trace().trust().text.splitlines()
+
     def do_print(self, arg: str) -> Iterator[str]:
         """Show a value."""
         if not arg:

@@ -46,6 +46,13 @@ COMMANDS = {
         "l",
     ),
     "log": Command("look", "log [N]", "Show the last N transitions (default 10).", ("log 4",)),
+    "trust": Command(
+        "look",
+        "trust",
+        "Show how far this branch is to be trusted: switches decided by less than the tolerances, "
+        "places without a unique answer, values outside the chart's domain. Runs it to its end.",
+        ("trust",),
+    ),
     "print": Command(
         "look",
         "print EXPRESSION",

@@ -106,7 +106,7 @@ class Problem:
 
     def trace(self, rows: Rows, stops: Rows, firings: Firings) -> Trace:
         """Return the trace of a run."""
-        trace = Trace(rows, stops, firings, self.what, self.settings)
+        trace = Trace(rows, stops, firings, self.what, self.settings, initial=self.initial)
         vars(trace)["program"] = self.program  # it need not be generated again
         return trace
 

@@ -220,7 +220,10 @@ def replay_html(
 ) -> str:
     """Return a replay page as text."""
     traces = [trace] if other is None else [trace, other]
-    return page_html(*page_data(traces, **options))
+    data, charts = page_data(traces, **options)
+    for run, each in zip(data["runs"], traces, strict=True):
+        run["trust"] = [str(found) for found in each.trust()]
+    return page_html(data, charts)
 
 
 def page_data(

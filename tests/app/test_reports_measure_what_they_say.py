@@ -105,7 +105,7 @@ def test_the_element_table_equals_the_log(case: str, tmp_path: Path) -> None:
     (tmp_path / "any.toml").write_text(OPEN_LOOP)
     base = load_scenario(tmp_path / "any.toml")
     loaded = Loaded(base.path, base.scenario, trace.model, trace.rig, {}, None, None)
-    text = summary_text(loaded, trace)
+    text = summary_text(loaded, trace, trace.trust())
     rows, dwell, log = element_rows(text), dwell_times(trace), trace.transitions
     assert [row["element"] for row in rows] == [str(i + 1) for i in range(trace.n)]
     for i, row in enumerate(rows):
@@ -329,4 +329,5 @@ def test_a_summary_says_where_the_motion_was_held(
     monkeypatch.setattr("gms_fsm.app.report._draw", refuses)
     with pytest.warns(UserWarning, match="no figure was drawn: plots are away"):
         _, files = run_scenario(load_scenario(path), tmp_path / "out")
-    assert "- held on w = 0: 1 times, " in files[0].read_text()
+    said = files[0].read_text()
+    assert "- note, sliding: held on w = 0 for 1.375 s, first at t = 0.625 s" in said

@@ -87,4 +87,4 @@ def test_a_summary_shows_title_and_notes(tmp_path: Path) -> None:
     run_scenario(load_scenario(path), tmp_path / "out")
     shown, tags = _shown((tmp_path / "out" / "summary.md").read_text())
     assert shown.startswith("<img src=x onerror=alert(1)> *Run* # two " + " ".join(nasty.split()))
-    assert tags <= {"h1", "p", "ul", "li", "table", "thead", "tbody", "tr", "th", "td"}
+    assert tags <= {"h1", "h2", "p", "ul", "li", "table", "thead", "tbody", "tr", "th", "td"}

@@ -152,8 +152,9 @@ def check_command(
     charts of all contacts are checked.
     """
     from gms_fsm import prove
-    from gms_fsm.app._own_files import domain_of, own_file
+    from gms_fsm.app._own_files import own_file
     from gms_fsm.app.verbs.catalogue import checkable, chosen
+    from gms_fsm.charts.registry import domain_of
 
     if names:
         say(checkable())

@@ -93,7 +93,7 @@ def animate_command(
     contact: ContactName = "",
 ) -> None:
     """Make a film of a run: chart, bristles, force and states, slowed at transitions."""
-    from gms_fsm.traces.trace import files_of
+    from gms_fsm.traces.views import files_of
     from plots.film.animation import animate
 
     refuse_input(output, *files_of(trace))
@@ -136,7 +136,7 @@ def replay_command(
 ) -> None:
     """Write a run as a web page in which it can be stepped through and explained."""
     from gms_fsm import prove
-    from gms_fsm.traces.trace import files_of
+    from gms_fsm.traces.views import files_of
     from plots import write_replay
 
     files = [trace] if other is None else [trace, other]

@@ -1,5 +1,7 @@
-"""A run whose scales do not fit its model, or with arrests too fast for the clock, gets a note."""
+"""A run says where its result may be another one, and what was probably not meant."""
 
+import pickle
+import random
 import re
 from pathlib import Path
 
@@ -16,14 +18,18 @@ from gms_fsm import (
     Prescribed,
     PulledSlider,
     Sampled,
+    Slider,
     State,
     Stribeck,
     System,
     Transition,
     simulate,
 )
-from gms_fsm.session.notes import notes_on, notes_on_system
+from gms_fsm.charts.registry import registered
+from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.verdicts import KINDS
 from tests.helpers import ROOT, open_loop, pulled_mass, stick_slip
+from tests.planted import PLANTED, TOUCH, clean, grazing, tie
 
 
 def bank(k: float = 1.0, v_c: float = 1e-6) -> GMS:
@@ -32,6 +38,11 @@ def bank(k: float = 1.0, v_c: float = 1e-6) -> GMS:
         [0.5, 0.5], [k * 4e5, k * 2e5], C=20.0, v_c=v_c, stribeck=Stribeck(2.0, 2.4, 1e-3)
     )
     return GMS(p, law="signed")
+
+
+def notes_on(trace: Trace) -> tuple[str, ...]:
+    meant = ("units", "unused", "window")
+    return tuple(each.text for each in trace.trust() if each.kind in meant)
 
 
 def notes(model: GMS, velocity: object, t_end: float = 10.0, **options: object) -> tuple[str, ...]:
@@ -112,9 +123,8 @@ def test_a_controller_or_a_body_that_is_connected_to_nothing(
     )
     pid = Sampled("pid", period=0.1, updates={"e": "-x_l", "u": "u + e"})
     pad = Contact("pad", bank(), v="v_l")
-    found = notes_on_system(
-        simulate(System("servo", bodies=bodies, contacts=(pad,), sampled=(pid,)), 0.1)
-    )
+    run = simulate(System("servo", bodies=bodies, contacts=(pad,), sampled=(pid,)), 0.1)
+    found = [each.text for each in run.trust().of("unused")]
     assert [note[: len(start)] for note, start in zip(found, said, strict=True)] == said
 
 
@@ -137,7 +147,7 @@ def test_the_command_line_prints_them_and_the_summary_shows_them(gms_fsm):
     sets = ("model.v_c=10.0", "run.t_end=2.0", "output.figures=[]")
     done = gms_fsm("run", path, "-o", "out", *(word for each in sets for word in ("--set", each)))
     assert done.code == 0
-    note = "note: no transition: the speed stays below v_c"
+    note = "note, units: no transition: the speed stays below v_c"
     assert note in done.out
     assert f"- {note}" in Path("out/summary.md").read_text()
 
@@ -154,3 +164,93 @@ def test_windows_that_depend_on_the_state_or_on_steps_are_not_searched(how: dict
     )
     found = notes(ChartModel(chart, {}), "0.1*cos(t)", **how)  # type: ignore[arg-type]
     assert "could not be detected" not in "".join(found)
+
+
+# --------------------------------------------------------------------------- doubts
+@pytest.mark.parametrize("kind", PLANTED)
+def test_a_planted_doubt_is_found(kind: str):
+    for seed in range(4):
+        found = PLANTED[kind](random.Random(seed)).trust()
+        assert kind in {each.kind for each in found.warnings}, f"{kind}, seed {seed}: {found}"
+
+
+def test_a_clean_run_has_no_warning():
+    for seed in range(8):
+        found = clean(random.Random(seed)).trust()
+        assert not found.warnings, f"seed {seed}: {found}"
+
+
+def test_equal_elements_switch_at_one_instant_and_this_is_called_harmless():
+    (found,) = simulate(stick_slip("signed"), Prescribed("0.2"), 3.0).trust()
+    assert (found.kind, found.severity, found.t) == ("tie", "note", 2.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
+def test_engines_have_the_same_findings(engine: str):
+    model, rig = pulled_mass()
+    assert simulate(model, rig, 20.0, engine=engine).trust() == simulate(model, rig, 20.0).trust()
+
+
+def test_a_switch_that_the_tolerances_decide_is_another_one_with_finer_ones():
+    """With X below b only the coarse run may switch, with X above it only the fine one."""
+    for seed in range(6):
+        trace = grazing(random.Random(seed))
+        (found,) = trace.trust(again=True).of("repeat")
+        finer = simulate(trace.model, trace.rig, trace.settings["t_end"], rtol=1e-8)
+        same = len(finer.transitions) == len(trace.transitions)
+        assert found.severity == ("note" if same else "warning"), f"seed {seed}: {found}"
+
+
+def test_a_repeated_run_says_how_far_its_times_and_its_end_move():
+    model, rig = pulled_mass()
+    (found,) = simulate(model, rig, 20.0).trust(again=True).of("repeat")
+    assert re.match(
+        r"with rtol/100 the sequence of \d+ transitions holds, its times move by at most "
+        r"[\d.]+ [µn]s; the end state \(SI units\) moves: x by [\d.e-]+",
+        found.text,
+    )
+
+
+def test_a_force_that_is_not_finite_is_a_finding_where_nothing_reads_it():
+    chart = Chart(
+        "steep", inputs=("v",), parameters=("a",), states=(State("on"),), outputs={"F": "exp(a)*v"}
+    )
+    found = simulate(ChartModel(chart, {"a": 750.0}), Prescribed(0.1), 1.0).trust()
+    (first,) = found.of("not finite")
+    assert first.severity == "warning"
+    assert "look at the parameters in [exp(a)*v]" in first.text
+
+
+def test_a_value_outside_the_domain_that_proofs_assume_is_named():
+    entry = registered()["elasto-plastic"]
+    model = ChartModel(
+        entry.chart(),
+        {"sigma_0": 1e4, "sigma_1": 0.0, "z_ba": 2e-4},
+        stribeck=Stribeck(1.0, 1.5, 1e-3),
+    )
+    (found,) = simulate(model, Prescribed("0.001"), 0.1).trust().of("domain")
+    assert "s > sigma_0 * z_ba does not hold" in found.text
+
+
+def test_trust_of_one_contact_is_its_part_of_the_whole():
+    trace = tie(random.Random(1))
+    assert trace.trust().findings == Trace.trust(pickle.loads(pickle.dumps(trace))).findings
+    assert {each.kind for each in trace.trust()} <= {*KINDS}
+
+
+def test_a_switch_explains_the_doubt_about_it():
+    from gms_fsm.session.explain import explain
+
+    motion = Prescribed("1.00000001e-3*cos(t)")
+    run = simulate(ChartModel(TOUCH, {"k": 1e3, "b": 1e-3}), motion, 3.0)
+    (doubt,) = run.trust().of("grazing")
+    assert doubt.text in str(explain(run, int(np.searchsorted(run.t, doubt.times[0])) - 1, 0))
+
+
+def test_a_function_that_is_seen_often_enough_is_not_doubted():
+    def force(t: float) -> float:
+        return 0.5 * np.sin(3.0 * t)
+
+    model, _ = pulled_mass()
+    assert not simulate(model, Slider(1.0, force), 10.0).trust().of("sampling")
