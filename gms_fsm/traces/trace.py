@@ -497,9 +497,8 @@ class Trace:
         """
         key, find = f"trust, again {again}", asked("trust")
         assert find is not None  # this package declares it
-        found: Trust = vars(self).get(key) or find(self, again=again)
-        vars(self)[key] = found
-        return found
+        vars(self)[key] = found = vars(self).get(key) or find(self, again=again)
+        return found  # type: ignore[no-any-return]
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:

@@ -294,9 +294,9 @@ class Trust:
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> print(simulate(model, Prescribed("0.2"), 3.0).trust())
-    note, tie: elements 1 to 4 switch at the same instant, first at t = 2 s; the order makes no \
-difference
+    >>> (found,) = simulate(model, Prescribed("0.2"), 3.0).trust()
+    >>> found.kind, found.severity, found.t
+    ('tie', 'note', 2.0)
     """
 
     findings: tuple[Doubt, ...]

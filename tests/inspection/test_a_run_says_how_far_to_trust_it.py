@@ -26,10 +26,11 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts.registry import registered
+from gms_fsm.traces.failures import NotFiniteError
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import KINDS
 from tests.helpers import ROOT, open_loop, pulled_mass, stick_slip
-from tests.planted import PLANTED, TOUCH, clean, grazing, tie
+from tests.soak.doubts import PLANTED, TOUCH, clean, extreme, fault_of, grazing, tie
 
 
 def bank(k: float = 1.0, v_c: float = 1e-6) -> GMS:
@@ -254,3 +255,26 @@ def test_a_function_that_is_seen_often_enough_is_not_doubted():
 
     model, _ = pulled_mass()
     assert not simulate(model, Slider(1.0, force), 10.0).trust().of("sampling")
+
+
+def test_no_row_is_not_finite_without_an_error_or_a_finding():
+    for seed in range(25):
+        name, trace = extreme(random.Random(seed))
+        assert trace is None or not fault_of(trace), f"seed {seed}, {name}"
+
+
+@pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
+@pytest.mark.parametrize("F", ["exp(a)*v", "-exp(a)*v"])
+def test_a_guard_that_reads_an_infinite_force_ends_the_run_and_names_it(engine: str, F: str):
+    chart = Chart(
+        "steep",
+        inputs=("v",),
+        parameters=("a",),
+        states=(State("on"), State("off", outputs={"F": "0"})),
+        transitions=(Transition("go", "on", "off", guard="F > 5"),),
+        outputs={"F": F},
+    )
+    with pytest.raises(NotFiniteError) as caught:
+        simulate(ChartModel(chart, {"a": 750.0}), Prescribed(0.1), 1.0, engine=engine)
+    assert f"in state on, [{F}], is not finite (" in str(caught.value)
+    assert "inf, with a = 750)" in str(caught.value)

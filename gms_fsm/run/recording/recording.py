@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 import integrators
-from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.language import rough_points
+from gms_fsm.language import names_in, rough_points
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LogRecord
 from gms_fsm.run.machines import Interference
@@ -32,7 +32,7 @@ from gms_fsm.traces.failures import (
     StepSizeError,
 )
 from gms_fsm.traces.rows import Rows
-from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.scope import FORCE, Scope, parameter_values
 from gms_fsm.traces.trace import Trace
 from integrators import (
     Arc,
@@ -415,6 +415,10 @@ def _not_finite(error: NotFinite, recorder: Recording) -> str:
         if not math.isfinite(scope.v):
             return f"the velocity v{whose} is not finite"
         states = {state.name: state for state in chart.states}
+        for i, F in enumerate(scope.each(FORCE)):
+            if not math.isfinite(F):
+                state = states[scope.states[i]]
+                return _infinite_force(chart, state, i, F, parameter_values(scope.model, i), whose)
         for variable in chart.variables:
             for i, name in enumerate(scope.states):
                 if not math.isfinite(scope.each(f"d{variable}")[i]):
@@ -425,6 +429,21 @@ def _not_finite(error: NotFinite, recorder: Recording) -> str:
                         f"{bank.name if whose else 'element'} {i + 1}"
                     )
     return "a signal or a flow is not finite"
+
+
+def _infinite_force(
+    chart: Chart, state: State, i: int, F: float, values: Mapping[str, float], whose: str
+) -> str:
+    """Name the force text of an element that is not finite, with the numbers that it reads."""
+    text = state.outputs.get("F") or chart.outputs.get("F", "")
+    tree = chart.forces[state.name, "F"]
+    names = names_in(tree) & values.keys() if tree is not None else ()
+    numbers = ", ".join(f"{name} = {values[name]:.6g}" for name in sorted(names))
+    known = f"({F:g}{f', with {numbers}' if numbers else ''})"
+    return (
+        f"the force of {whose.removeprefix(' of ') or 'element'} {i + 1} in state {state.name}, "
+        f"[{text}], is not finite {known}"
+    )
 
 
 def check_end(recorder: Recording) -> None:

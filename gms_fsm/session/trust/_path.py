@@ -116,8 +116,9 @@ class Track:
         here, found = np.array(self.margins_at(t, y, mode)), np.zeros(len(self.program.strict))
         for j, by in enumerate(self.tolerance[row].tolist()):
             if by > 0.0:
-                shifted = [*y[:j], y[j] + by, *y[j + 1 :]]
-                found += np.abs(np.array(self.margins_at(t, shifted, mode)) - here)
+                there = np.array(self.margins_at(t, shifted(y, j, by), mode))
+                with np.errstate(all="ignore"):
+                    found += np.abs(there - here)
         return found[list(chosen)]
 
     def bank(self, machine: int) -> tuple[BankPlaces, int]:
@@ -133,3 +134,10 @@ class Track:
     def whose(self, machine: int) -> str:
         """Return the contact of a machine if its user named it, else an empty text."""
         return self.trace.what.whose(self.program.layout.bank(machine).name)
+
+
+def shifted(y: list[float], place: int, by: float) -> list[float]:
+    """Return a state with one component moved."""
+    moved = list(y)
+    moved[place] += by
+    return moved

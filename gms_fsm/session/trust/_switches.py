@@ -15,7 +15,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.session.trust._gathering import Gathering
-from gms_fsm.session.trust._path import Track
+from gms_fsm.session.trust._path import Track, shifted
 from gms_fsm.traces.verdicts import Doubt
 
 NEARBY = 0.05  # of the step before: how far the flow is followed to find rate and curvature
@@ -170,7 +170,8 @@ def _shape(
         np.array(path.margins_at(*path.moved(row, by), mode))[list(chosen)] for by in (-h, h)
     )
     here = path.margins[row][list(chosen)]
-    return here, (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
+    with np.errstate(all="ignore"):
+        return here, (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
 
 
 def _is_undone(m: float, rate: float, bend: float, doubt: float, within: float) -> bool:
@@ -220,7 +221,7 @@ def _nearly_enabled(
     states = [y]
     for j, by in enumerate(path.tolerance[row].tolist()):
         if by > 0.0:
-            states += ([*y[:j], y[j] + sign * by, *y[j + 1 :]] for sign in (1.0, -1.0))
+            states += (shifted(y, j, signed) for signed in (by, -by))
     every = (enumerate(path.enabled(t, each, mode)) for each in states)
     return {i: edge for edges in every for i, edge in edges if edge >= 0}
 

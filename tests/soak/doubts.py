@@ -1,10 +1,16 @@
-"""Runs with a doubt planted in them, by kind, and clean ones; each from a seed."""
+"""Runs with a doubt planted in them, clean ones, and models of the zoo with extreme numbers.
+
+Each is made from a seed: ``python -m tests.soak.doubts --count 400``.
+"""
 
 from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Mapping
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
 
 from gms_fsm import (
     GMS,
@@ -23,6 +29,10 @@ from gms_fsm import (
     Transition,
     simulate,
 )
+from gms_fsm.charts.registry import registered
+from gms_fsm.errors import GMSError
+from gms_fsm.traces.failures import SimulationError
+from tests.soak.trying import Seen, examine
 
 CREEP = State("low", flow={"z": "v"})
 TOUCH = Chart(
@@ -129,7 +139,7 @@ def pulse(r: random.Random) -> Trace:
 def growing(r: random.Random) -> Trace:
     """Return a run in which the published law slips backward for a while."""
     p = GMSParameters.paper("stick-slip")
-    period = r.uniform(15.0, 40.0)
+    period = r.uniform(35.0, 70.0)
     motion = Prescribed(f"{r.uniform(0.1, 0.2)}*sin({2.0 * math.pi / period}*t)")
     return simulate(GMS(p, law="published"), motion, 2.0 * period)
 
@@ -141,3 +151,62 @@ PLANTED: Mapping[str, Callable[[random.Random], Trace]] = {
     "sampling": pulse,
     "growth": growing,
 }
+
+
+DECADES = 3.0  # up and down
+MOST_STEPS = 20_000
+
+
+def extreme(r: random.Random) -> tuple[str, Trace | None]:
+    """Run a model of the zoo with numbers over six decades; what refuses them returns no trace."""
+    each = r.choice([each for each in registered().values() if not each.wrong])
+    shown = each.demonstration
+    scale = {name: 10.0 ** r.uniform(-DECADES, DECADES) for name in shown.values}
+    values = {name: np.multiply(scale[name], value) for name, value in shown.values.items()}
+    values = {name: float(u) if u.ndim == 0 else u for name, u in values.items()}
+    law = r.choice(each.laws or ("",))
+    try:
+        model = ChartModel(
+            each.chart(law),
+            values,
+            n=shown.n,
+            stribeck=shown.stribeck,
+            sigma_2=shown.sigma_2,
+            weights=shown.weights,
+            inputs=shown.inputs,
+        )
+        A, w = 10.0 ** r.uniform(-6.0, 1.0), 10.0 ** r.uniform(-1.0, 2.0)
+        rig = r.choice([Prescribed(f"{A}*sin({w}*t)"), Slider(1.0, f"{A}*sin({w}*t)")])
+        return each.name, simulate(model, rig, 12.0 / w, max_steps=MOST_STEPS)
+    except SimulationError as error:
+        return f"{each.name}: {type(error).__name__}", None
+    except GMSError:
+        return f"{each.name} refused", None
+
+
+def fault_of(trace: Trace) -> str:
+    """Return what is wrong with a run: a row that is not finite, without a finding."""
+    columns = [trace.v, trace.x, trace.z, *(trace.seen[trace.places.of(name)] for name in ("F",))]
+    given = [u for u in columns if not np.isnan(u).all()]  # a chart may have no variable
+    if all(np.isfinite(u).all() for u in given) or trace.trust().of("not finite"):
+        return ""
+    return f"{trace!r} has values that are not finite, and no finding says so"
+
+
+def look(given: Namespace, index: int) -> Iterator[Seen]:
+    """Look at one run of each kind."""
+    again = f"--index {index}"
+    for kind, make in PLANTED.items():
+        found = make(random.Random(f"{given.seed}:{index}")).trust()
+        fault = "" if found.of(kind) and found.warnings else f"{kind} is not found: {found}"
+        yield Seen(again, {f"planted: {kind}": 1}, fault, shown=(found,))
+    found = clean(random.Random(f"{given.seed}:{index}")).trust()
+    yield Seen(again, {"clean": 1}, str(found) if found.warnings else "", shown=(found,))
+    name, trace = extreme(random.Random(f"{given.seed}:{index}"))
+    fault = "" if trace is None else fault_of(trace)
+    ended = "extreme: to the end" if trace is not None else "extreme: error"
+    yield Seen(again, {ended: 1}, fault, shown=(name,))
+
+
+if __name__ == "__main__":
+    examine("doubts", "Are planted doubts found, and no others?", look, count=200)
