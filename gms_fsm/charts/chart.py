@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from gms_fsm.charts.parameters import QUANTITIES, Parameter
+from gms_fsm.charts.nesting import Nesting, check_ends, check_paths
+from gms_fsm.charts.parameters import QUANTITIES, Parameter, check_rules
 from gms_fsm.charts.parts import (
     State,
     Transition,
@@ -61,11 +62,13 @@ class Chart:
         Constants, each with a unit and a rule; a plain name stands for a parameter of unknown unit
         that may be any finite number.
     states : sequence of State
-        The first one is the default state.
+        The first one is the default state. Of states inside others the chart has the innermost,
+        called by their paths: ``slip.forward``.
     transitions : sequence of Transition
-        Among the edges that leave one state, earlier ones have priority. Guards may read ``F``, the
-        force of the contact, ``a``, its acceleration, ``age``, the time in the present state [s],
-        and ``after(T)``, short for ``age >= T``.
+        Among the edges that leave one state, earlier ones have priority, but those of inner states
+        precede those of the states around them. Guards may read ``F``, the force of the contact,
+        ``a``, its acceleration, ``age``, the time since the state that the edge leaves was entered
+        [s], and ``after(T)``, short for ``age >= T``.
     outputs : mapping of str to str
         ``F``, the element's force [N], in all states that give none of their own; may use
         ``d<variable>`` for a derivative.
@@ -119,6 +122,10 @@ class Chart:
     # By state and force; None where the state is locked.
     forces: Mapping[tuple[str, str], Value | None] = field(init=False, repr=False, compare=False)
     lets: Mapping[str, Value] = field(init=False, repr=False, compare=False)
+    # Variables that no text declares: times in states, and histories.
+    hidden: tuple[str, ...] = field(init=False, repr=False, compare=False)
+    # As written; `states` and `transitions` are the innermost states and the edges between them.
+    nesting: Nesting = field(init=False, repr=False)
     totals: Mapping[str, Value] = field(init=False, repr=False, compare=False)
 
     def __init__(
@@ -157,11 +164,13 @@ class Chart:
             given[each] = texts_of({} if texts is None else texts, f"{here}: {each}")
         for each, value in given.items():  # copies: nobody else can change a frozen chart
             object.__setattr__(self, each, value)
+        object.__setattr__(self, "nesting", Nesting(self.states, self.transitions))
         self._check_names()
-        self._check_rules()
+        check_rules(self.parameters, here)
+        object.__setattr__(self, "states", self.nesting.leaves())
         object.__setattr__(self, "layout", places_of(layout or {}, self.states, here))
-        expanded = tuple(each for edge in self.transitions for each in edge.each())
-        for each, value in {**ChartReader(self).trees(), "transitions": expanded}.items():
+        object.__setattr__(self, "transitions", self.nesting.rows())
+        for each, value in ChartReader(self).trees().items():
             object.__setattr__(self, each, value)
 
     def __repr__(self) -> str:
@@ -228,39 +237,12 @@ class Chart:
                         key=key,
                     )
                 owner[name] = kind
+        for level in self.nesting.levels.values():
+            _check_name(level.state.name, "state", here, (*level.key, "name"))
+        check_paths(self.nesting, owner, here)
         for name in sorted({*self.force_names} & owner.keys()):
             raise ChartError(f"{owner[name]} name {name!r} is taken by a force", place=here)
-        known = [s.name for s in self.states]
-        for i, edge in enumerate(self.transitions):
-            for end, state in (
-                *(("source", each) for each in edge.sources),
-                ("target", edge.target),
-            ):
-                if state not in known:
-                    raise ChartError(
-                        f"{end} {state!r} is not a state",
-                        place=f"{here}, edge {edge.name!r}",
-                        advice=f"states: {_listed(known)}",
-                        key=("transitions", i, end),
-                    )
-            if edge.impulse and not self.states[known.index(edge.target)].locked:
-                raise ChartError(
-                    f"it takes an impulse, but its target {edge.target!r} is not locked",
-                    place=f"{here}, edge {edge.name!r}",
-                    advice="leave impulse out; an action that sets the velocity is an impulse too",
-                    key=("transitions", i, "impulse"),
-                )
-
-    def _check_rules(self) -> None:
-        for i, each in enumerate(self.parameters):
-            known = {*self.parameter_names} - {each.name}
-            for name in sorted(each.others - known):
-                raise ChartError(
-                    f"chart {self.name!r}, parameter {each.name!r}: its rule names {name!r}, "
-                    "which is not another parameter",
-                    advice=f"there are {_listed(sorted(known))}",
-                    key=("parameters", i, "rule"),
-                )
+        check_ends(self.nesting, here)
 
     # ------------------------------------------------------------------ forces
     @property
@@ -304,8 +286,8 @@ class Chart:
             With the keys ``name``, ``reference``, ``inputs``, ``velocities``, ``variables``,
             ``parameters`` (a list of names) or ``[[parameter]]`` (name, unit, rule, per_element,
             meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[[state]]`` (name,
-            flow, entry, exit, outputs, locked) and ``[[edge]]`` (name, from, to, guard, do,
-            impulse).
+            flow, entry, exit, outputs, locked, initial, history; those inside one as
+            ``[[state.state]]``) and ``[[edge]]`` (name, from, to, guard, do, impulse).
 
         Returns
         -------
@@ -537,6 +519,22 @@ class Chart:
                 advice=f"its states are {_listed(names)}",
             )
         return names.index(name)
+
+    def assigned(self, edge: Transition | None = None) -> tuple[tuple[str, Value], ...]:
+        """Return what an edge assigns, in order: exits, action, entries.
+
+        Parameters
+        ----------
+        edge : Transition, optional
+            One of `transitions`; without one, the start of a run, which enters the default state.
+
+        Returns
+        -------
+        tuple of (str, Value)
+            Variables and velocities, each with its new value.
+        """
+        performed = self.nesting.begins() if edge is None else edge.performs
+        return tuple(each for key in performed for each in self.assignments[key].items())
 
     def leaving(self, state: str) -> tuple[tuple[int, Transition], ...]:
         """Return the edges that leave a state, each with its index, highest priority first.

@@ -343,3 +343,16 @@ def as_floats(values: FloatArray) -> list[float]:
     """Return plain Python floats; the readable engine is three times as fast with lists."""
     floats: list[float] = values.tolist()
     return floats
+
+
+def check_rules(parameters: tuple[Parameter, ...], here: str) -> None:
+    """Refuse rules that name what is not another parameter."""
+    for i, each in enumerate(parameters):
+        known = {other.name for other in parameters} - {each.name}
+        for name in sorted(each.others - known):
+            raise ChartError(
+                f"{here}, parameter {each.name!r}: its rule names {name!r}, "
+                "which is not another parameter",
+                advice=f"there are {', '.join(map(repr, sorted(known))) or 'none'}",
+                key=("parameters", i, "rule"),
+            )

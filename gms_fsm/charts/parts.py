@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from math import isfinite, nan
 from typing import Any
 
@@ -11,10 +11,14 @@ from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ChartError, shown
 from gms_fsm.foundation.arguments import unknown
 
+DEEPEST_STATE = 8  # levels; deeper ones nobody could read
+
 
 @dataclass(frozen=True)
 class State:
     """One state of a machine: how its variables evolve, and what force it gives, while active.
+
+    A state with `states` of its own is composite: one of them is active while it is.
 
     Parameters
     ----------
@@ -31,6 +35,12 @@ class State:
     locked : bool
         While the state is active, the velocities of the contact are held at 0, and its forces are
         those that hold them.
+    states : sequence of State, optional
+        The states inside. They inherit `flow`, `outputs` and `locked`, unless they give their own.
+    initial : str, optional
+        The state inside that is entered with this one; the first one unless another is named.
+    history : bool
+        Whether the state inside that was active last is entered again.
 
     Examples
     --------
@@ -38,6 +48,8 @@ class State:
     'stick'
     >>> State("forward", outputs={"F": "F_c + b * v"}).outputs["F"]
     'F_c + b * v'
+    >>> State("slip", states=(State("forward"), State("backward"))).initial
+    'forward'
     """
 
     name: str
@@ -46,6 +58,9 @@ class State:
     exit: Mapping[str, str] = field(default_factory=dict)
     outputs: Mapping[str, str] = field(default_factory=dict)
     locked: bool = False
+    states: tuple[State, ...] = ()
+    initial: str = ""
+    history: bool = False
 
     def __new__(cls, *parts: Any, **given: Any) -> State:
         """Refuse unknown arguments with an error of this package."""
@@ -54,7 +69,6 @@ class State:
             raise ChartError(
                 f"a State takes {', '.join(known[:-1])} and {known[-1]}, not {name!r}",
                 place=f"state {shown(given.get('name', parts[0] if parts else '?'))}",
-                advice="states do not nest, so write one state for each combination",
             )
         return object.__new__(cls)
 
@@ -63,8 +77,45 @@ class State:
         for each in ("flow", "entry", "exit", "outputs"):
             # Copies: nobody else can change a frozen chart.
             object.__setattr__(self, each, texts_of(getattr(self, each), f"{here}: {each}"))
-        if not isinstance(self.locked, bool):
-            raise ChartError("it must be True or False", place=f"{here}: locked", value=self.locked)
+        for each in ("locked", "history"):
+            given = getattr(self, each)
+            if not isinstance(given, bool):
+                raise ChartError("it must be True or False", place=f"{here}: {each}", value=given)
+        object.__setattr__(self, "states", tuple_of(self.states, f"{here}: states"))
+        self._check_inside(here)
+        if self.states and not self.initial:
+            object.__setattr__(self, "initial", self.states[0].name)
+
+    def _check_inside(self, here: str) -> None:
+        for i, each in enumerate(self.states):
+            if not isinstance(each, State):
+                raise ChartError(
+                    f"states has {shown(each)}",
+                    place=here,
+                    advice="write it as State('forward', outputs={'F': 'F_c'})",
+                    key=("states", i),
+                )
+        names = [each.name for each in self.states]
+        if self.initial and self.initial not in names:
+            raise unknown(
+                "state inside", self.initial, names, ChartError, place=here, key=("initial",)
+            )
+        if self.history and not self.states:
+            raise ChartError(
+                "it has a history, and no states inside",
+                place=here,
+                advice="give its states, or leave history out",
+                key=("history",),
+            )
+        if self.depth > DEEPEST_STATE:
+            raise ChartError(
+                f"it has states on more than {DEEPEST_STATE} levels", place=here, key=("states",)
+            )
+
+    @property
+    def depth(self) -> int:
+        """Number of levels of states, itself included."""
+        return 1 + max((each.depth for each in self.states), default=0)
 
 
 @dataclass(frozen=True, init=False)
@@ -76,7 +127,8 @@ class Transition:
     name : str
         The edge's name, unique in its chart, for example ``"arrest"``.
     source : str or sequence of str
-        The state it leaves, or several that it leaves alike.
+        The state it leaves, or several that it leaves alike; from a composite state it leaves
+        whichever state inside is active. A state inside another is named with it, ``slip.forward``.
     target : str
         The state it enters.
     guard : str
@@ -102,6 +154,8 @@ class Transition:
     actions: Mapping[str, str]
     impulse: bool = field(repr=False)
     sources: tuple[str, ...] = field(init=False, repr=False)
+    # Whose assignments are performed, in this order: ("exit", "stick"), ("action", "slips") ...
+    performs: tuple[tuple[str, str], ...] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -135,15 +189,9 @@ class Transition:
             ("actions", given),
             ("impulse", impulse),
             ("sources", sources),
+            ("performs", ()),
         ):
             object.__setattr__(self, each, value)
-
-    def each(self) -> tuple[Transition, ...]:
-        """Return one transition per source; each knows all of them."""
-        parts = tuple(replace(self, source=source) for source in self.sources)
-        for part in parts:
-            object.__setattr__(part, "sources", self.sources)
-        return parts
 
 
 def texts_of(given: object, owner: str) -> dict[str, str]:

@@ -5,14 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from gms_fsm.charts.nesting import AGE, Level, joined
 from gms_fsm.errors import ChartError, ExpressionError, Part
-from gms_fsm.language import Condition, Number, Value, names_in, parse_condition, parse_value
+from gms_fsm.language import (
+    Condition,
+    Name,
+    Number,
+    Value,
+    names_in,
+    parse_condition,
+    parse_value,
+    renamed,
+)
+from gms_fsm.language.normal import renamed_in
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
-    from gms_fsm.charts.parts import State
-
-AGE = "age"  # s since the state was entered; a variable of every chart that reads it
+    from gms_fsm.charts.parts import State, Transition
 
 
 class ChartReader:
@@ -35,7 +44,7 @@ class ChartReader:
         self.late = [
             each for each in (*chart.force_names, *chart.rate_names) if each not in declared
         ]
-        self.ages = False
+        self.ages: set[str] = set()  # the variables that texts read
 
     def trees(self) -> dict[str, Any]:
         """Return what the chart keeps, by its name."""
@@ -49,39 +58,36 @@ class ChartReader:
         flows: dict[tuple[str, str], Value] = {}
         forces: dict[tuple[str, str], Value | None] = {}
         assignments: dict[tuple[str, str], dict[str, Value]] = {}
-        for i, state in enumerate(chart.states):
-            owner = here.of(f"state {state.name!r}", "states", i)
-            self.only(state.flow, chart.variables, owner.of("flow", "flow"))
+        for level in chart.nesting.levels.values():
+            owner = here.of(f"state {level.path!r}", *level.key)
+            self.only(level.state.flow, chart.variables, owner.of("flow", "flow"))
+            self.only_forces(level.state.outputs, owner.of("outputs", "outputs"))
+            for kind, texts in (("entry", level.state.entry), ("exit", level.state.exit)):
+                found = self.assignments(texts, owner.of(kind, kind), level.age)
+                assignments[kind, level.path] = found
+        for state in chart.states:
             for variable in chart.variables:
-                flows[state.name, variable] = self.value(
-                    state.flow.get(variable, "0"),
-                    self.known_now,
-                    owner.of(f"flow of {variable!r}", "flow", variable),
-                )
-            for kind, texts in (("entry", state.entry), ("exit", state.exit)):
-                assignments[kind, state.name] = self.assignments(texts, owner.of(kind, kind))
+                flows[state.name, variable] = self.flow(state, variable)
             for force in chart.force_names:
-                forces[state.name, force] = self.force(state, force, owner)
+                forces[state.name, force] = self.force(state, force)
         guards: dict[str, Condition] = {}
-        for i, edge in enumerate(chart.transitions):
+        for i, edge in enumerate(chart.nesting.transitions):
             owner = here.of(f"edge {edge.name!r}", "transitions", i)
-            guards[edge.name] = self.guard(edge.guard, owner.of("guard", "guard"))
-            assignments["action", edge.name] = self.assignments(
-                edge.actions, owner.of("action", "actions")
-            )
+            age = self.age_of(edge, owner)
+            guard = self.guard(edge.guard, owner.of("guard", "guard"), age)
+            for name, conditions, _ in chart.nesting.entries(edge):
+                guards[name] = joined(guard, conditions)
+            found = self.assignments(edge.actions, owner.of("action", "actions"), age)
+            assignments["action", edge.name] = found
         totals = {
             force: self.total(chart.contact_outputs[force], force)
             for force in chart.force_names
             if force in chart.contact_outputs
         }
-        variables = chart.variables
-        if self.ages:
-            variables = (*variables, AGE)
-            for state in chart.states:
-                flows[state.name, AGE] = Number(1.0)
-                assignments["entry", state.name][AGE] = Number(0.0)
+        hidden = self.hidden(flows, assignments)
         return {
-            "variables": variables,
+            "variables": (*chart.variables, *hidden),
+            "hidden": hidden,
             "lets": self.lets,
             "flows": flows,
             "forces": forces,
@@ -95,9 +101,53 @@ class ChartReader:
         """The names that can be used, with the expressions read so far."""
         return [*self.known, *self.lets]
 
-    def force(self, state: State, force: str, owner: Part) -> Value | None:
+    def hidden(
+        self,
+        flows: dict[tuple[str, str], Value],
+        assignments: dict[tuple[str, str], dict[str, Value]],
+    ) -> tuple[str, ...]:
+        """Add the variables that no text declares: times in states, and histories."""
+        levels = self.chart.nesting.levels.values()
+        found = dict.fromkeys(level.age for level in levels if level.age in self.ages)
+        for level in levels:
+            if level.age in found:
+                assignments["entry", level.path][level.age] = Number(0.0)
+            if level.state.history:
+                found[level.last] = None
+                for number, inside in enumerate(level.inside()):
+                    assignments["exit", inside][level.last] = Number(float(number))
+        for state in self.chart.states:
+            around = [self.chart.nesting.levels[path] for path in self.around(state.name)]
+            running = {level.age for level in around}
+            for name in found:
+                flows[state.name, name] = Number(1.0 if name in running else 0.0)
+        return tuple(found)
+
+    def around(self, path: str) -> tuple[str, ...]:
+        """Return the paths of a state and of those around it, the outermost first."""
+        return self.chart.nesting.levels[path].chain
+
+    def giving(self, kind: str, state: State, name: str) -> tuple[Level, Part] | None:
+        """Return the innermost state that gives a text for a leaf."""
+        for path in reversed(self.around(state.name)):
+            level = self.chart.nesting.levels[path]
+            if name in getattr(level.state, kind):
+                return level, self.here.of(f"state {path!r}", *level.key)
+        return None
+
+    def flow(self, state: State, variable: str) -> Value:
+        """Read a flow in a state."""
+        given = self.giving("flow", state, variable)
+        if given is None:
+            return self.value("0", self.known_now, self.here)
+        level, owner = given
+        part = owner.of(f"flow of {variable!r}", "flow", variable)
+        return self.value(level.state.flow[variable], self.known_now, part, level.age)
+
+    def force(self, state: State, force: str) -> Value | None:
         """Read a force in a state; None where the state is locked."""
-        self.only_forces(state.outputs, owner.of("outputs", "outputs"))
+        level = self.chart.nesting.levels[state.name]
+        owner = self.here.of(f"state {state.name!r}", *level.key)
         if state.locked:
             if force in state.outputs:
                 raise ChartError(
@@ -116,9 +166,23 @@ class ChartReader:
                 key=owner.key,
             )
         rates = [f"d{variable}" for variable in self.chart.variables]
-        whose = owner if force in state.outputs else self.here
-        owner = whose.of(f"output {force!r}", "outputs", force)
-        return self.value(texts[force], [*self.known_now, *rates], owner)
+        given = self.giving("outputs", state, force)
+        whose, age = (self.here, AGE) if given is None else (given[1], given[0].age)
+        part = whose.of(f"output {force!r}", "outputs", force)
+        return self.value(texts[force], [*self.known_now, *rates], part, age)
+
+    def age_of(self, edge: Transition, owner: Part) -> str:
+        """Return the variable that age means to an edge: the time in the state that it leaves."""
+        ages = dict.fromkeys(self.chart.nesting.levels[each].age for each in edge.sources)
+        texts = [edge.guard, *edge.actions.values()]
+        if len(ages) > 1 and any(_age(text) for text in texts):
+            raise ChartError(
+                f"it reads the age of {' and of '.join(map(repr, edge.sources))}",
+                place=owner.words,
+                advice="write an edge for each of them",
+                key=owner.key,
+            )
+        return next(iter(ages))
 
     def total(self, text: str, force: str) -> Value:
         """Read the force of a contact over the sum of its elements' forces."""
@@ -144,25 +208,27 @@ class ChartReader:
             name for each in found for name in (self.inside(each) if each in self.lets else {each})
         )
 
-    def guard(self, text: str, owner: Part) -> Condition:
+    def guard(self, text: str, owner: Part, age: str) -> Condition:
         """Read a guard."""
         try:
             tree = parse_condition(text, [*self.known_now, *self.late, *_age(text)])
         except ExpressionError as error:
             raise error.at(owner) from None
-        self.ages |= AGE in names_in(tree)
-        return tree
+        if AGE not in names_in(tree):
+            return tree
+        self.ages.add(age)
+        return renamed_in(tree, {AGE: Name(age)})
 
-    def assignments(self, texts: Mapping[str, str], owner: Part) -> dict[str, Value]:
+    def assignments(self, texts: Mapping[str, str], owner: Part, age: str) -> dict[str, Value]:
         """Read assignments to variables and velocities."""
         self.only(texts, (*self.chart.variables, *self.chart.velocities), owner)
         names = [*self.known_now, *self.late]
         return {
-            name: self.value(text, names, Part(f"{owner.words} {name!r}", (*owner.key, name)))
+            name: self.value(text, names, Part(f"{owner.words} {name!r}", (*owner.key, name)), age)
             for name, text in texts.items()
         }
 
-    def value(self, text: str, names: Iterable[str], owner: Part) -> Value:
+    def value(self, text: str, names: Iterable[str], owner: Part, age: str = AGE) -> Value:
         """Read a value."""
         names = [*names, *_age(text)]
         try:
@@ -170,8 +236,10 @@ class ChartReader:
         except ExpressionError as error:
             self.refuse_loop(text, names, owner)
             raise error.at(owner) from None
-        self.ages |= AGE in names_in(tree)
-        return tree
+        if AGE not in names_in(tree):
+            return tree
+        self.ages.add(age)
+        return renamed(tree, {AGE: Name(age)})
 
     def refuse_loop(self, text: str, names: list[str], owner: Part) -> None:
         """Refuse F and a where they would depend on themselves."""

@@ -13,6 +13,7 @@ from typing import Any
 from transitions import Machine, MachineError
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.errors import ChartError, ParameterError, shown
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.language import PYTHON, Condition, names_in, spell
@@ -118,17 +119,17 @@ class ElementMachines:
         self.elements = [_new_element(element, model, i) for i in range(model.n)]
         self.machine = Machine(
             model=self.elements,
-            states=[state.name for state in chart.states],
+            states=[spelled(state.name) for state in chart.states],
             transitions=[
                 {
                     "trigger": edge.name,
-                    "source": edge.source,
-                    "dest": edge.target,
+                    "source": spelled(edge.source),
+                    "dest": spelled(edge.target),
                     "conditions": [self.guards[edge.name]],
                 }
                 for edge in chart.transitions
             ],
-            initial=chart.default_state.name,
+            initial=spelled(chart.default_state.name),
             auto_transitions=False,
             send_event=True,
         )
@@ -157,9 +158,11 @@ class ElementMachines:
             rows = []
             own = {edge.name: index for index, edge in chart.leaving(state.name)}
             for edge in {edge.name: edge for edge in chart.transitions}.values():
-                for transition in self.machine.get_transitions(edge.name, source=state.name):
+                source = spelled(state.name)
+                for transition in self.machine.get_transitions(edge.name, source=source):
                     conditions = [c.func for c in transition.conditions]
-                    if conditions != [self.guards[edge.name]] or transition.dest != edge.target:
+                    target = spelled(edge.target)
+                    if conditions != [self.guards[edge.name]] or transition.dest != target:
                         raise ChartError(
                             f"the machine was given conditions {conditions} or the target "
                             f"{transition.dest!r}, which are not in chart {chart.name!r}",
@@ -181,7 +184,7 @@ class ElementMachines:
                         f"chart {chart.name!r} has it once",
                         advice="change the chart, the only source of switching",
                     )
-            table.append(rows)
+            table.append(sorted(rows, key=lambda row: row[0]))
         known = {edge.name for edge in chart.transitions}
         for trigger in self.machine.get_triggers(*self.machine.states):
             if trigger not in known:
@@ -268,8 +271,8 @@ class MachineEngine:
 
     def set_state(self, machine: int, state: str) -> None:
         """Put one element into a state, without callbacks."""
-        self.parts[machine].machine.set_state(state, self.elements[machine])
-        self.states[machine] = state
+        self.states[machine] = spelled(state)
+        self.parts[machine].machine.set_state(self.states[machine], self.elements[machine])
 
     def show(self, t: float, y: list[float], mode: list[int], jolt: list[int]) -> None:
         """Show the present values to every element."""
@@ -329,7 +332,7 @@ class MachineEngine:
                 place,
                 t,
             )
-        self.states[machine] = row.target
+        self.states[machine] = spelled(row.target)
         for i, (element, state) in enumerate(zip(self.elements, self.states, strict=True)):
             if element.state != state:
                 raise Interference(

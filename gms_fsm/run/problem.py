@@ -477,7 +477,7 @@ def _not_locked(chart: Chart) -> str:
 def _enters(system: System) -> bool:
     """Return whether the default state of some chart has an entry."""
     charts = (contact.chart for contact in system.contacts)
-    return any(chart.assignments["entry", chart.default_state.name] for chart in charts)
+    return any(chart.assigned() for chart in charts)
 
 
 def _entered(
@@ -497,7 +497,7 @@ def _entered(
     layout = program.layout
     for bank, contact in zip(layout.banks, system.contacts, strict=True):
         chart = contact.chart
-        for name in chart.assignments["entry", chart.default_state.name]:
+        for name, _ in chart.assigned():
             if name in chart.velocities and 0 in mode[bank.elements]:
                 raise ParameterError(
                     f"the entry of the default state {chart.states[0].name!r} sets {name!r}",

@@ -17,7 +17,6 @@ from gms_fsm.language import Binary, Condition, Name, Number, Value, names_in, r
 from gms_fsm.language.normal import renamed_in
 
 ZERO = Number(0.0)
-AGE = "age"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +103,7 @@ def subject_of(chart: Chart) -> ChartSubject:
     late = [name for name in (*chart.force_names, *chart.rate_names) if name not in declared]
     steps = {
         (edge.source, edge.name): tuple(
-            (name, renamed(tree, lets))
-            for place in (("exit", edge.source), ("action", edge.name), ("entry", edge.target))
-            for name, tree in chart.assignments[place].items()
+            (name, renamed(tree, lets)) for name, tree in chart.assigned(edge)
         )
         for edge in chart.transitions
     }
@@ -161,7 +158,7 @@ def subject_of(chart: Chart) -> ChartSubject:
         mobility=mobility if moves else "",
         assumed=(
             *([f"{mobility} > 0"] if moves else []),
-            *([f"{AGE} >= 0"] if AGE in chart.variables else []),
+            *(f"{name} >= 0" for name in chart.hidden),
         ),
     )
 

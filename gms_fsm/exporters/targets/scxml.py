@@ -15,7 +15,6 @@ from xml.etree import ElementTree as ET
 from gms_fsm._version import __version__
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
-from gms_fsm.charts.reader import AGE
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
@@ -113,7 +112,7 @@ def _own_parts(root: ET.Element, chart: Chart) -> None:
     for kind, names in (
         ("input", chart.inputs),
         ("velocity", chart.velocities),
-        ("variable", [each for each in chart.variables if each != AGE]),
+        ("variable", [each for each in chart.variables if each not in chart.hidden]),
     ):
         for name in names:
             unit = chart.unit(name)

@@ -18,7 +18,6 @@ from typing import Any
 from gms_fsm._version import __version__
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import Parameter
-from gms_fsm.charts.reader import AGE
 from gms_fsm.coupling.steppable import other_inputs
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._subject import Subject
@@ -88,7 +87,7 @@ def _data(chart: Chart) -> dict[str, Any]:
         "REFERENCE": chart.reference,
         "INPUTS": chart.inputs,
         "VELOCITIES": chart.velocities,
-        "VARIABLES": tuple(name for name in chart.variables if name != AGE),
+        "VARIABLES": tuple(name for name in chart.variables if name not in chart.hidden),
         "PARAMETERS": tuple(_parameter(each) for each in chart.parameters),
         "LET": dict(chart.let),
         "STATES": tuple(state.name for state in chart.states),

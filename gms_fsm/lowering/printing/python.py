@@ -169,14 +169,18 @@ class _PythonPrinter(LockFunctions):
         ]
         lines, several = self.before_guards(steps), len(self.read.banks) > 1
         phases = [
-            {edge.name: self.phases(bank, edge) for edge in bank.edges} for bank in self.read.banks
+            {
+                constant: self.phases(bank, edge)
+                for edge, constant in zip(bank.edges, constants, strict=True)
+            }
+            for bank, constants in zip(self.read.banks, self.names.edges, strict=True)
         ]
         last = max((len(each) for edges in phases for each in edges.values()), default=1)
         if last > 1 or any(each[0].hits for edges in phases for each in edges.values()):
             lines += self.locks.no_impulse()
         for number in range(last):
             found = [
-                {name: each[number] for name, each in edges.items() if number < len(each)}
+                {edge: each[number] for edge, each in edges.items() if number < len(each)}
                 for edges in phases
             ]
             lines += self.dispatched(found)
@@ -197,10 +201,9 @@ class _PythonPrinter(LockFunctions):
         lines, several, word = list[CodeLine](), len(self.read.banks) > 1, "if"
         for bank, found in zip(self.read.banks, phases, strict=True):
             inner: list[CodeLine] = []
-            for edge, constant in zip(bank.edges, self.names.edges[bank.index], strict=True):
-                if edge.name in found:
-                    test = f"{'elif' if inner else 'if'} edge == {constant}:"
-                    inner += [CodeLine(test), *indented(found[edge.name].lines)]
+            for constant, phase in found.items():
+                test = f"{'elif' if inner else 'if'} edge == {constant}:"
+                inner += [CodeLine(test), *indented(phase.lines)]
             first = self.element(bank.index, self.own(bank.index, reads_of(inner)), "live")
             body = self.outward(bank.index, [*first, *inner])
             if several and inner:

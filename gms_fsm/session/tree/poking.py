@@ -94,13 +94,19 @@ def pokeable(start: Problem) -> list[str]:
     updated = (name for each in system.sampled for name in each.updates)
     moved = (name for body in system.bodies for name in (body.x, body.v))
     shared = [name for name in (*moved, *system.flow, *updated) if name in layout.y.shared]
-    own = [bank.of(name) for bank in layout.banks for name in bank.variables if name != AGE]
+    own = [
+        bank.of(name)
+        for bank in layout.banks
+        for name in bank.variables
+        if name not in system.contact(bank.name).chart.hidden
+    ]
     return [*shared, *own]
 
 
 def _of_model(start: Problem, given: Mapping[str, Any]) -> dict[str, float | Mapping[int, float]]:
     """Return the new values of the variables of a model on a rig, checked."""
-    known = [name for name in start.model.chart.variables if name != AGE]
+    chart = start.model.chart
+    known = [name for name in chart.variables if name not in chart.hidden]
     found: dict[str, float | Mapping[int, float]] = {}
     for name, values in given.items():
         if name in parameter_names(start.model):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
 from gms_fsm.language import (
     Binary,
@@ -365,11 +365,9 @@ class SystemReader:
         for name in (*chart.force_names, *chart.rate_names):
             names.setdefault(name, Name(of(c, name)))
 
-        def steps(*keys: tuple[str, str]) -> tuple[tuple[str, Value], ...]:
+        def steps(edge: Transition | None = None) -> tuple[tuple[str, Value], ...]:
             return tuple(
-                (own_names[name], renamed(tree, names))
-                for key in keys
-                for name, tree in chart.assignments[key].items()
+                (own_names[name], renamed(tree, names)) for name, tree in chart.assigned(edge)
             )
 
         locked = {state.name for state in chart.states if state.locked}
@@ -406,14 +404,13 @@ class SystemReader:
                     edge.source,
                     edge.target,
                     renamed_in(chart.guards[edge.name], names),
-                    # Stateflow's order: exit of the source, action, entry of the target.
-                    steps(("exit", edge.source), ("action", edge.name), ("entry", edge.target)),
+                    steps(edge),
                     edge.target in locked,
                     number in chart.arrests,
                 )
                 for number, edge in enumerate(chart.transitions)
             ),
-            start=steps(("entry", chart.default_state.name)),
+            start=steps(),
             means=names,
         )
 

@@ -1,0 +1,248 @@
+"""A chart as it is written: states inside states, and what becomes of them.
+
+All readers see the innermost states only, the leaves, and edges between these. An edge that leaves
+a composite state leaves every leaf inside it, after the edges of the states inside, as in SCXML.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from gms_fsm.charts.parts import State, Transition
+from gms_fsm.errors import ChartError
+from gms_fsm.language import Both, Condition, Name, Number, Relation, spell
+
+AGE = "age"  # s since the state was entered; a variable of every chart that reads it
+
+
+def spelled(path: str) -> str:
+    """Return the name of a state where a language has no dots.
+
+    Examples
+    --------
+    >>> spelled("slip.forward")
+    'slip__forward'
+    """
+    return path.replace(".", "__")
+
+
+@dataclass(frozen=True)
+class Level:
+    """A state as it is written, at its place.
+
+    Parameters
+    ----------
+    state : State
+        Without the names of the states around it.
+    chain : tuple of str
+        The paths of the states around it, the outermost first, and its own.
+    key : tuple of str or int
+        Where it is written, for errors.
+    """
+
+    state: State
+    chain: tuple[str, ...]
+    key: tuple[str | int, ...]
+
+    @property
+    def path(self) -> str:
+        """What it is called: ``slip.forward``."""
+        return self.chain[-1]
+
+    @property
+    def age(self) -> str:
+        """The variable that is the time since it was entered."""
+        return f"{spelled(self.path)}__{AGE}" if self.state.states else AGE
+
+    @property
+    def last(self) -> str:
+        """The variable that is the number of the state inside it that was left last."""
+        return f"{spelled(self.path)}__history"
+
+    def inside(self) -> list[str]:
+        """Return the paths of the states directly inside, the initial one first."""
+        names = sorted(
+            (each.name for each in self.state.states), key=lambda name: name != self.state.initial
+        )
+        return [f"{self.path}.{name}" for name in names]
+
+    def was(self, number: int) -> tuple[Condition, ...]:
+        """Return the conditions for a state inside to be the one that was left last."""
+        above = Relation(">", Name(self.last), Number(number - 0.5))
+        below = Relation("<", Name(self.last), Number(number + 0.5))
+        final = number == len(self.state.states) - 1
+        return (*([above] if number else []), *([] if final else [below]))
+
+
+def _levels(states: tuple[State, ...], chain: tuple[str, ...] = ()) -> Iterator[Level]:
+    for i, state in enumerate(states):
+        own = (*chain, f"{chain[-1]}.{state.name}" if chain else state.name)
+        yield Level(state, own, ("states", i))
+        for each in _levels(state.states, own):
+            yield replace(each, key=("states", i, *each.key))
+
+
+@dataclass(frozen=True)
+class Nesting:
+    """The states and edges of a chart as they are written."""
+
+    states: tuple[State, ...]
+    transitions: tuple[Transition, ...]
+
+    @cached_property
+    def levels(self) -> dict[str, Level]:
+        """All states by their paths, outer ones before those inside."""
+        return {level.path: level for level in _levels(self.states)}
+
+    @cached_property
+    def composite(self) -> tuple[Level, ...]:
+        """The states with states inside."""
+        return tuple(level for level in self.levels.values() if level.state.states)
+
+    def leaves_of(self, path: str) -> list[str]:
+        """Return the paths of the innermost states in a state, or of itself."""
+        return [
+            level.path
+            for level in self.levels.values()
+            if path in level.chain and not level.state.states
+        ]
+
+    def ways(self, path: str) -> list[tuple[tuple[Condition, ...], str]]:
+        """Return the leaves that are entered with a state, each with conditions on histories."""
+        level = self.levels[path]
+        if not level.state.states:
+            return [((), path)]
+        inside = level.inside()
+        if not level.state.history:
+            return self.ways(inside[0])
+        return [
+            ((*(level.was(number) if len(inside) > 1 else ()), *conditions), leaf)
+            for number, each in enumerate(inside)
+            for conditions, leaf in self.ways(each)
+        ]
+
+    def entries(self, edge: Transition) -> list[tuple[str, tuple[Condition, ...], str]]:
+        """Return what an edge becomes for each leaf that it can enter: name, conditions, leaf."""
+        return [
+            (
+                f"{edge.name}__{spelled(leaf.removeprefix(f'{edge.target}.'))}"
+                if number
+                else edge.name,
+                conditions,
+                leaf,
+            )
+            for number, (conditions, leaf) in enumerate(self.ways(edge.target))
+        ]
+
+    def begins(self) -> tuple[tuple[str, str], ...]:
+        """Return whose assignments the start of a run performs."""
+        first = self.ways(self.states[0].name)[0][1]
+        return tuple(("entry", path) for path in self.levels[first].chain)
+
+    # ------------------------------------------------------------------ what readers see
+    def leaves(self) -> tuple[State, ...]:
+        """Return the innermost states with what they inherit, the default state first."""
+        first = self.ways(self.states[0].name)[0][1]
+        found = [self._leaf(level) for level in self.levels.values() if not level.state.states]
+        return tuple(sorted(found, key=lambda state: state.name != first))
+
+    def _leaf(self, level: Level) -> State:
+        if len(level.chain) == 1:
+            return level.state
+        flow: dict[str, str] = {}
+        outputs: dict[str, str] = {}
+        locked = False
+        for path in level.chain:
+            state = self.levels[path].state
+            flow |= state.flow
+            locked |= state.locked
+            outputs = {**({} if state.locked else outputs), **state.outputs}
+        return replace(level.state, name=level.path, flow=flow, outputs=outputs, locked=locked)
+
+    def rows(self) -> tuple[Transition, ...]:
+        """Return an edge for each leaf that an edge leaves, those of inner states first."""
+        written = [
+            (self.levels[source], edge) for edge in self.transitions for source in edge.sources
+        ]
+        if self.composite:
+            written.sort(key=lambda each: -len(each[0].chain))
+        found: dict[tuple[str, str], Transition] = {}
+        for level, edge in written:
+            for leaf in self.leaves_of(level.path):
+                for name, conditions, target in self.entries(edge):
+                    if (leaf, name) not in found:  # else an inner state has it, too
+                        texts = [f"({edge.guard})", *map(spell, conditions)]
+                        row = replace(edge, name=name, source=leaf, target=target)
+                        for each, value in (
+                            ("guard", " and ".join(texts) if conditions else edge.guard),
+                            ("performs", self._performed(level, edge, leaf, target)),
+                        ):
+                            object.__setattr__(row, each, value)
+                        found[leaf, name] = row
+        for row in found.values():
+            sources = tuple(leaf for leaf, name in found if name == row.name)
+            object.__setattr__(row, "sources", sources)
+        return tuple(found.values())
+
+    def _performed(
+        self, source: Level, edge: Transition, leaf: str, target: str
+    ) -> tuple[tuple[str, str], ...]:
+        """Return whose assignments an edge performs: it leaves what is not around both its ends."""
+        around = {*source.chain[:-1]} & {*self.levels[edge.target].chain[:-1]}
+        left = [path for path in self.levels[leaf].chain if path not in around]
+        entered = [path for path in self.levels[target].chain if path not in around]
+        return (
+            *(("exit", path) for path in reversed(left)),
+            ("action", edge.name),
+            *(("entry", path) for path in entered),
+        )
+
+
+def joined(guard: Condition, more: tuple[Condition, ...]) -> Condition:
+    """Return a guard with further conditions."""
+    if not more:
+        return guard
+    return Both((*(guard.operands if isinstance(guard, Both) else (guard,)), *more))
+
+
+def check_paths(nesting: Nesting, owner: dict[str, str], here: str) -> None:
+    """Refuse states whose names, or those of their hidden variables, something else has."""
+    for level in nesting.levels.values():
+        own = [spelled(level.path)] if len(level.chain) > 1 else []
+        for name in (*own, *((level.age, level.last) if level.state.states else ())):
+            if name in owner:
+                raise ChartError(
+                    f"the name {name!r} is used twice ({owner[name]} and state {level.path!r})",
+                    place=here,
+                    advice="every name must be unique",
+                    key=level.key,
+                )
+            owner[name] = f"state {level.path!r}"
+
+
+def check_ends(nesting: Nesting, here: str) -> None:
+    """Refuse edges that leave or enter what is not a state, or take an impulse for nothing."""
+    known = [*nesting.levels]
+    for i, edge in enumerate(nesting.transitions):
+        for end, state in (
+            *(("source", each) for each in edge.sources),
+            ("target", edge.target),
+        ):
+            if state not in known:
+                raise ChartError(
+                    f"{end} {state!r} is not a state",
+                    place=f"{here}, edge {edge.name!r}",
+                    advice=f"states: {', '.join(map(repr, known))}",
+                    key=("transitions", i, end),
+                )
+    locked = {leaf.name for leaf in nesting.leaves() if leaf.locked}
+    for i, edge in enumerate(nesting.transitions):
+        if edge.impulse and not {leaf for *_, leaf in nesting.entries(edge)} <= locked:
+            raise ChartError(
+                f"it takes an impulse, but its target {edge.target!r} is not locked",
+                place=f"{here}, edge {edge.name!r}",
+                advice="leave impulse out; an action that sets the velocity is an impulse too",
+                key=("transitions", i, "impulse"),
+            )
