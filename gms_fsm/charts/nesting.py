@@ -141,6 +141,11 @@ class Nesting:
         first = self.ways(self.states[0].name)[0][1]
         return tuple(("entry", path) for path in self.levels[first].chain)
 
+    def giver(self, kind: str, leaf: str, name: str) -> Level | None:
+        """Return the innermost state that gives a text, of its flow or outputs, for a leaf."""
+        around = (self.levels[path] for path in reversed(self.levels[leaf].chain))
+        return next((level for level in around if name in getattr(level.state, kind)), None)
+
     # ------------------------------------------------------------------ what readers see
     def leaves(self) -> tuple[State, ...]:
         """Return the innermost states with what they inherit, the default state first."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, fields
 from math import isfinite, nan
 from typing import Any
@@ -192,6 +193,12 @@ class Transition:
             ("performs", ()),
         ):
             object.__setattr__(self, each, value)
+
+    def leaving(self, source: str) -> Transition:
+        """Return the transition that leaves one of its sources, and knows all of them."""
+        one = copy(self)
+        object.__setattr__(one, "source", source)
+        return one
 
 
 def texts_of(given: object, owner: str) -> dict[str, str]:

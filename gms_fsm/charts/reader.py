@@ -59,7 +59,7 @@ class ChartReader:
         forces: dict[tuple[str, str], Value | None] = {}
         assignments: dict[tuple[str, str], dict[str, Value]] = {}
         for level in chart.nesting.levels.values():
-            owner = here.of(f"state {level.path!r}", *level.key)
+            owner = self.state(level)
             self.only(level.state.flow, chart.variables, owner.of("flow", "flow"))
             self.only_forces(level.state.outputs, owner.of("outputs", "outputs"))
             for kind, texts in (("entry", level.state.entry), ("exit", level.state.exit)):
@@ -117,37 +117,27 @@ class ChartReader:
                 for number, inside in enumerate(level.inside()):
                     assignments["exit", inside][level.last] = Number(float(number))
         for state in self.chart.states:
-            around = [self.chart.nesting.levels[path] for path in self.around(state.name)]
-            running = {level.age for level in around}
+            chain = self.chart.nesting.levels[state.name].chain
+            running = {self.chart.nesting.levels[path].age for path in chain}
             for name in found:
                 flows[state.name, name] = Number(1.0 if name in running else 0.0)
         return tuple(found)
 
-    def around(self, path: str) -> tuple[str, ...]:
-        """Return the paths of a state and of those around it, the outermost first."""
-        return self.chart.nesting.levels[path].chain
-
-    def giving(self, kind: str, state: State, name: str) -> tuple[Level, Part] | None:
-        """Return the innermost state that gives a text for a leaf."""
-        for path in reversed(self.around(state.name)):
-            level = self.chart.nesting.levels[path]
-            if name in getattr(level.state, kind):
-                return level, self.here.of(f"state {path!r}", *level.key)
-        return None
+    def state(self, level: Level) -> Part:
+        """Return what errors call a state."""
+        return self.here.of(f"state {level.path!r}", *level.key)
 
     def flow(self, state: State, variable: str) -> Value:
         """Read a flow in a state."""
-        given = self.giving("flow", state, variable)
-        if given is None:
-            return self.value("0", self.known_now, self.here)
-        level, owner = given
-        part = owner.of(f"flow of {variable!r}", "flow", variable)
+        level = self.chart.nesting.giver("flow", state.name, variable)
+        if level is None:
+            return Number(0.0)
+        part = self.state(level).of(f"flow of {variable!r}", "flow", variable)
         return self.value(level.state.flow[variable], self.known_now, part, level.age)
 
     def force(self, state: State, force: str) -> Value | None:
         """Read a force in a state; None where the state is locked."""
-        level = self.chart.nesting.levels[state.name]
-        owner = self.here.of(f"state {state.name!r}", *level.key)
+        owner = self.state(self.chart.nesting.levels[state.name])
         if state.locked:
             if force in state.outputs:
                 raise ChartError(
@@ -166,8 +156,8 @@ class ChartReader:
                 key=owner.key,
             )
         rates = [f"d{variable}" for variable in self.chart.variables]
-        given = self.giving("outputs", state, force)
-        whose, age = (self.here, AGE) if given is None else (given[1], given[0].age)
+        giver = self.chart.nesting.giver("outputs", state.name, force)
+        whose, age = (self.here, AGE) if giver is None else (self.state(giver), giver.age)
         part = whose.of(f"output {force!r}", "outputs", force)
         return self.value(texts[force], [*self.known_now, *rates], part, age)
 

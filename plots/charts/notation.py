@@ -6,7 +6,7 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.language import (
     MATHEMATICS,
     MATLAB_LIKE,
@@ -108,11 +108,17 @@ class ChartWriter:
         written = (MATHEMATICS if self.math else MATLAB_LIKE).operators
         return {Both: str(written["and"].write).strip(), Either: str(written["or"].write).strip()}
 
-    def actions(self, trees: Mapping[str, Value]) -> str:
-        """Write the assignments of an edge on one line; empty if there are none."""
-        if not trees:
+    def actions(self, edge: Transition) -> str:
+        """Write what an edge assigns on one line; empty if there is nothing.
+
+        What the states at its ends assign stands in these, and what no text declares nowhere.
+        """
+        chart = self.chart
+        done = edge.performs[1:-1] or (("action", edge.name),)
+        pairs = [pair for key in done for pair in chart.assignments[key].items()]
+        texts = [self.assignment(*pair) for pair in pairs if pair[0] not in chart.hidden]
+        if not texts:
             return ""
-        texts = [self.assignment(name, tree) for name, tree in trees.items()]
         return "/ " + ", ".join(texts) if self.math else "{" + " ".join(texts) + "}"
 
 
