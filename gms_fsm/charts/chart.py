@@ -500,7 +500,7 @@ class Chart:
         Parameters
         ----------
         name : str
-            A state's name.
+            A state's name; a composite state stands for the one that is entered with it.
 
         Returns
         -------
@@ -512,13 +512,12 @@ class Chart:
         ChartError
             If there is no such state.
         """
-        names = [s.name for s in self.states]
-        if name not in names:
+        if not isinstance(name, str) or name not in self.nesting.levels:
             raise ChartError(
                 f"chart {self.name!r} has no state {shown(name)}",
-                advice=f"its states are {_listed(names)}",
+                advice=f"its states are {_listed(self.nesting.levels)}",
             )
-        return names.index(name)
+        return [s.name for s in self.states].index(self.nesting.ways(name)[0][1])
 
     def assigned(self, edge: Transition | None = None) -> tuple[tuple[str, Value], ...]:
         """Return what an edge assigns, in order: exits, action, entries.

@@ -101,6 +101,11 @@ class Nesting:
         """The states with states inside."""
         return tuple(level for level in self.levels.values() if level.state.states)
 
+    @property
+    def histories(self) -> tuple[str, ...]:
+        """The variables that are histories."""
+        return tuple(level.last for level in self.composite if level.state.history)
+
     def leaves_of(self, path: str) -> list[str]:
         """Return the paths of the innermost states in a state, or of itself."""
         return [
@@ -210,6 +215,15 @@ def joined(guard: Condition, more: tuple[Condition, ...]) -> Condition:
     if not more:
         return guard
     return Both((*(guard.operands if isinstance(guard, Both) else (guard,)), *more))
+
+
+def written_guard(guard: Condition, nesting: Nesting, edge: Transition) -> Condition:
+    """Return the guard of an edge as it is written, without conditions on histories."""
+    more = len(nesting.entries(edge)[0][1])
+    if not more or not isinstance(guard, Both):
+        return guard
+    own = guard.operands[:-more]
+    return own[0] if len(own) == 1 else Both(own)
 
 
 def check_paths(nesting: Nesting, owner: dict[str, str], here: str) -> None:

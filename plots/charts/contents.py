@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.charts.nesting import AGE, Level
-from gms_fsm.language import MATLAB_LIKE, Both, Condition, Name, Value, renamed, spell
+from gms_fsm.charts.nesting import AGE, Level, written_guard
+from gms_fsm.language import MATLAB_LIKE, Condition, Name, Value, renamed, spell
 from gms_fsm.language.normal import renamed_in
 from plots.charts.notation import ChartWriter
 
@@ -150,22 +150,19 @@ def written_edges(chart: Chart) -> Iterator[tuple[int, Transition]]:
         yield from enumerate((edge.leaving(path) for edge in own), start=1)
 
 
-def written_guard(chart: Chart, edge: Transition) -> Condition:
-    """Return a guard as it is written, without conditions on histories."""
+def guard_of(chart: Chart, edge: Transition) -> Condition:
+    """Return the guard of an edge, or of an edge as it is written."""
     guard = chart.guards[edge.name]
     if edge.performs:  # of a leaf
         return guard
-    more = len(chart.nesting.entries(edge)[0][1])
-    if more and isinstance(guard, Both):
-        own = guard.operands[:-more]
-        guard = own[0] if len(own) == 1 else Both(own)
+    guard = written_guard(guard, chart.nesting, edge)
     return renamed_in(guard, {chart.nesting.levels[edge.source].age: Name(AGE)})
 
 
 def edge_text(write: ChartWriter, priority: int, edge: Transition) -> str:
     """Return the text of an edge: priority, guard, action."""
     actions = write.actions(edge)
-    guard = spell(written_guard(write.chart, edge), MATLAB_LIKE)
+    guard = spell(guard_of(write.chart, edge), MATLAB_LIKE)
     return f"{priority} [{guard}] {actions}".rstrip()
 
 

@@ -28,10 +28,10 @@ from plots.charts.contents import (
     chart_in_words,
     chart_texts,
     edges_by_priority,
+    guard_of,
     level_texts,
     state_texts,
     written_edges,
-    written_guard,
 )
 from plots.charts.drawing import Drawing, graph_drawing
 from plots.charts.labels import (
@@ -414,7 +414,7 @@ class ChartSheet:
     def legend_text(self, edge: Transition) -> str:
         """Return an edge's guard and action as one text."""
         action = self.write.actions(edge)
-        return f"{self.write.text(written_guard(self.chart, edge))} {action}".rstrip()
+        return f"{self.write.text(guard_of(self.chart, edge))} {action}".rstrip()
 
     def _indexed(self, row: Row) -> Row:
         return with_indices(row) if self.write.math else row
@@ -465,7 +465,7 @@ class ChartSheet:
         return [[Piece("[", "bracket"), number, *each, Piece("]", "bracket")]]
 
     def _guard_lines(self, edge: Transition) -> list[Row]:
-        guard = written_guard(self.chart, edge)
+        guard = guard_of(self.chart, edge)
         lines = [
             (line, clause)
             for clause, part in enumerate(clauses(guard))

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
 
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
@@ -261,7 +262,8 @@ def _names(read: Assembly, bank: Bank, words: Iterable[str], cases: bool) -> Map
     states: dict[str, str] = {}
     for state in chart.states:
         here = f"{place}, state {state.name!r}"
-        same = identifier(state.name if cases else state.name.upper(), (), here)
+        called = spelled(state.name)
+        same = identifier(called if cases else called.upper(), (), here)
         if same in states:
             raise ParameterError(
                 f"the format's language has one name for it and for state {states[same]!r}",

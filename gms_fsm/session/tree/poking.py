@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from gms_fsm.charts.nesting import AGE
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.foundation.arguments import there_are, unknown
 from gms_fsm.run.problem import Problem
@@ -15,9 +16,6 @@ from gms_fsm.systems.models import parameter_names
 
 if TYPE_CHECKING:
     from gms_fsm.session.tree.branch import BranchRow
-
-
-AGE = "age"  # restarts in a state that was poked
 
 
 @dataclass(frozen=True)
@@ -205,9 +203,10 @@ def initial_with(edits: Edits, start: Problem, here: BranchRow) -> dict[str, Any
     for bank in layout.banks:
         states = enumerate(initial[f"{bank.name}.states"], start=bank.first)
         initial[f"{bank.name}.states"] = [poked.get(i, name) for i, name in states]
-        if AGE in bank.variables:
-            ages = enumerate(initial[bank.of(AGE)], start=bank.first)
-            initial[bank.of(AGE)] = [0.0 if i in poked else age for i, age in ages]
+        for name in start.system.contact(bank.name).chart.hidden:
+            if name.endswith(AGE):  # restarts in a state that was poked
+                ages = enumerate(initial[bank.of(name)], start=bank.first)
+                initial[bank.of(name)] = [0.0 if i in poked else age for i, age in ages]
     for name, values in edits.variables.items():
         if isinstance(values, Mapping):
             own = name if start.what.named else layout.contact().of(name)
