@@ -6,7 +6,7 @@ a composite state leaves every leaf inside it, after the edges of the states ins
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -58,7 +58,7 @@ class Level:
 
     @property
     def last(self) -> str:
-        """The variable that is the number of the state inside it that was left last."""
+        """The variable that is the number of the state inside it that was entered last."""
         return f"{spelled(self.path)}__history"
 
     def inside(self) -> list[str]:
@@ -69,7 +69,7 @@ class Level:
         return [f"{self.path}.{name}" for name in names]
 
     def was(self, number: int) -> tuple[Condition, ...]:
-        """Return the conditions for a state inside to be the one that was left last."""
+        """Return the conditions for a state inside to be the one that was entered last."""
         above = Relation(">", Name(self.last), Number(number - 0.5))
         below = Relation("<", Name(self.last), Number(number + 0.5))
         final = number == len(self.state.states) - 1
@@ -145,6 +145,17 @@ class Nesting:
         """Return whose assignments the start of a run performs."""
         first = self.ways(self.states[0].name)[0][1]
         return tuple(("entry", path) for path in self.levels[first].chain)
+
+    def remembered(self, leaves: Sequence[State]) -> dict[str, list[float | None]]:
+        """Return for each history what it is in each leaf; None outside of its state."""
+        found: dict[str, list[float | None]] = {}
+        for level in self.composite:
+            if level.state.history:
+                inside = level.inside()
+                chains = (self.levels[leaf.name].chain for leaf in leaves)
+                active = ([k for k, each in enumerate(inside) if each in own] for own in chains)
+                found[level.last] = [float(each[0]) if each else None for each in active]
+        return found
 
     def giver(self, kind: str, leaf: str, name: str) -> Level | None:
         """Return the innermost state that gives a text, of its flow or outputs, for a leaf."""

@@ -115,7 +115,7 @@ class ChartReader:
             if level.state.history:
                 found[level.last] = None
                 for number, inside in enumerate(level.inside()):
-                    assignments["exit", inside][level.last] = Number(float(number))
+                    assignments["entry", inside][level.last] = Number(float(number))
         for state in self.chart.states:
             chain = self.chart.nesting.levels[state.name].chain
             running = {self.chart.nesting.levels[path].age for path in chain}

@@ -418,7 +418,7 @@ def _given(
             for name in layout.y.own
             if name not in y and name.startswith(bank.of(""))
         }
-    state, mode = layout.y.joined(y), list[int]()
+    mode = list[int]()
     for bank, part in zip(layout.banks, system.contacts, strict=True):
         chart = part.chart
         default = [chart.default_state.name] * bank.n
@@ -428,8 +428,12 @@ def _given(
             raise ParameterError(
                 f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
             )
-        mode += [chart.state_index(str(name)) for name in wanted]
-    return state, mode, {*given}
+        active = [chart.state_index(str(name)) for name in wanted]
+        for history, remembered in chart.nesting.remembered(chart.states).items():
+            if bank.of(history) not in given:
+                y[bank.of(history)] = [remembered[k] or 0.0 for k in active]
+        mode += active
+    return layout.y.joined(y), mode, {*given}
 
 
 @functools.lru_cache(maxsize=64)

@@ -106,9 +106,9 @@ def _happens(point: Breakpoint, branch: Branch, row: int, machine: int) -> bool:
         fired = branch.fired(row)
         if fired is None or fired.element != i or fired.contact not in ("", bank.name):
             return False
-        row = next(e for _, e in chart.leaving(fired.source) if e.name == fired.edge)
-        done = {"fires": "action", "enter": "entry", "leave": "exit"}[point.kind]
-        return (done, point.name) in row.performs or (done, point.name) == ("action", row.name)
+        edge = next(each for _, each in chart.leaving(fired.source) if each.name == fired.edge)
+        done = {"fires": "action", "enter": "entry", "leave": "exit"}[point.kind], point.name
+        return done in edge.performs or done == ("action", edge.name)
     if point.name not in chart.guards:  # of another contact
         return False
     sources = source_of(point.name, chart)

@@ -79,7 +79,8 @@ def _inside(sheet: ChartSheet, number: int, path: str) -> _Drawn:
     ]
     links = [
         LayerEdge(
-            *(names.index(levels[end].chain[depth]) for end in (edge.source, edge.target)),
+            names.index(levels[edge.source].chain[depth]),
+            names.index(levels[edge.target].chain[depth]),
             (label.width, label.height),
         )
         for (_, edge), label in zip(edges, labels, strict=True)
@@ -117,8 +118,8 @@ def _inside(sheet: ChartSheet, number: int, path: str) -> _Drawn:
             if end not in names:
                 own = levels[end].chain[depth]
                 blocks = _blocks(drawn, [ids[each] for each in levels[end].chain])
-                head = float(heads[names.index(own)].height)
-                more = _onward(points[place], drawn.boxes[end], drawn.boxes[own], head, blocks)
+                below = float(heads[names.index(own)].height)
+                more = _onward(points[place], drawn.boxes[end], drawn.boxes[own], below, blocks)
                 points = points + more[1:] if place else more[:0:-1] + points
         look = edge_look(sheet, number, edge)
         drawn.lines.append(

@@ -166,8 +166,8 @@ class _States:
         if given.history:
             history = ET.SubElement(own, "history", {"id": level.last, "type": "shallow"})
             ET.SubElement(history, "transition", {"target": spelled(inside[0])})
-        for each in given.states:
-            self.state(own, f"{path}.{each.name}")
+        for state in given.states:
+            self.state(own, f"{path}.{state.name}")
         if not level.chain[1:]:
             values = ET.SubElement(own, "transition", {"event": VALUES})
             for name in _outside(chart):

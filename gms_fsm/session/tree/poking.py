@@ -203,7 +203,14 @@ def initial_with(edits: Edits, start: Problem, here: BranchRow) -> dict[str, Any
     for bank in layout.banks:
         states = enumerate(initial[f"{bank.name}.states"], start=bank.first)
         initial[f"{bank.name}.states"] = [poked.get(i, name) for i, name in states]
-        for name in start.system.contact(bank.name).chart.hidden:
+        chart, machines = start.system.contact(bank.name).chart, range(layout.n)[bank.elements]
+        for history, remembered in chart.nesting.remembered(chart.states).items():
+            lasts = enumerate(initial[bank.of(history)], start=bank.first)
+            now = {i: remembered[chart.state_index(poked[i])] for i in poked if i in machines}
+            initial[bank.of(history)] = [
+                last if (new := now.get(i)) is None else new for i, last in lasts
+            ]
+        for name in chart.hidden:
             if name.endswith(AGE):  # restarts in a state that was poked
                 ages = enumerate(initial[bank.of(name)], start=bank.first)
                 initial[bank.of(name)] = [0.0 if i in poked else age for i, age in ages]
