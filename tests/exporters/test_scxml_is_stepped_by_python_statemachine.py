@@ -9,6 +9,7 @@ import pytest
 
 from gms_fsm import Chart, Prescribed, State, export, simulate
 from tests.exporters.charts_to_export import model
+from tests.exporters.nested_charts import made, seen_by, stepped
 from tests.exporters.scxml_host import PythonStateMachine, moved_by, run, switches_of
 from tests.helpers import stick_slip
 
@@ -26,6 +27,17 @@ def test_the_gms_element(tmp_path: Path) -> None:
     mine = run(PythonStateMachine(path), gms, 0, moved_by(VELOCITY), 25.0, 0.05)
     assert len(mine) == 4
     assert mine == switches_of(trace, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 8, 13])
+def test_random_states_in_states(seed: int, tmp_path: Path) -> None:
+    """The same state, and the same value that every entry, exit and action changes, each step."""
+    pytest.importorskip("statemachine", reason="needs python-statemachine")
+    path, *_ = export(made(seed), "scxml", tmp_path, name="own")
+    seen, trace = stepped(made(seed))
+    assert seen_by(PythonStateMachine(path), made(seed)) == seen
+    assert len(trace.transitions) > 5
 
 
 def test_the_readme_is_a_program(tmp_path: Path) -> None:

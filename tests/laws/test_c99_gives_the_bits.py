@@ -19,6 +19,7 @@ TRANSLATED = (
     "sliding",
     "system servo",
     "system puck",
+    "states in states",
 )
 
 
