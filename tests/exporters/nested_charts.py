@@ -11,7 +11,7 @@ from gms_fsm.charts.nesting import spelled
 from gms_fsm.language import evaluate
 from tests.exporters.scxml_host import Tool, moved_by
 
-__all__ = ["VELOCITY", "made", "seen_by", "stepped"]
+__all__ = ["VELOCITY", "made", "run_of", "seen_by"]
 
 VELOCITY = "sin(3 * t) + 0.5 * sin(7.1 * t)"
 STEP, COUNT = 0.05, 80
@@ -82,7 +82,7 @@ def _paths(state: State, around: str = "") -> Iterator[str]:
         yield from _paths(each, f"{around}{state.name}.")
 
 
-def stepped(model: ChartModel) -> tuple[Seen, Trace]:
+def run_of(model: ChartModel) -> tuple[Seen, Trace]:
     """Return what a run with Euler's method sees at its steps, and the run."""
     how: Any = {"method": "euler", "step": STEP, "events": "step", "engine": "ifelse"}
     trace = simulate(model, Prescribed(VELOCITY), STEP * COUNT, **how)
@@ -94,7 +94,7 @@ def stepped(model: ChartModel) -> tuple[Seen, Trace]:
 
 
 def seen_by(tool: Tool, model: ChartModel) -> Seen:
-    """Step a document as `stepped` steps the chart."""
+    """Step a document as `run_of` steps the chart."""
     chart, velocity, found = model.chart, moved_by(VELOCITY), Seen()
     paths = {spelled(each.name): each.name for each in chart.states}
     values = {each: 0.0 for each in chart.variables if each not in chart.nesting.histories}

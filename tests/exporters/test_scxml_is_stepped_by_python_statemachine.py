@@ -9,7 +9,7 @@ import pytest
 
 from gms_fsm import Chart, Prescribed, State, export, simulate
 from tests.exporters.charts_to_export import model
-from tests.exporters.nested_charts import made, seen_by, stepped
+from tests.exporters.nested_charts import made, run_of, seen_by
 from tests.exporters.scxml_host import PythonStateMachine, moved_by, run, switches_of
 from tests.helpers import stick_slip
 
@@ -35,7 +35,7 @@ def test_random_states_in_states(seed: int, tmp_path: Path) -> None:
     """The same state, and the same value that every entry, exit and action changes, each step."""
     pytest.importorskip("statemachine", reason="needs python-statemachine")
     path, *_ = export(made(seed), "scxml", tmp_path, name="own")
-    seen, trace = stepped(made(seed))
+    seen, trace = run_of(made(seed))
     assert seen_by(PythonStateMachine(path), made(seed)) == seen
     assert len(trace.transitions) > 5
 

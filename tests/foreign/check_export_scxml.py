@@ -20,7 +20,7 @@ import pytest
 
 from gms_fsm import Prescribed, export, simulate
 from tests.exporters.charts_to_export import MODELS, model
-from tests.exporters.nested_charts import made, seen_by, stepped
+from tests.exporters.nested_charts import made, run_of, seen_by
 from tests.exporters.scxml_host import PythonStateMachine, moved_by, run, switches_of
 from tests.helpers import ROOT
 
@@ -141,7 +141,7 @@ def nested(tool: str, ran: Ran, folder: Path, start: Callable[[Path], Any]) -> N
     count, levels = 0, 0
     for seed in range(200):
         path, *_ = export(made(seed), "scxml", folder / str(seed), name="own")
-        seen, trace = stepped(made(seed))
+        seen, trace = run_of(made(seed))
         machine = start(path)
         try:
             assert seen_by(machine, made(seed)) == seen, seed
