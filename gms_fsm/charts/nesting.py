@@ -6,7 +6,7 @@ a composite state leaves every leaf inside it, after the edges of the states ins
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -146,16 +146,20 @@ class Nesting:
         first = self.ways(self.states[0].name)[0][1]
         return tuple(("entry", path) for path in self.levels[first].chain)
 
-    def remembered(self, leaves: Sequence[State]) -> dict[str, list[float | None]]:
-        """Return for each history what it is in each leaf; None outside of its state."""
-        found: dict[str, list[float | None]] = {}
+    def remembered(self, level: Level, leaf: str, before: float = 0.0) -> float:
+        """Return a history in a leaf, which outside of its state is as before."""
+        chain = self.levels[leaf].chain
+        inside = [k for k, each in enumerate(level.inside()) if each in chain]
+        return float(inside[0]) if inside else before
+
+    def moved(self, name: str, value: float, old: str, new: str) -> float:
+        """Return a variable that no text declares, after a leaf has been put in another's place."""
         for level in self.composite:
-            if level.state.history:
-                inside = level.inside()
-                chains = (self.levels[leaf.name].chain for leaf in leaves)
-                active = ([k for k, each in enumerate(inside) if each in own] for own in chains)
-                found[level.last] = [float(each[0]) if each else None for each in active]
-        return found
+            if name == level.last:
+                return self.remembered(level, new, value)
+            if name == level.age and level.path in self.levels[old].chain:
+                return value if level.path in self.levels[new].chain else 0.0
+        return 0.0
 
     def giver(self, kind: str, leaf: str, name: str) -> Level | None:
         """Return the innermost state that gives a text, of its flow or outputs, for a leaf."""

@@ -429,9 +429,10 @@ def _given(
                 f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
             )
         active = [chart.state_index(str(name)) for name in wanted]
-        for history, remembered in chart.nesting.remembered(chart.states).items():
-            if bank.of(history) not in given:
-                y[bank.of(history)] = [remembered[k] or 0.0 for k in active]
+        for level in chart.nesting.composite:
+            if level.state.history and bank.of(level.last) not in given:
+                leaves = (chart.states[k].name for k in active)
+                y[bank.of(level.last)] = [chart.nesting.remembered(level, each) for each in leaves]
         mode += active
     return layout.y.joined(y), mode, {*given}
 

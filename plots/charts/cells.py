@@ -122,13 +122,14 @@ class CellWriter:
         )
         look = f'BORDER="{border}" COLOR="{ink}" STYLE="ROUNDED" '
         look += "" if inside else f'BGCOLOR="{self.colours.paper}" '
-        spare = tall - sum(heights) - 2 * border - bool(more)
+        ruled = inside or bool(more)
+        spare = tall - sum(heights) - 2 * border - ruled
         top = 0 if inside else spare // 2
         above, below = (
             f'<TR><TD HEIGHT="{room}"></TD></TR>' * bool(room) for room in (top, spare - top)
         )
         texts = "".join(more)
-        body = f"{title}<HR/>{above}{texts}{below}" if more else f"{above}{title}{below}"
+        body = f"{title}<HR/>{above}{texts}{below}" if ruled else f"{above}{title}{below}"
         return Label(f"<{_table(look, wide, tall, body)}>", wide, tall)
 
     def _row(

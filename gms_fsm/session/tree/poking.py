@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from gms_fsm.charts.nesting import AGE
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.foundation.arguments import there_are, unknown
 from gms_fsm.run.problem import Problem
@@ -201,19 +200,14 @@ def initial_with(edits: Edits, start: Problem, here: BranchRow) -> dict[str, Any
     layout = start.program.layout
     poked = {machine_of(element, start): name for element, name in edits.state.items()}
     for bank in layout.banks:
-        states = enumerate(initial[f"{bank.name}.states"], start=bank.first)
-        initial[f"{bank.name}.states"] = [poked.get(i, name) for i, name in states]
-        chart, machines = start.system.contact(bank.name).chart, range(layout.n)[bank.elements]
-        for history, remembered in chart.nesting.remembered(chart.states).items():
-            lasts = enumerate(initial[bank.of(history)], start=bank.first)
-            now = {i: remembered[chart.state_index(poked[i])] for i in poked if i in machines}
-            initial[bank.of(history)] = [
-                last if (new := now.get(i)) is None else new for i, last in lasts
-            ]
+        key, chart = f"{bank.name}.states", start.system.contact(bank.name).chart
+        states = dict(enumerate(initial[key], start=bank.first))
+        moved = {i: (states[i], name) for i, name in poked.items() if i in states}
+        initial[key] = [*(states | {i: new for i, (_, new) in moved.items()}).values()]
         for name in chart.hidden:
-            if name.endswith(AGE):  # restarts in a state that was poked
-                ages = enumerate(initial[bank.of(name)], start=bank.first)
-                initial[bank.of(name)] = [0.0 if i in poked else age for i, age in ages]
+            values = dict(enumerate(initial[bank.of(name)], start=bank.first))
+            values |= {i: chart.nesting.moved(name, values[i], *ends) for i, ends in moved.items()}
+            initial[bank.of(name)] = [*values.values()]
     for name, values in edits.variables.items():
         if isinstance(values, Mapping):
             own = name if start.what.named else layout.contact().of(name)
