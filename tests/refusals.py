@@ -1217,6 +1217,11 @@ def edge(**changes: Any) -> dict[str, Any]:
     return {"transitions": (dataclasses.replace(GO, **changes), BACK)}
 
 
+def inside(*states: State, **changes: Any) -> dict[str, Any]:
+    """Return the valid chart's states with states inside the second one, and further changes."""
+    return {**state(states=states or (State("one"), State("two"))), **changes}
+
+
 def state(**changes: Any) -> dict[str, Any]:
     """Return the valid chart's states with the second one changed."""
     return {"states": (STICK, dataclasses.replace(SLIP, **changes))}
@@ -1226,6 +1231,9 @@ rows = {
     "unknown source": (edge(source="glue"),),
     "line end in a name": (edge(source="gl\nue"),),
     "unknown one of two sources": (edge(source=("stick", "glue")),),
+    "unknown state inside another": (inside(**edge(target="slip.three")),),
+    "state inside another by its name alone": (inside(**edge(target="two")),),
+    "age of two levels": (inside(**edge(source=("stick", "slip"), guard="after(1)")),),
 }
 group("chart", ChartError, chart, rows, "chart 'rubber', edge 'go'")
 rows = {
@@ -1269,6 +1277,9 @@ rows = {
     "variable and parameter": ({"parameters": (*K, "z")},),
     "derivative and parameter": ({"parameters": (*K, "dz")},),
     "state twice": ({"states": (STICK, STICK)},),
+    "state inside and parameter": (inside(parameters=(*K, "slip__two")),),
+    "age and parameter": (inside(parameters=(*K, "slip__age")),),
+    "path for a name": (inside(State("one.two")),),
     "state and edge": (edge(name="slip"),),
     "parameter and edge": (edge(name="k"),),
     "parameter t": ({"parameters": (*K, "t")},),
@@ -1318,12 +1329,36 @@ rows = {
     "edge of none": (lambda: chart({"transitions": ()}).guard_text("go"),),
 }
 group("part of a chart", ChartError, called, rows, "")
+
+
+def nest() -> State:
+    """Return a state in which states nest deeper than anybody reads."""
+    found = State("s")
+    for level in range(20):
+        found = State(f"s{level}", states=(found,))
+    return found
+
+
 rows = {
     "part that no state has": (
         "state 'stick'",
         ...,
         lambda: State("stick", flow={"z": "v"}, during="z = 0"),
     ),
+    "state inside twice": ("state 'slip'", ..., lambda: inside(STICK, STICK)),
+    "history of nothing": ("state 'slip'", ..., lambda: State("slip", history=True)),
+    "deep history": (
+        "state 'slip': history",
+        "deep",
+        lambda: State("slip", states=(STICK,), history="deep"),  # type: ignore[arg-type]
+    ),
+    "initial state elsewhere": (
+        "state 'slip'",
+        ...,
+        lambda: State("slip", states=(STICK,), initial="stuck"),
+    ),
+    "text for a state inside": ("state 'slip'", ..., lambda: State("slip", states=("stick",))),  # type: ignore[arg-type]
+    "states that nest without end": ("state 's7'", ..., nest),
     "locked by a number": ("state 'slip': locked", 1, lambda: State("slip", locked=1)),
     "edge from nowhere": ("edge 'go'", ..., lambda: Transition("go", (), "slip", guard="v > 0")),
     "name that is none": ("chart 5: name", 5, lambda: Chart(5, states=(), outputs={})),
@@ -1484,7 +1519,6 @@ group(
     rows,
 )
 
-NESTED: Any = {"states": (STICK,)}
 rows = {
     "equation that is a table": (
         "state 'slip', flow of 'z', column 1",
@@ -1493,10 +1527,6 @@ rows = {
     ),
 }
 group("wrong kind", ExpressionError, lambda call: call(), rows)
-rows = {
-    "states in a state": ("state 'outer'", ..., lambda: State(name="outer", flow={}, **NESTED)),
-}
-group("wrong kind", ChartError, lambda call: call(), rows)
 PUSHED, SWEPT = Prescribed(0.2), {"v_s": [1e-3, 2e-3]}
 rows = {
     "rig before model": ("model", PUSHED, (PUSHED, stick_slip("signed"), 3.0, SWEPT)),

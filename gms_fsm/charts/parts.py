@@ -97,9 +97,20 @@ class State:
                     key=("states", i),
                 )
         names = [each.name for each in self.states]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ChartError(
+                    f"the name {name!r} is used twice in it",
+                    place=here,
+                    advice="every name must be unique",
+                    key=("states", i, "name"),
+                )
         if self.initial and self.initial not in names:
-            raise unknown(
-                "state inside", self.initial, names, ChartError, place=here, key=("initial",)
+            raise ChartError(
+                f"initial {shown(self.initial)} is not a state inside it",
+                place=here,
+                advice=f"states inside: {', '.join(map(repr, names)) or 'none'}",
+                key=("initial",),
             )
         if self.history and not self.states:
             raise ChartError(
