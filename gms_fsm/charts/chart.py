@@ -532,6 +532,8 @@ class Chart:
         tuple of (str, Value)
             Variables and velocities, each with its new value.
         """
+        if edge is not None:
+            checked_kind("edge", edge, Transition, "a Transition of the chart")
         performed = self.nesting.begins() if edge is None else edge.performs
         return tuple(each for key in performed for each in self.assignments[key].items())
 
