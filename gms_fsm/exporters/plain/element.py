@@ -239,8 +239,11 @@ def _names(read: Assembly, bank: Bank, words: Iterable[str], cases: bool) -> Map
     for name in chart.parameter_names:
         take("parameter", name, of(c, name))
     for full in bank.variables:
-        take("variable", full.rsplit(".", 1)[1], full)
-        take("rate", f"d{full.rsplit('.', 1)[1]}", bank.rate(full))
+        name = full.rsplit(".", 1)[1]
+        # Structured text has no names with two underscores in a row.
+        name = name if cases or name not in chart.hidden else name.replace("__", "_")
+        take("variable", name, full)
+        take("rate", f"d{name}", bank.rate(full))
     for name in chart.let:
         take("let", name, of(c, name))
     for name in chart.inputs:
@@ -372,7 +375,7 @@ class PlanReader:
             computed = each.forces[self.force] if common is None else Computed(common)
             found.append(
                 StateParts(
-                    each.state,
+                    spelled(each.state),
                     {
                         self.names[name]: self.expression(bank.flows[each.state, name], rate)
                         for name, rate in each.rates.items()

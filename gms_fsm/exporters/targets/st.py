@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from gms_fsm.charts.nesting import spelled
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._readme import about_friction
@@ -122,7 +121,8 @@ class StructuredText:
         at = f"[{self.i}]" if self.i else ""
         self.now = {each.name: self.take(f"{each.name}_i") for each in element.variables if at}
         self.state = self.take("state")
-        self.states = [self.take(f"STATE_{spelled(each.name).upper()}") for each in element.states]
+        paths = [each.name.replace("__", "_").upper() for each in element.states]
+        self.states = [self.take(f"STATE_{path}") for path in paths]
         self.walker = Walker(
             FORMS,
             self.dialect,
