@@ -6,7 +6,8 @@ a composite state leaves every leaf inside it, after the edges of the states ins
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -60,6 +61,13 @@ class Level:
     def last(self) -> str:
         """The variable that is the number of the state inside it that was entered last."""
         return f"{spelled(self.path)}__history"
+
+    def texts(self, given: Mapping[str, str]) -> dict[str, str]:
+        """Return texts as they read elsewhere, where age is that of another state."""
+        return {
+            name: re.sub(rf"\b{AGE}\b", self.age, text) if isinstance(text, str) else text
+            for name, text in given.items()
+        }
 
     def inside(self) -> list[str]:
         """Return the paths of the states directly inside, the initial one first."""
@@ -180,10 +188,13 @@ class Nesting:
         outputs: dict[str, str] = {}
         locked = False
         for path in level.chain:
-            state = self.levels[path].state
-            flow |= state.flow
-            locked |= state.locked
-            outputs = {**({} if state.locked else outputs), **state.outputs}
+            around = self.levels[path]
+            flow |= around.texts(around.state.flow)
+            locked |= around.state.locked
+            outputs = {
+                **({} if around.state.locked else outputs),
+                **around.texts(around.state.outputs),
+            }
         return replace(level.state, name=level.path, flow=flow, outputs=outputs, locked=locked)
 
     def rows(self) -> tuple[Transition, ...]:

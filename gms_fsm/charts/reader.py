@@ -147,7 +147,8 @@ class ChartReader:
                     key=(*owner.key, "outputs", force),
                 )
             return None
-        texts = {**self.chart.outputs, **state.outputs}
+        giver = self.chart.nesting.giver("outputs", state.name, force)
+        texts = self.chart.outputs if giver is None else giver.state.outputs
         if force not in texts:
             raise ChartError(
                 f"no output {force!r}",
@@ -156,7 +157,6 @@ class ChartReader:
                 key=owner.key,
             )
         rates = [f"d{variable}" for variable in self.chart.variables]
-        giver = self.chart.nesting.giver("outputs", state.name, force)
         whose, age = (self.here, AGE) if giver is None else (self.state(giver), giver.age)
         part = whose.of(f"output {force!r}", "outputs", force)
         return self.value(texts[force], [*self.known_now, *rates], part, age)

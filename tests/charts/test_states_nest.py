@@ -130,6 +130,7 @@ def test_flow_outputs_and_locks_are_inherited_and_inner_ones_win() -> None:
 
 def test_the_age_of_an_outer_state_goes_on_while_inner_ones_change() -> None:
     """The closed form: all lights go out 1.5 s after the first came on, whatever was lit."""
+    assert LIGHTS.states[1].flow == {"u": "on__age"}
     log = trace("states in states").transitions
     assert [*zip(log.t.round(9), log.edge, log.target, strict=True)][:6] == [
         (0.3, "again", "on.go.green"),
