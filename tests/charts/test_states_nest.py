@@ -25,8 +25,9 @@ from gms_fsm import (
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.errors import ChartError
 from gms_fsm.session.session import Session
-from tests.corpus import LIGHT, trace
-from tests.helpers import stick_slip
+from tests.corpus import ENGINES, LIGHT, trace
+from tests.exporters.nested_charts import VELOCITY, made
+from tests.helpers import other_parts, stick_slip
 
 LIGHTS = LIGHT.chart
 SINE = "0.15 * sin(2 * pi * t / 25)"
@@ -163,6 +164,16 @@ def test_a_history_enters_the_state_that_was_active_last_and_in_it_the_initial_o
 
 
 # --------------------------------------------------------------------------- readers
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 8])
+def test_engines_agree_on_random_nested_charts(seed: int) -> None:
+    first, *others = (
+        simulate(made(seed), Prescribed(VELOCITY), 4.0, engine=engine) for engine in ENGINES
+    )
+    assert all(other_parts(each, first) == [] for each in others)
+    assert len(first.transitions) > 5
+
+
 def test_a_composite_gms_element_has_the_switches_and_the_bits_of_the_flat_one() -> None:
     flat, nested = (
         simulate(each, Prescribed(SINE), 25.0) for each in (stick_slip("signed"), composite())

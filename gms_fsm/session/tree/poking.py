@@ -205,9 +205,9 @@ def initial_with(edits: Edits, start: Problem, here: BranchRow) -> dict[str, Any
         moved = {i: (states[i], name) for i, name in poked.items() if i in states}
         initial[key] = [*(states | {i: new for i, (_, new) in moved.items()}).values()]
         for name in chart.hidden:
-            values = dict(enumerate(initial[bank.of(name)], start=bank.first))
-            values |= {i: chart.nesting.moved(name, values[i], *ends) for i, ends in moved.items()}
-            initial[bank.of(name)] = [*values.values()]
+            kept = dict(enumerate(initial[bank.of(name)], start=bank.first))
+            kept |= {i: chart.nesting.moved(name, kept[i], *ends) for i, ends in moved.items()}
+            initial[bank.of(name)] = [*kept.values()]
     for name, values in edits.variables.items():
         if isinstance(values, Mapping):
             own = name if start.what.named else layout.contact().of(name)
