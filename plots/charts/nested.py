@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
 PAD = 16.0  # between the border of a composite state and what is inside
+LANES = (8.0, 4.5, 11.5)  # from the border to lines along it
 ROUND = 8.0  # radius of a corner of a line
 SAMPLES = 12  # points on a part of a line, for finding what hides it
 
@@ -38,6 +39,7 @@ class _Drawn:
     nodes: list[Node] = field(default_factory=list)
     lines: list[DrawnLine] = field(default_factory=list)
     boxes: dict[str, Box] = field(default_factory=dict)  # of all states inside, by path
+    inward: dict[str, int] = field(default_factory=dict)  # lines into each composite state
 
     def add(self, other: _Drawn, corner: Point) -> None:
         """Add another drawing at a place."""
@@ -119,13 +121,26 @@ def _inside(sheet: ChartSheet, number: int, path: str) -> _Drawn:
                 own = levels[end].chain[depth]
                 blocks = _blocks(drawn, [ids[each] for each in levels[end].chain])
                 below = float(heads[names.index(own)].height)
-                more = _onward(points[place], drawn.boxes[end], drawn.boxes[own], below, blocks)
+                lane = LANES[drawn.inward.get(own, 0) % len(LANES)]
+                drawn.inward[own] = drawn.inward.get(own, 0) + 1
+                outer = _Outer(*drawn.boxes[own], below, lane)
+                more = _onward(points[place], drawn.boxes[end], outer, blocks)
                 points = points + more[1:] if place else more[:0:-1] + points
         look = edge_look(sheet, number, edge)
         drawn.lines.append(
             DrawnLine(name, (ids[edge.source], ids[edge.target]), tuple(points), True, look)
         )
     return drawn
+
+
+@dataclass(frozen=True)
+class _Outer:
+    """A composite state into which a line leads: its box, the height of its texts, a lane."""
+
+    at: Point
+    size: Size
+    head: float
+    lane: float  # from the border
 
 
 def _blocks(drawn: _Drawn, around: list[str]) -> list[Box]:
@@ -148,23 +163,23 @@ def _scope(levels: dict[str, Level], edge: Transition) -> str:
     return next((each for each in reversed(levels[edge.source].chain[:-1]) if each in around), "")
 
 
-def _onward(point: Point, box: Box, outer: Box, head: float, blocks: list[Box]) -> list[Point]:
+def _onward(point: Point, box: Box, outer: _Outer, blocks: list[Box]) -> list[Point]:
     """Return a line from the border of a composite state to a state inside.
 
     It is straight, or along the border, whichever hides least behind what else is inside.
     """
-    if not abs(abs(point[1] - outer[0][1]) - outer[1][1] / 2) < 1.0:  # from the left or the right
-        turned = [_turned(each) for each in blocks]
-        found = _ways((point[1], point[0]), _turned(box), _turned(outer), 0.0, turned, head)
+    if not abs(abs(point[1] - outer.at[1]) - outer.size[1] / 2) < 1.0:  # from the left or the right
+        turned = replace(outer, at=outer.at[::-1], size=outer.size[::-1], head=0.0)
+        found = _ways(point[::-1], _turned(box), turned, [*map(_turned, blocks)], (1.0,))
         return [(x, y) for y, x in found]
-    above = point[1] < outer[0][1]
-    return _ways(point, box, outer, head if above else 0.0, blocks, 0.0)
+    above = point[1] < outer.at[1]
+    return _ways(point, box, outer if above else replace(outer, head=0.0), blocks, (1.0, -1.0))
 
 
 def _ways(
-    point: Point, box: Box, outer: Box, head: float, blocks: list[Box], title: float
+    point: Point, box: Box, outer: _Outer, blocks: list[Box], sides: tuple[float, ...]
 ) -> list[Point]:
-    """Return the best line from the upper or lower border."""
+    """Return the best line from the upper or lower border: straight, or along one of the sides."""
     (x, y), ((middle, centre), (width, height)) = point, box
     down = 1.0 if y < centre else -1.0
     aim = min(max(x, middle - width / 2 + CORNER), middle + width / 2 - CORNER)
@@ -172,11 +187,9 @@ def _ways(
     half = (end[1] - y) / 2
     direct = [point, (x, y + half), (aim, end[1] - half), end]
     found = [straight(point, end) if aim == x else direct]
-    level = y + down * (head + PAD / 2)
-    for side in (1.0, -1.0):
-        if side < 0 and title:  # the texts of the composite state are there
-            continue
-        gutter = outer[0][0] + side * (outer[1][0] / 2 - PAD / 2)
+    level = y + down * (outer.head + outer.lane)
+    for side in sides:
+        gutter = outer.at[0] + side * (outer.size[0] / 2 - outer.lane)
         corners = [point, (x, level), (gutter, level), (gutter, centre)]
         found.append(_rounded([*corners, (middle + side * width / 2, centre)]))
     return min(found, key=lambda line: _hidden(line, blocks))
