@@ -15,7 +15,9 @@ from gms_fsm import (
     Chart,
     ChartModel,
     ElementMachines,
+    Parameter,
     Prescribed,
+    Slider,
     State,
     Trace,
     Transition,
@@ -185,6 +187,49 @@ def test_a_composite_gms_element_has_the_switches_and_the_bits_of_the_flat_one()
     assert {"slip.forward", "slip.backward"} <= {*nested.transitions.target.tolist()}
 
 
+def test_a_brake_that_locks_while_it_is_closed_has_the_bits_of_the_flat_one() -> None:
+    """One edge of the composite state releases it, whether it slips or holds the body."""
+    free = Parameter("mu", "1", "> 0")
+    inner = (
+        State("stuck", locked=True),
+        State("forward", outputs={"F": "mu * N"}),
+        State("backward", outputs={"F": "-mu * N"}),
+    )
+    edges = (
+        ("catch_forward", "open", "forward", "N > 0.6 and v > 0"),
+        ("catch_backward", "open", "backward", "N > 0.6 and v <= 0"),
+        ("stop_forward", "forward", "stuck", "v < 0"),
+        ("stop_backward", "backward", "stuck", "v > 0"),
+        ("go_forward", "stuck", "forward", "F > 1.2 * mu * N"),
+        ("go_backward", "stuck", "backward", "F < -1.2 * mu * N"),
+    )
+    nested_names = {each.name: f"closed.{each.name}" for each in inner} | {"open": "open"}
+    charts = []
+    for names, states, closed in (
+        (nested_names, (State("closed", states=inner),), "closed"),
+        ({name: name for name in nested_names}, inner, ("stuck", "forward", "backward")),
+    ):
+        rows = [Transition(name, names[a], names[b], guard) for name, a, b, guard in edges]
+        rows.append(Transition("release", closed, "open", "N <= 0.6"))
+        first = State("open", outputs={"F": "0.1 * v"})
+        charts.append(Chart("brake", ("v", "N"), (), (free,), (first, *states), rows))
+    nested, flat = (
+        simulate(
+            ChartModel(chart, {"mu": 2.0}, inputs={"N": "1 + 3 * sin(2 * t)"}),
+            Slider(1.0, "2 * sin(1.3 * t)"),
+            20.0,
+        )
+        for chart in charts
+    )
+    assert {"release", "go_forward", "stop_backward"} <= {*nested.transitions.edge.tolist()}
+    assert {*nested.transitions.source[nested.transitions.edge == "release"].tolist()} >= {
+        "closed.stuck",
+        "closed.forward",
+    }
+    assert nested.rows.y.tobytes() == flat.rows.y.tobytes()
+    assert nested.F.tobytes() == flat.F.tobytes()
+
+
 def test_what_is_proved_of_the_flat_element_is_proved_of_the_composite_one() -> None:
     flat, nested = (prove(each) for each in (GMS_ELEMENT["signed"], composite().chart))
     assert not flat.refuted
@@ -196,6 +241,9 @@ def test_charts_and_runs_keep_nested_states_in_files(tmp_path: Path) -> None:
     path = LIGHTS.save(tmp_path / "light.toml")
     assert Chart.load(path) == LIGHTS
     assert path.read_text().count("[[state.state.state]]") == 2
+    for chart in (made(seed).chart for seed in range(20)):
+        assert Chart.load(chart.save(tmp_path / "any.toml")) == chart
+        (tmp_path / "any.toml").unlink()
     one = trace("states in states")
     for name in ("run.npz", "run.csv"):
         again = Trace.load(one.save(tmp_path / name))
