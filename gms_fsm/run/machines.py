@@ -32,9 +32,9 @@ class Element:
     Callbacks can read: ``t`` [s], ``x`` [m], ``v`` [m/s], the threshold ``s``, each variable
     (``z`` [m]) and each parameter (``k``, ``sigma``, ``C``, ``v_c``) of the chart, the current
     ``state`` (one inside others is spelled ``slip__forward``) and the element's ``index`` counted
-    from 0. Parameters are read-only: the run is
-    integrated with those of the model. Derive from it to give elements methods that `transitions`
-    calls by name, for example ``on_enter_slip(self, event)``.
+    from 0. Parameters are read-only: the run is integrated with those of the model. Derive from it
+    to give elements methods that `transitions` calls by name, for example
+    ``on_enter_slip(self, event)``.
     """
 
     # No __slots__ and no generated __eq__: transitions fails with the former, and registers models

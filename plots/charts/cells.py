@@ -120,8 +120,8 @@ class CellWriter:
             self._row([Piece("", "pad"), *row], height, inner, ground=inside)
             for row, height in zip(rows, heights, strict=True)
         )
-        look = f'BORDER="{border}" COLOR="{ink}" STYLE="ROUNDED" '
-        look += "" if inside else f'BGCOLOR="{self.colours.paper}" '
+        ground = "" if inside else f'BGCOLOR="{self.colours.paper}" '
+        look = f'BORDER="{border}" COLOR="{ink}" {ground}STYLE="ROUNDED" '
         ruled = inside or bool(more)
         spare = tall - sum(heights) - 2 * border - ruled
         top = 0 if inside else spare // 2
