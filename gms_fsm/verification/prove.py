@@ -40,12 +40,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import listed
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.parts import Contact
+from gms_fsm.systems.system import System
 from gms_fsm.verification._checks import chattering, determinism, livelock, reachability, stability
 from gms_fsm.verification._prover import Prover
 from gms_fsm.verification._release import release
 from gms_fsm.verification._subject import subject_of
+from gms_fsm.verification._zeno import zeno
+from gms_fsm.verification.facts import ContactFacts, facts_of
 from gms_fsm.verification.findings import CHECKS, Check, Finding, Report, Status
 
 __all__ = ["CHECKS", "Check", "Finding", "Report", "Status", "default_domain", "prove"]
@@ -71,7 +75,7 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
     >>> default_domain(gms_element("signed")), default_domain(LUGRE)
     (('s > 0', 'C > 0', 'v_c > 0'), ('s > 0', 'sigma_0 > 0'))
     """
-    used, declared = subject_of(chart).used, chart.declared
+    used, declared = subject_of(ContactFacts(chart)).used, chart.declared
     return tuple(
         condition
         for name in chart.inputs + chart.parameter_names
@@ -80,16 +84,24 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
     )
 
 
-def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
+def prove(
+    chart: Chart | Model | Contact | System,
+    domain: Sequence[str] | None = None,
+    *,
+    contact: str = "",
+) -> Report:
     """Check a chart at all points of a domain.
 
     Parameters
     ----------
-    chart : Chart
-        The chart; only its texts are used.
+    chart : Chart, Model, Contact or System
+        The chart; only its texts are used. Of a model or a contact also the number of elements and
+        the period, of a system also whether other contacts move the same bodies.
     domain : sequence of str, optional
         Conditions on its names to assume, for example ``["s >= 0", "v_c > 0"]``. The default is
         `default_domain`.
+    contact : str
+        The contact, in a system with several.
 
     Returns
     -------
@@ -113,18 +125,23 @@ def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
     >>> finding.check, finding.where, finding.counterexample  # doctest: +SKIP
     ('stability', ('slip',), {'C': 1.0, 'v': -1.0, 's': 1.0, 'z': 1.0})
     """
-    if not hasattr(chart, "guards"):
-        raise ParameterError(
-            "prove takes a Chart", place="chart", value=chart, advice="for a model, pass its .chart"
-        )
+    return prove_facts(facts_of(chart, contact), domain)
+
+
+def prove_facts(facts: ContactFacts, domain: Sequence[str] | None = None) -> Report:
+    """Check a chart, given what a run makes of it."""
+    subject = subject_of(facts)
     if domain is None:
-        domain = default_domain(chart)
+        domain = default_domain(facts.chart)
     domain = (
         (domain,)
         if isinstance(domain, str)
         else tuple(listed("domain", domain, "a list of conditions"))
     )
-    domain = (*domain, *subject_of(chart).assumed)
-    prover = Prover(chart, domain)
-    checks = (determinism, livelock, reachability, chattering, stability, release)
-    return Report(chart, domain, tuple(found for check in checks for found in check(prover)))
+    domain = (*domain, *subject.assumed)
+    prover = Prover(subject, domain)
+    found = tuple(finding for check in ALL for finding in check(prover))
+    return Report(facts.chart, domain, found, subject.about)
+
+
+ALL = (determinism, livelock, reachability, chattering, stability, release, zeno)
