@@ -45,6 +45,7 @@ from gms_fsm.verification._switching import (
     may_change,
     others,
     others_switch,
+    read_by,
     renewed,
     untaken,
 )
@@ -94,7 +95,8 @@ def livelock(prover: Prover) -> Iterator[Finding]:
         return
     passable: list[tuple[Transition, ...]] = []
     found = []
-    for cycle in cycles[:MOST_CYCLES]:
+    # Elements that share a force switch together, so that no one of them can be followed alone.
+    for cycle in cycles[:MOST_CYCLES] if not prover.subject.rest else ():
         where = tuple(name for edge in cycle for name in (edge.source, edge.name))
         found.append(prover.settle("livelock", where, _all_around, cycle, passable))
     yield from found
@@ -173,7 +175,7 @@ def _all_around(
     passable.append(cycle)
     once, end = around(1, certain=False)
     closed = [end[name].value == prover.symbols[name] for name in sorted(assigned)]
-    names = names_of(*(tree for edge in cycle for tree in _read(subject, edge))) | assigned
+    names = read_by(subject, cycle) | assigned
     point = prover.example(names, *once, *closed)
     if point is not None and jolts_and_arrests(subject, cycle):
         raise Undecided("an arrest is not taken where an impulse changes the velocity")
@@ -185,12 +187,6 @@ def _all_around(
     if prover.find(*once) is None:
         raise Undecided("an earlier arrest ends it, except where the velocity jumps")
     return Answer("undecided", "each pass assigns different values; only two passes were followed")
-
-
-def _read(subject: ChartSubject, edge: Transition) -> list[Value | Condition]:
-    """Return all that decides whether an edge is taken, and what it does."""
-    guards = [subject.guard(each) for each in earlier(subject, edge)]
-    return [*subject.trees(edge), *guards]
 
 
 # --------------------------------------------------------------------------- reachability
@@ -294,17 +290,20 @@ def _pushed_by_others(prover: Prover, pairs: Sequence[tuple[Transition, Transiti
         if prover.subject.assigned(there) or prover.subject.assigned(back):
             raise Undecided(JUMPS)
         other, assumed = renewed(prover, prover.still, "!")
-        formulas = [*assumed, *prover.within(there.source)]
+        formulas, touched = [*assumed, *prover.within(there.source)], list[Any]()
         for edge, names in ((there, prover.still), (back, other)):
             reading = Reading()
-            moved = moving(prover, reading, edge.source, names)
+            moved = moving(prover, reading, edge.source, names, "" if edge is there else "!")
             loose = []
             for way in ways(split(prover.subject.guard(edge))):
                 margins = [reading.margin(part, moved) for part in way]
                 loose.append(z3.And([z3.Or(m.value > 0, rests(z3, m)) for m in margins]))
+                touched += [m.value == 0 for m in margins]
             prover.defined(reading)
-            formulas.append(z3.Or(*loose, *(u == 0 for u in reading.breaks)))
-        if prover.find(*formulas) is not None:
+            jumps = [u == 0 for u in reading.breaks]
+            touched += jumps
+            formulas.append(z3.Or(*loose, *jumps))
+        if prover.find(*formulas, z3.Or(touched)) is not None:
             return Answer("undecided", f"{others(prover)} may switch at the same instant")
     return Answer("proved", f"nor where {others(prover)} switch at the same instant")
 
@@ -333,7 +332,15 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     guards = [subject.guard(edge) for edge in (there, back)]
     resting = prover.within(there.source, back.source)
     of_flows, of_guards = Reading(), Reading()
-    moved = [moving(prover, of_flows, edge.source, prover.still) for edge in (there, back)]
+    moved = [
+        moving(prover, of_flows, edge.source, prover.still, mark)
+        for edge, mark in ((there, ""), (back, "!"))
+    ]
+    jumping = [
+        (moved[0][name].slope, moved[1][name].slope)
+        for name in prover.chart.velocities
+        if subject.facts.free and name in subject.inputs
+    ]
     at_break = z3.Or([u == 0 for u in of_flows.breaks])
     strict, loose = [], []
     for pair in product(*(ways(split(guard)) for guard in guards)):
@@ -362,10 +369,13 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
         prover, [*guards, *map(subject.guard, before)], (there.source, back.source)
     )
     calm, firm = [u != 0 for u in breaks], passed_over(prover, moved, (there, back))
+    calm += [one == other for one, other in jumping]
     point = prover.example(names, z3.Or(strict), *resting, *calm, *firm)
     if point is not None:
         place = _surface(guards[0], point)
-        text = f"on {place} each flow pushes into the other's guard: endless switching"
+        one = all(isinstance(split(guard), Requirement) for guard in guards)
+        follows = "a sliding mode, if not endless switching" if one else "endless switching"
+        text = f"on {place} each flow pushes into the other's guard: {follows}"
         return refuted(text, point)
     if of_guards.breaks:
         raise Undecided("sgn jumps in a guard")
@@ -379,6 +389,8 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
         return Answer("proved", text)
     if before and prover.find(z3.Or(strict), *resting, *calm) is not None:
         raise Undecided("an earlier edge may be taken instead")
+    if jumping and prover.find(z3.Or(loose), *resting, *sure, *calm) is None:
+        raise Undecided("the force may jump with the state, and the acceleration with it")
     raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
 
 
@@ -433,10 +445,19 @@ def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
     return prover.find(*formulas) is not None
 
 
-def moving(prover: Prover, reading: Reading, state: str, here: Duals) -> Duals:
-    """Return every name with its rate of change in a state, at some values of the names."""
+def moving(prover: Prover, reading: Reading, state: str, here: Duals, mark: str = "") -> Duals:
+    """Return every name with its rate of change in a state, at some values of the names.
+
+    With a mark, accelerations that jump with the force have other values.
+    """
     subject = prover.subject
     rates = {name: prover.rates[f"d{name}/dt"] for name in subject.inputs}
+    if mark and subject.facts.free:
+        rates |= {
+            name: prover.z3.Real(f"d{name}/dt{mark}")
+            for name in subject.chart.velocities
+            if name in rates
+        }
     if "t" in rates:
         rates["t"] = prover.z3.RealVal(1)
     if subject.mobility:

@@ -228,6 +228,7 @@ class Answer:
     status: Status
     text: str
     counterexample: Mapping[str, float] = field(default_factory=dict)
+    where: tuple[str, ...] = ()  # in place of what was asked about
 
 
 class Prover:
@@ -403,6 +404,7 @@ class Prover:
             answer = question(self, *about)
         except Undecided as reason:
             answer = Answer("undecided", str(reason))
+        where = answer.where or where
         return Finding(check, answer.status, where, answer.text, answer.counterexample, case)
 
 

@@ -130,9 +130,11 @@ class ChartSubject:
     def about(self) -> tuple[str, ...]:
         """What the statements are about, line by line."""
         facts, v, H, W = self.facts, self.chart.velocities[0], self.load, self.mobility
+        jumps = facts.free and not self.moves
         lines = [
             "over the reals, not floats; over points, not trajectories",
-            "inputs and their rates (ds/dt, dv/dt) are free, but equal in both states of a switch",
+            "inputs and their rates (ds/dt, dv/dt) are free, but equal in both states of a switch"
+            + ", except the acceleration" * jumps,
         ]
         if self.moves:
             held = f", F = {H} and a = {v} = 0 while it is locked" * self.chart.locks
@@ -196,16 +198,16 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
     for state in chart.states:
         inside = lets | _rates(chart, flows, state.name)
         own[state.name] = {
-            force: renamed(tree, inside)
-            for force in chart.force_names
-            if (tree := chart.forces[state.name, force]) is not None
+            name: renamed(given, inside)
+            for name in chart.force_names
+            if (given := chart.forces[state.name, name]) is not None
         }
         found = values[state.name] = {}
         for force in chart.force_names:
             if force not in own[state.name]:  # locked
                 found[force] = Name(_called(load, chart, force))
                 continue
-            total = own[state.name][force]
+            total: Value = own[state.name][force]
             if several:
                 total = Binary("+", total, Name(rest[force]))
             if force in chart.totals:
@@ -218,9 +220,8 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
             found |= {name: ZERO for name in chart.rate_names if name in late}
     if moves and len(chart.velocities) == 1:
         for state in chart.states:
-            force = values[state.name]["F"]
-            net = Binary("*", Binary("-", Name(load), force), Name(mobility))
-            rate = ZERO if state.locked else net
+            net = Binary("-", Name(load), values[state.name]["F"])
+            rate = ZERO if state.locked else Binary("*", net, Name(mobility))
             flows[state.name, chart.velocities[0]] = rate
             if chart.rate_names[0] in late:
                 values[state.name][chart.rate_names[0]] = rate

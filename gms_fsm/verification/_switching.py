@@ -7,7 +7,7 @@ rounds of all elements are followed here, as the run takes them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement
 from typing import Any
 
@@ -86,6 +86,13 @@ def jolts_and_arrests(subject: ChartSubject, edges: Sequence[Transition]) -> boo
         name for edge in edges for name, _ in subject.assigned(edge)
     }
     return bool(sets) and any(map(subject.arrests, edges))
+
+
+def read_by(subject: ChartSubject, edges: Sequence[Transition]) -> frozenset[str]:
+    """Return the names that decide which edges are taken on the way, and what these do."""
+    sources = {edge.source for edge in edges}
+    asked = [each for each in subject.chart.transitions if each.source in sources]
+    return names_of(*(tree for edge in asked for tree in subject.trees(edge)))
 
 
 # --------------------------------------------------------------------------- in floats
@@ -180,13 +187,16 @@ def interrupted(prover: Prover, cycles: Sequence[tuple[Transition, ...]]) -> Ans
                 formulas += assumed
             formulas.append(reading.truth(prover.subject.guard(edge), here))
             formulas += untaken(prover, edge, here, certain=True)
+            if prover.subject.arrests(edge):  # not where the velocity has jumped
+                for name in prover.chart.velocities:
+                    v, began = here[name].value, prover.symbols[name]
+                    formulas.append(prover.z3.Or(v == began, v == 0))
             here = after(prover, reading, edge, here)
         prover.defined(reading)
         if prover.find(*formulas) is not None:
             return None
-    return Answer(
-        "proved", f"nor can one be passed while {others(prover)} switch at the same instant"
-    )
+    text = f"no cycle can be passed at one instant, whatever {others(prover)} do"
+    return Answer("proved", text)
 
 
 @dataclass
@@ -216,8 +226,8 @@ class Walks:
             formulas = self.prover.within(states[0]) if self.n == 1 else []
             if (found := self.follow([(states, here)], [], formulas, [])) is not None:
                 return found
-        who = "elements together" if self.n > 1 else "cycles by turns"
-        return Answer("proved", f"nor is there an endless sequence of {who}")
+        who = f"the {self.n} elements together" if self.n > 1 else "cycles by turns"
+        return Answer("proved", f"{who} come to an end at each instant")
 
     def follow(
         self,
@@ -328,8 +338,8 @@ class Walks:
         if jolts_and_arrests(subject, walk):
             raise Undecided("an arrest is not taken where an impulse changes the velocity")
         forces = [tree for each in subject.own.values() for tree in each.values()]
-        trees = [tree for edge in walk for tree in subject.trees(edge)]
-        names = names_of(*trees, *(forces if self.n > 1 else ())) | self.assigned
+        names = read_by(subject, walk) | self.assigned
+        names |= names_of(*forces) if self.n > 1 else set()
         names -= {*subject.rest.values()} if self.n > 1 else set()
         own = names & {*subject.elements}
         called = {
@@ -345,8 +355,10 @@ class Walks:
         for number in range(2, self.n + 1):
             mine = {name: point[text] for text, (k, name) in called.items() if k == number}
             points.append({**points[0], **mine})
-        text = f"from {', '.join(states)}, {' then '.join(dict.fromkeys(e.name for e in walk))}"
-        return refuted(f"{text}: endless switching", point, endless(subject, states, points))
+        edges = tuple(dict.fromkeys(edge.name for edge in walk))
+        text = f"from {', '.join(states)} they are taken at one instant: endless switching"
+        answer = refuted(text, point, endless(subject, states, points))
+        return replace(answer, where=(*states, *edges))
 
 
 def by_turns(prover: Prover, n: int) -> Answer:

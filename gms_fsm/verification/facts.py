@@ -30,6 +30,8 @@ class ContactFacts:
         Whether each element has a threshold of its own, from a Stribeck curve.
     viscous : bool
         Whether the model adds ``sigma_2 * v`` to the force.
+    free : bool
+        Whether its force moves the bodies, so that dv/dt jumps where the force does.
     pulled, struck : bool
         Whether other contacts can change forces, or velocities, within an instant.
     """
@@ -39,6 +41,7 @@ class ContactFacts:
     period: float | None = None
     curved: bool = False
     viscous: bool = False
+    free: bool = False
     pulled: bool = False
     struck: bool = False
 
@@ -71,22 +74,22 @@ def facts_of(what: Any, contact: str = "") -> ContactFacts:
     )
 
 
-def _of_contact(contact: Contact, pulled: bool = False, struck: bool = False) -> ContactFacts:
+def _of_contact(contact: Contact, **beside: bool) -> ContactFacts:
     return ContactFacts(
         contact.chart,
         contact.n,
         contact.period,
         contact.stribeck is not None,
         contact.sigma_2 != 0.0,
-        pulled,
-        struck,
+        **beside,
     )
 
 
 def _in_system(read: Assembly, bank: Bank) -> ContactFacts:
     others = [other for other in _coupled(read, bank) if other.edges]
     struck = any(other.is_impulse(edge) for other in others for edge in other.edges)
-    return _of_contact(bank.contact, bool(others), struck)
+    free = {body.name for body in read.free} & {body for row in bank.jacobian for body in row}
+    return _of_contact(bank.contact, free=bool(free), pulled=bool(others), struck=struck)
 
 
 def _coupled(read: Assembly, bank: Bank) -> list[Bank]:
