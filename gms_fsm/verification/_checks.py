@@ -328,7 +328,7 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
             text = f"{edge.name} is taken only where the velocity jumps: {arrests[0].name} has "
             return Answer("proved", f"{text}precedence")
     jumps = subject.assigned(there) or subject.assigned(back)
-    before = [each for edge in (there, back) for each in earlier(subject, edge)]
+    beside = [each for edge in (there, back) for each in rivals(prover, edge)]
     guards = [subject.guard(edge) for edge in (there, back)]
     resting = prover.within(there.source, back.source)
     of_flows, of_guards = Reading(), Reading()
@@ -366,7 +366,7 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     prover.defined(of_flows)
     prover.defined(of_guards)
     names = moving_names(
-        prover, [*guards, *map(subject.guard, before)], (there.source, back.source)
+        prover, [*guards, *map(subject.guard, beside)], (there.source, back.source)
     )
     calm, firm = [u != 0 for u in breaks], passed_over(prover, moved, (there, back))
     calm += [one == other for one, other in jumping]
@@ -387,23 +387,30 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     if prover.find(z3.Or(loose), *resting, *sure) is None:
         text = "there is no surface on which both flows push into the other's guard"
         return Answer("proved", text)
-    if before and prover.find(z3.Or(strict), *resting, *calm) is not None:
-        raise Undecided("an earlier edge may be taken instead")
+    if beside and prover.find(z3.Or(strict), *resting, *calm) is not None:
+        raise Undecided("another edge may be taken instead")
     if jumping and prover.find(z3.Or(loose), *resting, *sure, *calm) is None:
         raise Undecided("the force may jump with the state, and the acceleration with it")
     raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
 
 
+def rivals(prover: Prover, edge: Transition) -> list[Transition]:
+    """Return the other edges that leave the same state."""
+    return [each for _, each in prover.chart.leaving(edge.source) if each.name != edge.name]
+
+
 def passed_over(prover: Prover, moved: Sequence[Duals], edges: Sequence[Transition]) -> list[Any]:
-    """Return when edges with precedence hold neither at a point nor just after it."""
+    """Return when no other edge of the same states holds at a point, or just after it."""
     z3, found = prover.z3, []
     for edge, here in zip(edges, moved, strict=True):
-        for each in earlier(prover.subject, edge):
+        for each in rivals(prover, edge):
             reading = Reading()
             for way in ways(split(prover.subject.guard(each))):
-                margins = [reading.margin(part, here) for part in way]
-                falls = [z3.And(m.value == 0, m.slope < 0) for m in margins]
-                found.append(z3.Or(*(m.value < 0 for m in margins), *falls))
+                margins = [(part, reading.margin(part, here)) for part in way]
+                falls = [
+                    z3.And(m.value == 0, m.slope < 0) for part, m in margins if not inclusive(part)
+                ]
+                found.append(z3.Or(*(m.value < 0 for _, m in margins), *falls))
             prover.defined(reading)
             found += [u != 0 for u in reading.breaks]
     return found
@@ -438,6 +445,8 @@ def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
     v_c.
     """
     variables = {*prover.subject.variables}
+    if prover.subject.facts.free:
+        variables |= {*prover.chart.velocities}
     alike = [part.relation for part in parts if not names_in(part.relation) & variables]
     reading = Reading()
     formulas = [reading.truth(relation, prover.still) for relation in alike]

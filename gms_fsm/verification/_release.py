@@ -7,9 +7,33 @@ from typing import Any
 
 from gms_fsm.charts.chart import Transition
 from gms_fsm.language import split
-from gms_fsm.verification._checks import inclusive, moving, moving_names, passed_over, rests, ways
-from gms_fsm.verification._prover import Answer, Prover, Reading, Undecided, names_of, refuted
-from gms_fsm.verification._switching import after, earlier, may_change, others, renewed, untaken
+from gms_fsm.verification._checks import (
+    inclusive,
+    moving,
+    moving_names,
+    passed_over,
+    rests,
+    rivals,
+    ways,
+)
+from gms_fsm.verification._prover import (
+    Answer,
+    Duals,
+    Prover,
+    Reading,
+    Undecided,
+    names_of,
+    refuted,
+)
+from gms_fsm.verification._switching import (
+    after,
+    changed,
+    earlier,
+    may_change,
+    others,
+    renewed,
+    untaken,
+)
 from gms_fsm.verification.findings import Finding
 
 
@@ -59,6 +83,21 @@ def _pushed_back_by_others(
     return Answer("proved", f"nor where {others(prover)} switch at the same instant")
 
 
+def _for_ever(prover: Prover, edge: Transition, back: Transition, there: Duals) -> list[Any]:
+    """Return when the same edge is enabled again, and for a while, after the way back."""
+    subject, z3, reading = prover.subject, prover.z3, Reading()
+    end = after(prover, reading, back, there)
+    margins = [
+        [reading.margin(part, prover.still).value for part in way]
+        for way in ways(split(subject.guard(edge)))
+    ]
+    prover.defined(reading)
+    closed = [
+        end[name].value == prover.symbols[name] for name in sorted(changed(subject, [edge, back]))
+    ]
+    return [*closed, z3.Or([z3.And([m > 0 for m in way]) for way in margins])]
+
+
 def _pushed_back(prover: Prover, edge: Transition, back: Transition) -> Answer:
     """Search for a load at which a contact lets go, and the flow leads into the guard back.
 
@@ -89,16 +128,23 @@ def _pushed_back(prover: Prover, edge: Transition, back: Transition) -> Answer:
         prover.defined(reading, *let_go)
     names = moving_names(prover, [subject.guard(back)], (edge.target,))
     names |= names_of(*subject.trees(edge))
-    ahead = [each for taken in (edge, back) for each in earlier(subject, taken)]
-    names |= names_of(*map(subject.guard, ahead))
+    beside = [*earlier(subject, edge), *rivals(prover, back)]
+    names |= names_of(*map(subject.guard, beside), *subject.trees(back))
+    pushed = [*let_go, z3.Or(strict), *(u != 0 for u in breaks)]
     firm = [
         *untaken(prover, edge, prover.still, certain=False),
         *passed_over(prover, [moved], [back]),
     ]
-    point = prover.example(names, *let_go, z3.Or(strict), *(u != 0 for u in breaks), *firm)
+    text = f"after {edge.name} the contact is pushed back, and {back.name} locks it again"
+    if edge.source == back.target:
+        point = prover.example(names, *pushed, *firm, *_for_ever(prover, edge, back, there))
+        if point is not None:
+            return refuted(f"{text}: endless switching", point)
+    point = prover.example(names, *pushed, *firm)
     if point is not None:
-        text = f"after {edge.name} the contact is pushed back, and {back.name} locks it again"
-        return refuted(f"{text}: endless switching", point)
+        return refuted(text, point)
+    if prover.find(*pushed) is not None:
+        raise Undecided("another edge may be taken instead")
     at_break = z3.And(z3.Or([u == 0 for u in breaks]), z3.Or(reached))
     if prover.find(*let_go, z3.Or(*loose, at_break)) is not None:
         raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")

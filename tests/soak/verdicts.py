@@ -162,9 +162,10 @@ def contradicted(report: Report, contact: Contact, trace: Trace, end: str) -> It
         if (times == times[-1]).all() and _proved(report, "livelock"):
             yield f"livelock is proved, but {end}"
         pair = {(str(row.source), str(row.target)) for row in last}
-        if (np.diff(times) > 0).any() and len(pair) == 2 and _proved(report, "chattering"):
+        if (np.diff(times) > 0).any() and len(pair) == 2:
             (a, b), (c, d) = pair
-            if (a, b) == (d, c) and "Zeno" not in end:
+            proved = _proved(report, "chattering") and _proved(report, "release")
+            if (a, b) == (d, c) and "Zeno" not in end and proved:
                 yield f"chattering is proved, but {end}"
         if "Zeno" in end and report.of("zeno") and _proved(report, "zeno"):
             if len({str(name) for name in last.edge}) == 1:
@@ -202,9 +203,19 @@ def unconfirmed(report: Report, contact: Contact) -> Iterator[str]:
     """Yield refutations that a run from their point does not confirm."""
     for finding in report.refuted:
         point = finding.counterexample
-        if not point or finding.check not in ("livelock", "zeno"):
+        late = any(value for name, value in point.items() if name.startswith("age"))
+        if not point or late or finding.check not in ("livelock", "zeno", "chattering", "release"):
+            continue  # no run can begin late in a state
+        if finding.check in ("chattering", "release") and "R" in point:
             continue
         trace, end = _run_from(finding, contact)
+        if finding.check in ("chattering", "release"):
+            slides = trace is not None and (len(trace.sliding) > 0 or len(trace.transitions) > 20)
+            edges = [part for part in finding.where if part in contact.chart.guards]
+            if trace is not None and "switching" not in finding.text:  # once only
+                slides = slides or [str(each) for each in trace.transitions.edge[:2]] == edges
+            if not (slides or end.startswith("LivelockError")):
+                yield f"{finding} but a run from there: {end or 'goes on'}, {trace!r}"
         if finding.check == "livelock" and not end.startswith("LivelockError"):
             yield f"{finding} but a run from there: {end or 'goes on'}, {trace!r}"
         if finding.check == "zeno" and "Zeno" not in end:
@@ -227,12 +238,15 @@ def _run_from(finding: Finding, contact: Contact) -> tuple[Trace | None, str]:
     model = ChartModel(chart, {"k": k}, n=n)
     start: dict[str, Any] = {"z": [mine.get("z", 0.0) for mine in each], "states": states_of}
     start["x"] = point.get("x", 0.0)
-    mass, load, v = 1.0 / point.get("W", 1.0), point.get("H", 0.0), point.get("v", 0.0)
+    mass, v = 1.0 / point.get("W", 1.0), f"{point.get('v', 0.0)!r}"
+    load = f"{point.get('H', 0.0)!r} + {point.get('dH/dt', 0.0)!r} * t"
     reads = frozenset[str]().union(*map(names_in, chart.guards.values()))
     moves = chart.locks or chart.sets_velocity or bool(reads & {"F", "a"})
-    rig: Any = Slider(mass, repr(load)) if moves else Prescribed(repr(v))
-    if moves:
-        start["v"] = v
+    rig: Any = Slider(mass, load)
+    if not moves:
+        rig = Prescribed(f"{v} + {point.get('dv/dt', 0.0)!r} * t")
+    else:
+        start["v"] = float(v)
     held = {} if contact.period is None else {"events": "held", "step": contact.period}
     return outcome(model, rig, 20.0, initial=start, max_steps=20 * MOST_STEPS, **held)
 
