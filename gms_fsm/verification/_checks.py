@@ -368,7 +368,14 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     names = moving_names(
         prover, [*guards, *map(subject.guard, beside)], (there.source, back.source)
     )
-    calm, firm = [u != 0 for u in breaks], passed_over(prover, moved, (there, back))
+    calm, firm = (
+        [u != 0 for u in breaks],
+        [
+            u
+            for edge, here in zip((there, back), moved, strict=True)
+            for u in passed_over(prover, edge, here)
+        ],
+    )
     calm += [one == other for one, other in jumping]
     point = prover.example(names, z3.Or(strict), *resting, *calm, *firm)
     if point is not None:
@@ -399,20 +406,46 @@ def rivals(prover: Prover, edge: Transition) -> list[Transition]:
     return [each for _, each in prover.chart.leaving(edge.source) if each.name != edge.name]
 
 
-def passed_over(prover: Prover, moved: Sequence[Duals], edges: Sequence[Transition]) -> list[Any]:
-    """Return when no other edge of the same states holds at a point, or just after it."""
-    z3, found = prover.z3, []
-    for edge, here in zip(edges, moved, strict=True):
-        for each in rivals(prover, edge):
-            reading = Reading()
+def _steady(prover: Prover, state: str, part: Requirement) -> Any:
+    """Return when a comparison stays as it is, since its velocity does not change; None if unknown.
+
+    A load that does not change makes the velocity linear in time.
+    """
+    subject, known = prover.subject, {*prover.chart.parameter_names}
+    if not subject.moves or len(prover.chart.velocities) > 1:
+        return None
+    v, load = prover.chart.velocities[0], subject.load
+    if not names_in(part.relation) <= known | {v}:
+        return None
+    if not names_in(subject.flows[state, v]) <= known | {load, subject.mobility}:
+        return None
+    return prover.rates[f"d{load}/dt"] == 0
+
+
+def passed_over(prover: Prover, edge: Transition, here: Duals, by_order: bool = False) -> list[Any]:
+    """Return when no other edge of the same state holds at a point, or just after it.
+
+    Of those later in order it may suffice that they do not hold at the point, if the edge itself
+    holds just after it.
+    """
+    z3, found, first = prover.z3, [], earlier(prover.subject, edge)
+    for each in rivals(prover, edge):
+        reading = Reading()
+        if by_order and each not in first:
+            found.append(reading.truth(Not(prover.subject.guard(each)), here))
+        else:
             for way in ways(split(prover.subject.guard(each))):
                 margins = [(part, reading.margin(part, here)) for part in way]
-                falls = [
-                    z3.And(m.value == 0, m.slope < 0) for part, m in margins if not inclusive(part)
+                strict = [(part, m) for part, m in margins if not inclusive(part)]
+                falls = [z3.And(m.value == 0, m.slope < 0) for _, m in strict]
+                rest = [
+                    z3.And(m.value == 0, m.slope == 0, steady)
+                    for part, m in strict
+                    if (steady := _steady(prover, edge.source, part)) is not None
                 ]
-                found.append(z3.Or(*(m.value < 0 for _, m in margins), *falls))
-            prover.defined(reading)
-            found += [u != 0 for u in reading.breaks]
+                found.append(z3.Or(*(m.value < 0 for _, m in margins), *falls, *rest))
+        prover.defined(reading)
+        found += [u != 0 for u in reading.breaks]
     return found
 
 

@@ -133,7 +133,7 @@ def _pushed_back(prover: Prover, edge: Transition, back: Transition) -> Answer:
     pushed = [*let_go, z3.Or(strict), *(u != 0 for u in breaks)]
     firm = [
         *untaken(prover, edge, prover.still, certain=False),
-        *passed_over(prover, [moved], [back]),
+        *passed_over(prover, back, moved, by_order=True),
     ]
     text = f"after {edge.name} the contact is pushed back, and {back.name} locks it again"
     if edge.source == back.target:
