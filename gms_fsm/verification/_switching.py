@@ -338,7 +338,9 @@ class Walks:
         if jolts_and_arrests(subject, walk):
             raise Undecided("an arrest is not taken where an impulse changes the velocity")
         forces = [tree for each in subject.own.values() for tree in each.values()]
-        names = read_by(subject, walk) | self.assigned
+        # Of several elements some may wait, in states that the walk does not leave.
+        asked = walk if self.n == 1 else prover.chart.transitions
+        names = read_by(subject, asked) | self.assigned
         names |= names_of(*forces) if self.n > 1 else set()
         names -= {*subject.rest.values()} if self.n > 1 else set()
         own = names & {*subject.elements}
