@@ -96,7 +96,8 @@ def livelock(prover: Prover) -> Iterator[Finding]:
     passable: list[tuple[Transition, ...]] = []
     found = []
     # Elements that share a force switch together, so that no one of them can be followed alone.
-    for cycle in cycles[:MOST_CYCLES] if not prover.subject.rest else ():
+    shared = prover.subject.rest and prover.subject.shared
+    for cycle in cycles[:MOST_CYCLES] if not shared else ():
         where = tuple(name for edge in cycle for name in (edge.source, edge.name))
         found.append(prover.settle("livelock", where, _all_around, cycle, passable))
     yield from found
@@ -293,7 +294,7 @@ def _pushed_by_others(prover: Prover, pairs: Sequence[tuple[Transition, Transiti
         formulas, touched = [*assumed, *prover.within(there.source)], list[Any]()
         for edge, names in ((there, prover.still), (back, other)):
             reading = Reading()
-            moved = moving(prover, reading, edge.source, names, "" if edge is there else "!")
+            moved = moving(prover, reading, edge.source, names)
             loose = []
             for way in ways(split(prover.subject.guard(edge))):
                 margins = [reading.margin(part, moved) for part in way]
@@ -332,15 +333,7 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     guards = [subject.guard(edge) for edge in (there, back)]
     resting = prover.within(there.source, back.source)
     of_flows, of_guards = Reading(), Reading()
-    moved = [
-        moving(prover, of_flows, edge.source, prover.still, mark)
-        for edge, mark in ((there, ""), (back, "!"))
-    ]
-    jumping = [
-        (moved[0][name].slope, moved[1][name].slope)
-        for name in prover.chart.velocities
-        if subject.facts.free and name in subject.inputs
-    ]
+    moved = [moving(prover, of_flows, edge.source, prover.still) for edge in (there, back)]
     at_break = z3.Or([u == 0 for u in of_flows.breaks])
     strict, loose = [], []
     for pair in product(*(ways(split(guard)) for guard in guards)):
@@ -376,7 +369,6 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
             for u in passed_over(prover, edge, here)
         ],
     )
-    calm += [one == other for one, other in jumping]
     point = prover.example(names, z3.Or(strict), *resting, *calm, *firm)
     if point is not None:
         place = _surface(guards[0], point)
@@ -396,8 +388,6 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
         return Answer("proved", text)
     if beside and prover.find(z3.Or(strict), *resting, *calm) is not None:
         raise Undecided("another edge may be taken instead")
-    if jumping and prover.find(z3.Or(loose), *resting, *sure, *calm) is None:
-        raise Undecided("the force may jump with the state, and the acceleration with it")
     raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
 
 
@@ -478,8 +468,6 @@ def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
     v_c.
     """
     variables = {*prover.subject.variables}
-    if prover.subject.facts.free:
-        variables |= {*prover.chart.velocities}
     alike = [part.relation for part in parts if not names_in(part.relation) & variables]
     reading = Reading()
     formulas = [reading.truth(relation, prover.still) for relation in alike]
@@ -487,19 +475,10 @@ def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
     return prover.find(*formulas) is not None
 
 
-def moving(prover: Prover, reading: Reading, state: str, here: Duals, mark: str = "") -> Duals:
-    """Return every name with its rate of change in a state, at some values of the names.
-
-    With a mark, accelerations that jump with the force have other values.
-    """
+def moving(prover: Prover, reading: Reading, state: str, here: Duals) -> Duals:
+    """Return every name with its rate of change in a state, at some values of the names."""
     subject = prover.subject
     rates = {name: prover.rates[f"d{name}/dt"] for name in subject.inputs}
-    if mark and subject.facts.free:
-        rates |= {
-            name: prover.z3.Real(f"d{name}/dt{mark}")
-            for name in subject.chart.velocities
-            if name in rates
-        }
     if "t" in rates:
         rates["t"] = prover.z3.RealVal(1)
     if subject.mobility:

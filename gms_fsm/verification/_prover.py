@@ -263,6 +263,8 @@ class Prover:
     def _rest(self, domain: Sequence[str]) -> list[Any]:
         """Return what the states and values of the other elements make of their force."""
         subject, real, z3 = self.subject, self.z3.Real, self.z3
+        if not subject.shared:
+            raise Undecided("here it only accelerates the bodies")
         if subject.facts.n - 1 > MOST_OTHERS:
             raise Undecided(f"there are {subject.facts.n - 1}")
         own, formulas = {*subject.elements}, []

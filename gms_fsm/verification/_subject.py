@@ -57,6 +57,8 @@ class ChartSubject:
     rest : mapping of str to str
         By force, what the force of the other elements is called; empty if there are none, or if it
         does not move.
+    shared : bool
+        Whether edges depend on the force at the same instant, beside its effect on the motion.
     own : mapping of str to mapping of str to Value
         By state and force, that of one element.
     assumed : tuple of str
@@ -76,6 +78,7 @@ class ChartSubject:
     load: str
     mobility: str
     rest: Mapping[str, str]
+    shared: bool
     own: Mapping[str, Mapping[str, Value]]
     assumed: tuple[str, ...]
     facts: ContactFacts
@@ -130,11 +133,9 @@ class ChartSubject:
     def about(self) -> tuple[str, ...]:
         """What the statements are about, line by line."""
         facts, v, H, W = self.facts, self.chart.velocities[0], self.load, self.mobility
-        jumps = facts.free and not self.moves
         lines = [
             "over the reals, not floats; over points, not trajectories",
-            "inputs and their rates (ds/dt, dv/dt) are free, but equal in both states of a switch"
-            + ", except the acceleration" * jumps,
+            "inputs and their rates (ds/dt, dv/dt) are free, but equal in both states of a switch",
         ]
         if self.moves:
             held = f", F = {H} and a = {v} = 0 while it is locked" * self.chart.locks
@@ -183,7 +184,8 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
     }
     guards = {name: renamed_in(tree, lets) for name, tree in chart.guards.items()}
     read = _names(guards.values()) | _names(tree for row in steps.values() for _, tree in row)
-    moves = bool(read & {*late}) or chart.locks or chart.sets_velocity
+    driven = bool(read & {*late}) or chart.locks or chart.sets_velocity
+    moves = driven or (facts.free and bool(read & {*chart.velocities}))
     load, mobility = _fresh("H", declared), _fresh("W", declared)
     flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
     several = moves and facts.n > 1
@@ -258,6 +260,7 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
         load=load if moves else "",
         mobility=mobility if moves else "",
         rest=rest,
+        shared=driven,
         own=own,
         assumed=(
             *([f"{mobility} > 0"] if moves else []),

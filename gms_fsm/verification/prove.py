@@ -47,7 +47,7 @@ from gms_fsm.systems.system import System
 from gms_fsm.verification._checks import chattering, determinism, livelock, reachability, stability
 from gms_fsm.verification._prover import Prover
 from gms_fsm.verification._release import release
-from gms_fsm.verification._subject import subject_of
+from gms_fsm.verification._subject import ChartSubject, subject_of
 from gms_fsm.verification._zeno import zeno
 from gms_fsm.verification.facts import ContactFacts, facts_of
 from gms_fsm.verification.findings import CHECKS, Check, Finding, Report, Status
@@ -75,7 +75,12 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
     >>> default_domain(gms_element("signed")), default_domain(LUGRE)
     (('s > 0', 'C > 0', 'v_c > 0'), ('s > 0', 'sigma_0 > 0'))
     """
-    used, declared = subject_of(ContactFacts(chart)).used, chart.declared
+    return _rules(subject_of(ContactFacts(chart)))
+
+
+def _rules(subject: ChartSubject) -> tuple[str, ...]:
+    used, chart = subject.used, subject.chart
+    declared = chart.declared
     return tuple(
         condition
         for name in chart.inputs + chart.parameter_names
@@ -132,7 +137,7 @@ def prove_facts(facts: ContactFacts, domain: Sequence[str] | None = None) -> Rep
     """Check a chart, given what a run makes of it."""
     subject = subject_of(facts)
     if domain is None:
-        domain = default_domain(facts.chart)
+        domain = _rules(subject)
     domain = (
         (domain,)
         if isinstance(domain, str)

@@ -241,7 +241,7 @@ def _run_from(finding: Finding, contact: Contact) -> tuple[Trace | None, str]:
     mass, v = 1.0 / point.get("W", 1.0), f"{point.get('v', 0.0)!r}"
     load = f"{point.get('H', 0.0)!r} + {point.get('dH/dt', 0.0)!r} * t"
     reads = frozenset[str]().union(*map(names_in, chart.guards.values()))
-    moves = chart.locks or chart.sets_velocity or bool(reads & {"F", "a"})
+    moves = chart.locks or chart.sets_velocity or bool(reads & {"F", "a"} or {*point} & {"H", "W"})
     rig: Any = Slider(mass, load)
     if not moves:
         rig = Prescribed(f"{v} + {point.get('dv/dt', 0.0)!r} * t")
