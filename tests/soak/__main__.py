@@ -197,10 +197,20 @@ def child(part: str, *command: str, ends: str = "") -> bool:
 
 
 # --------------------------------------------------------------------------- all parts
-PARTS = (*fuzz.BODIES, "kill", "million", "runs", "trials", "stepping", "systems", "exact")
+PARTS = (
+    *fuzz.BODIES,
+    "kill",
+    "million",
+    "runs",
+    "trials",
+    "stepping",
+    "systems",
+    "exact",
+    "verdicts",
+)
 COUNTS = {
     "kills": 200, "examples": 300, "transitions": 1_000_000, "trials": 2000, "records": 1000,
-    "systems": 500, "exact": 1000,
+    "systems": 500, "exact": 1000, "verdicts": 400,
 }  # fmt: skip
 
 
@@ -233,6 +243,7 @@ def main() -> None:
         "trials": ("tests.soak.trials", of_each),
         "systems": ("tests.soak.random_systems", str(given.systems)),
         "exact": ("tests.soak.exact_systems", str(given.exact)),
+        "verdicts": ("tests.soak.verdicts", str(given.verdicts)),
     }
     none_differs = f"0 of {given.records} differ"
 

@@ -139,46 +139,52 @@ def _proved(report: Report, check: Any) -> bool:
 
 def contradicted(report: Report, contact: Contact, trace: Trace, end: str) -> Iterator[str]:
     """Yield what a run shows of a contact against its report."""
-    chart, log = contact.chart, trace.transitions
-    taken = {str(name) for name in log.edge}
+    log = trace.transitions
+    seen = {
+        "its guard can never hold": log.edge,
+        "never taken": log.edge,
+        "no chain of edges leads to it": log.target,
+        "no edge leaves it": log.source,
+    }
     for finding in report.of("reachability"):
-        if finding.status == "refuted" and "take" in finding.text + "take" * (
-            "hold" in finding.text
-        ):
-            (name,) = [part for part in finding.where if part in chart.guards]
-            if name in taken:
-                yield f"{finding} but it was taken at t = {log.t[log.edge == name][0]:.6g}"
-        for words, states in (("leads to it", log.target), ("leaves it", log.source)):
-            if finding.status == "refuted" and words in finding.text:
-                if finding.where[0] in {str(state) for state in states}:
-                    yield f"{finding} but a run shows it"
+        never = seen.get(finding.text.partition(":")[0], ()) if finding.status == "refuted" else ()
+        if finding.where[-1] in {str(name) for name in never}:
+            yield f"{finding} but a run shows it"
     if contact.period is None:  # else rows have the force that is held
         yield from _both_enabled(report, trace)
     if end.startswith("LivelockError"):
-        last = log[-40:]
-        times = np.asarray(last.t)
-        if len(last) < 40:
-            return
-        if (times == times[-1]).all() and _proved(report, "livelock"):
-            yield f"livelock is proved, but {end}"
-        pair = {(str(row.source), str(row.target)) for row in last}
-        if (np.diff(times) > 0).any() and len(pair) == 2:
-            (a, b), (c, d) = pair
-            proved = _proved(report, "chattering") and _proved(report, "release")
-            if (a, b) == (d, c) and "Zeno" not in end and proved:
-                yield f"chattering is proved, but {end}"
-        if "Zeno" in end and report.of("zeno") and _proved(report, "zeno"):
-            if len({str(name) for name in last.edge}) == 1:
-                yield f"zeno is proved, but {end}"
+        yield from (f"{check} is proved, but {end}" for check in _endless(report, log[-40:], end))
+    if _proved(report, "chattering"):
+        yield from _sliding(report, contact, trace)
+
+
+def _endless(report: Report, last: Any, end: str) -> Iterator[str]:
+    """Yield the checks that say that the last switches of a livelock do not go on."""
+    times = np.asarray(last.t)
+    if len(last) < 40:
+        return  # another contact's
+    if (times == times[-1]).all() and _proved(report, "livelock"):
+        yield "livelock"
+    ways = {(str(row.source), str(row.target)) for row in last}
+    chatters = (np.diff(times) > 0).any() and len(ways) == 2 and "Zeno" not in end
+    proved = _proved(report, "chattering") and _proved(report, "release")
+    if chatters and ways == {(b, a) for a, b in ways} and proved:
+        yield "chattering"
+    proved = bool(report.of("zeno")) and _proved(report, "zeno")
+    if "Zeno" in end and len({str(name) for name in last.edge}) == 1 and proved:
+        yield "zeno"
+
+
+def _sliding(report: Report, contact: Contact, trace: Trace) -> Iterator[str]:
+    """Compare pairs of states between which no flows meet with those that a run slides between."""
     for finding in report.of("chattering"):
-        states = [part for part in finding.where if part not in chart.guards]
-        pairs = {f"({', '.join(each)}) of element" for each in permutations(states, 2)}
-        for each in trace.sliding if finding.status == "proved" else ():
-            inside = abs(each.sigma_start) < 1.0
-            whose = inside and str(each.surface).endswith(f" of {contact.name}")
-            if whose and any(pair in str(each.surface) for pair in pairs):
-                if _proved(report, "chattering"):
-                    yield f"{finding} but it slides on {each.surface}"
+        states = [part for part in finding.where if part not in contact.chart.guards]
+        pairs = [f"({', '.join(each)}) of element" for each in permutations(states, 2)]
+        for each in trace.sliding:
+            mine = str(each.surface).endswith(f" of {contact.name}")
+            held = abs(each.sigma_start) < 1.0 and any(pair in str(each.surface) for pair in pairs)
+            if mine and held:
+                yield f"{finding} but it slides on {each.surface}"
 
 
 def _both_enabled(report: Report, trace: Trace) -> Iterator[str]:
@@ -202,24 +208,22 @@ def _both_enabled(report: Report, trace: Trace) -> Iterator[str]:
 def unconfirmed(report: Report, contact: Contact) -> Iterator[str]:
     """Yield refutations that a run from their point does not confirm."""
     for finding in report.refuted:
-        point = finding.counterexample
-        late = any(value for name, value in point.items() if name.startswith("age"))
-        if not point or late or finding.check not in ("livelock", "zeno", "chattering", "release"):
-            continue  # no run can begin late in a state
-        if finding.check in ("chattering", "release") and "R" in point:
+        point, pair = finding.counterexample, finding.check in ("chattering", "release")
+        if not point or not (pair or finding.check in ("livelock", "zeno")):
             continue
+        if (pair and "R" in point) or any(u for name, u in point.items() if name.startswith("age")):
+            continue  # no run can begin late in a state, or beside elements that are not given
         trace, end = _run_from(finding, contact)
-        if finding.check in ("chattering", "release"):
-            slides = trace is not None and (len(trace.sliding) > 0 or len(trace.transitions) > 20)
-            edges = [part for part in finding.where if part in contact.chart.guards]
-            if trace is not None and "switching" not in finding.text:  # once only
-                slides = slides or [str(each) for each in trace.transitions.edge[:2]] == edges
-            if not (slides or end.startswith("LivelockError")):
-                yield f"{finding} but a run from there: {end or 'goes on'}, {trace!r}"
-        if finding.check == "livelock" and not end.startswith("LivelockError"):
+        confirmed = end.startswith("LivelockError")
+        if finding.check == "zeno":
+            confirmed = "Zeno" in end
+        elif pair and trace is not None:
+            taken = [str(each) for each in trace.transitions.edge]
+            confirmed |= len(trace.sliding) > 0 or len(taken) > 20
+            if "switching" not in finding.text:  # once only
+                confirmed |= taken[:2] == [u for u in finding.where if u in contact.chart.guards]
+        if not confirmed:
             yield f"{finding} but a run from there: {end or 'goes on'}, {trace!r}"
-        if finding.check == "zeno" and "Zeno" not in end:
-            yield f"{finding} but a run from there: {end or 'goes on'}"
 
 
 def _run_from(finding: Finding, contact: Contact) -> tuple[Trace | None, str]:
