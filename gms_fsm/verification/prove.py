@@ -12,27 +12,40 @@ order would be a different model.
 - Over points, not trajectories: a refuting point need not lie on the trajectory of any run.
 - Inputs (``s``, ``v``) and their rates (``ds/dt``, ``dv/dt``) are free symbols: that s is a
   function of v is not used, so no transcendental function is needed. The rates are the same in
-  both states of a switch; in closed loop dv/dt can jump with the force, which is not followed.
+  both states of a switch: a chart alone, or a model, is moved as prescribed.
 - ``sgn``, ``abs``, ``min`` and ``max`` are split by case, integer powers are products. ``exp``,
   ``sqrt``, ``sin``, ``cos``, ``tanh`` and other powers are not encoded: undecided. A quotient
   is accepted only if the domain proves its denominator nonzero.
-- A chart that reads F or a, locks the contact, or sets its velocity is read for a contact of one
-  element on any system: H, the force that would hold v where it is, and its rate are free, and so
-  is W > 0, the inverse of the inertia that the contact feels. While the contact moves,
-  ``a = (H - F) W`` is the rate of v; while it is locked, ``F = H`` and ``a = v = 0``. H and its
-  rate are the same on both sides of a switch, of an impulse too.
-- Only determinism and reachability use the priorities of edges; the other checks do not.
+- A chart that reads F or a, locks the contact, or sets its velocity is read for a contact on any
+  system; so is one that reads v, if a free body of its system moves the contact. H, the force that
+  would hold v where it is, and its rate are free, and so is W > 0, the inverse of the inertia that
+  the contact feels. While the contact moves, ``a = (H - F) W`` is the rate of v; while it is
+  locked, ``F = H`` and ``a = v = 0``. H and its rate are the same on both sides of a switch, of an
+  impulse too.
+- A chart alone is read for one element. Of a model or a contact the number of elements counts: F is
+  the sum over them, and R, the force of the others, is one that states and values of theirs give.
+  Elements that share a force are followed together, up to four.
+- With a period a machine takes one edge at a tick at most: it has no livelock, does not chatter,
+  and is not pushed back at once.
+- Where other contacts move the same bodies, a statement about one instant is also tried with other
+  values of H, W and v after each switch. What then fails is undecided.
+- Of the edges that leave a state the earlier one is taken. Edges into a lock that take no impulse
+  have precedence only where the velocity does not jump.
 
 The checks. *determinism*: no two edges of one state are enabled at the same time, or their
-order decides which is taken. *livelock*: no cycle of edges is enabled at one point. *reachability*,
-from the graph and the guards alone: every state can be entered and left, and every guard can hold
-where no earlier edge takes precedence. *chattering*: no two states have flows that cross the
+order decides which is taken. *livelock*: no cycle of edges is taken at one point, nor cycles by
+turns, nor by several elements together. *reachability*, from the graph and the guards alone: every
+state can be entered and left, and every guard can hold where no earlier edge takes precedence, and
+before a time in the state has ended the stay. *chattering*: no two states have flows that cross the
 surfaces of the guards between them in opposite directions, each into the other's guard (to first
 order in time; edges that assign variables are undecided, unless their inputs exclude each other).
 *stability*: no state has an unstable equilibrium, for flows linear in the variable. *release*, for
 charts with locked states: whoever lets go is not pushed back at once, into the guard of an edge
 that locks it again (to first order in time). If it could be, the contact would chatter between
-stuck and moving.
+stuck and moving. *zeno*, for edges from a state to itself that set the velocity: impacts do not
+follow each other ever sooner, infinitely many in a finite time, as those of a ball without a rest
+speed. It is refuted for impacts that leave a share of the velocity under a constant load, and
+proved where the guard is out of reach just after an impact; else undecided.
 """
 
 from __future__ import annotations
