@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import unknown
-from gms_fsm.systems.models import is_model
+from gms_fsm.systems.mounted import contact_of
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.reading.assembly import Assembly, Bank
-from gms_fsm.systems.system import System
 
 
 @dataclass(frozen=True)
@@ -48,30 +45,12 @@ class ContactFacts:
 
 def facts_of(what: Any, contact: str = "") -> ContactFacts:
     """Return the facts of a chart alone, of a model or contact, or of a contact of a system."""
-    if isinstance(what, System):
-        banks = {bank.name: bank for bank in what.assembly.banks}
-        if not contact and len(banks) > 1:
-            raise ParameterError(
-                f"system {what.name!r} has the contacts {', '.join(map(repr, banks))}",
-                place="contact",
-                advice=f"say which one: prove(system, contact={next(iter(banks))!r})",
-            )
-        if contact and contact not in banks:
-            raise unknown("contact", contact, [*banks], ParameterError, place="contact")
-        return _in_system(what.assembly, banks[contact or next(iter(banks))])
-    if contact:
-        raise ParameterError(
-            "only a system has contacts", place="contact", value=contact, advice="leave it out"
-        )
-    if isinstance(what, Chart):
+    if isinstance(what, Chart) and not contact:
         return ContactFacts(what)
-    if isinstance(what, Contact):
-        return _of_contact(what)
-    if is_model(what):
-        return _of_contact(Contact("friction", what))
-    raise ParameterError(
-        "prove takes a Chart, a model, a Contact or a System", place="chart", value=what
-    )
+    given, read = contact_of(what, contact)
+    if read is None:
+        return _of_contact(given)
+    return _in_system(read, next(bank for bank in read.banks if bank.name == given.name))
 
 
 def _of_contact(contact: Contact, **beside: bool) -> ContactFacts:

@@ -150,7 +150,8 @@ def contradicted(report: Report, contact: Contact, trace: Trace, end: str) -> It
         never = seen.get(finding.text.partition(":")[0], ()) if finding.status == "refuted" else ()
         if finding.where[-1] in {str(name) for name in never}:
             yield f"{finding} but a run shows it"
-    if contact.period is None:  # else rows have the force that is held
+    # Rows at ticks have the force that was held, those that slide a force between two states.
+    if contact.period is None and not len(trace.sliding):
         yield from _both_enabled(report, trace)
     if end.startswith("LivelockError"):
         yield from (f"{check} is proved, but {end}" for check in _endless(report, log[-40:], end))
