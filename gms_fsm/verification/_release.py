@@ -79,8 +79,8 @@ def _pushed_back_by_others(
         for each in (of_edge, reading):
             prover.defined(each)
         if prover.find(*formulas, z3.Or(*loose, *(u == 0 for u in reading.breaks))) is not None:
-            return Answer("undecided", f"{others(prover)} may switch at the same instant")
-    return Answer("proved", f"nor where {others(prover)} switch at the same instant")
+            return Answer("undecided", f"{others(prover)} at the same instant are not followed")
+    return Answer("proved", f"nor with {others(prover)} at the same instant")
 
 
 def _for_ever(prover: Prover, edge: Transition, back: Transition, there: Duals) -> list[Any]:

@@ -143,9 +143,9 @@ class ChartSubject:
             lines.append(f"a = ({H} - F) {W} while the contact moves{held}")
         if self.rest:
             others = "the other element" if facts.n == 2 else f"the other {facts.n - 1} elements"
-            lines.append(
-                f"F is the sum over {facts.n} elements; {self.rest['F']} is that of {others}"
-            )
+            own = [f"; {name}2 is the {name} of element 2" for name in self.elements[-1:]]
+            lines.append(f"F is the sum over {facts.n} elements, {self.rest['F']} that of {others}")
+            lines[-1] += "".join(own)
         if facts.period is not None:
             lines.append(f"machines are asked once at each tick, every {facts.period:g} s")
         return tuple(lines)

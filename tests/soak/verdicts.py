@@ -17,7 +17,7 @@ from argparse import Namespace
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import permutations, takewhile
 from typing import Any
 
 import numpy as np
@@ -230,18 +230,13 @@ def unconfirmed(report: Report, contact: Contact) -> Iterator[str]:
 def _run_from(finding: Finding, contact: Contact) -> tuple[Trace | None, str]:
     """Run a contact of its own from a point, under the load given there."""
     chart, point = contact.chart, {"age": 0.0, **finding.counterexample}
-    names = {state.name for state in chart.states}
-    states = [part for part in finding.where if part in names][:1]
-    n = 1
-    if "from " in finding.text:
-        states = finding.text.split(" they are")[0].removeprefix("from ").split(", ")
-        n = len(states)
+    states = [*takewhile(lambda part: part not in chart.guards, finding.where)]
+    n = len(states)
     own = [{**point, **{u: point.get(f"{u}{i}", 0.0) for u in "zk"}} for i in range(2, n + 1)]
     each = [point, *own]
     k = np.array([mine.get("k", 1.0) for mine in each])
-    states_of = [*states, *states[:1] * (n - len(states))]
     model = ChartModel(chart, {"k": k}, n=n)
-    start: dict[str, Any] = {"z": [mine.get("z", 0.0) for mine in each], "states": states_of}
+    start: dict[str, Any] = {"z": [mine.get("z", 0.0) for mine in each], "states": states}
     start["x"] = point.get("x", 0.0)
     mass, v = 1.0 / point.get("W", 1.0), f"{point.get('v', 0.0)!r}"
     load = f"{point.get('H', 0.0)!r} + {point.get('dH/dt', 0.0)!r} * t"

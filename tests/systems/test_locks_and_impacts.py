@@ -179,10 +179,10 @@ def test_a_lock_lets_go_of_an_impulse_by_what_its_element_has_seen(engine: str) 
     latch = Contact("latch", LATCH, {"rate": 1.0, "most": 1.0}, v="v_b")
     hit = stop("hit", "v_a - v_b")
     system = System("door", bodies=[mass("a", 1.0), mass("b", 1.0)], contacts=[latch, hit])
-    for speed, given in ((1.0, False), (0.25, True)):  # struck after 0.5 s, or after 2 s
+    for speed, gives in ((1.0, False), (0.25, True)):  # struck after 0.5 s, or after 2 s
         trace = simulate(system, 3.0, initial={"v_a": speed}, engine=engine)
-        assert (("latch", "gives") in edges(trace)) == given
-        assert (trace.body("b").v[-1] > 0) == given
+        assert (("latch", "gives") in edges(trace)) == gives
+        assert (trace.body("b").v[-1] > 0) == gives
 
 
 HIT = Chart(
