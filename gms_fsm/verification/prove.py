@@ -28,8 +28,10 @@ order would be a different model.
 - With a period a machine takes one edge at a tick at most: it has no livelock, does not chatter,
   and is not pushed back at once.
 - Where other contacts move the same bodies, a statement about one instant is also tried with other
-  values of H, W and v after each switch. What then fails is undecided.
-- Of the edges that leave a state the earlier one is taken. Edges into a lock that take no impulse
+  values of H, W and v after each switch; where an impulse changes what an input follows, with
+  others of that input. What then fails is undecided.
+- Switches are located: an edge that waits for a time in the state is taken at that time, or with a
+  period at the next tick. Of the edges that leave a state the earlier one is taken. Edges into a lock that take no impulse
   have precedence only where the velocity does not jump.
 
 The checks. *determinism*: no two edges of one state are enabled at the same time, or their
