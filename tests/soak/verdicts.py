@@ -48,7 +48,7 @@ FLOWS = ("v", "0", "1", "-z", "1 - z", "-1", "1", "-1")
 CLAUSES = (
     "F > 1", "F < 1", "F <= 0", "F >= 2", "F < -1", "abs(F) > 1.5", "a > 0", "a < 0", "z > 1",
     "z <= 0", "abs(z) < 0.5", "v > 0", "v < 0", "x >= 0.5", "after(0.2)", "after(0.5)", "True",
-    "z < 1", "z >= 1", "v >= 0.1",
+    "z < 1", "z >= 1", "v >= 0.1", "u > 0", "u < 0",
 )  # fmt: skip
 ACTIONS: tuple[dict[str, str], ...] = ({}, {}, {}, {}, {"z": "0"}, {"z": "-z"}, {"z": "1"})
 IMPACTS: tuple[dict[str, str], ...] = ({"v": "-0.5 * v"}, {"v": "-v"}, {"v": "0"})
@@ -90,7 +90,7 @@ def _chart(dice: Dice, name: str, n: int) -> Chart:
         ]
     return Chart(
         name,
-        ("x", "v"),
+        ("x", "v", "u"),
         ("z",),
         ("k",),
         [
@@ -116,8 +116,10 @@ def _system(dice: Dice) -> System:
         x, v = dice.one_of(*motions)
         period = dice.one_of(None, None, None, 0.05, 0.3)
         values = {"k": np.array([dice.one_of(0.5, 1.0, 2.0) for _ in range(n)])}
-        chart = _chart(dice, name, n)
-        contacts.append(Contact(name, chart, values, v=v, n=n, inputs={"x": x}, period=period))
+        chart, u = _chart(dice, name, n), dice.one_of("v", "v - 0.2", "x", "sin(5 * t)")
+        contacts.append(
+            Contact(name, chart, values, v=v, n=n, inputs={"x": x, "u": u}, period=period)
+        )
     return System("random", bodies=bodies, contacts=contacts)
 
 
@@ -235,7 +237,8 @@ def _run_from(finding: Finding, contact: Contact) -> tuple[Trace | None, str]:
     own = [{**point, **{u: point.get(f"{u}{i}", 0.0) for u in "zk"}} for i in range(2, n + 1)]
     each = [point, *own]
     k = np.array([mine.get("k", 1.0) for mine in each])
-    model = ChartModel(chart, {"k": k}, n=n)
+    rate = f"{point.get('u', 0.0)!r} + {point.get('du/dt', 0.0)!r} * t"
+    model = ChartModel(chart, {"k": k}, n=n, inputs={"u": rate})
     start: dict[str, Any] = {"z": [mine.get("z", 0.0) for mine in each], "states": states}
     start["x"] = point.get("x", 0.0)
     mass, v = 1.0 / point.get("W", 1.0), f"{point.get('v', 0.0)!r}"
