@@ -7,7 +7,7 @@ from typing import Any
 
 from gms_fsm.charts.chart import Transition
 from gms_fsm.language import split
-from gms_fsm.verification._checks import (
+from gms_fsm.verification._flows import (
     inclusive,
     moving,
     moving_names,

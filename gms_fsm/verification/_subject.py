@@ -178,7 +178,7 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
     guards = {name: renamed_in(tree, lets) for name, tree in chart.guards.items()}
     read = _names(guards.values()) | _names(tree for row in steps.values() for _, tree in row)
     driven = bool(read & {*late}) or chart.locks or chart.sets_velocity
-    moves = driven or (facts.free and bool(read & {*chart.velocities}))
+    moves = driven or (facts.free and bool(read & {"x", *chart.velocities}))
     load, mobility = _fresh("H", declared), _fresh("W", declared)
     flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
     rest = {

@@ -59,6 +59,15 @@ def untaken(prover: Prover, edge: Transition, here: Duals, certain: bool) -> lis
     return found
 
 
+def is_hidden(prover: Prover, edge: Transition, before: Sequence[Transition]) -> bool:
+    """Return whether one of these edges is enabled wherever another one is."""
+    subject, reading = prover.subject, Reading()
+    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.within(edge.source)]
+    formulas += [reading.truth(Not(subject.guard(each)), prover.still) for each in before]
+    prover.defined(reading)
+    return prover.find(*formulas) is None
+
+
 def after(prover: Prover, reading: Reading, edge: Transition, here: Duals) -> dict[str, Dual]:
     """Return the values after an edge; F and a are those before it."""
     subject = prover.subject
