@@ -203,6 +203,17 @@ def test_a_free_body_chatters_where_a_driven_one_does_not() -> None:
         simulate(model, rig, 1.0)
 
 
+def test_forces_that_bend_a_path_back_from_both_sides_are_not_decided() -> None:
+    """At x = 0 and v = 0 both flows touch the surface, and each acceleration leads across it."""
+    states = (State("off", outputs={"F": "-1"}), State("on", outputs={"F": "1"}))
+    model = ChartModel(switch("x > 0", "x <= 0", states=states, inputs=("x",)), {})
+    on_a_body = System("free", bodies=(Body("b", inertia=1.0),), contacts=(Contact("c", model),))
+    (finding,) = prove(on_a_body).of("chattering")
+    assert (finding.status, "first order" in finding.text) == ("undecided", True)
+    with pytest.raises(LivelockError):
+        simulate(model, Slider(1.0, "0"), 1.0)
+
+
 def test_the_model_s_viscous_force_is_part_of_f() -> None:
     read = prove(one_element("signed")).domain
     assert "sigma_2 >= 0" not in read  # its guards do not read F
