@@ -143,9 +143,13 @@ def _pushed_back(prover: Prover, edge: Transition, back: Transition) -> Answer:
     point = prover.example(names, *pushed, *firm)
     if point is not None:
         return refuted(text, point)
-    if prover.find(*pushed) is not None:
+    sure = [
+        *untaken(prover, edge, prover.still, certain=True),
+        *untaken(prover, back, there, certain=True),
+    ]
+    if prover.find(*pushed, *sure) is not None:
         raise Undecided("another edge may be taken instead")
     at_break = z3.And(z3.Or([u == 0 for u in breaks]), z3.Or(reached))
-    if prover.find(*let_go, z3.Or(*loose, at_break)) is not None:
+    if prover.find(*let_go, *sure, z3.Or(*loose, at_break)) is not None:
         raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
     return Answer("proved", f"{back.name} cannot follow at once")
