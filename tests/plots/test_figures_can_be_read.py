@@ -468,3 +468,14 @@ def test_tables_of_phenomena_without_curves_and_with_narrow_cells() -> None:
     figure = figures.phenomenon_figure(found, "lag")
     assert figure is not None
     assert len(figure.legends) == 1
+    assert "width of the loop at 10 rad/s (shows it if > 0.5 %" in figure.get_supxlabel()
+
+
+def test_what_slides_away_leaves_its_panel_on_the_scale_of_the_others() -> None:
+    names = ["gms-signed", "maxwell-slip", "rate-state-slip"]
+    figure = figures.phenomenon_figure(measure_phenomena(names, ["memory"]), "memory")
+    assert figure is not None
+    limits = {ax.get_xlim() for ax in figure.axes}
+    assert len(limits) == 1
+    assert max(limits)[1] < 100  # µm
+    assert figure.axes[2].lines[0].get_xdata().max() > 1e6  # type: ignore[union-attr]

@@ -156,7 +156,7 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         )
 
     pictures = {
-        "fig1": schematic_figure(elements=ELEMENTS),
+        "fig1": schematic_figure(elements=ELEMENTS, title=f"Slider on {ELEMENTS} Maxwell elements"),
         "fig2c": _listing(traces["fig4_ifelse"]),
         "fig3": fig3("fig3", "Fig. 3, non-drifting: a force below break-away"),
         "fig3_slipping": fig3(
