@@ -153,6 +153,7 @@ def element_figure() -> Figure:
         panels.ratio(ratio, trace)
         panels.force(force, trace)
         panels.ribbons(states, trace)
+        states.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
         named = (
             (velocity, "the slider moves back and forth"),
             (ratio, "deflection over threshold"),

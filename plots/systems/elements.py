@@ -16,7 +16,7 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.quantities import scale_of, trimmed
 from gms_fsm.traces.trace import Trace, check_trace
-from plots.panels.parts.selection import checked_row, scaled
+from plots.panels.parts.selection import checked_row, dotted, scaled
 from plots.style import (
     INK,
     LINE_GREY,
@@ -171,7 +171,7 @@ def _numbers(trace: Trace | None, i: int) -> tuple[str, str]:
             continue
         every = np.broadcast_to(values[name], trace.n)
         scale = scale_of(every.tolist(), trace.model.chart.unit(name) or "")
-        text = trimmed(scale.text(float(every[i]))).replace("Ns", "N·s")
+        text = dotted(trimmed(scale.text(float(every[i]))))
         texts.append(f"{symbols[name].format(i + 1)} = {text}")
     return texts[0], texts[1]
 
