@@ -124,7 +124,8 @@ def draw_figures(signed: Trace) -> None:
     with rc_context(RC):
         figure = Figure(figsize=(5.4, 3.6), layout="constrained")
         ax = figure.subplots()
-        panels.stribeck(ax, run("stribeck_sweep"))
+        panels.stribeck(ax, run("stribeck_sweep"), log=True)
+        ax.set_title("Stribeck curve, and friction in a slow sweep of the velocity")
         ax.legend()
     figures.save(figure, FOLDER / "figure_stribeck.png")
 

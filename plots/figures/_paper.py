@@ -340,7 +340,7 @@ def held_residuals(
         force, place, between, period = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
         lines = panels.lag_over_time(force, lags, papers[0], window=(0.0, until))
         panels.lag_over_time(place, lags, papers[1], window=(0.0, until), place=True)
-        panels.lag_between_ticks(between, lags, window=(zoom, zoom + 2 * lags[0].period))
+        panels.lag_between_ticks(between, lags, papers[0], window=(zoom, zoom + 2 * lags[0].period))
         panels.lag_over_period(period, lags, papers, phases=phases)
         letter_panels(
             [force, place, between, period],

@@ -103,8 +103,11 @@ def overview(
         if count > MANY:
             panels.slipping(time[2], part, window=window, elements=elements)
         panels.ribbons(time[-1], part, window=window, elements=elements)
-        panels.hysteresis(loop, trace, window=window)
-        panels.portrait(portrait, part, elements=elements)
+        alone = measured is None  # else ink is the model, grey the measurement
+        panels.hysteresis(loop, trace, window=window, elements=elements, slipping=alone)
+        (lines,) = panels.portrait(portrait, part, elements=elements, bar=False)
+        assert isinstance(lines, LineCollection)
+        panels.slip_bar(lines, trace, [loop, portrait] if alone else portrait)
         if measured is not None:
             _add_measured(time[1], loop, measured, trace, window)
         if trace.model.chart.transitions:
@@ -353,8 +356,8 @@ def _zoom_names(zoom: Window, margin: str) -> list[str]:
     middle, width = (zoom[0] + zoom[1]) / 2, zoom[1] - zoom[0]
     factor, unit = scaled(np.array([width]), "s")
     return [
-        f"velocity, {factor * width:.3g} {unit} at t = {middle:.5g} s",
+        f"velocity, {factor * width:.3g} {unit} at $t$ = {middle:.5g} s",
         margin,
-        "jumps of F (open: before, filled: after)",
+        "jumps of $F$ (open: before, filled: after)",
         "order of slipping",
     ]

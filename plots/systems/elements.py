@@ -202,8 +202,8 @@ def _contact(
     elif trace is not None and not held:
         way = 1.0 if trace.v[row] >= 0 else -1.0
         start, height = contact + way * (CONTACT / 2 + 0.03), ground + 0.1  # beside the box
-        ends = (start, height), (start + 0.85 * way * CONTACT, height)
-        drawn.append(arrow_between(ax, *ends, size=9, lw=1.2))
+        tip = start + 0.85 * way * CONTACT
+        drawn.append(arrow_between(ax, (start, height), (tip, height), size=9, lw=1.2))
     return drawn
 
 

@@ -389,8 +389,11 @@ def test_panels_of_an_overview_share_their_time_span() -> None:
     ((begin, end),) = {ax.get_xlim() for ax in time}
     assert 20.0 < begin < end == 60.0
     x = trace.sample([begin, end]).x - trace.x[0]
-    shown = loop.lines[0].get_xdata()
+    shown = np.vstack(loop.collections[0].get_segments())[:, 0]
     assert [shown[0], shown[-1]] == pytest.approx(x, rel=1e-6)
+    # Both panels are as dark as many elements slip.
+    counts = [set(ax.collections[0].get_array()) for ax in (loop, portrait)]
+    assert counts[0] == counts[1] == {0, 1, 2, 3, 4}
     F = np.vstack(portrait.collections[0].get_segments())[:, 1]
     assert F.min() > 0.5  # the run begins at 0
 
@@ -441,7 +444,7 @@ def test_presets_have_the_sizes_of_the_journal_or_ones_own_and_end_with_their_co
     for name, width in {"screen": 1.6, "ieee1": 1.2}.items():  # also where a look is a constant
         with plots.preset(name):
             loop, portrait = figures.overview(run("signed")).axes[3:5]
-        widths = [loop.lines[0].get_linewidth(), portrait.collections[0].get_linewidth()[0]]
+        widths = [ax.collections[0].get_linewidth()[0] for ax in (loop, portrait)]
         assert widths == pytest.approx([width, width], abs=1e-3)
     with plots.preset(Preset("thesis", 5.5, None, 10.0, 8.0, 1.0, 200.0)):
         assert figures.cascade_figure(run("signed")).get_figwidth() == 5.5

@@ -222,15 +222,15 @@ def _listing(trace: Trace) -> Figure:
     tall = max(len(text.splitlines()) for text in texts) + 4
     size = 7.0  # points
     figure = Figure(figsize=(width("m", size) / 72 * sum(wide), LINE * size / 72 * tall))
-    figure.suptitle(LISTED, x=0.01, y=1 - 0.6 / tall, ha="left", size=9.0)
-    look: dict[str, Any] = {"size": size, "family": "monospace", "va": "top", "linespacing": LINE}
+    figure.suptitle(LISTED, x=0.01, y=1 - 0.6 / tall, ha="left", size=9.0, color=INK)
+    look: dict[str, Any] = {"size": size, "family": "monospace", "va": "baseline"}
     for text, x in zip(texts, (0.01, 0.01 + wide[0] / sum(wide)), strict=True):
         code = [each.partition("#")[0] for each in text.splitlines()]
-        comments = [
-            " " * len(a) + b[len(a) :] for a, b in zip(code, text.splitlines(), strict=True)
-        ]
-        figure.text(x, 1 - 3 / tall, "\n".join(code), color=INK, **look)
-        figure.text(x, 1 - 3 / tall, "\n".join(comments), color=TEXT_GREY, **look)
+        # Line by line: in one text the letters of a line would decide its height.
+        for number, (line, whole) in enumerate(zip(code, text.splitlines(), strict=True)):
+            comment = " " * len(line) + whole[len(line) :]
+            for part, ink in ((line, INK), (comment, TEXT_GREY)):
+                figure.text(x, 1 - (3 + number) / tall, part, color=ink, **look)
     return figure
 
 
