@@ -178,7 +178,7 @@ def microstep_figure(trace: Trace) -> Figure:
     rows = np.flatnonzero(trace.t == log.t[0])
     with rc_context(RC):
         figure = Figure(figsize=(7.6, 3.2), layout="constrained")
-        over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5))
+        over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5), sharey=True)
         t = float(log.t[0])
         panels.force(over_time, trace, window=(t - 1.5, t + 1.5))
         panels.lettered(over_time, "a", "over time: one jump of $F$")
@@ -203,7 +203,7 @@ def microstep_figure(trace: Trace) -> Figure:
             fontsize=8,
         )
         by_step.set(xlabel="micro-step", ylabel="$F$ [N]", xticks=range(5), xlim=(-0.5, 5.3))
-        by_step.margins(y=0.25)
+        by_step.set_ylim(top=1.08 * trace.F[rows].max())  # room for the names
     return figure
 
 
@@ -291,7 +291,7 @@ def draw_howto() -> None:
     plots.render(plots.statechart(AGEING), FOLDER / "howto_own_chart.png")
     report = prove(BROKEN["memoryless"].chart)
     (finding,) = report.refuted
-    note = [*wrap(f"{finding.check}: {finding.text}", 50), *wrap(finding.example, 50)]
+    note = [*wrap(f"{finding.check}: {finding.text}", 38), *wrap(finding.example, 38)]
     marked = [part for part in finding.where if part in report.chart.guards]
     graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
     plots.render(graph, FOLDER / "howto_refuted.png")

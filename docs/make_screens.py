@@ -24,7 +24,7 @@ def main() -> None:
     """Write every picture."""
     fig_4 = "paper_fig4_stick_slip"
     screen("debugger_why", fig_4, (124, 38), "goto 25", "why 1")
-    screen("debugger_small", fig_4, (80, 24), "goto 80", "why 1")
+    screen("debugger_small", fig_4, (80, 24), "goto 87.4", "next", "why 1")
     screen(
         "debugger_branches",
         fig_4,

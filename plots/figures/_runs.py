@@ -265,7 +265,7 @@ def _ribbon_axes(
         )
         pair = list(figure.add_subfigure(halves[1, 0]).subplots(1, 2))
         return figure, axes[:rows], axes[rows:], pair
-    figure = sheet(13.2 if zoom else 9.6, sum(tall) + 2.2)
+    figure = sheet(11.6 if zoom else 9.6, sum(tall) + 2.2)
     beside = not (zoom and low())
     widths = (2.1 if zoom else 1.3, 1)[: 1 + beside]
     halves = figure.add_gridspec(1, len(widths), width_ratios=widths)
@@ -358,6 +358,6 @@ def _zoom_names(zoom: Window, margin: str) -> list[str]:
     return [
         f"velocity, {factor * width:.3g} {unit} at $t$ = {middle:.5g} s",
         margin,
-        "jumps of $F$ (open: before, filled: after)",
+        "jumps of $F$ (open before, filled after)",
         "order of slipping",
     ]
