@@ -10,9 +10,11 @@ from typing import Any
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ChartError, shown
 from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.equality import by_value
 
 
-@dataclass(frozen=True)
+@by_value()
+@dataclass(frozen=True, eq=False)
 class State:
     """One state of a machine: how its variables evolve, and what force it gives, while active.
 
@@ -67,7 +69,8 @@ class State:
             raise ChartError("it must be True or False", place=f"{here}: locked", value=self.locked)
 
 
-@dataclass(frozen=True, init=False)
+@by_value()
+@dataclass(frozen=True, init=False, eq=False)
 class Transition:
     """One guarded edge between two states.
 

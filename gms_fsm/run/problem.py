@@ -15,6 +15,7 @@ from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.foundation.arguments import there_are, unknown
+from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.lowering.floor import floor_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.log_columns import LogRecord
@@ -366,7 +367,7 @@ def _initial(
 ) -> tuple[list[float], list[int]]:
     """Build the state vector and the modes."""
     layout = program.layout
-    if initial == {} and _is_plain(system.shape):
+    if initial == {} and _is_plain(ByIdentity(system.shape)):
         return [0.0] * layout.y.size, [0] * layout.n
     y, mode, given = _given(system, layout, initial)
     y = _entered(system, program, t_start, y, mode, given)
@@ -433,8 +434,9 @@ def _given(
 
 
 @functools.lru_cache(maxsize=64)
-def _is_plain(shape: System) -> bool:
+def _is_plain(key: ByIdentity[System]) -> bool:
     """Return whether systems of a shape start with 0 everywhere unless something else is given."""
+    shape = key.it
     locked = any(contact.chart.default_state.locked for contact in shape.contacts)
     return not (shape.sampled or locked or _enters(shape))
 

@@ -32,6 +32,7 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.charts.zoo.bristles.lugre import LUGRE
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.foundation.display import displayed, short_repr
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.given import Text, texts_of
 from gms_fsm.systems.gms_parameters import GMSParameters
 
@@ -76,6 +77,7 @@ def is_model(given: object) -> bool:
 
 @displayed("svg", "html")
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class GMS:
     """A bank of Generalized Maxwell Slip elements in parallel.
@@ -164,6 +166,7 @@ class GMS:
 
 @displayed("svg", "html")
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LuGre:
     """The LuGre model: one bristle, one state, no edges.
@@ -216,6 +219,7 @@ class LuGre:
 
 @displayed("svg", "html")
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class ChartModel:
     """Any chart run as a bank of n elements, for example with your own guards or states.

@@ -15,6 +15,7 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, cut, shown
 from gms_fsm.foundation.arguments import one_of
 from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.given import (
     Text,
     check_name,
@@ -98,6 +99,7 @@ class Body:
 
 
 @displayed("svg", "html")
+@by_value()
 @dataclass(frozen=True, init=False, eq=False)
 class Contact:
     """Machines of one chart on one relative velocity.
@@ -263,7 +265,8 @@ def loaded(model: Model | Contact) -> bool:
     return isinstance(model, Contact) and model.load is not None
 
 
-@dataclass(frozen=True)
+@by_value("updates")
+@dataclass(frozen=True, eq=False)
 class Sampled:
     """A sampled controller: values that change at exact ticks only.
 

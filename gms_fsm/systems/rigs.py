@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import Parameter, checked_scalar
 from gms_fsm.foundation.display import short_repr
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring
 
@@ -41,6 +42,7 @@ class Rig(Protocol):
 
 
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class Prescribed:
     """Open loop: the velocity is prescribed.
@@ -56,7 +58,7 @@ class Prescribed:
     'prescribed velocity'
     """
 
-    velocity: SignalLike
+    velocity: SignalLike = field(compare=False)
     signals: Mapping[str, Signal] = field(init=False, repr=False)
 
     title = "prescribed velocity"
@@ -73,6 +75,7 @@ class Prescribed:
 
 
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class Slider:
     """Closed loop: a mass pushed by a force, ``m dv/dt = F_a(t) - F``.
@@ -91,7 +94,7 @@ class Slider:
     """
 
     mass: float
-    force: SignalLike
+    force: SignalLike = field(compare=False)
     signals: Mapping[str, Signal] = field(init=False, repr=False)
 
     title = "slider pushed by a force"
@@ -108,6 +111,7 @@ class Slider:
         return {each.name: getattr(self, each.name) for each in self.parameters}
 
 
+@by_value()
 @dataclass(frozen=True, eq=False)
 class PulledSlider:
     """Closed loop: a mass pulled through a spring whose end moves at constant speed.
@@ -158,6 +162,7 @@ class PulledSlider:
 
 
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class TextRig:
     """Any rig as its texts, numbers and signals: what a file keeps of a rig of your own.

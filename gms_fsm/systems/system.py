@@ -20,6 +20,7 @@ from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, cut, shown
 from gms_fsm.foundation.arguments import checked_path, unknown
 from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import (
     Binary,
     Name,
@@ -65,6 +66,7 @@ Key = tuple[str | int, ...]
 
 
 @displayed("svg", "html")
+@by_value()
 @dataclass(frozen=True, eq=False)
 class System:
     """Bodies, the contacts between them, and what drives both.

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError, shown, why
 from gms_fsm.foundation.arguments import no_file, some_of
-from gms_fsm.foundation.display import short_repr
-from gms_fsm.foundation.logs import Log
+from gms_fsm.foundation.display import Log, short_repr
 from gms_fsm.lowering.observing import armed, rate, sigmas
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.system import Body

@@ -18,8 +18,7 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import GMSError, MissingExtraError
-from gms_fsm.foundation.display import Form
-from gms_fsm.foundation.logs import Log
+from gms_fsm.foundation.display import Form, Log
 from gms_fsm.foundation.quantities import trimmed
 from gms_fsm.session.explain import Clause, Explanation, Why
 from gms_fsm.session.results import BranchComparison, Here
