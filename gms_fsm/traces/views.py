@@ -42,6 +42,12 @@ class BodyTrace:
     v: FloatArray
 
 
+def range_of_force(trace: Trace) -> tuple[float, float]:
+    """Return the least and the largest friction force over what lasts."""
+    lasting = trace.F[trace.rows.lasting]
+    return float(lasting.min()), float(lasting.max())
+
+
 def driven_velocity(trace: Trace, body: Body) -> FloatArray:
     """Return the velocity of a driven body at all rows: the rate of its position."""
     program, found = trace.program, []

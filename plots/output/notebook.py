@@ -33,6 +33,7 @@ from gms_fsm.traces.verdicts import (
     InvariantVerdict,
     PassivityVerdict,
 )
+from gms_fsm.traces.views import range_of_force
 from gms_fsm.verification.findings import Finding, Report
 from plots.charts.live_chart import LiveChart
 from plots.charts.statechart import statechart
@@ -115,7 +116,7 @@ def trace_html(trace: Trace) -> str | None:
     if not several and find_spec("matplotlib") is not None:
         return None
     parts = [trace.contact(name) for name in trace.contacts] if several else [trace]
-    rows = [[p.model.title, p.n, len(p.transitions), p.F.min(), p.F.max()] for p in parts]
+    rows = [[p.model.title, p.n, len(p.transitions), *range_of_force(p)] for p in parts]
     return table(
         ["contact", "elements", "transitions", "least F [N]", "largest F [N]"],
         rows,
