@@ -1236,6 +1236,7 @@ rows = {
     "unknown output": ("chart 'rubber', outputs", ..., {"outputs": {"G": "k"}}),
     "unknown output of a state": ("state 'slip', outputs", ..., state(outputs={"G": "k"})),
     "force of a locked state": ("state 'slip'", ..., state(locked=True, outputs={"F": "k"})),
+    "F in a let": ("chart 'rubber', let 'pull'", ..., {"let": {"pull": "abs(F)"}}),
     "F in a flow": ("chart 'rubber', state 'slip', flow of 'z'", ..., state(flow={"z": "F"})),
     "a in a force": ("chart 'rubber', state 'slip', output 'F'", ..., state(outputs={"F": "a"})),
     "layout of no state": (
@@ -1291,6 +1292,11 @@ rows = {
 group("chart", ChartError, chart, rows, "")
 rows = {
     "unknown name in a guard": ("guard, column 12", ..., edge(guard="z >= s and u > v_c")),
+    "time with a unit": ("column 10", ..., edge(guard="after(2, sec)")),
+    "time with a unit after a blank": ("column 10", ..., edge(guard="after(20 ms)")),
+    "after without a time": ("column 1", ..., edge(guard="after()")),
+    "after of two": ("column 11", ..., edge(guard="z >= s or after(2, s_0)")),
+    "after as a number": ("column 5", ..., edge(guard="1 < after(2)")),
     "guard of equality": ("chart 'rubber', edge 'go', guard, column 6", ..., edge(guard="z == s")),
     "decimal comma in a guard": ("guard, column 7", ..., edge(guard="z >= 0,8 * s")),
     "capitals in a guard": ("guard, column 8", ..., edge(guard="z >= s AND v > v_c")),
@@ -1324,11 +1330,48 @@ rows = {
         ...,
         lambda: State("stick", flow={"z": "v"}, during="z = 0"),
     ),
+    "argument of transitions": (
+        "Transition",
+        ...,
+        lambda: call(Transition, trigger="go", source="stick", dest="slip"),
+    ),
+    "second argument of transitions": (
+        "transition 'go'",
+        ...,
+        lambda: call(Transition, "go", "stick", dest="slip"),
+    ),
+    "edge without a guard": (
+        "transition 'go'",
+        ...,
+        lambda: call(Transition, "go", "stick", "slip"),
+    ),
     "locked by a number": ("state 'slip': locked", 1, lambda: State("slip", locked=1)),
     "edge from nowhere": ("edge 'go'", ..., lambda: Transition("go", (), "slip", guard="v > 0")),
     "name that is none": ("chart 5: name", 5, lambda: Chart(5, states=(), outputs={})),
 }
 group("part of a chart", ChartError, called, rows)
+
+
+def call(kind: Any, *args: object, **given: object) -> object:
+    """Make an object with arguments that it does not take."""
+    return kind(*args, **given)
+
+
+rows = {
+    "no law": ("GMS", (GMS, GMSParameters.paper("stick-slip")), {}),
+    "law without its name": ("GMS", (GMS, GMSParameters.paper("stick-slip"), "signed"), {}),
+    "no law of a chart": ("gms_element", (gms_element,), {}),
+    "number with another name": ("Stribeck", (Stribeck, 1.0, 1.5), {"vs": 1e-3}),
+    "number too few": ("PulledSlider", (PulledSlider, 1.0, 2.0), {}),
+    "stiffness of a spring": ("spring 'shaft'", (Spring, "shaft", "motor"), {"stiffness": 2.0}),
+    "sample time": ("sampled 'pid'", (Sampled, "pid"), {"sample_time": 1e-3, "updates": {}}),
+}
+group(
+    "argument",
+    ParameterError,
+    lambda args, given: call(*args, **given),
+    {name: (place, ..., args, given) for name, (place, args, given) in rows.items()},
+)
 
 
 # --------------------------------------------------------------------------- parameters

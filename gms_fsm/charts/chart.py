@@ -25,7 +25,7 @@ from gms_fsm.charts.parts import (
 )
 from gms_fsm.charts.reader import ChartReader
 from gms_fsm.errors import ChartError, cut, shown
-from gms_fsm.foundation.arguments import checked_kind, checked_path
+from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, Condition, Value, spell
@@ -44,6 +44,7 @@ RESERVED = frozenset(
 )
 
 
+@refusing(ChartError, instead={"edges": "transitions"})
 @displayed("svg", "html")
 @by_value()
 @dataclass(frozen=True, init=False, eq=False)
@@ -199,11 +200,10 @@ class Chart:
                 advice="give at least one, for example ('v',)",
                 key=("velocities",),
             )
-        derivatives = ["d" + variable for variable in self.variables]
         groups = (
             ("input", "inputs", dict.fromkeys([*self.inputs, *self.velocities])),
             ("variable", "variables", self.variables),
-            ("derivative", "variables", derivatives),
+            ("derivative", "variables", ["d" + variable for variable in self.variables]),
             ("parameter", "parameters", self.parameter_names),
             ("let", "let", self.let),
             ("state", "states", [s.name for s in self.states]),

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.chart import SUPPLIED, Chart
-from gms_fsm.charts.gms import GMS_ELEMENT, Law, check_law
+from gms_fsm.charts.gms import GIVE_LAW, GMS_ELEMENT, Law, check_law
 from gms_fsm.charts.parameters import (
     SIGMA_2,
     STRIBECK,
@@ -31,6 +31,7 @@ from gms_fsm.charts.registry import Entry
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.charts.zoo.bristles.lugre import LUGRE
 from gms_fsm.errors import ParameterError, shown
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.given import Text, texts_of
@@ -75,6 +76,7 @@ def is_model(given: object) -> bool:
     return marked and not isinstance(given, type)
 
 
+@refusing(law=GIVE_LAW)
 @displayed("svg", "html")
 @short_repr
 @by_value()
@@ -123,7 +125,7 @@ class GMS:
                 f"published law with F_s = F_c = {self.stribeck.F_c!r} N: a slipping element stays "
                 "exactly on |z| = s, where the law is at rest, and never arrests; use law='signed' "
                 "or F_s > F_c",
-                stacklevel=3,
+                stacklevel=4,
             )
 
     @property
@@ -164,6 +166,7 @@ class GMS:
         return self.parameters.sigma_2
 
 
+@refusing()
 @displayed("svg", "html")
 @short_repr
 @by_value()
@@ -217,6 +220,7 @@ class LuGre:
         return np.ones(1)
 
 
+@refusing()
 @displayed("svg", "html")
 @short_repr
 @by_value()

@@ -13,7 +13,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, cut, shown
-from gms_fsm.foundation.arguments import one_of
+from gms_fsm.foundation.arguments import one_of, refusing
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.given import (
@@ -32,6 +32,7 @@ LOAD = "N"  # the input of a contact that multiplies its Stribeck curve
 LEAST_LOAD = 1e-9  # N; charts divide by thresholds
 
 
+@refusing()
 @dataclass(frozen=True)
 class Body:
     """A body with one degree of freedom: free, or moved with a given velocity.
@@ -98,6 +99,7 @@ class Body:
         return "rad" if self.motion == "turning" else "m"
 
 
+@refusing()
 @displayed("svg", "html")
 @by_value()
 @dataclass(frozen=True, init=False, eq=False)
@@ -265,6 +267,7 @@ def loaded(model: Model | Contact) -> bool:
     return isinstance(model, Contact) and model.load is not None
 
 
+@refusing(instead={"sample_time": "period"})
 @by_value("updates")
 @dataclass(frozen=True, eq=False)
 class Sampled:

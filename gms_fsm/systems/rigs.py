@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Protocol
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import Parameter, checked_scalar
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.display import short_repr
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
@@ -41,6 +42,7 @@ class Rig(Protocol):
         """Text of dv/dt in t, x, v, F, the signals and the numbers; None if v is prescribed."""
 
 
+@refusing()
 @short_repr
 @by_value()
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,7 @@ class Prescribed:
         return {}
 
 
+@refusing()
 @short_repr
 @by_value()
 @dataclass(frozen=True, eq=False)
@@ -111,6 +114,7 @@ class Slider:
         return {each.name: getattr(self, each.name) for each in self.parameters}
 
 
+@refusing()
 @by_value()
 @dataclass(frozen=True, eq=False)
 class PulledSlider:

@@ -18,7 +18,7 @@ import numpy as np
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, cut, shown
-from gms_fsm.foundation.arguments import checked_path, unknown
+from gms_fsm.foundation.arguments import checked_path, refusing, unknown
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import (
@@ -65,6 +65,7 @@ __all__ = [
 Key = tuple[str | int, ...]
 
 
+@refusing(instead={"parameters": "numbers"})
 @displayed("svg", "html")
 @by_value()
 @dataclass(frozen=True, eq=False)
