@@ -34,6 +34,7 @@ from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import LoopOptions
 
+IMPLICIT = ("Radau", "BDF", "LSODA")  # methods of SciPy for stiff runs
 STEPS_A_TICK = 4  # after each tick the steps begin anew
 LATEST = 1e9  # s; one tick of a double is then 1e-7 s
 
@@ -129,7 +130,9 @@ class Problem:
 
     @property
     def implicit(self) -> str:
-        """An implicit method and the tolerances that it needs, as one writes them."""
+        """An implicit method and the tolerances it needs, as one writes them; "" if one is used."""
+        if self.chosen.method_name in IMPLICIT:
+            return ""
         missing = _without_scale(self.program.layout, self.options.atol)
         return f"method=scipy.integrate.Radau{f', atol={missing}' if missing else ''}"
 
