@@ -58,6 +58,7 @@ class Commands:
         self.session, self.marks, self.width, self.element = session, marks, width, 0
         self.last_move = ""  # the line that moved last, which an empty line repeats
         self.left = False  # whether the last line was `quit`
+        self.refused = 0  # lines that were answered by an error
 
     def reply(self, line: str) -> Iterator[str]:
         """Execute a line as a person types it; a mistake is answered and changes nothing."""
@@ -73,10 +74,12 @@ class Commands:
             yield "stopped"
             yield from self.here()
         except GMSError as error:
+            self.refused += 1
             yield f"error: {error}"
         except BrokenPipeError:
             raise
         except Exception as error:  # losing the session would be worse than an unclear message
+            self.refused += 1
             yield f"error: {type(error).__name__}: {error}"
         else:
             self.left = name == "quit"
