@@ -79,10 +79,10 @@ from gms_fsm.errors import (
     TraceFileError,
     UnitError,
 )
+from gms_fsm.foundation.quantities import factor
 from gms_fsm.identification.certainty.intervals import Bootstrap
 from gms_fsm.phenomena.results import PhenomenaTable, PhenomenonResult
 from gms_fsm.records import _table, damper, tribometer
-from gms_fsm.records.units import factor
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.signals import as_signal
 from gms_fsm.systems.system import with_model
@@ -1581,6 +1581,11 @@ rows = {
     "equality": ("invariant, column 6", ..., lambda: "z == s"),
 }
 group("monitors", ExpressionError, monitored, rows)
+rows = {
+    f"unit {text!r}": (f"invariant {text!r}", ..., lambda text=text: text)
+    for text in ("z < 3 mm/s", "F < 2 furlong")
+}
+group("monitors", UnitError, monitored, rows)
 
 
 # --------------------------------------------------------------------------- branches

@@ -20,7 +20,7 @@ from gms_fsm.foundation.quantities import WIDTH, in_words
 from gms_fsm.language import evaluate
 from gms_fsm.session.explain import holds
 from gms_fsm.session.session import KINDS, Breakpoint, Session
-from gms_fsm.session.units import in_si, units_of
+from gms_fsm.traces.system_scope import asked_unit, in_si, units_of
 
 
 class Commands:
@@ -214,7 +214,7 @@ class Commands:
     def do_goto(self, arg: str) -> Iterator[str]:
         """Go to a time."""
         try:
-            t = self.session.watch(in_si(self.session.start, arg, "t"))
+            t = self.session.watch(in_si(self.session.start.what, arg, "t"))
         except ExpressionError:
             advice = f"{self._usage('goto')}; the run ends at {self.session.t_end:g} s"
             raise SessionError(f"{arg!r} is not a time", advice=advice) from None
@@ -246,7 +246,7 @@ class Commands:
 
     def _unit(self, name: str) -> str:
         """Return the unit of a name, empty if it is not known."""
-        return units_of(self.session.start).get(name, "")
+        return units_of(self.session.start.what).get(name, "")
 
     def _units_in(self, text: str) -> str:
         """Return the units in which a text's numbers are read."""
@@ -340,7 +340,9 @@ class Commands:
     def _value(self, text: str) -> str:
         if re.search(r"[<>]|==|\b(and|or|not|state)\b", text):
             return "true" if self._truth(text) else "false"
-        return in_words(self.session.watch(text), self._unit(text.strip()), 9)
+        asked, unit, size = asked_unit(self.session.start.what, text)
+        value = self.session.watch(asked)
+        return f"{value / size:.9g} {unit}" if unit else in_words(value, self._unit(asked), 9)
 
     def _truth(self, text: str) -> bool:
         tree = self.session.parse(self._with_states(text))

@@ -34,14 +34,17 @@ def by_value(*ordered: str) -> Callable[[Kind], Kind]:
         found = ((each.name, getattr(self, each.name)) for each in fields(self) if each.compare)
         return tuple(_key([*value.items()] if name in ordered else value) for name, value in found)
 
-    def equal(self: Any, other: object) -> bool:
+    def equal(self: Any, other: object) -> Any:
         if type(other) is not type(self):
             return NotImplemented
         return self is other or key(self) == key(other)
 
+    def digest(self: Any) -> int:
+        return hash(key(self))
+
     def add(kind: Kind) -> Kind:
         kind.__eq__ = equal  # type: ignore[method-assign,assignment]
-        kind.__hash__ = lambda self: hash(key(self))  # type: ignore[method-assign,assignment]
+        kind.__hash__ = digest  # type: ignore[method-assign,assignment]
         return kind
 
     return add

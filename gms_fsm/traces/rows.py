@@ -35,7 +35,8 @@ class Rows:
         passed = np.diff(self.t) != 0.0
         if not passed.any():
             return np.ones(len(self), dtype=bool)
-        return np.concatenate([[False], passed]) | np.concatenate([passed, [False]])
+        found: NDArray[np.bool_] = np.append(False, passed) | np.append(passed, False)
+        return found
 
     def at(self, chosen: NDArray[Any] | slice) -> Rows:
         """Return some of the rows."""
