@@ -2561,8 +2561,12 @@ rows = {
     "an unknown key": ("inertia = 2", "inertia = 2\nmass = 1"),
     "an unknown motion": ("inertia = 2", 'inertia = 2\nmotion = "rotary"'),
     "an unknown table": ("[[sampled]]", "[[sample]]"),
+    "a scenario of a system": ('name = "pair"', 'name = "pair"\nrun.t_end = 1.0'),
+    "a model on a rig": ('name = "pair"', 'rig.kind = "prescribed"\nname = "pair"'),
 }
 group("system file", ScenarioError, system_file, rows, "own.toml")
+rows = {"scenario of the package": ("servo",)}
+group("system file", ScenarioError, System.load, rows, "servo")
 FUNCTION = '{ kind = "function" }'
 rows = {
     "a chart elsewhere": ("contact.0.chart: chart", "../a.toml", '"lugre"', '"../a.toml"'),
@@ -2639,6 +2643,11 @@ rows = {
     },
 }  # fmt: skip
 group("part of a system", ParameterError, lambda call: call(), rows)
+rows = {
+    key: ("", ..., lambda key=key: simulate(load_system("servo"), 0.1, initial={key: 1.0}))
+    for key in ("load.y", "w", "bearing.state")
+}
+group("initial value of a system", ParameterError, called, rows)
 rows = {"pairs in a pair": ("signal", ..., ((0.0, 0.0), (1.0, 2.0)))}
 group("signal", SignalError, Prescribed, rows)
 rows = {

@@ -11,6 +11,7 @@ import functools
 import inspect
 import operator
 import os
+import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -246,8 +247,8 @@ def unknown(
     return kind(f"there is no {noun} {shown(name)}", advice=there_are(name, known), **at)
 
 
-def there_are(name: object, known: Iterable[str]) -> str:
-    """Return the advice on a name that is not known.
+def there_are(name: object, known: Iterable[str], *, every: bool = False) -> str:
+    """Return the advice on a name that is not known: with names, or every name there is.
 
     Examples
     --------
@@ -256,6 +257,8 @@ def there_are(name: object, known: Iterable[str]) -> str:
     """
     names = [*dict.fromkeys(known)]
     hint = meant(name, names)
+    if every and len(names) > MOST_NAMED:
+        return "\n".join([f"{hint}there are", *textwrap.wrap(", ".join(names), 76)])
     if hint and len(names) > MOST_NAMED + 1:  # a wall of names would hide the one that is meant
         return f"{hint}there are {len(names)} in all"
     return f"{hint}there {'is only' if len(names) == 1 else 'are'} {some_of(names)}"
