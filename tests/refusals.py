@@ -849,10 +849,11 @@ rows = {
 group("motion", RecordError, moving, rows)
 
 
-def fit_command(override: str) -> None:
-    """Fit the good table."""
+def fit_command(override: str, head: str = "") -> None:
+    """Fit the good table, without the head of one of its tables."""
     Path("own.csv").write_text(GOOD)
-    Path("a.toml").write_text(f'{MEASURED}\n[fit]\nfree = ["k"]\nsearch = "local"\n')
+    text = f'{MEASURED}\n[fit]\nfree = ["k"]\nsearch = "local"\n'
+    Path("a.toml").write_text(text.replace(head, ""))
     verb("fit", "a.toml", "-o", "out", "--set", override)
 
 
@@ -866,6 +867,12 @@ rows = {
     "bounds and not free": ("[fit]: bounds", ..., "fit.bounds.C=[1.0, 2.0]"),
     "search": ("a.toml", ..., "fit.search=genetic"),
     "rows in a text": ("a.toml", ..., "fit.train=4-16"),
+    "rows with dots": ("a.toml", ..., "fit.train=4..16"),
+    "one time": ("a.toml", ..., "fit.train=4"),
+    "one time in a list": ("a.toml", ..., "fit.test=[4.0]"),
+    "one bound": ("a.toml", ..., "fit.bounds.k=1e3"),
+    "no head of the fit": ("a.toml", ..., "run.rtol=1e-5", "[fit]\n"),
+    "no head of the record": ("a.toml", ..., "run.rtol=1e-5", "[record]\n"),
     "names in a text": ("a.toml", ..., "fit.free=k, C"),
     "text for a column": ("a.toml", ..., "record.time=t"),
     "measured": ("[fit]: measured", ..., "fit.measured=G"),
