@@ -102,6 +102,9 @@ class System:
     Locked contacts may hold the same motion. The earlier ones, as listed, then carry the force, and
     those that would repeat them carry none; `Trace.shared` marks these.
 
+    Systems are equal if all their parts are: bodies, contacts with their charts and numbers,
+    springs, signals. So are models, rigs and signals; functions only if they are the same.
+
     Examples
     --------
     >>> from gms_fsm.charts.gms import gms_element
@@ -268,9 +271,10 @@ class System:
         return load(checked_path("path", path), cls)
 
     def save(self, path: str | Path) -> Path:
-        """Write the system to a TOML file, from which `load` returns an equivalent one.
+        """Write the system to a TOML file, from which `load` returns an equal one.
 
-        Charts that are included are written by name, others in full.
+        Charts that are included are written by name, others in full. A model of a class of one's
+        own is read back as an equivalent `ChartModel`.
 
         Parameters
         ----------
