@@ -1,4 +1,4 @@
-"""Values in engineering units, with one unit for each quantity and place: ``-776.2 mm``."""
+"""Values in engineering units, one unit for each quantity and place (``-776.2 mm``); factors."""
 
 from __future__ import annotations
 
