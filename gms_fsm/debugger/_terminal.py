@@ -99,7 +99,7 @@ class Debugger(cmd.Cmd):
         Returns
         -------
         int
-            The exit code, 0.
+            The exit code: 1 if commands that were not typed were refused, else 0.
         """
         if self.title:
             self.say(self.title)
@@ -111,7 +111,7 @@ class Debugger(cmd.Cmd):
             except KeyboardInterrupt:  # at the prompt
                 self.say("\nquit exits")
             else:
-                return 0
+                return int(self.commands.refused > 0 and not self.typed)
 
     def precmd(self, line: str) -> str:
         """Echo a command that was not typed."""

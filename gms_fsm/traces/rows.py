@@ -29,6 +29,15 @@ class Rows:
     def __len__(self) -> int:
         return int(self.t.size)
 
+    @property
+    def lasting(self) -> NDArray[np.bool_]:
+        """Which rows begin or end an interval: not those between two micro-steps of an instant."""
+        passed = np.diff(self.t) != 0.0
+        if not passed.any():
+            return np.ones(len(self), dtype=bool)
+        found: NDArray[np.bool_] = np.append(False, passed) | np.append(passed, False)
+        return found
+
     def at(self, chosen: NDArray[Any] | slice) -> Rows:
         """Return some of the rows."""
         return Rows(self.t[chosen], self.microstep[chosen], self.y[chosen], self.mode[chosen])
