@@ -25,6 +25,7 @@ from gms_fsm.errors import (
 from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.extras import require
+from gms_fsm.foundation.text import visible
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
@@ -116,7 +117,8 @@ class Trace:
     every: Firings | None = field(default=None, repr=False)  # of all contacts, where one is chosen
 
     def __repr__(self) -> str:
-        return f"<Trace: {self.title}; {len(self.rows)} rows, {len(self.firings)} transitions>"
+        title = visible(self.title)
+        return f"<Trace: {title}; {len(self.rows)} rows, {len(self.firings)} transitions>"
 
     @property
     def title(self) -> str:

@@ -368,8 +368,3 @@ class ProgramWriter(ABC):
         """Spell the corners of a signal: their times and values."""
         places = (self.plan.tables.text((name, column)) for column in ("times", "values"))
         return ", ".join(f"tables[{place}]" for place in places)
-
-
-def one_line(text: str) -> str:
-    """Return text fit for a comment: a line break would end it."""
-    return "".join(c if c.isprintable() else " " for c in text)

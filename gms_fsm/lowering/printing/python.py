@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gms_fsm.charts.chart import SUPPLIED
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     Binary,
     Comparison,
@@ -19,7 +20,7 @@ from gms_fsm.language import (
     split,
 )
 from gms_fsm.lowering.places import total
-from gms_fsm.lowering.printing.lines import CodeLine, Signs, indented, one_line, reads_of
+from gms_fsm.lowering.printing.lines import CodeLine, Signs, indented, reads_of
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
 from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sides
@@ -74,7 +75,7 @@ def python(plan: ProgramPlan) -> str:
     """
     printer = _PythonPrinter(plan)
     lines = [
-        f"# {one_line(plan.title)}",
+        f"# {visible(plan.title)}",
         "# Generated from the chart; parameters are arguments, so one text serves all values.",
         "",
     ]
