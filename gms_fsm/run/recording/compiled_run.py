@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-import sys
-from collections.abc import Callable, Mapping
+import weakref
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -147,6 +147,8 @@ class Columns:
         size, modes = layout.y.size, layout.modes
         self.prepared = _prepared(start)
         self.engine, self.block = self.prepared.engine, self.prepared.block()
+        # A method __del__ would run while the interpreter ends, too, where modules are emptied.
+        weakref.finalize(self, self.prepared.take_back, self.block).atexit = False
         self.run_of: RecordArguments = self.block.contents
         self.p = compiled.packed(start.program.p) if p is None else p
         few = max(16, min(1024, 4_000_000 // size))  # initial number of rows
@@ -181,10 +183,6 @@ class Columns:
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
             self.log.stops_microstep[0] = 0
             self.log.stops = 1
-
-    def __del__(self, ended: Callable[[], bool] = sys.is_finalizing) -> None:
-        if not ended() and hasattr(self, "block"):  # at the end modules are emptied already
-            self.prepared.take_back(self.block)
 
     def run(self, most_steps: int, *, pause: bool) -> int:
         """Run the machine code; see `integrators.runners.columns.record`."""
