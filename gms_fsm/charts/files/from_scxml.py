@@ -48,8 +48,8 @@ def load(kind: type[Chart], path: Path, texts: Mapping[str, Any]) -> Chart:
     given = Texts.of(texts, here)  # unknown names first
     root = _root(path, here)
     states = _states(root, here)
-    edges = [one for state in states for one in _all(state, "transition")]
-    check_size(len(states), sum(one.get("event") != VALUES for one in edges), here)
+    events = [one.get("event") for state in states for one in _all(state, "transition")]
+    check_size(len(states), sum(event != VALUES for event in events), here)
     rows = [row for state in states for row in _rows(state, here)]
     rows = _named(_ordered(rows, here))
     edges = _edges(rows)
