@@ -103,7 +103,7 @@ class Debugger(cmd.Cmd):
             The exit code, 0.
         """
         if self.title:
-            self.say(self.title)
+            self.say(visible(self.title))
         self.say(self.session.title)
         self.say("help lists the commands, where shows everything, quit exits.")
         while True:
