@@ -1196,6 +1196,11 @@ def document(text: str) -> None:
 rows = {
     "type definition": ('<!DOCTYPE scxml><scxml xmlns="http://www.w3.org/2005/07/scxml"/>',),
     "larger than a chart": (" " * 11_000_000,),
+    "20,000 states": (
+        '<scxml xmlns="http://www.w3.org/2005/07/scxml">'
+        + "".join(f'<state id="s{i}"><transition target="s0"/></state>' for i in range(20_000))
+        + "</scxml>",
+    ),
 }
 group("document", ChartError, document, rows, "own.toml")
 STICK = State("stick", flow={"z": "v"})

@@ -15,8 +15,8 @@ from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
 from gms_fsm.foundation.files import output_folder, refuse_input, write_text
-from gms_fsm.foundation.markdown import plain, table_lines
 from gms_fsm.foundation.quantities import named_numbers
+from gms_fsm.foundation.text import plain, table_lines
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record

@@ -18,6 +18,7 @@ from gms_fsm.charts.parameters import QUANTITIES, Parameter
 from gms_fsm.charts.parts import (
     State,
     Transition,
+    check_size,
     parameter_of,
     places_of,
     texts_of,
@@ -191,8 +192,7 @@ class Chart:
                     raise ChartError(
                         f"{each} has {shown(given)}", place=here, advice=f"write it as {example}"
                     )
-        if not self.states:
-            raise ChartError("it has no states", place=here, advice="give at least one")
+        check_size(len(self.states), sum(len(each.sources) for each in self.transitions), here)
         if not self.velocities:
             raise ChartError(
                 "it has no velocity",

@@ -12,6 +12,20 @@ from gms_fsm.errors import ChartError, shown
 from gms_fsm.foundation.arguments import refusing, unknown
 from gms_fsm.foundation.equality import by_value
 
+MOST_PARTS = 5_000  # states and edges of a chart; more would take minutes to read and to compile
+
+
+def check_size(states: int, edges: int, place: str) -> None:
+    """Refuse a chart without states, and one that is too large, before anything else of it."""
+    if not states:
+        raise ChartError("it has no states", place=place, advice="give at least one")
+    if states + edges > MOST_PARTS:
+        raise ChartError(
+            f"it has {states:,} states and {edges:,} edges",
+            place=place,
+            advice=f"a chart can have {MOST_PARTS:,} of both together",
+        )
+
 
 @refusing(
     ChartError,

@@ -17,6 +17,7 @@ from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, shown
 from gms_fsm.foundation.arguments import either, meant, nearest, some_of
 from gms_fsm.foundation.files import output_folder, write_whole
 from gms_fsm.foundation.quantities import in_si
+from gms_fsm.foundation.text import encoded
 from gms_fsm.foundation.toml import LARGEST_FILE, Key, data_of, line_of, override, text_of, written
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
@@ -90,7 +91,7 @@ def write_file(path: Path, table: Table) -> Path:
         raise OutputError(f"its name must end in .toml, not {path.suffix!r}", place=str(path))
     text = written(table.model_dump(by_alias=True, exclude_defaults=True))
     try:
-        raw = text.encode()
+        raw = encoded(text)
     except UnicodeEncodeError as error:
         found = shown(error.object[error.start : error.end])
         raise OutputError(

@@ -28,6 +28,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, listed
 from gms_fsm.foundation.extras import missing
 from gms_fsm.foundation.quantities import PREFIXES, SMALLEST, TAKES_PREFIX, UNITS
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
@@ -261,9 +262,9 @@ def page_data(
         charts += [picture for picture in dict.fromkeys(pictures) if picture not in charts]
         run = stored_run(page, [charts.index(picture) for picture in pictures], reports)
         head = [*names[i : i + 1], each.title]
-        runs.append({"title": ": ".join(head), "of": len(each), **run})
+        runs.append({"title": visible(": ".join(head)), "of": len(each), **run})
     data = {
-        "title": title or " and ".join(dict.fromkeys(map(_heading, traces))),
+        "title": visible(title or " and ".join(dict.fromkeys(map(_heading, traces)))),
         "runs": runs,
         "language": _language(),
         "quantities": {

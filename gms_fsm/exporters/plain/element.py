@@ -25,6 +25,7 @@ from gms_fsm.exporters.plain.parts import (
     StateParts,
     Variable,
 )
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     Call,
     Comparison,
@@ -465,4 +466,4 @@ class PlanReader:
 
 
 def _about(parameter: Parameter) -> str:
-    return ": ".join(part for part in (parameter.unit, parameter.meaning) if part)
+    return visible(": ".join(part for part in (parameter.unit, parameter.meaning) if part))
