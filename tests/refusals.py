@@ -2161,9 +2161,17 @@ group("exported session", SessionError, lambda call: call(), rows, "")
 
 
 # --------------------------------------------------------------------------- proofs
+TWO_PADS = System(
+    "pads",
+    bodies=(Body("body", inertia=1.0),),
+    contacts=(Contact("pad", FIG4[0]), Contact("other", FIG4[0])),
+)
 rows = {
     "quotient in its domain": ("", ..., lambda: prove(gms_element("signed"), ["z / s > 1"])),
-    "model": ("chart", FIG4[0], lambda: prove(FIG4[0])),
+    "no chart": ("chart", 3, lambda: prove(3)),  # type: ignore[arg-type]
+    "contact of a chart": ("contact", "pad", lambda: prove(gms_element("signed"), contact="pad")),
+    "which contact": ("contact", ..., lambda: prove(TWO_PADS)),
+    "unknown contact": ("contact", ..., lambda: prove(TWO_PADS, contact="pat")),
 }
 group("prove", ParameterError, lambda call: call(), rows)
 

@@ -151,19 +151,23 @@ def check_command(
     settles is reported, but does not count as refuted. Of a system, the
     charts of all contacts are checked.
     """
-    from gms_fsm import prove
     from gms_fsm.app._own_files import own_file
     from gms_fsm.app.verbs.catalogue import checkable, chosen
     from gms_fsm.charts.registry import domain_of
+    from gms_fsm.verification.facts import facts_of
+    from gms_fsm.verification.prove import prove_facts
 
     if names:
         say(checkable())
         return
     own = own_file(name, law)
     no_contact(contact, own)
-    charts = {"": chosen("check", name, law)[1]} if own is None else own.charts(contact)
+    charts = {"": facts_of(chosen("check", name, law)[1])} if own is None else own.facts(contact)
     folder = None if output is None else output_folder(output)
-    reports = {each: prove(chart, domain or domain_of(chart)) for each, chart in charts.items()}
+    reports = {
+        names: prove_facts(facts, domain or domain_of(facts.chart))
+        for names, facts in charts.items()
+    }
     texts = [str(report) for report in reports.values()]
     if own is not None and own.system is not None:
         texts = [f"contact {each}:\n{text}" for each, text in zip(reports, texts, strict=True)]
