@@ -46,7 +46,7 @@ def visible_lines(text: str) -> str:
 
 
 def referenced(xml: str) -> str:
-    """Return XML whose control codes and invisible marks are references, which readers give back."""
+    """Return XML whose control codes and invisible marks are references: readers give them back."""
     return _UNSEEN.sub(lambda match: f"&#{ord(match[0])};", xml)
 
 
