@@ -12,7 +12,6 @@ from typing import Any
 from gms_fsm.app.scenario import kind_of, load_scenario, load_system
 from gms_fsm.charts.chart import SUPPLIED, Chart
 from gms_fsm.charts.parameters import Parameter, checked_values
-from gms_fsm.charts.registry import registered
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.toml import parsed
@@ -124,14 +123,6 @@ def own_file(name: str, law: str = "") -> OwnFile | None:
     loaded = load_scenario(path)
     period = loaded.arguments.get("step") if loaded.scenario.run.events == "held" else None
     return OwnFile(path, system=system_of(loaded.model, loaded.rig, period))
-
-
-def domain_of(chart: Chart) -> tuple[str, ...] | None:
-    """Return what a proof of a chart assumes, if it is an included one that says so."""
-    for each in registered().values():
-        if chart in [each.chart(law) for law in each.laws or ("",)]:
-            return each.domain
-    return None
 
 
 def any_model(chart: Chart) -> ChartModel:

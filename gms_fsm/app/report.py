@@ -15,26 +15,27 @@ from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
 from gms_fsm.foundation.files import output_folder, refuse_input, write_text
-from gms_fsm.foundation.markdown import plain, table_lines
 from gms_fsm.foundation.quantities import named_numbers
+from gms_fsm.foundation.text import plain, table_lines
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import Moment
-from gms_fsm.session.notes import notes_on, notes_on_system
 from gms_fsm.systems.models import GMS
 from gms_fsm.systems.system import Contact, System, loaded
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace, dwell_times
+from gms_fsm.traces.verdicts import Trust
+from gms_fsm.traces.views import range_of_force
 
 __all__ = [
     "ForceComparison",
     "compare",
     "dwell_times",
     "monitor_lines",
-    "note_lines",
     "run_scenario",
     "summary_text",
+    "trust_lines",
 ]
 
 
@@ -102,6 +103,7 @@ def run_scenario(
     progress: Callable[[Moment], object] | None = None,
     *,
     checkpoint: bool = False,
+    again: bool = False,
 ) -> tuple[Trace, list[Path]]:
     """Run a scenario and write the trace, log, figure and summary.
 
@@ -115,6 +117,8 @@ def run_scenario(
         Passed to `simulate`.
     checkpoint : bool
         Save the state of the run in ``run.checkpoint``, from which an interrupted run resumes.
+    again : bool
+        Repeat the run with finer tolerances for its section on trust (`Trace.trust`).
 
     Returns
     -------
@@ -163,16 +167,18 @@ def run_scenario(
         raise
     saved = trace.save(folder / "trace.npz")  # first, so that no later failure can lose the run
     try:
-        return trace, _reported(loaded, trace, folder, saved)
+        return trace, _reported(loaded, trace, folder, saved, again=again)
     except KeyboardInterrupt as error:
         error.args = (f"interrupted; the run is in {saved}",)
         raise
 
 
-def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[Path]:
+def _reported(
+    loaded: Loaded, trace: Trace, folder: Path, saved: Path, *, again: bool
+) -> list[Path]:
     """Write the report of a run and return all files."""
     files = [
-        write_text(folder / "summary.md", summary_text(loaded, trace)),
+        write_text(folder / "summary.md", summary_text(loaded, trace, trace.trust(again=again))),
         saved,
         write_text(folder / "transitions.csv", trace.transitions_csv()),
     ]
@@ -221,7 +227,7 @@ def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
 
 
 # --------------------------------------------------------------------------- the summary
-def summary_text(loaded: Loaded, trace: Trace) -> str:
+def summary_text(loaded: Loaded, trace: Trace, trust: Trust) -> str:
     """Write the summary of a run.
 
     Parameters
@@ -230,12 +236,14 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
         The scenario.
     trace : Trace
         The run of the scenario.
+    trust : Trust
+        Its findings.
 
     Returns
     -------
     str
-        Markdown: the system, the activity of each element, the comparison with the measurement, and
-        the parameters that are not identifiable from it.
+        Markdown: the system, the activity of each element, the findings, the comparison with the
+        measurement, and the parameters that are not identifiable from it.
     """
     settings = ", ".join(
         f"{name} = {_setting(value)}" for name, value in trace.settings.items() if value is not None
@@ -252,9 +260,7 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
             f"- rig: {plain(trace.rig.title)}",
             f"- parameters: {_parameters(trace)}",
             f"- run: {settings}",
-            f"{result}, F from {trace.F.min():.4g} to {trace.F.max():.4g} N",
-            *_held(trace),
-            *(f"- note: {note}" for note in notes_on(trace)),
+            f"{result}, {_range(trace)} N",
             "",
             *_element_table(trace),
         ]
@@ -268,12 +274,12 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
             ),
             f"- run: {settings}",
             result,
-            *_held(trace),
-            *(f"- note: {note}" for note in notes_on_system(trace)),
             "",
             *_end_tables(trace, trace.system),
             *(line for name in trace.contacts for line in _contact_lines(trace.contact(name))),
         ]
+    lines += ["", "## Trust", "", *(f"- {plain(str(each))}" for each in trust)]
+    lines += ["- no findings"] * (not len(trust))
     if trace.monitors:
         lines += ["", "## Monitors", "", *(f"- {line}" for line in monitor_lines(trace))]
     if loaded.record is not None and loaded.motion is not None:
@@ -309,12 +315,15 @@ def _contact_lines(trace: Trace) -> list[str]:
         "",
         f"- on: {', '.join(map(plain, velocities))}",
         f"- parameters: {_parameters(trace)}",
-        f"- result: {len(trace.transitions)} transitions, F from {trace.F.min():.4g} to "
-        f"{trace.F.max():.4g}",
-        *(f"- note: {note}" for note in notes_on(trace)),
+        f"- result: {len(trace.transitions)} transitions, {_range(trace)}",
         "",
         *_element_table(trace),
     ]
+
+
+def _range(trace: Trace) -> str:
+    least, most = range_of_force(trace)
+    return f"F from {least:.4g} to {most:.4g}"
 
 
 def _setting(value: Setting) -> str:
@@ -322,19 +331,6 @@ def _setting(value: Setting) -> str:
     if not isinstance(value, Mapping):
         return str(value)
     return "(" + ", ".join(f"{name} {_number(np.array(u))}" for name, u in value.items()) + ")"
-
-
-def _held(trace: Trace) -> list[str]:
-    """Return a line on the intervals in which the motion slid on a surface."""
-    stretches = trace.sliding
-    if not len(stretches):
-        return []
-    seconds = float((stretches.t_end - stretches.t_start).sum())
-    names = " and ".join(f"{name} = 0" for name in dict.fromkeys(stretches.surface.tolist()))
-    return [
-        f"- held on {names}: {len(stretches)} times, {seconds:.4g} s in total, first at t = "
-        f"{float(stretches.t_start[0]):.6g} s (a sliding mode: between two signs or two states)"
-    ]
 
 
 def monitor_lines(trace: Trace) -> list[str]:
@@ -356,24 +352,24 @@ def monitor_lines(trace: Trace) -> list[str]:
     ]
 
 
-def note_lines(trace: Trace) -> list[str]:
-    """Return the notes on a run, with the contact if there are several.
+def trust_lines(trust: Trust, *, every: bool) -> list[str]:
+    """Return the findings about a run that a terminal shows.
 
     Parameters
     ----------
-    trace : Trace
-        The run.
+    trust : Trust
+        The findings.
+    every : bool
+        Whether to show all; otherwise warnings, and what was probably not meant.
 
     Returns
     -------
     list of str
-        Lines for the user.
+        Lines for the user; the summary has all.
     """
-    whole = notes_on_system(trace)
-    if len(trace.contacts) == 1:
-        return [*whole, *notes_on(trace)]
-    each = [f"{name}: {note}" for name in trace.contacts for note in notes_on(trace.contact(name))]
-    return [*whole, *each]
+    urgent = ("units", "unused")
+    shown = [each for each in trust if every or each.severity == "warning" or each.kind in urgent]
+    return [str(each) for each in shown]
 
 
 def _parameters(trace: Trace) -> str:

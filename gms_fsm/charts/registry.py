@@ -253,6 +253,14 @@ def charts() -> Mapping[str, Chart]:
     }
 
 
+def domain_of(chart: Chart) -> tuple[str, ...] | None:
+    """Return what a proof of a chart assumes, if it is an included one that says so."""
+    for each in registered().values():
+        if chart in [each.chart(law) for law in each.laws or ("",)]:
+            return each.domain
+    return None
+
+
 def registered_modules() -> list[str]:
     """Return the modules of this folder and of those in it, by the last part of their names."""
     found = pkgutil.walk_packages(sys.modules["gms_fsm.charts"].__path__, "gms_fsm.charts.")

@@ -46,11 +46,19 @@ COMMANDS = {
         "l",
     ),
     "log": Command("look", "log [N]", "Show the last N transitions (default 10).", ("log 4",)),
+    "trust": Command(
+        "look",
+        "trust",
+        "Show how far this branch is to be trusted: switches decided by less than the tolerances, "
+        "places without a unique answer, values outside the chart's domain. Runs it to its end.",
+        ("trust",),
+    ),
     "print": Command(
         "look",
         "print EXPRESSION",
-        "Print the value of an expression or the truth of a condition. Names: {names}.",
-        ("print {z}1 / {s}1", "print {lead}F1", "p {lead}state({n}) == {state}"),
+        "Print the value of an expression, in SI units or the unit given, or the truth of a "
+        "condition. Names: {names}.",
+        ("print {z}1 / {s}1", "print {lead}F in mN", "p {lead}state({n}) == {state}"),
         "p",
     ),
     "watch": Command(

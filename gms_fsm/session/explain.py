@@ -10,6 +10,8 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.foundation.quantities import Scale, scale_of, trimmed
@@ -22,7 +24,7 @@ from gms_fsm.language import (
     names_in,
     spell,
 )
-from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.scope import Scope, unit_of
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 
@@ -168,6 +170,8 @@ class Why:
         The contact, in the run of a system; else empty.
     tick : float or None
         As in `Explanation`.
+    doubts : tuple of str
+        What `gms_fsm.Trace.trust` finds about this element from this time to the next.
     """
 
     element: int
@@ -178,6 +182,7 @@ class Why:
     sigma: Mapping[str, float] = field(default_factory=dict)
     contact: str = ""
     tick: float | None = None
+    doubts: tuple[str, ...] = field(default=(), compare=False)
 
     def __iter__(self) -> Iterator[Explanation]:
         return iter(self.edges)
@@ -201,6 +206,7 @@ class Why:
             lines.append(f"its guards are evaluated at ticks only, the next time {when}")
         if not self.edges:
             lines.append("no edge leaves this state")
+        lines += self.doubts
         return tuple(lines)
 
     def __str__(self) -> str:
@@ -273,7 +279,14 @@ def explain(trace: Trace, row: int, element: int) -> Why:
     edges = explain_state(chart, source, values_at(trace, before, element), fired)
     left = source if fired else ""
     contact = trace.what.whose(trace.places.name)
-    return Why(element, float(trace.t[row]), now, left, tuple(edges), trace.sigma(row), contact)
+    t = float(trace.t[row])
+    until = float(np.append(trace.t[trace.t > t], np.inf)[0])
+    doubts = tuple(
+        str(each)
+        for each in trace.trust()
+        if each.element == element and any(t <= time < until for time in each.times)
+    )
+    return Why(element, t, now, left, tuple(edges), trace.sigma(row), contact, doubts=doubts)
 
 
 def explain_state(
@@ -366,7 +379,7 @@ def clause_unit(chart: Chart, part: Condition, text: str) -> str:
     str
         Empty if the names do not determine it.
     """
-    units = {chart.unit(name) for name in names_in(part)} - {""}
+    units = {unit_of(chart, name) for name in names_in(part)} - {""}
     plain = not set(text) & set("*/^()")
     return units.pop() if plain and len(units) == 1 else ""
 

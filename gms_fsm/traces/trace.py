@@ -17,14 +17,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm.charts.parameters import FloatArray, as_numbers
-from gms_fsm.errors import (
-    ParameterError,
-    shown,
-)
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
-from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import require
+from gms_fsm.foundation.text import visible
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
@@ -32,19 +30,19 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
-from gms_fsm.traces.between import between
 from gms_fsm.traces.files.columns import columns_of
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.impulses import impulses_of
 from gms_fsm.traces.observed import Observed
 from gms_fsm.traces.rows import Rows, merged
-from gms_fsm.traces.verdicts import Verdict
+from gms_fsm.traces.verdicts import Trust, Verdict
 from gms_fsm.traces.views import (
     BodyTrace,
     driven_velocity,
     dwell_times,
     no_attribute,
     read_parts,
+    sampled,
     sigma_at,
     sliding_of,
     write_trace,
@@ -53,7 +51,7 @@ from gms_fsm.traces.views import (
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["BodyTrace", "Trace", "check_trace", "dwell_times", "files_of"]
+__all__ = ["BodyTrace", "Trace", "check_trace", "dwell_times"]
 
 
 def check_trace(trace: object) -> None:
@@ -114,9 +112,10 @@ class Trace:
     heading: str = field(default="", repr=False)
     which: str = field(default="", repr=False)  # the contact, of a system with several
     every: Firings | None = field(default=None, repr=False)  # of all contacts, where one is chosen
+    initial: Mapping[str, Any] | None = field(default=None, repr=False)  # as given; not in files
 
     def __repr__(self) -> str:
-        return f"<Trace: {self.title}; {len(self.rows)} rows, {len(self.firings)} transitions>"
+        return f"<Trace: {visible(self.title)}; {len(self)} rows, {len(self.firings)} transitions>"
 
     @property
     def title(self) -> str:
@@ -436,22 +435,7 @@ class Trace:
         SignalError
             If the trace comes from a file and its signal was a Python function.
         """
-        wanted = np.atleast_1d(as_numbers("times", times))
-        table = merged(self.rows, self.stops)
-        if wanted.ndim != 1 or wanted.size == 0:
-            raise ParameterError(
-                f"times has shape {wanted.shape}", advice="give a flat, non-empty list"
-            )
-        outside = wanted[~((wanted >= table.t[0]) & (wanted <= table.t[-1]))]
-        if outside.size:
-            raise ParameterError(
-                f"time {shown(outside[0])} s is outside the run, {shown(table.t[0])} to "
-                f"{shown(table.t[-1])} s"
-            )
-        left = np.searchsorted(table.t, wanted, side="right") - 1
-        y = between(self.program, table, left, wanted)
-        rows = Rows(wanted, np.zeros(wanted.size, dtype=np.int64), y, table.mode[left])
-        return replace(self, rows=rows, stops=merged(table, rows), stored={})
+        return sampled(self, times)
 
     def refined(self, points: int) -> Trace:
         """Return the rows with evenly spaced samples between them, for smooth curves.
@@ -481,15 +465,40 @@ class Trace:
             This trace if it already has them.
         """
         table = merged(self.rows, self.stops)
-        if len(table) == len(self.rows):
-            return self
-        return replace(self, rows=table, stops=table, stored={})
+        same = len(table) == len(self.rows)
+        return self if same else replace(self, rows=table, stops=table, stored={})
 
     def with_monitors(self, found: Mapping[str, Verdict]) -> Trace:
         """Return the same run with the verdicts of its monitors, and all that was computed."""
         trace = replace(self, monitors=found)
         vars(trace).update({**vars(self), "monitors": found})
         return trace
+
+    def trust(self, *, again: bool = False) -> Trust:
+        """Return what this run says about its own result, from its rows, log and program.
+
+        Parameters
+        ----------
+        again : bool
+            Also repeat the run with a hundredth of the tolerances, and compare.
+
+        Returns
+        -------
+        Trust
+            Its `findings`, of the kinds in `gms_fsm.traces.verdicts`, warnings first.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+        >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="published"),
+        ...                  Prescribed("0.15*sin(2*pi*t/25)"), 30.0)
+        >>> [each.kind for each in trace.trust().warnings]
+        ['growth']
+        """
+        key, find = f"trust, again {again}", asked("trust")
+        assert find is not None  # this package declares it
+        vars(self)[key] = found = vars(self).get(key) or find(self, again=again)
+        return found  # type: ignore[no-any-return]
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
@@ -589,10 +598,3 @@ class Trace:
         from gms_fsm.traces.files.csv_files import log_texts
 
         return "".join(log_texts(self.firings))
-
-
-def files_of(path: Path) -> list[Path]:
-    """Return the files of a trace: one, or for ``.csv`` also that of its log."""
-    from gms_fsm.traces.files.csv_files import log_path
-
-    return [path, log_path(path)] if path.suffix == ".csv" else [path]

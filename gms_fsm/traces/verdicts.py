@@ -1,22 +1,28 @@
-"""Verdicts of the monitors of a run, as data kept in the trace and in its files.
+"""Verdicts on a run: of its monitors, kept in the trace and its files, and how far to trust it.
 
 Elements are numbered from 0 in the fields, as in all arrays, and from 1 in the texts.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 from gms_fsm.foundation.display import displayed, short_repr
 
 __all__ = [
+    "KINDS",
     "ChatteringVerdict",
     "ClauseSeen",
     "CoverageVerdict",
+    "Doubt",
     "Episode",
     "InvariantVerdict",
+    "Kind",
     "PassivityVerdict",
+    "Severity",
+    "Trust",
     "Verdict",
 ]
 
@@ -213,3 +219,120 @@ class CoverageVerdict:
 
 
 Verdict: TypeAlias = ChatteringVerdict | InvariantVerdict | PassivityVerdict | CoverageVerdict
+
+
+# --------------------------------------------------------------------------- trust
+Kind: TypeAlias = Literal[
+    "not finite",
+    "domain",
+    "not unique",
+    "grazing",
+    "close call",
+    "order",
+    "tie",
+    "window",
+    "growth",
+    "sampling",
+    "repeat",
+    "sliding",
+    "impulse",
+    "units",
+    "unused",
+    "not judged",
+]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+Severity: TypeAlias = Literal["warning", "note"]
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """One finding about a run.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    severity : {"warning", "note"}
+        A warning says that the result may be another one than the model's; a note says what was
+        decided, or what was probably not meant.
+    text : str
+        The finding in words, with the first time and how often.
+    times : tuple of float
+        When it is seen, s; empty if it belongs to the whole run.
+    contact : str
+        The contact, of a system; else empty.
+    element : int or None
+        Element index, from 0; None if it belongs to no single element.
+    """
+
+    kind: Kind
+    severity: Severity
+    text: str
+    times: tuple[float, ...] = ()
+    contact: str = ""
+    element: int | None = None
+
+    @property
+    def t(self) -> float | None:
+        """When it is first seen, s."""
+        return self.times[0] if self.times else None
+
+    def __str__(self) -> str:
+        return f"{self.severity}, {self.kind}: {self.text}"
+
+
+@displayed("html")
+@short_repr
+@dataclass(frozen=True)
+class Trust:
+    """What a run says about its own result: a sequence of `Doubt`, warnings first.
+
+    Parameters
+    ----------
+    findings : tuple of Doubt
+        The findings.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> (found,) = simulate(model, Prescribed("0.2"), 3.0).trust()
+    >>> found.kind, found.severity, found.t
+    ('tie', 'note', 2.0)
+    """
+
+    findings: tuple[Doubt, ...]
+
+    def __iter__(self) -> Iterator[Doubt]:
+        return iter(self.findings)
+
+    def __len__(self) -> int:
+        return len(self.findings)
+
+    def __str__(self) -> str:
+        return self.text
+
+    @property
+    def warnings(self) -> tuple[Doubt, ...]:
+        """Findings with the severity ``"warning"``."""
+        return tuple(each for each in self.findings if each.severity == "warning")
+
+    @property
+    def text(self) -> str:
+        """The findings, one per line; or that there are none."""
+        return "\n".join(map(str, self.findings)) or "no findings"
+
+    def of(self, kind: Kind) -> tuple[Doubt, ...]:
+        """Return the findings of one kind.
+
+        Parameters
+        ----------
+        kind : str
+            One of `KINDS`.
+
+        Returns
+        -------
+        tuple of Doubt
+            In order of time.
+        """
+        return tuple(each for each in self.findings if each.kind == kind)

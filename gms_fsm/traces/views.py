@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import OutputError, TraceFileError, why
+from gms_fsm.charts.parameters import FloatArray, as_numbers
+from gms_fsm.errors import OutputError, ParameterError, TraceFileError, shown, why
 from gms_fsm.foundation.arguments import no_file, some_of
-from gms_fsm.foundation.display import short_repr
-from gms_fsm.foundation.logs import Log
+from gms_fsm.foundation.display import Log, short_repr
 from gms_fsm.lowering.observing import armed, rate, sigmas
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.system import Body
+from gms_fsm.traces.between import between
 from gms_fsm.traces.files.parts import Parts, RunDescription, checked
 from gms_fsm.traces.rows import Rows, merged
 
@@ -40,6 +40,12 @@ class BodyTrace:
     name: str
     x: FloatArray
     v: FloatArray
+
+
+def range_of_force(trace: Trace) -> tuple[float, float]:
+    """Return the least and the largest friction force over what lasts."""
+    lasting = trace.F[trace.rows.lasting]
+    return float(lasting.min()), float(lasting.max())
 
 
 def driven_velocity(trace: Trace, body: Body) -> FloatArray:
@@ -67,6 +73,26 @@ def picked(trace: Trace, keep: NDArray[Any] | slice) -> Trace:
     seen = {name: column[keep] for name, column in trace.seen.items()}
     vars(part).update({"program": trace.program, "seen": seen})
     return part
+
+
+def sampled(trace: Trace, times: ArrayLike) -> Trace:
+    """Return a run at other times; see `Trace.sample`."""
+    wanted = np.atleast_1d(as_numbers("times", times))
+    table = merged(trace.rows, trace.stops)
+    if wanted.ndim != 1 or wanted.size == 0:
+        raise ParameterError(
+            f"times has shape {wanted.shape}", advice="give a flat, non-empty list"
+        )
+    outside = wanted[~((wanted >= table.t[0]) & (wanted <= table.t[-1]))]
+    if outside.size:
+        raise ParameterError(
+            f"time {shown(outside[0])} s is outside the run, {shown(table.t[0])} to "
+            f"{shown(table.t[-1])} s"
+        )
+    left = np.searchsorted(table.t, wanted, side="right") - 1
+    y = between(trace.program, table, left, wanted)
+    rows = Rows(wanted, np.zeros(wanted.size, dtype=np.int64), y, table.mode[left])
+    return replace(trace, rows=rows, stops=merged(table, rows), stored={})
 
 
 def dwell_times(trace: Trace) -> FloatArray:
@@ -173,6 +199,13 @@ def write_trace(trace: Trace, path: Path) -> Path:
         path,
         Parts(header, RunDescription(trace.what), trace.rows, trace.stops, trace.firings, stored),
     )
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return the files of a trace: one, or for ``.csv`` also that of its log."""
+    from gms_fsm.traces.files.csv_files import log_path
+
+    return [path, log_path(path)] if path.suffix == ".csv" else [path]
 
 
 def read_parts(path: Path) -> Parts:

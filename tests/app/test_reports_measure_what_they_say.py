@@ -105,7 +105,7 @@ def test_the_element_table_equals_the_log(case: str, tmp_path: Path) -> None:
     (tmp_path / "any.toml").write_text(OPEN_LOOP)
     base = load_scenario(tmp_path / "any.toml")
     loaded = Loaded(base.path, base.scenario, trace.model, trace.rig, {}, None, None)
-    text = summary_text(loaded, trace)
+    text = summary_text(loaded, trace, trace.trust())
     rows, dwell, log = element_rows(text), dwell_times(trace), trace.transitions
     assert [row["element"] for row in rows] == [str(i + 1) for i in range(trace.n)]
     for i, row in enumerate(rows):
@@ -114,6 +114,19 @@ def test_the_element_table_equals_the_log(case: str, tmp_path: Path) -> None:
         for j, state in enumerate(trace.model.chart.states):
             assert float(row[f"{state.name} [s]"]) == pytest.approx(dwell[i, j], rel=1e-3)
     assert f"{len(trace)} rows, {len(log)} transitions" in text
+
+
+def test_the_range_of_the_force_is_over_what_lasts() -> None:
+    """The guide is stuck between two micro-steps with 7 kN; else it has less than 100 N."""
+    table = load_scenario("ball_screw_table", ["run.t_end=1.7"])
+    trace = table.simulate()
+    guide = trace.contact("guide")
+    assert np.abs(guide.F).max() > 7e3
+    ends = [k for k in range(1, len(trace)) if trace.t[k] > trace.t[k - 1]]
+    lasting = guide.F[sorted({*ends, *(k - 1 for k in ends)})]
+    said = f"F from {lasting.min():.4g} to {lasting.max():.4g}\n"
+    assert np.abs(lasting).max() < 100
+    assert said in summary_text(table, trace, trace.trust())
 
 
 # --------------------------------------------------------------------------- R² and RMSE
@@ -329,4 +342,5 @@ def test_a_summary_says_where_the_motion_was_held(
     monkeypatch.setattr("gms_fsm.app.report._draw", refuses)
     with pytest.warns(UserWarning, match="no figure was drawn: plots are away"):
         _, files = run_scenario(load_scenario(path), tmp_path / "out")
-    assert "- held on w = 0: 1 times, " in files[0].read_text()
+    said = files[0].read_text()
+    assert "- note, sliding: held on w = 0 for 1.375 s, first at t = 0.625 s" in said

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import say
+from gms_fsm.app.verbs.console import put, say
 from gms_fsm.app.verbs.options import ChartName, ContactName, Law
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.files import output_folder, write_text
@@ -77,7 +77,7 @@ def chart_command(
     from gms_fsm.app.verbs.catalogue import catalogue, chosen
 
     if listed:
-        typer.echo(catalogue())
+        put(catalogue())
         return
     import plots
 
@@ -92,7 +92,7 @@ def chart_command(
         theme=theme.value,
         names=names,
     )
-    typer.echo(str(plots.render(graph, output)))
+    put(str(plots.render(graph, output)))
 
 
 def handout_command(
@@ -123,7 +123,7 @@ def handout_command(
         if own.run:
             trace = load_scenario(own.path).simulate()
             model = trace.contact(contact or trace.contacts[0])
-    typer.echo(str(plots.handout(model, output)))
+    put(str(plots.handout(model, output)))
 
 
 def check_command(
@@ -151,8 +151,9 @@ def check_command(
     settles is reported, but does not count as refuted. Of a system, the
     charts of all contacts are checked.
     """
-    from gms_fsm.app._own_files import domain_of, own_file
+    from gms_fsm.app._own_files import own_file
     from gms_fsm.app.verbs.catalogue import checkable, chosen
+    from gms_fsm.charts.registry import domain_of
     from gms_fsm.verification.facts import facts_of
     from gms_fsm.verification.prove import prove_facts
 
@@ -173,7 +174,7 @@ def check_command(
     text = "\n\n".join(texts)
     say(text)
     for path in [] if folder is None else _write_reports(text, [*reports.values()], folder):
-        typer.echo(str(path))
+        put(str(path))
     if any(report.refuted for report in reports.values()):
         raise typer.Exit(1)
 
@@ -243,7 +244,7 @@ def blocks_command(
                 "no system is given", place="--schematic", advice="name a system or scenario file"
             )
         picture = plots.block_diagram(4 if elements is None else elements)
-        typer.echo(str(plots.render(picture, output)))
+        put(str(plots.render(picture, output)))
         return
     from gms_fsm.app._own_files import own_file
 
@@ -261,9 +262,9 @@ def blocks_command(
     if schematic:
         from plots import figures
 
-        typer.echo(str(figures.save(plots.schematic(own.system), output)))
+        put(str(figures.save(plots.schematic(own.system), output)))
         return
-    typer.echo(str(plots.render(plots.block_diagram(own.system), output)))
+    put(str(plots.render(plots.block_diagram(own.system), output)))
 
 
 def code_command(
@@ -302,7 +303,7 @@ def code_command(
             raise ParameterError(
                 f"{name} says what the friction acts on", place="--rig", advice="leave it out"
             )
-        typer.echo(printed(_start_of_file(own)), nl=False)
+        put(printed(_start_of_file(own)), nl=False)
         return
     rigs: dict[RigName, Rig] = {
         RigName.prescribed: Prescribed(VELOCITY),
@@ -327,7 +328,7 @@ def code_command(
             other = f"--rig slider, or {other}"
         advice = f"{error.advice}; here, give {other}"
         raise error.replaced(advice=advice).inside(name) from None
-    typer.echo(printed(start), nl=False)
+    put(printed(start), nl=False)
 
 
 def _start_of_file(own: OwnFile) -> Problem:

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import messages, named_bar, note, opening, say
+from gms_fsm.app.verbs.console import messages, named_bar, note, opening, put, say
 from gms_fsm.app.verbs.options import (
     INTERRUPTED,
     ContactName,
@@ -86,6 +86,13 @@ def run_command(
             help="Save the state in the output folder once a minute; the same command resumes it.",
         ),
     ] = False,
+    trust: Annotated[
+        bool,
+        typer.Option(
+            "--trust",
+            help="Repeat the run with a hundredth of the tolerances, and show all findings.",
+        ),
+    ] = False,
     preset: PresetName = "screen",
     _listed: Annotated[
         bool,
@@ -97,7 +104,7 @@ def run_command(
     """Run a scenario; write the trace, transition log, overview figure and summary."""
     import plots
     from gms_fsm.app.live import LiveView
-    from gms_fsm.app.report import monitor_lines, note_lines, run_scenario, velocity_note
+    from gms_fsm.app.report import monitor_lines, run_scenario, trust_lines, velocity_note
     from gms_fsm.app.scenario import load_scenario
 
     if pace is not None and not live:
@@ -110,7 +117,7 @@ def run_command(
     try:
         view = LiveView(messages(), start, end, detail=live, pace=pace)
         with plots.preset(preset), view:
-            trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
+            trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint, again=trust)
     except KeyboardInterrupt as error:
         note(str(error) or "interrupted")
         raise typer.Exit(INTERRUPTED) from None
@@ -119,8 +126,8 @@ def run_command(
     say(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
     for line in monitor_lines(trace):
         say(line)
-    for each in note_lines(trace):
-        say(f"note: {each}")
+    for line in trust_lines(trace.trust(again=trust), every=trust):
+        say(line)
     say(f"start with {files[0]}")
 
 
@@ -249,7 +256,7 @@ def schema_command() -> None:
     """Print the JSON schema of scenario files, for editors."""
     from gms_fsm.app.scenario import schema
 
-    typer.echo(json.dumps(schema(), indent=2))
+    put(json.dumps(schema(), indent=2))
 
 
 def debug_command(
@@ -295,13 +302,13 @@ def lesson_command(
         from gms_fsm.app.lessons.engine.notebooks import write_notebook
 
         for each in [numbered(number)] if number else LESSONS:
-            typer.echo(str(write_notebook(each, output)))
+            put(str(write_notebook(each, output)))
         return
     chosen = numbered(number)
     with messages().status(f"running lesson {chosen}"):
         taught = teach(chosen, output)
     for line in taught.lines:
         say(line)
-    typer.echo()
+    put()
     for path in taught.files:
-        typer.echo(str(path))
+        put(str(path))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gms_fsm.app.verbs.console import progress_bars
+from gms_fsm.app.verbs.console import progress_bars, put
 from gms_fsm.app.verbs.options import ContactName, End, OutputFolder, PresetName, Start, TraceFile
 from gms_fsm.errors import TraceFileError
 from gms_fsm.foundation.arguments import unknown
@@ -75,7 +75,7 @@ def plot_command(
         pictures = (overview, figures.ribbons_figure(run, window=window))
     for figure, names in zip(pictures, files, strict=True):
         for name in names:
-            typer.echo(str(figures.save(figure, folder / name)))
+            put(str(figures.save(figure, folder / name)))
 
 
 def animate_command(
@@ -93,7 +93,7 @@ def animate_command(
     contact: ContactName = "",
 ) -> None:
     """Make a film of a run: chart, bristles, force and states, slowed at transitions."""
-    from gms_fsm.traces.trace import files_of
+    from gms_fsm.traces.views import files_of
     from plots.film.animation import animate
 
     refuse_input(output, *files_of(trace))
@@ -115,7 +115,7 @@ def animate_command(
             t_end=end,
             progress=show,
         )
-    typer.echo(str(film))
+    put(str(film))
 
 
 def replay_command(
@@ -136,7 +136,7 @@ def replay_command(
 ) -> None:
     """Write a run as a web page in which it can be stepped through and explained."""
     from gms_fsm import prove
-    from gms_fsm.traces.trace import files_of
+    from gms_fsm.traces.views import files_of
     from plots import write_replay
 
     files = [trace] if other is None else [trace, other]
@@ -150,4 +150,4 @@ def replay_command(
     reports = [prove(chart) for chart in charts] if check else []
     window = _window(runs[0], start, end)
     page = write_replay(output, *runs, title=title, names=names, window=window, checks=reports)
-    typer.echo(str(page))
+    put(str(page))

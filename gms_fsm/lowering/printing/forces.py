@@ -215,6 +215,10 @@ class ForceWriter(ProgramWriter):
         if not read & self.late:
             return []
         lines = self.forces("live", wanted=True)
+        for force in (force for bank in self.read.banks for force in bank.forces if force in read):
+            # With an infinite force no guard is decided: NaN ends the run where it is watched.
+            F = self.local(force)
+            lines.append(CodeLine(f"{F} = {F} - ({F} - {F})  # NaN if infinite"))
         rates = {name for bank in self.read.banks for name in bank.rates}
         if read & rates:
             if not self.locking:

@@ -102,6 +102,6 @@ def _steps_ahead(start: Problem, place: Place, floor: Any) -> float:
                         steps = (time - before) / STABLE_AT_MOST
                         total += steps * _fastest(start, (time, state, event.mode), floor)
                     before = time
-    except (HybridError, SignalError):
+    except (HybridError, SignalError, ArithmeticError, ValueError):  # it may overflow in SciPy
         return 0.0
     return total

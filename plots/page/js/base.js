@@ -31,6 +31,8 @@ function place(node, attributes) {
 // Changes a text only if it is another one: a change costs a layout, and is read aloud where a node is live.
 function say(node, text) { if (node.textContent !== text) node.textContent = text; }
 
+const counted = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
+
 const clamp = (u, low, high) => Math.min(Math.max(u, low), high);
 
 // The last index whose value is not above u, in an increasing array; -1 if there is none.

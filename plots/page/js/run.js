@@ -19,7 +19,7 @@ const BETWEEN = ["", "after ", "before "]; // where a row of the page lies, seen
 
 class RunData {
   constructor(stored, place) {
-    Object.assign(this, { place, title: stored.title, of: stored.of, rows: stored.rows, system: stored.system });
+    Object.assign(this, { place, title: stored.title, of: stored.of, rows: stored.rows, system: stored.system, trust: stored.trust ?? [] });
     for (const name of ["instants", "number", "between", "microstep"]) this[name] = integers(stored[name]);
     this.pool = stored.pool.map(([kind, on, text]) => {
       const values = unpacked(kind, text), { instants } = this;

@@ -13,6 +13,10 @@ class RunView {
     this.root = $("#run").content.cloneNode(true).firstElementChild;
     $("#runs").append(this.root);
     $("h2", this.root).textContent = (data.runs.length > 1 ? `Run ${this.place + 1}: ` : "") + run.title;
+    const trust = $(".trust", this.root), warned = run.trust.filter((text) => text.startsWith("warning")).length;
+    trust.hidden = !run.trust.length;
+    $("summary", trust).textContent = `trust: ${counted(warned, "warning")}, ${counted(run.trust.length - warned, "note")}`;
+    for (const text of run.trust) make("li", $("ul", trust), text);
     $(".of", this.root).textContent = `Run ${this.place + 1}`;
     const which = $(".contact", this.root);
     run.contacts.forEach(({ name }) => make("option", which, name));

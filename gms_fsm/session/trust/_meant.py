@@ -1,4 +1,4 @@
-"""Notes on a finished run: not errors, but probably not what the user meant.
+"""What was probably not meant.
 
 Mixed-up units (a stroke in metres with thresholds in micrometres, a v_c above every speed, a mass
 in grams, a friction in millinewtons), and arrests that the clock could not resolve.
@@ -20,8 +20,7 @@ from gms_fsm.systems.models import Model, parameters_of
 from gms_fsm.systems.system import System
 from gms_fsm.traces.scope import parameter_values
 from gms_fsm.traces.trace import Trace
-
-__all__ = ["notes_on", "notes_on_system"]
+from gms_fsm.traces.verdicts import Doubt
 
 FAR = 1e4  # a stroke of more thresholds than this is worth a note
 NEAR = 1e-2  # of the smallest threshold: smaller deflections are not near it
@@ -30,48 +29,20 @@ GRAVITY = 9.81  # m/s^2
 FRICTIONS = (1e-3, 1e2)  # of the weight: less and more are hardly meant
 
 
-def notes_on(trace: Trace) -> tuple[str, ...]:
-    """Return notes on a run, one sentence each.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run.
-
-    Returns
-    -------
-    tuple of str
-        The notes; empty for most runs.
-
-    Examples
-    --------
-    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
-    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> notes_on(simulate(model, Prescribed("1e-7*sin(t)"), 1.0))
-    ('no transition: the speed stays below v_c (largest |v| 84.1 nm/s, v_c 1 µm/s)',)
-    """
-    return (*_sizes(trace), *_weight(trace), *_windows(trace))
+def meant(trace: Trace) -> Iterator[Doubt]:
+    """Yield what about one contact hardly was meant, and arrests that the clock could not see."""
+    whose = trace.which
+    for text in (*_sizes(trace), *_weight(trace)):
+        yield Doubt("units", "note", f"{whose}: {text}" if whose else text, (), whose)
+    for times, text in _windows(trace):
+        yield Doubt("window", "warning", f"{whose}: {text}" if whose else text, times, whose)
 
 
-def notes_on_system(trace: Trace) -> tuple[str, ...]:
-    """Return notes on what a system does not use, one sentence each; none of a model on a rig.
-
-    A value of a controller that no other text reads acts on nothing, and a body may have been left
-    without force, spring and contact.
-
-    Examples
-    --------
-    >>> from gms_fsm import GMS, Body, Contact, GMSParameters, Sampled, System, simulate
-    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> system = System("servo", bodies=(Body("load", inertia=1.0),),
-    ...                 contacts=(Contact("pad", model),),
-    ...                 sampled=(Sampled("pid", period=0.1, updates={"u": "-x"}),))
-    >>> notes_on_system(simulate(system, 0.1))
-    ('nothing reads u of pid, so that it acts on nothing; if it is a force, give it to a body: force = "u"',)
-    """  # noqa: E501 (a message is one line)
-    if trace.system is None:
-        return ()
-    return (*_unread(trace.system), *_idle(trace.system))
+def unused(trace: Trace) -> Iterator[Doubt]:
+    """Yield what a system does not use: values that nothing reads, bodies that nothing moves."""
+    if trace.system is not None:
+        for text in (*_unread(trace.system), *_idle(trace.system)):
+            yield Doubt("unused", "note", text)
 
 
 def _unread(system: System) -> Iterator[str]:
@@ -171,7 +142,7 @@ def _scaling(model: Model) -> str:
     return ", ".join(f"{each.name} ({each.unit})" for each in known) + (" and " if known else "")
 
 
-def _windows(trace: Trace) -> Iterator[str]:
+def _windows(trace: Trace) -> Iterator[tuple[tuple[float, ...], str]]:
     """Search for windows such as |v| <= v_c that were crossed within one tick of the clock."""
     if trace.settings.get("events") != "located":
         return
@@ -195,9 +166,10 @@ def _windows(trace: Trace) -> Iterator[str]:
                     missed.append(float(t[row]))
         if missed:
             yield (
+                tuple(sorted(missed)),
                 f"{edge.name} could not be detected {len(missed)} times, first at t = "
                 f"{min(missed):.9g} s: v passes its window within one tick of the clock; use a "
-                "larger v_c, or let the run start nearer to t = 0"
+                "larger v_c, or let the run start nearer to t = 0",
             )
 
 

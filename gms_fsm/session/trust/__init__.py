@@ -1,0 +1,53 @@
+"""How far to trust a finished run: `trust_of` is what `Trace.trust` calls.
+
+Every finding is made from what the run has seen: its rows, its log and its program. A run pays
+nothing for it; it is computed when it is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from gms_fsm.session.trust._again import again as repeated
+from gms_fsm.session.trust._meant import meant, unused
+from gms_fsm.session.trust._motion import growth, impulses, not_unique, slides
+from gms_fsm.session.trust._path import Track
+from gms_fsm.session.trust._switches import switches
+from gms_fsm.session.trust._values import not_finite, outside, sampling
+from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.verdicts import KINDS, Doubt, Trust
+
+__all__ = ["trust_of"]
+
+
+def trust_of(trace: Trace, *, again: bool = False) -> Trust:
+    """Return the findings about a run; see `gms_fsm.Trace.trust`."""
+    if trace.which:
+        whole = trust_of(
+            replace(trace, firings=trace.every or trace.firings, which="", every=None), again=again
+        )
+        return Trust(tuple(each for each in whole if each.contact in ("", trace.which)))
+    found = [*_findings(trace.whole(), at_times=trace.stops is not trace.rows)]
+    if again:
+        found += repeated(trace)
+    found.sort(key=lambda each: (each.severity != "warning", KINDS.index(each.kind)))
+    return Trust(tuple(found))
+
+
+def _findings(trace: Trace, *, at_times: bool) -> Iterator[Doubt]:
+    path = Track(trace)
+    yield from sampling(path, steps=not at_times)
+    if len(trace) > 1:
+        yield from not_unique(path)
+        yield from switches(path)
+        yield from slides(path)
+        yield from impulses(path)
+    else:
+        text = "from the end of a run alone, switches and slides cannot be judged"
+        yield Doubt("not judged", "note", text)
+    yield from unused(trace)
+    for name in trace.contacts:
+        one = trace.contact(name)
+        for find in (not_finite, outside, growth, meant):
+            yield from find(one)

@@ -1,0 +1,139 @@
+"""The same run with a hundredth of the tolerances: whether its sequence holds, how far it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.errors import GMSError, cut
+from gms_fsm.foundation.quantities import in_words
+from gms_fsm.run.settings import Settings
+from gms_fsm.run.simulate import simulate
+from gms_fsm.traces.firings import Firings
+from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.verdicts import Doubt
+from integrators import METHODS
+
+FINER = 100.0
+
+
+def again(trace: Trace) -> Iterator[Doubt]:
+    """Yield whether the sequence of switches holds, and how far times and the end state move."""
+    try:
+        finer = _repeated(trace)
+    except GMSError as error:
+        yield Doubt("repeat", "warning", f"with rtol/{FINER:g} the run ends: {cut(str(error))}")
+        return
+    one, other = trace.firings, finer.firings
+    moved, apart = 0.0, None
+    for machine in range(trace.program.layout.n):
+        mine, its = (log.at(log.machine == machine) for log in (one, other))
+        count = min(len(mine), len(its))
+        differ = np.flatnonzero(mine.edge[:count] != its.edge[:count])
+        if differ.size or len(mine) != len(its):
+            k = int(differ[0]) if differ.size else count
+            t = min(float(log.t[k]) for log in (mine, its) if k < len(log))
+            if apart is None or t < apart[0]:
+                apart = t, _named(trace, mine, k), _named(trace, its, k)
+        elif count:
+            moved = max(moved, float(np.abs(mine.t - its.t).max()))
+    if apart is not None:
+        t, here, there = apart
+        text = f"with rtol/{FINER:g} the sequence is another one from t = {t:.9g} s on: {there}"
+        yield Doubt("repeat", "warning", f"{text} in place of {here}", (t,))
+        return
+    end = {name: value for name, value in _ends(trace, finer) if value > 0.0}
+    state = ", ".join(f"{name} by {value:.2g}" for name, value in end.items()) or "not at all"
+    text = "there is no transition"
+    if len(one):
+        text = f"the sequence of {len(one)} transitions holds"
+        if (one.edge != other.edge).any() or (one.machine != other.machine).any():
+            text += " for each element, though not their order between elements"
+        text += f", its times move by at most {in_words(moved, 's', 2)}"
+    yield Doubt(
+        "repeat", "note", f"with rtol/{FINER:g} {text}; the end state (SI units) moves: {state}"
+    )
+
+
+def _repeated(trace: Trace) -> Trace:
+    """Return the run with finer tolerances, from its first row."""
+    given: Mapping[str, Any] = trace.settings
+    rtol, atol = given["rtol"] / FINER, given["atol"]
+    if isinstance(atol, Mapping):
+        atol = {name: _part(value) for name, value in atol.items() if np.min(value) > 0.0}
+    elif atol is not None:
+        atol = atol / FINER
+    chosen = Settings(
+        method=_method(given["method"]),
+        step=None if given["step"] is None else given["step"] / 2.0,
+        rtol=rtol,
+        atol=atol,
+        max_step=given["max_step"] or np.inf,
+        max_steps=100 * given["max_steps"],
+        events=given["events"],
+        engine=given["engine"],
+    )
+    if given["events"] == "held":  # the step belongs to the model
+        chosen = Settings(**{**_fields(chosen), "step": given["step"]})
+    initial = _beginning(trace) if trace.initial is None else trace.initial
+    times: dict[str, Any] = {"t_start": given["t_start"], "initial": initial}
+    if trace.what.named:
+        return simulate(trace.what.system, given["t_end"], settings=chosen, **times)
+    return simulate(trace.what.model, trace.what.rig, given["t_end"], settings=chosen, **times)
+
+
+def _beginning(trace: Trace) -> dict[str, Any]:
+    """Return the initial values of a run that was read from a file, from its first row.
+
+    Values of samplers are left out: those of the row are after the first tick.
+    """
+    first, layout, system = trace.whole().rows, trace.program.layout, trace.what.system
+    labels = {name: key for key, name in layout.keys.items()}
+    left_out = {body.v for body in system.bodies if body.driven}
+    left_out |= {name for each in system.sampled for name in each.updates}
+    initial: dict[str, Any] = {}
+    for name in (*layout.y.shared, *layout.y.own):
+        if name in labels and name not in left_out:
+            values = first.y[0, layout.y.all_of(name)].tolist()
+            initial[labels[name]] = values if name in layout.y.own else values[0]
+    for bank in layout.banks:
+        states = system.contact(bank.name).chart.states
+        key = "states" if len(layout.banks) == 1 else f"{bank.name}.states"
+        initial[key] = [states[int(mode)].name for mode in first.mode[0, bank.elements]]
+    return initial
+
+
+def _fields(chosen: Settings) -> dict[str, Any]:
+    return {name: value for name, value in vars(chosen).items() if name != "t_eval"}
+
+
+def _method(name: str) -> Any:
+    if name in METHODS:
+        return name
+    import scipy.integrate
+
+    return getattr(scipy.integrate, name)
+
+
+def _part(value: Any) -> Any:
+    return [each / FINER for each in value] if isinstance(value, list) else value / FINER
+
+
+def _named(trace: Trace, log: Firings, k: int) -> str:
+    if k >= len(log):
+        return "none"
+    layout, machine = trace.program.layout, int(log.machine[k])
+    bank = layout.bank(machine)
+    edge = layout.edges[int(log.edge[k])][0]
+    who = trace.what.element(bank.name, machine - bank.first)
+    return f"{edge} of {who} at t = {float(log.t[k]):.9g} s"
+
+
+def _ends(one: Trace, other: Trace) -> Iterator[tuple[str, float]]:
+    layout = one.program.layout
+    a, b = (each.whole().rows.y[-1] for each in (one, other))
+    for name in (*layout.y.shared, *layout.y.own):
+        places = layout.y.all_of(name)
+        yield layout.label(name), float(np.abs(a[places] - b[places]).max())
