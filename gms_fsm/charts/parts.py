@@ -4,18 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from math import isfinite, nan
 from typing import Any
 
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ChartError, shown
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.arguments import refusing, unknown
+from gms_fsm.foundation.equality import by_value
 
 DEEPEST_STATE = 8  # levels; deeper ones nobody could read
+MOST_PARTS = 5_000  # states and edges of a chart; more would take minutes to read and to compile
 
 
-@dataclass(frozen=True)
+def check_size(states: int, edges: int, place: str) -> None:
+    """Refuse a chart without states, and one that is too large, before anything else of it."""
+    if not states:
+        raise ChartError("it has no states", place=place, advice="give at least one")
+    if states + edges > MOST_PARTS:
+        raise ChartError(
+            f"it has {states:,} states and {edges:,} edges",
+            place=place,
+            advice=f"a chart can have {MOST_PARTS:,} of both together",
+        )
+
+
+@refusing(
+    ChartError,
+    instead={"during": "flow", "on_enter": "entry", "on_exit": "exit"},
+)
+@by_value()
+@dataclass(frozen=True, eq=False)
 class State:
     """One state of a machine: how its variables evolve, and what force it gives, while active.
 
@@ -62,16 +81,6 @@ class State:
     states: tuple[State, ...] = ()
     initial: str = ""
     history: bool = False
-
-    def __new__(cls, *parts: Any, **given: Any) -> State:
-        """Refuse unknown arguments with an error of this package."""
-        known = [each.name for each in fields(cls)]
-        for name in sorted(given.keys() - set(known)):
-            raise ChartError(
-                f"a State takes {', '.join(known[:-1])} and {known[-1]}, not {name!r}",
-                place=f"state {shown(given.get('name', parts[0] if parts else '?'))}",
-            )
-        return object.__new__(cls)
 
     def __post_init__(self) -> None:
         here = f"state {shown(self.name)}"
@@ -130,7 +139,13 @@ class State:
         return 1 + max((each.depth for each in self.states), default=0)
 
 
-@dataclass(frozen=True, init=False)
+@refusing(
+    ChartError,
+    instead={"trigger": "name", "dest": "target", "conditions": "guard", "condition": "guard"},
+    guard="guard='True' for always",
+)
+@by_value()
+@dataclass(frozen=True, init=False, eq=False)
 class Transition:
     """One guarded edge between two states.
 

@@ -22,6 +22,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import require
+from gms_fsm.foundation.text import visible
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
@@ -114,7 +115,7 @@ class Trace:
     initial: Mapping[str, Any] | None = field(default=None, repr=False)  # as given; not in files
 
     def __repr__(self) -> str:
-        return f"<Trace: {self.title}; {len(self)} rows, {len(self.firings)} transitions>"
+        return f"<Trace: {visible(self.title)}; {len(self)} rows, {len(self.firings)} transitions>"
 
     @property
     def title(self) -> str:
@@ -464,9 +465,8 @@ class Trace:
             This trace if it already has them.
         """
         table = merged(self.rows, self.stops)
-        if len(table) == len(self.rows):
-            return self
-        return replace(self, rows=table, stops=table, stored={})
+        same = len(table) == len(self.rows)
+        return self if same else replace(self, rows=table, stops=table, stored={})
 
     def with_monitors(self, found: Mapping[str, Verdict]) -> Trace:
         """Return the same run with the verdicts of its monitors, and all that was computed."""

@@ -23,9 +23,9 @@ from gms_fsm.exporters.alone import (
     check_moved_from_outside,
     element_numbers,
     fields_of,
-    one_line,
 )
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import referenced, visible
 from gms_fsm.systems.system import LEAST_LOAD, Contact, loaded
 
 __all__: list[str] = []
@@ -98,7 +98,7 @@ def _document(name: str, chart: Chart, numbers: Mapping[str, float]) -> str:
         write.state(root, state.name)
     ET.indent(root, "  ")
     head = f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- Written by gms-fsm {__version__}. -->\n'
-    return head + ET.tostring(root, encoding="unicode") + "\n"
+    return head + referenced(ET.tostring(root, encoding="unicode")) + "\n"
 
 
 def _outside(chart: Chart) -> dict[str, str]:
@@ -195,7 +195,7 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
     numbers = (
         "The chart has no numbers: set every <data> without expr before the first step."
         if contact is None
-        else f"Numbers: those of {one_line(contact.title)}, one document for each element."
+        else f"Numbers: those of {visible(contact.title)}, one document for each element."
     )
     curve = ""
     if contact is not None and contact.stribeck is not None:
@@ -213,7 +213,7 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
         f"\n- python-statemachine keeps the names {', '.join(kept)} for itself." if kept else ""
     )
     return f"""\
-# {one_line(chart.name)} as SCXML
+# {visible(chart.name)} as SCXML
 
 Written by gms-fsm {__version__}, format scxml.
 

@@ -8,7 +8,6 @@ the velocity of a driven body, a relative velocity, an input, a named expression
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -248,7 +247,6 @@ class Assembly:
         return renamed(tree, inside) if inside else tree
 
 
-@functools.lru_cache(maxsize=64)
 def assembled(system: System) -> Assembly:
     """Read all texts of a system; a system is read once, when it is constructed."""
     return SystemReader(system).read()
