@@ -1292,6 +1292,15 @@ rows = {
     "state twice": ({"states": (STICK, STICK)},),
     "state inside and parameter": (inside(parameters=(*K, "slip__two")),),
     "age and parameter": (inside(parameters=(*K, "slip__age")),),
+    "edge of a history and parameter": (
+        {
+            "states": (
+                STICK,
+                dataclasses.replace(SLIP, states=(State("a"), State("b")), history=True),
+            ),
+            "parameters": (*K, "go__b"),
+        },
+    ),
     "path for a name": (inside(State("one.two")),),
     "state and edge": (edge(name="slip"),),
     "parameter and edge": (edge(name="k"),),
@@ -1362,6 +1371,11 @@ rows = {
         "state 'stick'",
         ...,
         lambda: State("stick", flow={"z": "v"}, during="z = 0"),
+    ),
+    "edges of composite states without end": (
+        "chart 'rubber'",
+        ...,
+        lambda: chart(inside(*(State(f"s{i}") for i in range(2500)), **edge(source="slip"))),
     ),
     "state inside twice": ("state 'slip'", ..., lambda: inside(STICK, STICK)),
     "history of nothing": ("state 'slip'", ..., lambda: State("slip", history=True)),

@@ -244,7 +244,7 @@ class Chart:
         check_paths(self.nesting, owner, here)
         for name in sorted({*self.force_names} & owner.keys()):
             raise ChartError(f"{owner[name]} name {name!r} is taken by a force", place=here)
-        check_ends(self.nesting, here)
+        check_ends(self.nesting, owner, here)
 
     # ------------------------------------------------------------------ forces
     @property

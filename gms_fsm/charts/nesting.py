@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from gms_fsm.charts.parts import State, Transition
+from gms_fsm.charts.parts import State, Transition, check_size
 from gms_fsm.errors import ChartError
 from gms_fsm.language import Both, Condition, Name, Number, Relation, spell
 
@@ -116,6 +116,8 @@ class Nesting:
 
     def leaves_of(self, path: str) -> list[str]:
         """Return the paths of the innermost states in a state, or of itself."""
+        if not self.levels[path].state.states:
+            return [path]
         return [
             level.path
             for level in self.levels.values()
@@ -217,9 +219,11 @@ class Nesting:
                         ):
                             object.__setattr__(row, each, value)
                         found[leaf, name] = row
+        sources: dict[str, list[str]] = {}
+        for leaf, name in found:
+            sources.setdefault(name, []).append(leaf)
         for row in found.values():
-            sources = tuple(leaf for leaf, name in found if name == row.name)
-            object.__setattr__(row, "sources", sources)
+            object.__setattr__(row, "sources", tuple(sources[row.name]))
         return tuple(found.values())
 
     def _performed(
@@ -257,19 +261,25 @@ def check_paths(nesting: Nesting, owner: dict[str, str], here: str) -> None:
     for level in nesting.levels.values():
         own = [spelled(level.path)] if len(level.chain) > 1 else []
         for name in (*own, *((level.age, level.last) if level.state.states else ())):
-            if name in owner:
-                raise ChartError(
-                    f"the name {name!r} is used twice ({owner[name]} and state {level.path!r})",
-                    place=here,
-                    advice="every name must be unique",
-                    key=level.key,
-                )
-            owner[name] = f"state {level.path!r}"
+            _take(name, owner, f"state {level.path!r}", here, level.key)
 
 
-def check_ends(nesting: Nesting, here: str) -> None:
+def _take(
+    name: str, owner: dict[str, str], what: str, here: str, key: tuple[str | int, ...]
+) -> None:
+    if name in owner:
+        raise ChartError(
+            f"the name {name!r} is used twice ({owner[name]} and {what})",
+            place=here,
+            advice="every name must be unique",
+            key=key,
+        )
+    owner[name] = what
+
+
+def check_ends(nesting: Nesting, owner: dict[str, str], here: str) -> None:
     """Refuse edges that leave or enter what is not a state, or take an impulse for nothing."""
-    known = [*nesting.levels]
+    known = nesting.levels
     for i, edge in enumerate(nesting.transitions):
         for end, state in (
             *(("source", each) for each in edge.sources),
@@ -282,7 +292,16 @@ def check_ends(nesting: Nesting, here: str) -> None:
                     advice=f"states: {', '.join(map(repr, known))}",
                     key=("transitions", i, end),
                 )
-    locked = {leaf.name for leaf in nesting.leaves() if leaf.locked}
+        for name, *_ in nesting.entries(edge)[1:]:  # one for each state that a history enters
+            _take(name, owner, f"edge {edge.name!r}", here, ("transitions", i, "name"))
+    leaves = nesting.leaves()
+    rows = (
+        len(nesting.leaves_of(source)) * len(nesting.ways(edge.target))
+        for edge in nesting.transitions
+        for source in edge.sources
+    )
+    check_size(len(leaves), sum(rows), here)
+    locked = {leaf.name for leaf in leaves if leaf.locked}
     for i, edge in enumerate(nesting.transitions):
         if edge.impulse and not {leaf for *_, leaf in nesting.entries(edge)} <= locked:
             raise ChartError(
