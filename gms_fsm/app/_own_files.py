@@ -58,7 +58,7 @@ class OwnFile:
                 )
             return {self.path.stem: self.chart}
         assert self.system is not None
-        chosen = [self.system.contact(contact)] if contact else self.system.contacts
+        chosen = [self.system.contact(contact)] if contact else self.system.machines
         found: list[tuple[list[str], Chart]] = []
         for each in chosen:
             names = next((names for names, chart in found if chart == each.chart), None)
@@ -76,7 +76,7 @@ class OwnFile:
                 place=str(self.path),
                 advice="give a scenario file",
             )
-        several = self.system.contacts
+        several = self.system.machines
         if len(several) > 1 and not contact:
             raise contacts_error(self.path, [each.name for each in several], "give")
         chosen: Any = self.system.contact(contact) if contact else several[0]
@@ -88,7 +88,7 @@ class OwnFile:
         found = self.charts(contact)
         if len(found) > 1:
             assert self.system is not None
-            names = [each.name for each in self.system.contacts]
+            names = [each.name for each in self.system.machines]
             raise contacts_error(self.path, names, "give", ", with different charts")
         return next(iter(found.values()))
 

@@ -18,6 +18,7 @@ from gms_fsm.charts.parameters import QUANTITIES, Parameter
 from gms_fsm.charts.parts import (
     State,
     Transition,
+    event_name,
     parameter_of,
     places_of,
     texts_of,
@@ -75,7 +76,8 @@ class Chart:
         Named expressions that all other texts can use; later ones can use earlier ones.
     velocities : sequence of str
         What the contact moves by. With several (a planar contact) the forces are ``F``,
-        ``F_<second>`` and so on, the accelerations ``a``, ``a_<second>``.
+        ``F_<second>`` and so on, the accelerations ``a``, ``a_<second>``. With none it is the chart
+        of a `Supervisor`, whose outputs have any names.
     contact_outputs : mapping of str to str, optional
         The force of a contact, where it is not just the sum of its elements' forces, which is
         called ``F`` here: ``{"F": "F + sigma_2 * v"}``.
@@ -190,13 +192,6 @@ class Chart:
                     )
         if not self.states:
             raise ChartError("it has no states", place=here, advice="give at least one")
-        if not self.velocities:
-            raise ChartError(
-                "it has no velocity",
-                place=here,
-                advice="give at least one, for example ('v',)",
-                key=("velocities",),
-            )
         derivatives = ["d" + variable for variable in self.variables]
         groups = (
             ("input", "inputs", dict.fromkeys([*self.inputs, *self.velocities])),
@@ -265,13 +260,22 @@ class Chart:
     # ------------------------------------------------------------------ forces
     @property
     def force_names(self) -> tuple[str, ...]:
-        """Name of the force along each velocity: ``F``, then ``F_<velocity>``."""
+        """What it gives out: ``F``, then ``F_<velocity>``; without velocity its outputs."""
+        if not self.velocities:
+            own = (name for state in self.states for name in state.outputs)
+            return tuple(dict.fromkeys([*self.outputs, *own]))
         return ("F", *(f"F_{each}" for each in self.velocities[1:]))
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """The events that edges wait for or emit, under the names they have in trees."""
+        used = (name for edge in self.transitions for name in (edge.event, *edge.emit) if name)
+        return tuple(dict.fromkeys(map(event_name, used)))
 
     @property
     def rate_names(self) -> tuple[str, ...]:
         """Name of the acceleration along each velocity: ``a``, then ``a_<velocity>``."""
-        return ("a", *(f"a_{each}" for each in self.velocities[1:]))
+        return ("a", *(f"a_{each}" for each in self.velocities[1:]))[: len(self.velocities)]
 
     @property
     def locks(self) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ChartError, shown
 from gms_fsm.foundation.arguments import unknown
+from gms_fsm.language import EVENT
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,11 @@ class Transition:
     actions : mapping of str to str, optional
         Assignments ``variable: expression`` performed when it is taken. An assignment to a velocity
         is an impulse that keeps the momentum of the bodies.
+    event : str
+        The event that the edge waits for; its guard then has to hold at that instant, and may be
+        left out.
+    emit : sequence of str
+        Events for the machines of the system; they are asked for them next, at the same instant.
     impulse : bool
         Whether an edge into a locked state takes the velocity that is left as an impulse, on
         purpose: an engaging clutch, a rest speed. Other edges lock the contact where its velocity
@@ -101,6 +107,8 @@ class Transition:
     guard: str
     actions: Mapping[str, str]
     impulse: bool = field(repr=False)
+    event: str = field(repr=False)
+    emit: tuple[str, ...] = field(repr=False)
     sources: tuple[str, ...] = field(init=False, repr=False)
 
     def __init__(
@@ -108,11 +116,22 @@ class Transition:
         name: str,
         source: str | Sequence[str],
         target: str,
-        guard: str,
+        guard: str = "",
         actions: Mapping[str, str] | None = None,
         *,
+        event: str = "",
+        emit: str | Sequence[str] = (),
         impulse: bool = False,
     ) -> None:
+        here = f"edge {shown(name)}"
+        emitted = (emit,) if isinstance(emit, str) else tuple_of(emit, f"{here}: emit")
+        for each in (*emitted, *[event][: bool(event)]):
+            if not isinstance(each, str) or not each.isidentifier():
+                raise ChartError("it is not a name", place=f"{here}: event", value=each)
+        if guard == "" and event:
+            guard = "True"
+        elif guard == "":
+            raise ChartError("it has no guard", place=here, advice="give one; 'True' is always")
         if not isinstance(source, str) and not isinstance(source, Sequence):
             raise ChartError(
                 "it must be the name of a state, or several",
@@ -134,6 +153,8 @@ class Transition:
             ("guard", guard),
             ("actions", given),
             ("impulse", impulse),
+            ("event", event),
+            ("emit", emitted),
             ("sources", sources),
         ):
             object.__setattr__(self, each, value)
@@ -144,6 +165,11 @@ class Transition:
         for part in parts:
             object.__setattr__(part, "sources", self.sources)
         return parts
+
+
+def event_name(event: str) -> str:
+    """Return what an event is called in trees, where it is 1 while machines are asked for it."""
+    return EVENT + event
 
 
 def texts_of(given: object, owner: str) -> dict[str, str]:

@@ -136,12 +136,12 @@ class Commands:
     @property
     def states(self) -> list[str]:
         """Names of the states of all charts."""
-        charts = (contact.chart for contact in self.session.system.contacts)
+        charts = (contact.chart for contact in self.session.system.machines)
         return list(dict.fromkeys(state.name for chart in charts for state in chart.states))
 
     @property
     def _edges(self) -> list[str]:
-        charts = (contact.chart for contact in self.session.system.contacts)
+        charts = (contact.chart for contact in self.session.system.machines)
         return list(dict.fromkeys(edge.name for chart in charts for edge in chart.transitions))
 
     def _usage(self, name: str) -> str:

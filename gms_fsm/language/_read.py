@@ -316,6 +316,8 @@ class _Reader:
                 return Binary(
                     _OPERATORS[type(op)], self.value(left, depth), self.value(right, depth)
                 )
+            case ast.Call(func=ast.Name(id="is_in" | "count" as f), args=[ast.Attribute() as of]):
+                return self.name(node, f"{f}({ast.unparse(of)})")
             case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
                 self.known(node, function)
                 return self.call(node, function, arguments, depth)

@@ -419,7 +419,7 @@ def _given(
             if name not in y and name.startswith(bank.of(""))
         }
     state, mode = layout.y.joined(y), list[int]()
-    for bank, part in zip(layout.banks, system.contacts, strict=True):
+    for bank, part in zip(layout.banks, system.machines, strict=True):
         chart = part.chart
         default = [chart.default_state.name] * bank.n
         wanted = names.get(bank.name, default)
@@ -435,7 +435,7 @@ def _given(
 @functools.lru_cache(maxsize=64)
 def _is_plain(shape: System) -> bool:
     """Return whether systems of a shape start with 0 everywhere unless something else is given."""
-    locked = any(contact.chart.default_state.locked for contact in shape.contacts)
+    locked = any(contact.chart.default_state.locked for contact in shape.machines)
     return not (shape.sampled or locked or _enters(shape))
 
 
@@ -446,7 +446,7 @@ def _check_locks(
     layout, out = program.layout, [0.0] * program.layout.shown.size
     locked = [
         (bank, contact.chart, state)
-        for bank, contact in zip(layout.banks, system.contacts, strict=True)
+        for bank, contact in zip(layout.banks, system.machines, strict=True)
         for state in [contact.chart.states[i] for i in mode[bank.elements]]
         if state.locked
     ]
@@ -476,7 +476,7 @@ def _not_locked(chart: Chart) -> str:
 
 def _enters(system: System) -> bool:
     """Return whether the default state of some chart has an entry."""
-    charts = (contact.chart for contact in system.contacts)
+    charts = (contact.chart for contact in system.machines)
     return any(chart.assignments["entry", chart.default_state.name] for chart in charts)
 
 
@@ -495,7 +495,7 @@ def _entered(
     if not _enters(system):
         return y
     layout = program.layout
-    for bank, contact in zip(layout.banks, system.contacts, strict=True):
+    for bank, contact in zip(layout.banks, system.machines, strict=True):
         chart = contact.chart
         for name in chart.assignments["entry", chart.default_state.name]:
             if name in chart.velocities and 0 in mode[bank.elements]:

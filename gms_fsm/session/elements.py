@@ -89,7 +89,7 @@ def element_name(start: Problem, machine: int) -> str:
 def title_of(start: Problem) -> str:
     """Return what runs: titles of model and rig, or of a system and its contacts."""
     if start.what.named:
-        return f"{start.system.name}; {'; '.join(each.title for each in start.system.contacts)}"
+        return f"{start.system.name}; {'; '.join(each.title for each in start.system.machines)}"
     return f"{start.model.title}; {start.rig.title}"
 
 

@@ -27,7 +27,7 @@ def names_of(start: Problem) -> list[str]:
 def units_of(start: Problem) -> dict[str, str]:
     """Return the units of names, as far as they are known: those of bodies are not declared."""
     found: dict[str, str] = {}
-    for contact in start.system.contacts:
+    for contact in start.system.machines:
         chart = contact.chart
         for name in names_of(start):
             owner, _, last = name.rpartition(".")

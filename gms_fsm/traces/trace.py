@@ -121,7 +121,7 @@ class Trace:
         """What ran: model and rig, or a system and its contacts."""
         if not self.subject.named:
             return f"{self.model.title}; {self.rig.title}"
-        return f"{self.what.title}; contacts {', '.join(self.contacts)}"
+        return f"{self.what.title}; {', '.join(self.what.contacts)}"
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -184,7 +184,7 @@ class Trace:
     @property
     def contacts(self) -> tuple[str, ...]:
         """Names of the contacts."""
-        return tuple(bank.name for bank in self.program.layout.banks)
+        return tuple(bank.name for bank in self.program.layout.banks if bank.velocity)
 
     def contact(self, name: str) -> Trace:
         """Return the run as one contact sees it: its v, F, z, s, states and transitions.
@@ -212,6 +212,8 @@ class Trace:
         chosen = replace(self, firings=mine, which=bank.name, every=every)
         vars(chosen).update({k: u for k, u in vars(self).items() if k in ("program", "seen")})
         return chosen
+
+    supervisor = contact
 
     def body(self, name: str) -> BodyTrace:
         """Return the motion of a body.
@@ -259,6 +261,8 @@ class Trace:
         layout = self.program.layout
         if name in layout.y.shared:
             return self._named(name)
+        if name in self.what.system.names and name in self.seen:
+            return self.seen[name]  # an output of a supervisor
         bank = self.places if self.which or len(layout.banks) == 1 else None
         names = {} if bank is None else bank.plain({each: each for each in layout.observed.shared})
         if isinstance(name, str) and name in names:
@@ -270,6 +274,8 @@ class Trace:
     def x(self) -> FloatArray:
         """Position, shape (rows,), m."""
         position = self.places.position
+        if not position:
+            return np.full(len(self.rows), np.nan)
         if position in self.program.layout.y.shared:
             return self._named(position)
         return self.seen[position]
@@ -330,6 +336,8 @@ class Trace:
     @property
     def v(self) -> FloatArray:
         """Velocity, shape (rows,), m/s."""
+        if not self.places.velocity:
+            return np.full(len(self.rows), np.nan)
         return self.seen[self.places.of(self.places.velocity)]
 
     @property
@@ -340,7 +348,8 @@ class Trace:
     @property
     def F(self) -> FloatArray:
         """Friction force, shape (rows,), N."""
-        return self.seen[self.places.of("F")]
+        force = self.places.of("F")
+        return self.seen[force] if force in self.seen else np.full(len(self.rows), np.nan)
 
     @property
     def shared(self) -> NDArray[np.bool_]:
@@ -355,7 +364,8 @@ class Trace:
     @property
     def F_elements(self) -> FloatArray:
         """Force of each element, shape (rows, n), N."""
-        return self.seen[self.places.of("F_elements")]
+        force = self.places.of("F_elements")
+        return self.seen[force] if force in self.seen else np.full((len(self.rows), self.n), np.nan)
 
     @property
     def dz(self) -> FloatArray:

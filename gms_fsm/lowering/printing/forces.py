@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Literal, TypeAlias
 
 from gms_fsm.language import Name, names_in
 from gms_fsm.lowering.printing.lines import TABLES, CodeLine, ProgramWriter, Signs
@@ -10,6 +11,8 @@ from gms_fsm.lowering.printing.locks import Locks
 from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import BankPlan, Computed, Gradient, ProgramPlan, gradient_of
 from gms_fsm.systems.reading.assembly import Bank, of
+
+Part: TypeAlias = Literal["all", "outputs", "rates"]  # of what a machine gives out
 
 
 class ForceWriter(ProgramWriter):
@@ -44,8 +47,23 @@ class ForceWriter(ProgramWriter):
     ) -> list[CodeLine]:
         """Write the rates and the forces of all contacts, and the accelerations."""
         lines: list[CodeLine] = []
-        for bank in self.plan.banks:
-            lines += self.bank_forces(bank, signs, wanted, rates=rates, observed=observed)
+        made: set[str] = set()
+        for bank in self.read.order:
+            lines += self.late_definitions(made, signs) if wanted else []
+            plan = self.plan.banks[bank.index]
+            # Rates that read what machines give out are computed after all of it.
+            part: Part = "outputs" if self.read.is_deferred(bank) else "all"
+            lines += self.bank_forces(
+                plan, signs, wanted, rates=rates, observed=observed, part=part
+            )
+            made |= {*bank.forces}
+        lines += self.late_definitions(made, signs) if wanted else []
+        for bank in self.read.banks if rates or observed else ():
+            if self.read.is_deferred(bank):
+                plan = self.plan.banks[bank.index]
+                lines += self.bank_forces(
+                    plan, signs, wanted, rates=rates, observed=observed, part="rates"
+                )
         if wanted and (rates or self.locking):
             for body in self.read.free:
                 value = self.plan.accelerations[body.name]
@@ -54,6 +72,16 @@ class ForceWriter(ProgramWriter):
         if wanted and self.locking:
             lines += self.driven_accelerations()
             lines += self.locks.forces()
+        return lines
+
+    def late_definitions(self, made: set[str], signs: Signs) -> list[CodeLine]:
+        """Write what is computed from what machines give out, as far as that is known."""
+        lines: list[CodeLine] = []
+        for each in self.read.definitions:
+            needs = self.read.closure([each.name]) & self.late
+            if each.name in self.late - made and needs <= made | {each.name}:
+                lines += self.defined(each.name, signs)
+                made.add(each.name)
         return lines
 
     def bank_forces(
@@ -65,12 +93,14 @@ class ForceWriter(ProgramWriter):
         rates: bool = False,
         observed: bool = False,
         held: bool = False,
+        part: Part = "all",
     ) -> list[CodeLine]:
         """Write the loop over the elements of a contact, and its force; `held` stores both."""
         bank, y = plan.bank, self.layout.y
         if bank.periodic and not held:
             return self.held_forces(bank, wanted, rates=rates, observed=observed)
         forces = wanted and (plan.moves or observed or not rates or self.locking)
+        forces, later = forces and part != "rates", part == "outputs"
         used = {name for tree in plan.common.values() for name in names_in(tree)} | {
             name
             for each in plan.states
@@ -80,7 +110,7 @@ class ForceWriter(ProgramWriter):
         needed = {
             name
             for name in bank.variables
-            if rates or observed or held or (forces and bank.rate(name) in used)
+            if ((rates or observed or held) and not later) or (forces and bank.rate(name) in used)
         }
         # Only a contact with several velocities has several forces.
         several = {force: f"F_i{'' if q == 0 else f'_{q}'}" for q, force in enumerate(bank.forces)}
@@ -111,9 +141,15 @@ class ForceWriter(ProgramWriter):
                 after.append(
                     CodeLine(f"{total} += {self.spell(tree)}  # (3)", computed_names(tree))
                 )
-        if observed:
+        if observed and part != "rates":
             after += self.elements_seen(plan, several)
-        if rates:
+        if observed and not later:
+            seen = self.layout.observed
+            after += [
+                self.store("out", seen, bank.rate(v), self.local(bank.rate(v)))
+                for v in bank.variables
+            ]
+        if rates and not later:
             after += [self.store("dy", y, v, self.local(bank.rate(v))) for v in bank.variables]
         if held:
             after += [
@@ -177,11 +213,8 @@ class ForceWriter(ProgramWriter):
         """Store what is observed of an element."""
         bank, seen = plan.bank, self.layout.observed
         lines = [self.threshold_seen(bank)]
-        lines += [
-            self.store("out", seen, f"{force}_elements", several[force]) for force in bank.forces
-        ]
         return lines + [
-            self.store("out", seen, bank.rate(v), self.local(bank.rate(v))) for v in bank.variables
+            self.store("out", seen, f"{force}_elements", several[force]) for force in bank.forces
         ]
 
     def threshold_seen(self, bank: Bank) -> CodeLine:

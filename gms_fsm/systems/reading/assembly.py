@@ -197,6 +197,54 @@ class Assembly:
     own: Mapping[str, tuple[int, np.ndarray]]
 
     @cached_property
+    def late(self) -> frozenset[str]:
+        """What machines give out, and the shared quantities computed from it."""
+        given = {name for bank in self.banks for name in (*bank.forces, *bank.rates)}
+        given |= {f"{body.name} a" for body in self.system.bodies}
+        shared = (each.name for each in self.definitions if each.bank is None)
+        return frozenset(given) | {name for name in shared if self.closure([name]) & given}
+
+    @cached_property
+    def order(self) -> tuple[Bank, ...]:
+        """The machines, each after those whose outputs its flows and outputs read."""
+        found: list[Bank] = []
+        waiting = [*self.banks]
+        while waiting:
+            given = {name: each for each in waiting for name in each.forces}
+            ready = [each for each in waiting if not self.read_by(each) & given.keys()]
+            if not ready:
+                raise ParameterError(
+                    f"the outputs of {', '.join(each.name for each in waiting)} follow from each "
+                    f"other: {' and '.join(sorted(self.read_by(waiting[0]) & given.keys()))} "
+                    "closes the loop (an algebraic loop)",
+                    place=f"system {self.system.name!r}",
+                    advice="put a further state between them, or give one of them a period",
+                )
+            found += ready[:1]
+            waiting.remove(ready[0])
+        return tuple(found)
+
+    def read_by(self, bank: Bank) -> frozenset[str]:
+        """Return what the outputs of a machine are computed from, but for its own."""
+        if bank.periodic:  # what it gives out is held
+            return frozenset()
+        trees = [
+            *(each for each in bank.outputs.values() if each is not None),
+            *bank.totals.values(),
+        ]
+        names = self.closure(name for tree in trees for name in names_in(tree))
+        rates = [tree for (_, name), tree in bank.flows.items() if bank.rate(name) in names]
+        names |= self.closure(name for tree in rates for name in names_in(tree))
+        return names - {*bank.forces, *bank.rates}
+
+    def is_deferred(self, bank: Bank) -> bool:
+        """Return whether rates of a machine, on which no output depends, read outputs."""
+        if bank.periodic:
+            return False
+        names = self.closure(name for tree in bank.flows.values() for name in names_in(tree))
+        return bool(names & self.late - self.read_by(bank))
+
+    @cached_property
     def free(self) -> tuple[Body, ...]:
         """The bodies that are not driven."""
         return tuple(body for body in self.system.bodies if not body.driven)
@@ -221,6 +269,12 @@ class Assembly:
             return 0
         periodic = [each.index for each in self.banks if each.contact.period is not None]
         return 1 << (len(self.system.sampled) + periodic.index(bank.index))
+
+    @property
+    def events_bit(self) -> int:
+        """The bit, among all that ticks, with which events are forgotten; 0 if there are none."""
+        periodic = sum(each.periodic for each in self.banks)
+        return 1 << (len(self.system.sampled) + periodic) if self.system.events else 0
 
     def bank_of(self, tree: Value | Condition) -> int | None:
         """Return the bank whose elements have one value of a tree each; None if there is one."""
@@ -261,11 +315,14 @@ class SystemReader:
         self.system, self.here = system, Part(f"system {system.name!r}")
         self.definitions: list[Definition] = []
         self.shared, self.own = numbers_of(system)
+        self.seen: list[str] = []  # what texts can name of machines
+        self.aliases: dict[str, Value] = {}  # of the relative velocities that are those of a body
 
     def value(self, text: str | float, names: Iterable[str], owner: Part) -> Value:
         """Return the tree of a text that may read some names."""
         try:
-            return parse_value(text if isinstance(text, str) else repr(float(text)), names)
+            tree = parse_value(text if isinstance(text, str) else repr(float(text)), names)
+            return renamed(tree, self.aliases) if self.aliases else tree
         except ExpressionError as error:
             raise error.at(owner) from None
 
@@ -281,13 +338,14 @@ class SystemReader:
                 formula = signal.tree if isinstance(signal, Formula) else None
                 self.definitions.append(Definition(name, formula, signal=signal))
         given = ["t", *system.signals, *numbers]
+        self.see_machines()
         forces, inertias = {}, {}
         for i, body in enumerate(system.bodies):
             owner = self.here.of(f"body {body.name!r}", "bodies", i)
             if body.velocity is None:
                 assert body.inertia is not None
-                forces[body.name] = self.value(body.force, system.names, owner.of("force", "force"))
-                tree = self.value(body.inertia, system.names, owner.of("inertia", "inertia"))
+                forces[body.name] = self.value(body.force, self.names, owner.of("force", "force"))
+                tree = self.value(body.inertia, self.names, owner.of("inertia", "inertia"))
                 inertias[body.name] = tree
             elif not (body.velocity == body.v and body.v in system.signals):
                 tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
@@ -296,7 +354,7 @@ class SystemReader:
             if name in forces:
                 forces[name] = added(forces[name], sign, term)
         flow = {
-            name: self.value(text, system.names, self.here.of(f"flow of {name!r}", "flow", name))
+            name: self.value(text, self.names, self.here.of(f"flow of {name!r}", "flow", name))
             for name, text in system.flow.items()
         }
         updates = {}
@@ -306,18 +364,23 @@ class SystemReader:
             updates[each.name] = {
                 name: renamed(
                     self.value(
-                        text, [*system.names, "period"], owner.of(repr(name), "updates", name)
+                        text, [*self.names, "period"], owner.of(repr(name), "updates", name)
                     ),
                     own,
                 )
                 for name, text in each.updates.items()
             }
-        banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
+        banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.machines))
         self.check_inertias(inertias)
         self.check_locks(banks)
-        return Assembly(
+        trees = [each.tree for each in self.definitions if each.tree is not None]
+        trees += [*forces.values(), *flow.values()]
+        trees += [tree for each in updates.values() for tree in each.values()]
+        used = frozenset[str]().union(*map(names_in, trees))
+        used |= {name for bank in banks for tree in bank.means.values() for name in names_in(tree)}
+        read = Assembly(
             system,
-            tuple(self.definitions),
+            _ordered(each for each in self.definitions if each.counts is None or each.name in used),
             banks,
             forces,
             inertias,
@@ -326,6 +389,30 @@ class SystemReader:
             self.shared,
             self.own,
         )
+        _ = read.order  # refuses loops
+        return read
+
+    def see_machines(self) -> None:
+        """Define what a text can see of other machines: how many are in a state, and values."""
+        moved = {body.v: body for body in self.system.bodies}
+        for index, machine in enumerate(self.system.machines):
+            for state in machine.chart.states:
+                for word in ("count", "is_in") if machine.n == 1 else ("count",):
+                    name = f"{word}({machine.name}.{state.name})"
+                    self.definitions.append(Definition(name, None, counts=(index, state.name)))
+                    self.seen.append(name)
+            chart, owned = machine.chart, machine.name
+            if machine.n == 1:
+                self.seen += [of(owned, name) for name in chart.variables]
+            self.seen += [of(owned, name) for name in (*chart.velocities, *chart.force_names)]
+            for text, name in zip(machine.v, chart.velocities, strict=True):
+                if text in moved:
+                    self.aliases[of(owned, name)] = Name(text)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names that a text of the system can use, with what it sees of machines."""
+        return (*self.system.names, *(name for name in self.seen if name not in self.system.names))
 
     def bank(self, index: int, contact: Contact) -> Bank:
         """Return a contact with the texts of its chart read."""
@@ -337,7 +424,7 @@ class SystemReader:
         own_names: dict[str, str] = {}  # of what an action can set
         # Velocities and the position, those of a body where they are just that.
         jacobian, moved = [], {body.v: body for body in self.system.bodies}
-        velocities = []
+        velocities, at = [], ""
         for text, name in zip(contact.v, chart.velocities, strict=True):
             tree = self.value(text, [*moved, *self.system.numbers], owner.of("v", "v"))
             row = self.coefficients(tree, moved, text, owner)
@@ -350,7 +437,7 @@ class SystemReader:
                 if "x" in contact.inputs:
                     where = self.text_of_input(contact, "x", owner)
                 position = self.defined(of(c, "x"), where)
-                names["x"] = position
+                names["x"], at = position, position.id
         for name in chart.inputs:
             if name not in names and not (name == "s" and model is not None):
                 names[name] = self.input(contact, name, owner)
@@ -364,6 +451,10 @@ class SystemReader:
         rates = [of(c, f"rate {name}" if name in names else name) for name in chart.rate_names]
         for name in (*chart.force_names, *chart.rate_names):
             names.setdefault(name, Name(of(c, name)))
+
+        for event in chart.events:
+            own_names[event] = event
+            names[event] = Name(event)
 
         def steps(*keys: tuple[str, str]) -> tuple[tuple[str, Value], ...]:
             return tuple(
@@ -388,7 +479,7 @@ class SystemReader:
             velocities=tuple(velocities),
             forces=tuple(of(c, name) for name in chart.force_names),
             rates=tuple(rates),
-            position=position.id,
+            position=at,
             threshold=threshold,
             jacobian=tuple(jacobian),
             flows={
@@ -502,7 +593,7 @@ class SystemReader:
 
     def input(self, contact: Contact, name: str, owner: Part) -> Value:
         """Bind an input of a chart."""
-        if name not in contact.inputs and name not in self.system.names:
+        if name not in contact.inputs and name not in self.names:
             raise ParameterError(
                 f"its chart reads the input {name!r}, which is not bound",
                 place=owner.words,
@@ -515,7 +606,7 @@ class SystemReader:
     def text_of_input(self, contact: Contact, name: str, owner: Part) -> Value:
         """Read what an input is."""
         text = contact.inputs.get(name, name)
-        return self.value(text, self.system.names, owner.of(f"input {name!r}", "inputs", name))
+        return self.value(text, self.names, owner.of(f"input {name!r}", "inputs", name))
 
     def curve(self, contact: Contact, index: int, names: dict[str, Value], owner: Part) -> str:
         """Define the Stribeck curve of a model and the thresholds; return their name."""
@@ -551,6 +642,18 @@ class SystemReader:
                 Definition(of(c, name), renamed(tree, names), index if per_element else None)
             )
             names[name] = Name(of(c, name))
+
+
+def _ordered(definitions: Iterable[Definition]) -> tuple[Definition, ...]:
+    """Return definitions, each after those that it names; others keep their order."""
+    waiting, found = [*definitions], list[Definition]()
+    while waiting:
+        left = {each.name for each in waiting}
+        ready = (each for each in waiting if each.tree is None or not names_in(each.tree) & left)
+        each = next(ready, waiting[0])  # a loop is refused later
+        found.append(each)
+        waiting.remove(each)
+    return tuple(found)
 
 
 def _rank(banks: Iterable[Bank], free: list[str], numbers: Mapping[str, float]) -> int:
