@@ -53,7 +53,7 @@ def test_traffic_lights_see_each_other_and_events_are_counted_at_the_same_instan
     trace = crossing().run()
     assert times(trace.supervisor("main"), "go") == pytest.approx([30.0, 90.0, 150.0])
     assert times(trace.supervisor("side"), "halt") == pytest.approx([30.0, 90.0, 150.0])
-    assert times(trace.supervisor("side"), "go") == pytest.approx([2.0, 62.0, 122.0, 182.0])
+    assert times(trace.supervisor("side"), "go") == pytest.approx([2.0, 60.0, 120.0, 180.0])
     assert times(trace.supervisor("cycles"), "count_one") == pytest.approx([60.0, 120.0, 180.0])
     assert trace.value("cycles.n")[-1] == 3.0
 
