@@ -181,6 +181,7 @@ QUANTITIES: Mapping[str, Parameter] = {
         Parameter("s", "m", "> 0", meaning="threshold: weight times Stribeck curve"),
         Parameter("z", "m", meaning="deflection"),
         Parameter("F", "N", meaning="friction force"),
+        Parameter("N", "N", meaning="normal force"),
     )
 }
 # What a model takes in addition to its chart's parameters.

@@ -47,9 +47,8 @@ def _body_lines(view: Screen) -> Iterator[str]:
     """Yield the bodies and the further values of a system."""
     wide = max((len(body.name) for body in view.bodies), default=0)
     for body in view.bodies:
-        (x, position), (v, velocity) = body.x, body.v
         given = "  (given)" if body.driven else ""
-        yield f"{body.name:<{wide}}  {x} = {position:.6g}, {v} = {velocity:.6g}{given}"
+        yield f"{body.name:<{wide}}  {body.text()}{given}"
     for each in view.values:
         tick = "" if each.tick is None else f"; next tick at t = {each.tick:.9g} s"
         yield f"{each.title}: {named_numbers(each.values)}{tick}"

@@ -5,7 +5,7 @@ and texts of known parts of that SVG, so hundreds of frames take seconds.
 
 The active state has a thick border and a dot. Only the edges that leave it have marks: their
 clauses carry ✓ or ✗. The edge that the element has just taken is thick and orange; on the row of
-that firing it carries the marks with which it was taken. Everything else is pale.
+that firing it carries the marks with which it was taken. Everything else is grey.
 """
 
 from __future__ import annotations
@@ -471,7 +471,7 @@ class ElementParts:
     ) -> None:
         """Paint an edge, given its name and source."""
         guard, texts, line = self.edges[key]
-        colour = fired or (self.colours.ink if leaving else self.colours.pale)
+        colour = fired or (self.colours.ink if leaving else self.colours.line)
         classes = ["leaving" if leaving else "pale"] + ["fired"] * bool(fired)
         _classify(line, "edge", classes)
         for shape in _shapes(line):
@@ -480,9 +480,9 @@ class ElementParts:
             if shape.get("fill") != "none":
                 shape.set("fill", colour)
         _classify(guard, "node guard", classes)
-        plain = self.colours.pale if classes == ["pale"] else self.colours.ink
+        plain = self.colours.soft if classes == ["pale"] else self.colours.ink
         for piece, node in texts:
-            self._paint_text(piece, node, marks, plain, colour)
+            self._paint_text(piece, node, marks, plain, fired or plain)
 
     def write_count(self, state: str, count: str) -> None:
         """Write how many elements are in a state (`ChartSheet.among`)."""

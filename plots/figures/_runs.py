@@ -103,8 +103,11 @@ def overview(
         if count > MANY:
             panels.slipping(time[2], part, window=window, elements=elements)
         panels.ribbons(time[-1], part, window=window, elements=elements)
-        panels.hysteresis(loop, trace, window=window)
-        panels.portrait(portrait, part, elements=elements)
+        alone = measured is None  # else ink is the model, grey the measurement
+        panels.hysteresis(loop, trace, window=window, elements=elements, slipping=alone)
+        (lines,) = panels.portrait(portrait, part, elements=elements, bar=False)
+        assert isinstance(lines, LineCollection)
+        panels.slip_bar(lines, trace, [loop, portrait] if alone else portrait)
         if measured is not None:
             _add_measured(time[1], loop, measured, trace, window)
         if trace.model.chart.transitions:
@@ -262,7 +265,7 @@ def _ribbon_axes(
         )
         pair = list(figure.add_subfigure(halves[1, 0]).subplots(1, 2))
         return figure, axes[:rows], axes[rows:], pair
-    figure = sheet(13.2 if zoom else 9.6, sum(tall) + 2.2)
+    figure = sheet(11.6 if zoom else 9.6, sum(tall) + 2.2)
     beside = not (zoom and low())
     widths = (2.1 if zoom else 1.3, 1)[: 1 + beside]
     halves = figure.add_gridspec(1, len(widths), width_ratios=widths)
@@ -353,8 +356,8 @@ def _zoom_names(zoom: Window, margin: str) -> list[str]:
     middle, width = (zoom[0] + zoom[1]) / 2, zoom[1] - zoom[0]
     factor, unit = scaled(np.array([width]), "s")
     return [
-        f"velocity, {factor * width:.3g} {unit} at t = {middle:.5g} s",
+        f"velocity, {factor * width:.3g} {unit} at $t$ = {middle:.5g} s",
         margin,
-        "jumps of F (open: before, filled: after)",
+        "jumps of $F$ (open before, filled after)",
         "order of slipping",
     ]

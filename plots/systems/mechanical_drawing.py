@@ -32,6 +32,7 @@ from plots.systems.mechanical_symbols import (
     UNIT,
     Pen,
     damper_points,
+    formula,
     spring_points,
     width,
 )
@@ -327,7 +328,7 @@ def _sources(system: System) -> list[str]:
             every = (
                 f"{1e3 * sampled.period:g} ms" if sampled.period < 1 else f"{sampled.period:g} s"
             )
-            lines.append(f"{', '.join(own)}: from {sampled.name}, every {every}")
+            lines.append(f"{', '.join(map(formula, own))}: from {sampled.name}, every {every}")
     for name, text in flows.items():
         lines += _folded(f"d{name}/dt = {text}")
     return lines

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from itertools import permutations
 
 from gms_fsm.charts.registry import charts
+from gms_fsm.foundation.quantities import JOINED
 from gms_fsm.language import (
     MATLAB_LIKE,
     Negative,
@@ -255,7 +256,8 @@ def label_of(touch: Touch) -> list[str]:
     """Return the lines under the symbol of a contact."""
     contact = touch.contact
     count = f" × {contact.n}" if contact.n > 1 else ""
-    lines = _wrapped(f"{printable(contact.chart.name)}{count}")
+    name = printable(contact.chart.name).replace(" law", f"{JOINED}law")
+    lines = _wrapped(f"{name}{count.replace(' ', JOINED)}")
     if _of_many(touch):
         lines += [formula(v) for v in contact.v]
     for name in SHOWN.get(touch.symbol, ()):
@@ -276,7 +278,8 @@ def _number(touch: Touch, name: str) -> str:
 
 
 def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, NARROW, break_long_words=False)
+    lines = textwrap.wrap(text, NARROW, break_long_words=False)
+    return [line.replace(JOINED, " ") for line in lines]
 
 
 def force_of(system: System, body: Body) -> Value:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -228,3 +229,14 @@ def scaled(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
     finite = np.abs(values[np.isfinite(values)])
     scale = scale_of(float(finite.max(initial=0.0)), unit)
     return scale.factor, scale.unit
+
+
+def dotted(unit: str) -> str:
+    """Return a unit with dots in its products, or a text that ends with it.
+
+    Examples
+    --------
+    >>> dotted("300 mNs/m"), dotted("Nm/rad")
+    ('300 mN·s/m', 'N·m/rad')
+    """
+    return re.sub(r"N(?=[sm])", "N·", unit)
