@@ -28,6 +28,7 @@ from gms_fsm.systems.models import Model, check_bank, is_model, with_values
 
 Motion = Literal["along", "normal", "turning"]  # the first is the default
 LOAD = "N"  # the input of a contact that multiplies its Stribeck curve
+COUNTS = ("is_in", "count")  # of the elements in a state; the first where there is one element
 LEAST_LOAD = 1e-9  # N; charts divide by thresholds
 
 

@@ -39,7 +39,16 @@ from gms_fsm.systems.given import (
     texts_of,
 )
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.parts import LEAST_LOAD, LOAD, Body, Contact, Sampled, Supervisor, loaded
+from gms_fsm.systems.parts import (
+    COUNTS,
+    LEAST_LOAD,
+    LOAD,
+    Body,
+    Contact,
+    Sampled,
+    Supervisor,
+    loaded,
+)
 from gms_fsm.systems.reading.texts import texts_of_system
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
@@ -312,6 +321,21 @@ class System:
         )
         every = ("t", *moved, *self.flow, *updated, *self.signals, *self.numbers, *given)
         return tuple(dict.fromkeys(every))
+
+    @property
+    def readable(self) -> tuple[str, ...]:
+        """All names that its texts can read: its own, and what they see of machines.
+
+        That is ``is_in(pad.stuck)`` and ``count(pad.slip)``, and by ``pad.z`` the variables of
+        single elements, the velocities and the forces.
+        """
+        found = [*self.names]
+        for each in self.machines:
+            chart, one = each.chart, each.n == 1
+            found += [f"{w}({each.name}.{s.name})" for w in COUNTS[not one :] for s in chart.states]
+            own = (*chart.variables[: len(chart.variables) * one], *chart.velocities)
+            found += [f"{each.name}.{name}" for name in (*own, *chart.force_names)]
+        return tuple(dict.fromkeys(found))
 
     @property
     def events(self) -> tuple[str, ...]:

@@ -59,7 +59,13 @@ def check_trace(trace: object) -> None:
         raise ParameterError(
             "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
         )
-    _ = trace.model.chart  # a system with several contacts refuses, and says to choose one
+    if not trace.model.chart.velocities:  # a system with several contacts refuses here
+        raise ParameterError(
+            "a supervisor has no velocity and no force to draw",
+            place="trace",
+            value=trace,
+            advice="its states are in .states, its chart is drawn by plots.statechart",
+        )
 
 
 @displayed("png", "html")

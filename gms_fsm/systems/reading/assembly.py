@@ -32,7 +32,7 @@ from gms_fsm.language import (
 )
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.systems.given import derivative_free, is_positive
-from gms_fsm.systems.parts import LEAST_LOAD, LOAD, Body, Contact
+from gms_fsm.systems.parts import COUNTS, LEAST_LOAD, LOAD, Body, Contact
 from gms_fsm.systems.reading.definitions import ContactEdge, Definition
 from gms_fsm.systems.reading.values import numbers_of, of
 from gms_fsm.systems.signals import Formula
@@ -315,7 +315,6 @@ class SystemReader:
         self.system, self.here = system, Part(f"system {system.name!r}")
         self.definitions: list[Definition] = []
         self.shared, self.own = numbers_of(system)
-        self.seen: list[str] = []  # what texts can name of machines
         self.aliases: dict[str, Value] = {}  # of the relative velocities that are those of a body
 
     def value(self, text: str | float, names: Iterable[str], owner: Part) -> Value:
@@ -393,26 +392,21 @@ class SystemReader:
         return read
 
     def see_machines(self) -> None:
-        """Define what a text can see of other machines: how many are in a state, and values."""
-        moved = {body.v: body for body in self.system.bodies}
+        """Define how many elements are in a state, and what the velocities of contacts are."""
+        moved = {body.v for body in self.system.bodies}
         for index, machine in enumerate(self.system.machines):
             for state in machine.chart.states:
-                for word in ("count", "is_in") if machine.n == 1 else ("count",):
+                for word in COUNTS:
                     name = f"{word}({machine.name}.{state.name})"
                     self.definitions.append(Definition(name, None, counts=(index, state.name)))
-                    self.seen.append(name)
-            chart, owned = machine.chart, machine.name
-            if machine.n == 1:
-                self.seen += [of(owned, name) for name in chart.variables]
-            self.seen += [of(owned, name) for name in (*chart.velocities, *chart.force_names)]
-            for text, name in zip(machine.v, chart.velocities, strict=True):
+            for text, name in zip(machine.v, machine.chart.velocities, strict=True):
                 if text in moved:
-                    self.aliases[of(owned, name)] = Name(text)
+                    self.aliases[of(machine.name, name)] = Name(text)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names that a text of the system can use, with what it sees of machines."""
-        return (*self.system.names, *(name for name in self.seen if name not in self.system.names))
+        """All names that a text of the system can use."""
+        return self.system.readable
 
     def bank(self, index: int, contact: Contact) -> Bank:
         """Return a contact with the texts of its chart read."""
