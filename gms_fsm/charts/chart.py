@@ -18,6 +18,7 @@ from gms_fsm.charts.parameters import QUANTITIES, Parameter
 from gms_fsm.charts.parts import (
     State,
     Transition,
+    check_size,
     event_name,
     parameter_of,
     places_of,
@@ -26,8 +27,9 @@ from gms_fsm.charts.parts import (
 )
 from gms_fsm.charts.reader import ChartReader
 from gms_fsm.errors import ChartError, cut, shown
-from gms_fsm.foundation.arguments import checked_kind, checked_path
+from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing
 from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, Condition, Value, spell
 
 if TYPE_CHECKING:
@@ -44,8 +46,10 @@ RESERVED = frozenset(
 )
 
 
+@refusing(ChartError, instead={"edges": "transitions"})
 @displayed("svg", "html")
-@dataclass(frozen=True, init=False)
+@by_value()
+@dataclass(frozen=True, init=False, eq=False)
 class Chart:
     """The state chart of one friction element, checked at construction.
 
@@ -190,13 +194,11 @@ class Chart:
                     raise ChartError(
                         f"{each} has {shown(given)}", place=here, advice=f"write it as {example}"
                     )
-        if not self.states:
-            raise ChartError("it has no states", place=here, advice="give at least one")
-        derivatives = ["d" + variable for variable in self.variables]
+        check_size(len(self.states), sum(len(each.sources) for each in self.transitions), here)
         groups = (
             ("input", "inputs", dict.fromkeys([*self.inputs, *self.velocities])),
             ("variable", "variables", self.variables),
-            ("derivative", "variables", derivatives),
+            ("derivative", "variables", ["d" + variable for variable in self.variables]),
             ("parameter", "parameters", self.parameter_names),
             ("let", "let", self.let),
             ("state", "states", [s.name for s in self.states]),
@@ -333,6 +335,28 @@ class Chart:
 
         return load(checked_path("path", path), cls)
 
+    def save(self, path: str | Path) -> Path:
+        """Write the chart to a TOML file, from which `load` returns an equal one.
+
+        Parameters
+        ----------
+        path : str or Path
+            File name ending in ``.toml``.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written, has another ending, or exists and is not as gms-fsm wrote it.
+        """
+        from gms_fsm.charts.files.tables import save
+
+        return save(self, checked_path("path", path))
+
     # ------------------------------------------------------------------ from other programs
     @classmethod
     def from_transitions(cls, machine: Any, **texts: Unpack[GivenTexts]) -> Chart:
@@ -406,9 +430,8 @@ class Chart:
         Raises
         ------
         ChartError, ExpressionError
-            If the document cannot be read, or has something without counterpart in a chart, which
-            is named, such as a parallel or nested state, a history, a script; or if a text is
-            wrong.
+            If it cannot be read, or has something without counterpart in a chart, which is named,
+            such as a parallel or nested state, a history, a script; or if a text is wrong.
 
         Examples
         --------
@@ -423,29 +446,6 @@ class Chart:
         from gms_fsm.charts.files import from_scxml
 
         return from_scxml.load(cls, checked_path("path", path), texts)
-
-    # ------------------------------------------------------------------ files
-    def save(self, path: str | Path) -> Path:
-        """Write the chart to a TOML file, from which `load` returns an equal one.
-
-        Parameters
-        ----------
-        path : str or Path
-            File name ending in ``.toml``.
-
-        Returns
-        -------
-        Path
-            The file written.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written, has another ending, or exists and is not as gms-fsm wrote it.
-        """
-        from gms_fsm.charts.files.tables import save
-
-        return save(self, checked_path("path", path))
 
     def placed(self, layout: Mapping[str, Sequence[float]]) -> Chart:
         """Return the same chart with another layout; `plots.layout` has one to begin with.

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import ChartError, GMSError, ParameterError, shown
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.arguments import refusing, unknown
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -88,6 +88,7 @@ def _bound(text: str, rule: str) -> Bound:
     return Bound(op, number, f"{op} {limit}")
 
 
+@refusing(ChartError)
 @dataclass(frozen=True)
 class Parameter:
     """A number that a chart or a model takes: its name, unit and rule.

@@ -3,17 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from math import isfinite, nan
 from typing import Any
 
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ChartError, shown
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.arguments import refusing, unknown
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import EVENT
 
+MOST_PARTS = 5_000  # states and edges of a chart; more would take minutes to read and to compile
+NO_GUARD = "an event alone"  # what stands for a guard that is left out
 
-@dataclass(frozen=True)
+
+def check_size(states: int, edges: int, place: str) -> None:
+    """Refuse a chart without states, and one that is too large, before anything else of it."""
+    if not states:
+        raise ChartError("it has no states", place=place, advice="give at least one")
+    if states + edges > MOST_PARTS:
+        raise ChartError(
+            f"it has {states:,} states and {edges:,} edges",
+            place=place,
+            advice=f"a chart can have {MOST_PARTS:,} of both together",
+        )
+
+
+@refusing(
+    ChartError,
+    "states do not nest, so write one state for each combination",
+    instead={"during": "flow", "on_enter": "entry", "on_exit": "exit"},
+)
+@by_value()
+@dataclass(frozen=True, eq=False)
 class State:
     """One state of a machine: how its variables evolve, and what force it gives, while active.
 
@@ -48,17 +70,6 @@ class State:
     outputs: Mapping[str, str] = field(default_factory=dict)
     locked: bool = False
 
-    def __new__(cls, *parts: Any, **given: Any) -> State:
-        """Refuse unknown arguments with an error of this package."""
-        known = [each.name for each in fields(cls)]
-        for name in sorted(given.keys() - set(known)):
-            raise ChartError(
-                f"a State takes {', '.join(known[:-1])} and {known[-1]}, not {name!r}",
-                place=f"state {shown(given.get('name', parts[0] if parts else '?'))}",
-                advice="states do not nest, so write one state for each combination",
-            )
-        return object.__new__(cls)
-
     def __post_init__(self) -> None:
         here = f"state {shown(self.name)}"
         for each in ("flow", "entry", "exit", "outputs"):
@@ -68,7 +79,13 @@ class State:
             raise ChartError("it must be True or False", place=f"{here}: locked", value=self.locked)
 
 
-@dataclass(frozen=True, init=False)
+@refusing(
+    ChartError,
+    instead={"trigger": "name", "dest": "target", "conditions": "guard", "condition": "guard"},
+    guard="guard='True' for always",
+)
+@by_value()
+@dataclass(frozen=True, init=False, eq=False)
 class Transition:
     """One guarded edge between two states.
 
@@ -116,7 +133,7 @@ class Transition:
         name: str,
         source: str | Sequence[str],
         target: str,
-        guard: str = "",
+        guard: str = NO_GUARD,
         actions: Mapping[str, str] | None = None,
         *,
         event: str = "",
@@ -128,10 +145,9 @@ class Transition:
         for each in (*emitted, *[event][: bool(event)]):
             if not isinstance(each, str) or not each.isidentifier():
                 raise ChartError("it is not a name", place=f"{here}: event", value=each)
-        if guard == "" and event:
-            guard = "True"
-        elif guard == "":
+        if guard is NO_GUARD and not event:
             raise ChartError("it has no guard", place=here, advice="give one; 'True' is always")
+        guard = "True" if guard is NO_GUARD else guard
         if not isinstance(source, str) and not isinstance(source, Sequence):
             raise ChartError(
                 "it must be the name of a state, or several",

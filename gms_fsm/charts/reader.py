@@ -206,13 +206,14 @@ class ChartReader:
         except ExpressionError:
             return
         for name in sorted(names_in(tree) & {*self.late}):
-            raise ChartError(
-                f"it reads {name!r}, which follows from it (an algebraic loop)",
-                place=owner.words,
-                advice=f"guards and actions can read {', '.join(self.late)}; a flow or a force "
-                "that needs them needs a variable in between",
-                key=owner.key,
-            )
+            late = f"guards and actions can read {', '.join(self.late)}"
+            if owner.key[:1] == ("let",):
+                reason = f"it reads {name!r}, and flows and forces, which could read it, cannot"
+                advice = f"write it out where it is needed: {late}"
+            else:
+                reason = f"it reads {name!r}, which follows from it (an algebraic loop)"
+                advice = f"{late}; a flow or a force that needs them needs a variable in between"
+            raise ChartError(reason, place=owner.words, advice=advice, key=owner.key)
 
     def only(self, texts: Mapping[str, str], allowed: tuple[str, ...], owner: Part) -> None:
         """Refuse texts for anything but the allowed variables."""

@@ -56,8 +56,9 @@ COMMANDS = {
     "print": Command(
         "look",
         "print EXPRESSION",
-        "Print the value of an expression or the truth of a condition. Names: {names}.",
-        ("print {z}1 / {s}1", "print {lead}F1", "p {lead}state({n}) == {state}"),
+        "Print the value of an expression, in SI units or the unit given, or the truth of a "
+        "condition. Names: {names}.",
+        ("print {z}1 / {s}1", "print {lead}F in mN", "p {lead}state({n}) == {state}"),
         "p",
     ),
     "watch": Command(

@@ -17,6 +17,7 @@ from typing import NamedTuple
 from gms_fsm.errors import ExpressionError, shown
 from gms_fsm.foundation.arguments import nearest, some_of
 from gms_fsm.foundation.parser import PARSER
+from gms_fsm.foundation.quantities import in_si
 from gms_fsm.language.functions import CONSTANTS, FUNCTIONS, NAMESPACE, SEVERAL
 from gms_fsm.language.tree import (
     Binary,
@@ -78,6 +79,9 @@ _STATE = re.compile(r"\bstate\d*\s*(\(\s*\d+\s*\)\s*)?$")
 _WORDS = re.compile(r"\b(AND|OR|NOT)\b")
 _DECIMAL_COMMA = re.compile(r"(?<![\w.])(\d+),(\d+)")
 _NO_SIGN_BETWEEN = re.compile(r"[\w.)]\s+[\w(]|\)[\w(]|\d[^\W\d_eE]")  # 2 pi, 2pi, (a)(b)
+_AFTER = re.compile(  # as in Stateflow: after(2, sec)
+    r"\bafter\(\s*([\d.]+(?:[eE][+-]?\d+)?)\s*,?\s*([mnuµ]?s(?=ec|\W)|min)(?:ec)?\s*\)"
+)
 _QUANTITIES = {"time": "t", "position": "x", "velocity": "v", "force": "F"}  # of records, of runs
 _ALIASES: Mapping[str, str] = {
     "sign": "sgn",
@@ -224,6 +228,11 @@ def _parsed(text: str) -> ast.expr:
             foreign.start() + 1,
             f"{'==' if state else _INSTEAD[mark]} instead",
         )
+    if timed := _AFTER.search(text):
+        seconds = in_si(f"{timed[1]} {timed[2]}")
+        raise ExpressionError(
+            "after takes one time, in seconds", text, timed.start(2) + 1, f"after({seconds})"
+        )
     flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay correct
     lead = len(flat) - len(flat.lstrip())
     if lead == len(flat):
@@ -318,6 +327,12 @@ class _Reader:
                 )
             case ast.Call(func=ast.Name(id="is_in" | "count" as f), args=[ast.Attribute() as of]):
                 return self.name(node, f"{f}({ast.unparse(of)})")
+            case ast.Call(func=ast.Name(id="after")) if "age" in self.names:
+                raise self.refuse(
+                    "found a comparison where a number is needed",
+                    node,
+                    "age, the time in the present state",
+                )
             case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
                 self.known(node, function)
                 return self.call(node, function, arguments, depth)
@@ -457,6 +472,9 @@ class _Reader:
                 "age" in self.names
             ):
                 return Relation(">=", Name("age"), self.value(time, depth))
+            case ast.Call(func=ast.Name(id="after"), args=given) if "age" in self.names:
+                wanted = "one time in seconds, for example after(0.2)"
+                raise self.refuse(f"after got {len(given)} arguments", node, wanted)
             case ast.Name(id="state") | ast.Call(func=ast.Name(id="state")) if self.own.states:
                 raise self.refuse("a state is compared with a name", node, self.compared())
             case ast.Constant() | ast.Name() | ast.BinOp() | ast.UnaryOp() | ast.Call():

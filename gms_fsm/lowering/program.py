@@ -35,6 +35,7 @@ from typing import Any
 import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError, shown
+from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
 from gms_fsm.lowering.adapting import Adaptive, adaptive
 from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful, quickened
@@ -43,7 +44,6 @@ from gms_fsm.lowering.printing.plan import Pair, ProgramPlan, both_sides, plan_o
 from gms_fsm.lowering.printing.python import FUNCTIONS, python
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import mounted
-from gms_fsm.systems.reading.texts import ByIdentity
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (

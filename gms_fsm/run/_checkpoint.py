@@ -98,8 +98,9 @@ class Checkpointer:
 
     def save(self) -> None:
         """Write a checkpoint atomically."""
-        state = {f"loop_{name}": u for name, u in states.state_of(self.run.buffers).items()}
+        # First the rows, which come back into the columns that the state counts.
         kept = {f"kept_{name}": u for name, u in self.run.kept().items()}
+        state = {f"loop_{name}": u for name, u in states.state_of(self.run.buffers).items()}
         head: dict[str, Any] = {"format": _FORMAT, "program": _program(), "identity": self.identity}
         write_whole(self.path, lambda file: np.savez(file, **head, **state, **kept))
 

@@ -8,7 +8,7 @@ that callbacks registered by a user (``on_enter_slip``, ``after`` ...) run once 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from transitions import Machine, MachineError
 
@@ -31,8 +31,9 @@ class Element:
     Callbacks can read: ``t`` [s], ``x`` [m], ``v`` [m/s], the threshold ``s``, each variable
     (``z`` [m]) and each parameter (``k``, ``sigma``, ``C``, ``v_c``) of the chart, the current
     ``state`` and the element's ``index`` counted from 0. Parameters are read-only: the run is
-    integrated with those of the model. Derive from it to give elements methods that `transitions`
-    calls by name, for example ``on_enter_slip(self, event)``.
+    integrated with those of the model. Values of the run cannot be set while it goes on; before it
+    they can, for ``element.may_break_away_forward()``. Derive from it to give elements methods that
+    `transitions` calls by name, for example ``on_enter_slip(self, event)``.
     """
 
     # No __slots__ and no generated __eq__: transitions fails with the former, and registers models
@@ -43,9 +44,17 @@ class Element:
     x: float
     v: float
     s: float
-    _fixed: frozenset[str] = frozenset()
+    _fixed: frozenset[str] = frozenset()  # parameters
+    _live: frozenset[str] = frozenset()  # what a run shows
+    _firing: Sequence[bool] = (False,)  # whether a machine of the run fires
 
     def __setattr__(self, name: str, value: Any) -> None:
+        if self._firing[0] and name in self._live:
+            raise Interference(
+                f"a callback set {name} of element {self.index + 1} to {shown(value)}; {ONLY_LOOK}",
+                advice="write the assignment into the chart: actions of the edge, or entry or exit "
+                "of a state",
+            )
         if name in self._fixed:
             raise ParameterError(
                 f"{name} is set to {shown(value)}, but parameters of an element are "
@@ -56,17 +65,37 @@ class Element:
             )
         object.__setattr__(self, name, value)
 
+    if not TYPE_CHECKING:  # which knows all attributes there are
+
+        def __getattr__(self, name):
+            """Say what to do where a value is read before a run shows it."""
+            if name not in self._live:
+                raise AttributeError(
+                    f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self
+                )
+            raise AttributeError(
+                f"element {self.index + 1} has no {name!r} before a run: run first, with "
+                "simulate(..., engine=machines), or set what guards and callbacks read: "
+                f"element.{name} = ...",
+                name=name,
+                obj=self,
+            )
+
 
 class Guard:
     """A guard as a condition of `transitions`: called with an event, or evaluated directly."""
 
     def __init__(self, edge: str, condition: Condition) -> None:
+        self.edge, self.condition = edge, condition
         names = {name: f"element.{name}" for name in names_in(condition)}
         self.text = spell(condition, PYTHON)
         source = f"def holds(element):\n    return {spell(condition, PYTHON, names)}\n"
         self.holds: Callable[[Element], bool] = ieee(
             load(f"guard {edge}", source)["holds"], load_careful(f"guard {edge}", source)["holds"]
         )
+
+    def __reduce__(self) -> tuple[type[Guard], tuple[str, Condition]]:
+        return Guard, (self.edge, self.condition)  # its function is generated
 
     def __call__(self, event: Any) -> bool:
         return self.holds(event.model)
@@ -206,6 +235,10 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
     values["index"] = index
     values |= parameter_values(model, index)
     values["_fixed"] = frozenset(model.values) | {"index"}
+    chart = model.chart
+    read = frozenset().union(*map(names_in, chart.guards.values()))
+    live = read.union(["t", "x"], chart.inputs, chart.velocities, chart.variables)
+    values["_live"] = live - {*values["_fixed"]}
     return element
 
 
@@ -213,10 +246,15 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
 class Interference(Exception):
     """A callback changed something it may only read; the run turns this into a user's error."""
 
-    def __init__(self, reason: str, place: str, t: float) -> None:
+    def __init__(
+        self,
+        reason: str,
+        place: str = "",
+        t: float = 0.0,
+        advice: str = "write the switch into the chart, as an edge with a guard",
+    ) -> None:
         super().__init__(reason)
-        self.reason, self.place, self.t = reason, place, t
-        self.advice = "write the switch into the chart, as an edge with a guard"
+        self.reason, self.place, self.t, self.advice = reason, place, t, advice
 
 
 class MachineEngine:
@@ -247,6 +285,9 @@ class MachineEngine:
         # Bypasses __setattr__ of the elements, which would cost time.
         self.seen_by = [vars(element) for element in self.elements]
         self.states = [""] * len(self.elements)
+        self.firing = [False]
+        for values in self.seen_by:
+            values["_firing"] = self.firing
         self.tick, self.jolts = program.ieee["tick"], program.ieee["jolts"]
         self.arrests = {
             bank.first_edge + number
@@ -316,12 +357,17 @@ class MachineEngine:
         place = f"{self.called(machine)}, edge {row.name!r}"
         # The trigger evaluates the guard once more; assignments follow, as in Stateflow, where the
         # whole set is selected before any of them.
+        self.firing[0] = True
         try:
             fired = getattr(self.elements[machine], row.name)()
+        except Interference as error:
+            raise Interference(error.reason, place, t, error.advice) from None
         except MachineError as error:
             raise Interference(
                 f"a callback changed a state ({error.value}); {ONLY_LOOK}", place, t
             ) from error
+        finally:
+            self.firing[0] = False
         if not fired:
             raise Interference(
                 "the edge was enabled, but a callback changed the element's values before "

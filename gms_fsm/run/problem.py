@@ -15,6 +15,7 @@ from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.foundation.arguments import there_are, unknown
+from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.lowering.floor import floor_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.log_columns import LogRecord
@@ -33,6 +34,7 @@ from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import LoopOptions
 
+IMPLICIT = ("Radau", "BDF", "LSODA")  # methods of SciPy for stiff runs
 STEPS_A_TICK = 4  # after each tick the steps begin anew
 LATEST = 1e9  # s; one tick of a double is then 1e-7 s
 
@@ -93,7 +95,7 @@ class Problem:
     def before_entry(self) -> tuple[list[float], list[int]]:
         """Return the state vector before any entry, and 1 for what the initial values give."""
         layout = self.program.layout
-        y, _, given = _given(self.system, layout, self.initial)
+        y, _, given = _given(self.what, layout, self.initial)
         return y, [int(name in given) for name, _ in layout.y]
 
     def chosen_tolerances(self) -> list[float]:
@@ -128,7 +130,9 @@ class Problem:
 
     @property
     def implicit(self) -> str:
-        """An implicit method and the tolerances that it needs, as one writes them."""
+        """An implicit method and the tolerances it needs, as one writes them; "" if one is used."""
+        if self.chosen.method_name in IMPLICIT:
+            return ""
         missing = _without_scale(self.program.layout, self.options.atol)
         return f"method=scipy.integrate.Radau{f', atol={missing}' if missing else ''}"
 
@@ -194,7 +198,7 @@ class Problem:
             most = chosen.max_steps + STEPS_A_TICK * len(program.ticks)
             options = replace(options, max_steps=most)
         initial = {} if initial is None else initial
-        y, mode = _initial(system, program, t_start, initial)
+        y, mode = _initial(what, program, t_start, initial)
         floor = floor_of(program, tolerances, (t_start, last), y, mode)
         options = replace(options, floor=floor)
         return cls(
@@ -217,7 +221,7 @@ class Problem:
         scales = scales_of_system(program)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
-        y, _ = _initial(what.system, program, self.t_start, self.initial)
+        y, _ = _initial(what, program, self.t_start, self.initial)
         span = self.t_start, self.last
         floor = floor_of(program, tolerances, span, y, self.mode)
         return replace(
@@ -362,22 +366,23 @@ def _covered(system: System, t_start: float, t_end: float) -> float:
 
 
 def _initial(
-    system: System, program: Program, t_start: float, initial: Mapping[str, Any]
+    what: Mounted, program: Program, t_start: float, initial: Mapping[str, Any]
 ) -> tuple[list[float], list[int]]:
     """Build the state vector and the modes."""
-    layout = program.layout
-    if initial == {} and _is_plain(system.shape):
+    system, layout = what.system, program.layout
+    if initial == {} and _is_plain(ByIdentity(system.shape)):
         return [0.0] * layout.y.size, [0] * layout.n
-    y, mode, given = _given(system, layout, initial)
+    y, mode, given = _given(what, layout, initial)
     y = _entered(system, program, t_start, y, mode, given)
     _check_locks(system, program, t_start, y, mode)
     return y, mode
 
 
 def _given(
-    system: System, layout: SystemLayout, initial: Mapping[str, Any]
+    what: Mounted, layout: SystemLayout, initial: Mapping[str, Any]
 ) -> tuple[list[float], list[int], set[str]]:
     """Return the state vector and the modes before any entry, and what has been given."""
+    system = what.system
     if not isinstance(initial, Mapping):
         raise ParameterError(
             "it must be a mapping, for example {'x': 0}", place="initial", value=initial
@@ -393,7 +398,7 @@ def _given(
         elif key in layout.keys:
             given[layout.keys[key]] = value
         else:
-            reason, advice = _unknown_initial(system, layout, key, value)
+            reason, advice = _unknown_initial(what, layout, key, value)
             raise ParameterError(reason, advice=advice)
     y: dict[str, Any] = dict.fromkeys(layout.y.shared, 0.0)
     for each in system.sampled:
@@ -433,8 +438,9 @@ def _given(
 
 
 @functools.lru_cache(maxsize=64)
-def _is_plain(shape: System) -> bool:
+def _is_plain(key: ByIdentity[System]) -> bool:
     """Return whether systems of a shape start with 0 everywhere unless something else is given."""
+    shape = key.it
     locked = any(contact.chart.default_state.locked for contact in shape.machines)
     return not (shape.sampled or locked or _enters(shape))
 
@@ -511,10 +517,10 @@ def _entered(
 
 
 def _unknown_initial(
-    system: System, layout: SystemLayout, key: object, value: object
+    what: Mounted, layout: SystemLayout, key: object, value: object
 ) -> tuple[str, str]:
     """Say what is wrong with a key of the initial values, and what to do."""
-    for body in system.bodies:
+    for body in what.system.bodies:
         if body.driven and key in (body.v, f"{body.name}.v"):
             whose = (
                 "the rig prescribes the velocity"
@@ -523,8 +529,7 @@ def _unknown_initial(
             )
             return f"initial has {key!r} = {shown(value)}, but {whose}", "leave it out"
     known = [layout.label(name) for name in (*layout.y.shared, *layout.y.own)]
-    states = ["states"] if len(layout.banks) == 1 else [f"{b.name}.states" for b in layout.banks]
-    return (
-        f"initial has the key {shown(key)}",
-        there_are(key, [*known, *states]),
-    )
+    known += ["states"] * (len(layout.banks) == 1)
+    if what.named:
+        known += [*layout.keys, *(f"{bank.name}.states" for bank in layout.banks)]
+    return f"initial has the key {shown(key)}", there_are(key, known, every=True)

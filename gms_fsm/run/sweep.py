@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.foundation.arguments import checked_kind, meant, unknown
-from gms_fsm.foundation.logs import Log
+from gms_fsm.foundation.display import Log
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.lowering.observing import observe

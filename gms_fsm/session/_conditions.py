@@ -13,8 +13,7 @@ from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
 from gms_fsm.run.problem import Problem
 from gms_fsm.session.explain import holds
 from gms_fsm.session.tree.branch import Branch, BranchRow
-from gms_fsm.session.units import in_si, names_of
-from gms_fsm.traces.system_scope import owners_of
+from gms_fsm.traces.system_scope import in_si, names_of, owners_of
 
 
 def read(start: Problem, text: str) -> Condition:
@@ -25,8 +24,10 @@ def read(start: Problem, text: str) -> Condition:
     if start.what.named:
         owners = owners_of(start.system)
     with _explained(start):
-        text = in_si(start, text)
-        return parse_condition(text, names_of(start), states, n, own_state=n == 1, owners=owners)
+        text = in_si(start.what, text)
+        return parse_condition(
+            text, names_of(start.what), states, n, own_state=n == 1, owners=owners
+        )
 
 
 def holds_at(condition: Condition, branch: Branch, row: BranchRow) -> bool:
@@ -37,7 +38,7 @@ def holds_at(condition: Condition, branch: Branch, row: BranchRow) -> bool:
 def value_of(start: Problem, text: str, values: Mapping[str, Any]) -> float:
     """Return the value of a watch expression, given the values of its names."""
     with _explained(start):
-        tree = parse_value(in_si(start, text), names_of(start))
+        tree = parse_value(in_si(start.what, text), names_of(start.what))
     try:
         return float(evaluate(tree, values))
     except (ArithmeticError, ValueError) as error:
@@ -59,7 +60,7 @@ def _explained(start: Problem) -> Iterator[None]:
 
 def _complete(start: Problem) -> dict[str, str]:
     """Return how to complete names that are incomplete."""
-    known, found = names_of(start), dict[str, str]()
+    known, found = names_of(start.what), dict[str, str]()
     for contact in start.system.machines:
         lead = start.what.of(contact.name, "")
         for name in contact.chart.variables:

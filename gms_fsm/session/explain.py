@@ -182,7 +182,7 @@ class Why:
     sigma: Mapping[str, float] = field(default_factory=dict)
     contact: str = ""
     tick: float | None = None
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = field(default=(), compare=False)
 
     def __iter__(self) -> Iterator[Explanation]:
         return iter(self.edges)

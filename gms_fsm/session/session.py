@@ -27,11 +27,11 @@ from gms_fsm.session.results import BranchComparison, Fired, Here
 from gms_fsm.session.tree import walker
 from gms_fsm.session.tree.branch import Branch
 from gms_fsm.session.tree.branches import Tree
-from gms_fsm.session.units import names_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import arguments_of, mounted
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
+from gms_fsm.traces.system_scope import names_of
 
 __all__ = ["KINDS", "Branch", "BranchComparison", "Breakpoint", "Fired", "Here", "Session"]
 
@@ -231,7 +231,7 @@ class Session:
 
         Variables of a single element need no number. In a system: its names, and ``gear.F``.
         """
-        return names_of(self.start)
+        return names_of(self.start.what)
 
     def parse(self, text: str) -> Condition:
         """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``.

@@ -13,8 +13,9 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, cut, shown
-from gms_fsm.foundation.arguments import one_of
+from gms_fsm.foundation.arguments import one_of, refusing
 from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.given import (
     Text,
     check_name,
@@ -32,6 +33,7 @@ COUNTS = ("is_in", "count")  # of the elements in a state; the first where there
 LEAST_LOAD = 1e-9  # N; charts divide by thresholds
 
 
+@refusing()
 @dataclass(frozen=True)
 class Body:
     """A body with one degree of freedom: free, or moved with a given velocity.
@@ -98,7 +100,9 @@ class Body:
         return "rad" if self.motion == "turning" else "m"
 
 
+@refusing()
 @displayed("svg", "html")
+@by_value()
 @dataclass(frozen=True, init=False, eq=False)
 class Contact:
     """Machines of one chart on one relative velocity.
@@ -327,7 +331,9 @@ def loaded(model: Model | Contact) -> bool:
     return isinstance(model, Contact) and model.load is not None
 
 
-@dataclass(frozen=True)
+@refusing(instead={"sample_time": "period"})
+@by_value("updates")
+@dataclass(frozen=True, eq=False)
 class Sampled:
     """A sampled controller: values that change at exact ticks only.
 

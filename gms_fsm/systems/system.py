@@ -18,8 +18,9 @@ import numpy as np
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, cut, shown
-from gms_fsm.foundation.arguments import checked_path, unknown
+from gms_fsm.foundation.arguments import checked_path, refusing, unknown
 from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import (
     Binary,
     Name,
@@ -74,7 +75,9 @@ __all__ = [
 Key = tuple[str | int, ...]
 
 
+@refusing(instead={"parameters": "numbers"})
 @displayed("svg", "html")
+@by_value()
 @dataclass(frozen=True, eq=False)
 class System:
     """Bodies, the contacts between them, and what drives both.
@@ -110,6 +113,9 @@ class System:
     -----
     Locked contacts may hold the same motion. The earlier ones, as listed, then carry the force, and
     those that would repeat them carry none; `Trace.shared` marks these.
+
+    Systems are equal if all their parts are: bodies, contacts with their charts and numbers,
+    springs, signals. So are models, rigs and signals; functions only if they are the same.
 
     Examples
     --------
@@ -286,9 +292,10 @@ class System:
         return load(checked_path("path", path), cls)
 
     def save(self, path: str | Path) -> Path:
-        """Write the system to a TOML file, from which `load` returns an equivalent one.
+        """Write the system to a TOML file, from which `load` returns an equal one.
 
-        Charts that are included are written by name, others in full.
+        Charts that are included are written by name, others in full. A model of a class of one's
+        own is read back as an equivalent `ChartModel`.
 
         Parameters
         ----------

@@ -9,21 +9,34 @@ be written without it, unless the system itself uses them. A model on a rig has 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gms_fsm.errors import SignalError
+from gms_fsm.errors import SignalError, UnitError, shown
+from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.quantities import UNITS, convert_numbers, factor
+from gms_fsm.foundation.quantities import in_si as number_in_si
 from gms_fsm.language import Owner, evaluate
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program
+from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.signals import Corners, Function, piecewise_linear
 from gms_fsm.systems.system import Contact, System
-from gms_fsm.traces.scope import Scope, watch_names
+from gms_fsm.traces.scope import Scope, unit_of, watch_names
 from gms_fsm.traces.trace import Trace
+
+# What the units of SI measure; a force is a force, also where it is a normal force.
+MEASURED = {
+    unit: quantity
+    for quantity, units in reversed(UNITS.items())
+    for unit, factor in units.items()
+    if factor == 1.0
+}
 
 
 def system_names(system: System) -> list[str]:
@@ -176,3 +189,58 @@ class SystemScope:
         chart, watched = scope.model.chart, scope.watches()
         watched |= {name: scope.seen[name] for name in (*chart.velocities, *chart.force_names)}
         return {name: watched[name] for name in _names_of(self.system.contact(bank.name))}
+
+
+# --------------------------------------------------------------------------- units
+def names_of(what: Mounted) -> list[str]:
+    """Return the names allowed in conditions and watches."""
+    return system_names(what.system) if what.named else watch_names(what.model)
+
+
+def units_of(what: Mounted, names: Iterable[str] = ()) -> dict[str, str]:
+    """Return the units of names, as far as they are known: those of bodies are not declared.
+
+    Without names, of those in conditions and watches.
+    """
+    every = [*names] or names_of(what)
+    found: dict[str, str] = {}
+    for contact in what.system.machines:
+        chart = contact.chart
+        for name in every:
+            owner, _, last = name.rpartition(".")
+            if what.named and (owner != contact.name or name in what.system.names):
+                continue
+            bare = re.sub(r"\d+$", "", last)
+            if unit := unit_of(chart, last) or unit_of(chart, bare):
+                found[name] = unit
+    return found | {"t": "s"}
+
+
+def in_si(what: Mounted, text: str, name: str = "", names: Iterable[str] = ()) -> str:
+    """Return a text with numbers in SI for those with units, such as ``"v > 300 mm/s"``.
+
+    With a name, the text is an expression for that name.
+    """
+    checked_kind("text", text, str, "a text")
+    known = {each: MEASURED[u] for each, u in units_of(what, names).items() if u in MEASURED}
+    return (
+        convert_numbers(f"{name}=={text}", known).partition("==")[2]
+        if name
+        else convert_numbers(text, known)
+    )
+
+
+def asked_unit(what: Mounted, text: str) -> tuple[str, str, float]:
+    """Return an expression without the unit that is asked for, such as ``F in mN``; unit, factor.
+
+    The unit is empty if none is asked for.
+    """
+    found = re.fullmatch(r"(.+?)\s+in\s+(\S+)", text.strip())
+    if found is None:
+        return text, "", 1.0
+    asked, unit = found.groups()
+    known = MEASURED.get(units_of(what).get(asked, ""))
+    size = factor(known, unit) if known else float(number_in_si(f"1 {unit}") or "nan")
+    if math.isnan(size):
+        raise UnitError(f"{shown(unit)} is not a unit", advice="for example mN, mm or mm/s")
+    return asked, unit, size

@@ -22,6 +22,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import require
+from gms_fsm.foundation.text import visible
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
@@ -50,22 +51,7 @@ from gms_fsm.traces.views import (
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["BodyTrace", "Trace", "check_trace", "dwell_times"]
-
-
-def check_trace(trace: object) -> None:
-    """Raise `ParameterError` unless an object to be drawn is a trace of one contact."""
-    if not isinstance(trace, Trace):
-        raise ParameterError(
-            "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
-        )
-    if not trace.model.chart.velocities:  # a system with several contacts refuses here
-        raise ParameterError(
-            "a supervisor has no velocity and no force to draw",
-            place="trace",
-            value=trace,
-            advice="its states are in .states, its chart is drawn by plots.statechart",
-        )
+__all__ = ["BodyTrace", "Trace", "dwell_times"]
 
 
 @displayed("png", "html")
@@ -120,7 +106,7 @@ class Trace:
     initial: Mapping[str, Any] | None = field(default=None, repr=False)  # as given; not in files
 
     def __repr__(self) -> str:
-        return f"<Trace: {self.title}; {len(self)} rows, {len(self.firings)} transitions>"
+        return f"<Trace: {visible(self.title)}; {len(self)} rows, {len(self.firings)} transitions>"
 
     @property
     def title(self) -> str:
@@ -280,11 +266,9 @@ class Trace:
     def x(self) -> FloatArray:
         """Position, shape (rows,), m."""
         position = self.places.position
-        if not position:
-            return np.full(len(self.rows), np.nan)
         if position in self.program.layout.y.shared:
             return self._named(position)
-        return self.seen[position]
+        return self._seen(position)
 
     @property
     def n(self) -> int:
@@ -325,6 +309,10 @@ class Trace:
             )
         return self._named(self.places.of(name))
 
+    def _seen(self, name: str) -> FloatArray:
+        """Return what was observed with one value; NaN where a supervisor does not have it."""
+        return self.seen[name] if name in self.seen else np.full(len(self.rows), np.nan)
+
     def _named(self, name: str) -> FloatArray:
         column: FloatArray = self.rows.y[:, self.program.layout.y.where(name)]
         return column
@@ -342,9 +330,7 @@ class Trace:
     @property
     def v(self) -> FloatArray:
         """Velocity, shape (rows,), m/s."""
-        if not self.places.velocity:
-            return np.full(len(self.rows), np.nan)
-        return self.seen[self.places.of(self.places.velocity)]
+        return self._seen(self.places.of(self.places.velocity))
 
     @property
     def s(self) -> FloatArray:
@@ -354,8 +340,7 @@ class Trace:
     @property
     def F(self) -> FloatArray:
         """Friction force, shape (rows,), N."""
-        force = self.places.of("F")
-        return self.seen[force] if force in self.seen else np.full(len(self.rows), np.nan)
+        return self._seen(self.places.of("F"))
 
     @property
     def shared(self) -> NDArray[np.bool_]:
@@ -480,9 +465,8 @@ class Trace:
             This trace if it already has them.
         """
         table = merged(self.rows, self.stops)
-        if len(table) == len(self.rows):
-            return self
-        return replace(self, rows=table, stops=table, stored={})
+        same = len(table) == len(self.rows)
+        return self if same else replace(self, rows=table, stops=table, stored={})
 
     def with_monitors(self, found: Mapping[str, Verdict]) -> Trace:
         """Return the same run with the verdicts of its monitors, and all that was computed."""

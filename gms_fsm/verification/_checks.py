@@ -34,10 +34,26 @@ from gms_fsm.verification._prover import (
     shown,
 )
 from gms_fsm.verification._subject import ChartSubject
+from gms_fsm.verification._switching import (
+    after,
+    by_turns,
+    changed,
+    earlier,
+    endless,
+    interrupted,
+    jolts_and_arrests,
+    may_change,
+    others,
+    others_switch,
+    read_by,
+    renewed,
+    untaken,
+)
 from gms_fsm.verification.findings import Finding
 
 MOST_CYCLES = 200  # cycles; a friction chart has a handful
 MOST_WAYS = 64  # alternatives per guard
+JUMPS = "an edge assigns variables; the flow after a jump is not followed"
 
 
 # --------------------------------------------------------------------------- determinism
@@ -58,10 +74,10 @@ def _at_once(prover: Prover, pair: Sequence[Transition]) -> Answer:
     guards = [prover.subject.guard(edge) for edge in pair]
     formulas = [reading.truth(guard, prover.still) for guard in guards]
     prover.defined(reading)
-    point = prover.example(names_of(*guards), *formulas, *prover.at_rest(pair[0].source))
+    point = prover.example(names_of(*guards), *formulas, *prover.within(pair[0].source))
     if point is None:
         return Answer("proved", "never enabled at the same time")
-    if _arrests(prover, pair[0]) and _is_hidden(prover, pair[1], pair[:1]):
+    if prover.subject.arrests(pair[0]) and _is_hidden(prover, pair[1], pair[:1]):
         return Answer("proved", f"{pair[1].name} is taken only where the velocity jumps")
     text = f"both are enabled at the same time; the machine takes the earlier, {first}"
     return by_example("settled by order", text, point, enabled(guards, point))
@@ -70,15 +86,49 @@ def _at_once(prover: Prover, pair: Sequence[Transition]) -> Answer:
 # --------------------------------------------------------------------------- livelock
 def livelock(prover: Prover) -> Iterator[Finding]:
     """Check that no cycle of edges is enabled at one point."""
+    if prover.subject.facts.period is not None:
+        yield Finding("livelock", "proved", (), "a machine takes at most one edge at each tick")
+        return
     cycles = list(islice(_cycles(prover.chart), MOST_CYCLES + 1))
     if not cycles:
         yield Finding("livelock", "proved", (), "the edges form no cycle")
-    for cycle in cycles[:MOST_CYCLES]:
+        return
+    passable: list[tuple[Transition, ...]] = []
+    found = []
+    # Elements that share a force switch together, so that no one of them can be followed alone.
+    shared = prover.subject.rest and prover.subject.shared
+    for cycle in cycles[:MOST_CYCLES] if not shared else ():
         where = tuple(name for edge in cycle for name in (edge.source, edge.name))
-        yield prover.settle("livelock", where, _all_around, cycle)
+        found.append(prover.settle("livelock", where, _all_around, cycle, passable))
+    yield from found
     if len(cycles) > MOST_CYCLES:
         text = f"more than {MOST_CYCLES} cycles; the others were not checked"
         yield Finding("livelock", "undecided", (), text)
+    elif not any(each.status == "refuted" for each in found) and (
+        may_change(prover) or _crossed(passable, cycles)
+    ):
+        yield prover.settle("livelock", (), _at_one_instant, cycles)
+
+
+def _crossed(
+    passable: Sequence[tuple[Transition, ...]], cycles: Sequence[tuple[Transition, ...]]
+) -> bool:
+    """Return whether a cycle that can be passed shares a state with another one."""
+    states = [{edge.source for edge in cycle} for cycle in cycles]
+    return any(
+        sum(bool({edge.source for edge in cycle} & other) for other in states) > 1
+        for cycle in passable
+    )
+
+
+def _at_one_instant(prover: Prover, cycles: Sequence[tuple[Transition, ...]]) -> Answer:
+    """Follow what cycles do by turns, several elements together, or beside other contacts."""
+    facts, several = prover.subject.facts, may_change(prover)
+    if several and (answer := interrupted(prover, cycles)) is not None:
+        return answer
+    if several and others_switch(prover):
+        return Answer("undecided", f"{others(prover)} may switch at the same instant")
+    return by_turns(prover, facts.n if several else 1)
 
 
 def _cycles(chart: Chart) -> Iterator[tuple[Transition, ...]]:
@@ -97,63 +147,47 @@ def _cycles(chart: Chart) -> Iterator[tuple[Transition, ...]]:
         yield from extend((), first)
 
 
-def _all_around(prover: Prover, cycle: tuple[Transition, ...]) -> Answer:
-    subject = prover.subject
-    assigned = frozenset(
-        name
-        for edge in cycle
-        for name in (*(name for name, _ in subject.assigned(edge)), *subject.landed(edge))
-    )
+def _all_around(
+    prover: Prover, cycle: tuple[Transition, ...], passable: list[tuple[Transition, ...]]
+) -> Answer:
+    """Search for a point at which a cycle is taken, again and again; others stay as they are.
 
-    def around(passes: int) -> tuple[list[Any], Duals]:
+    A cycle that can be passed at least once is added to `passable`.
+    """
+    subject = prover.subject
+    assigned = changed(subject, cycle)
+
+    def around(passes: int, certain: bool | None) -> tuple[list[Any], Duals]:
         reading, here = Reading(), dict(prover.still)
-        formulas = prover.at_rest(cycle[0].source)
+        formulas = prover.within(cycle[0].source)
         for edge in cycle * passes:
             formulas.append(reading.truth(subject.guard(edge), here))
+            if certain is not None:
+                formulas += untaken(prover, edge, here, certain)
             here = after(prover, reading, edge, here)
         prover.defined(reading)
         return formulas, here
 
-    once, end = around(1)
-    if prover.find(*once) is None:
+    if prover.find(*around(1, certain=None)[0]) is None:
         return Answer("proved", "never all enabled at one point")
+    if prover.find(*around(1, certain=True)[0]) is None:
+        text = "never all taken at one point: an earlier edge takes precedence"
+        return Answer("proved", text)
+    passable.append(cycle)
+    once, end = around(1, certain=False)
     closed = [end[name].value == prover.symbols[name] for name in sorted(assigned)]
-    names = names_of(*(tree for edge in cycle for tree in subject.trees(edge))) | assigned
+    names = read_by(subject, cycle) | assigned
     point = prover.example(names, *once, *closed)
+    if point is not None and jolts_and_arrests(subject, cycle):
+        raise Undecided("an arrest is not taken where an impulse changes the velocity")
     if point is not None:
         text = "all are enabled at one point: endless switching"
-        return refuted(text, point, _comes_back(subject, cycle, point))
-    if prover.find(*around(2)[0]) is None:
+        return refuted(text, point, endless(subject, [cycle[0].source], [point]))
+    if prover.find(*around(2, certain=True)[0]) is None:
         return Answer("proved", "the assignments end it before a second pass")
+    if prover.find(*once) is None:
+        raise Undecided("an earlier arrest ends it, except where the velocity jumps")
     return Answer("undecided", "each pass assigns different values; only two passes were followed")
-
-
-def after(prover: Prover, reading: Reading, edge: Transition, here: Duals) -> dict[str, Dual]:
-    """Return the values after an edge; F and a are those before it."""
-    subject = prover.subject
-    before = subject.before[edge.source, edge.name].items()
-    held = {name: reading.value(tree, here) for name, tree in before}
-    there = dict(here)
-    for name, tree in subject.assigned(edge):
-        there[name] = reading.value(tree, {**there, **held})
-    zero = prover.z3.RealVal(0)
-    return there | dict.fromkeys(subject.landed(edge), Dual(zero, zero))
-
-
-def _comes_back(
-    subject: ChartSubject, cycle: Sequence[Transition], point: Mapping[str, float]
-) -> bool:
-    """Return whether the cycle also returns to the same point in floats."""
-    here = dict(point)
-    for edge in cycle:
-        if not enabled([subject.guard(edge)], here):
-            return False
-        before = subject.before[edge.source, edge.name].items()
-        held = {name: evaluate(tree, here) for name, tree in before}
-        for name, tree in subject.assigned(edge):
-            here[name] = evaluate(tree, {**here, **held})
-        here |= dict.fromkeys(subject.landed(edge), 0.0)
-    return here == point
 
 
 # --------------------------------------------------------------------------- reachability
@@ -183,36 +217,32 @@ def reachability(prover: Prover) -> Iterator[Finding]:
 
 def _can_hold(prover: Prover, edge: Transition) -> Answer:
     subject, reading = prover.subject, Reading()
-    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.at_rest(edge.source)]
+    formulas = [
+        reading.truth(subject.guard(edge), prover.still),
+        *prover.within(edge.source, waits=False),
+    ]
     prover.defined(reading)
     if prover.find(*formulas) is None:
         return Answer("refuted", f"its guard can never hold: {shown(subject.guard(edge))}")
+    formulas += prover.within(edge.source)
+    if prover.find(*formulas) is None:
+        waits = [each.name for each, _ in subject.waits(edge.source) if each.name != edge.name]
+        first = ", ".join(dict.fromkeys(waits))
+        return Answer("refuted", f"never taken: {first} ends each stay in {edge.source} before")
+    prover.apart(names_of(subject.guard(edge)))
     # Where the velocity has jumped, arrests are not taken.
-    earlier = [each for each in _earlier(prover, edge) if not _arrests(prover, each)]
-    if _is_hidden(prover, edge, earlier):
-        names = ", ".join(each.name for each in earlier)
+    before = [each for each in earlier(subject, edge) if not subject.arrests(each)]
+    if _is_hidden(prover, edge, before):
+        names = ", ".join(each.name for each in before)
         text = f"never taken: wherever its guard holds, an earlier edge takes precedence ({names})"
         return Answer("refuted", text)
     return Answer("proved", "its guard can hold")
 
 
-def _arrests(prover: Prover, edge: Transition) -> bool:
-    """Return whether an edge locks the contact where its velocity passes 0."""
-    return any(
-        prover.chart.transitions[number].name == edge.name for number in prover.chart.arrests
-    )
-
-
-def _earlier(prover: Prover, edge: Transition) -> list[Transition]:
-    """Return the edges that leave the same state with precedence."""
-    leaving = [each for _, each in prover.chart.leaving(edge.source)]
-    return leaving[: [each.name for each in leaving].index(edge.name)]
-
-
 def _is_hidden(prover: Prover, edge: Transition, earlier: Sequence[Transition]) -> bool:
     """Return whether one of these edges is enabled wherever another one is."""
     subject, reading = prover.subject, Reading()
-    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.at_rest(edge.source)]
+    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.within(edge.source)]
     formulas += [reading.truth(Not(subject.guard(each)), prover.still) for each in earlier]
     prover.defined(reading)
     return prover.find(*formulas) is None
@@ -237,6 +267,9 @@ def _in_graph(state: str, certain: set[str], possible: set[str], yes: str, no: s
 # --------------------------------------------------------------------------- chattering
 def chattering(prover: Prover) -> Iterator[Finding]:
     """Check that no two flows push toward each other across a guard surface."""
+    if prover.subject.facts.period is not None:
+        yield Finding("chattering", "proved", (), "it switches at ticks only")
+        return
     pairs = [
         (there, back)
         for there, back in combinations(prover.chart.transitions, 2)
@@ -247,6 +280,38 @@ def chattering(prover: Prover) -> Iterator[Finding]:
     for there, back in pairs:
         where = (there.source, there.name, back.source, back.name)
         yield prover.settle("chattering", where, _pushed, there, back)
+    if pairs and may_change(prover):
+        yield prover.settle("chattering", (), _pushed_by_others, pairs)
+
+
+def _pushed_by_others(prover: Prover, pairs: Sequence[tuple[Transition, Transition]]) -> Answer:
+    """Prove that no two states alternate, whatever others give in each of them."""
+    z3 = prover.z3
+    for there, back in pairs:
+        if prover.subject.assigned(there) or prover.subject.assigned(back):
+            raise Undecided(JUMPS)
+        other, assumed = renewed(prover, prover.still, "!")
+        formulas, touched = [*assumed, *prover.within(there.source)], list[Any]()
+        for edge, names in ((there, prover.still), (back, other)):
+            reading = Reading()
+            moved = moving(prover, reading, edge.source, names)
+            loose = []
+            for way in ways(split(prover.subject.guard(edge))):
+                margins = [reading.margin(part, moved) for part in way]
+                loose.append(z3.And([z3.Or(m.value > 0, rests(z3, m)) for m in margins]))
+                touched += [m.value == 0 for m in margins]
+            prover.defined(reading)
+            jumps = [u == 0 for u in reading.breaks]
+            touched += jumps
+            formulas.append(z3.Or(*loose, *jumps))
+        if prover.find(*formulas, z3.Or(touched)) is not None:
+            return Answer("undecided", f"{others(prover)} may switch at the same instant")
+    return Answer("proved", f"nor where {others(prover)} switch at the same instant")
+
+
+def rests(z3: Any, margin: Dual) -> Any:
+    """Return the formula that a margin is zero and does not fall."""
+    return z3.And(margin.value == 0, margin.slope >= 0)
 
 
 def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
@@ -259,13 +324,14 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     """
     subject, z3 = prover.subject, prover.z3
     for edge in (there, back):
-        arrests = [each for each in _earlier(prover, edge) if _arrests(prover, each)]
+        arrests = [each for each in earlier(subject, edge) if subject.arrests(each)]
         if arrests and _is_hidden(prover, edge, arrests):
             text = f"{edge.name} is taken only where the velocity jumps: {arrests[0].name} has "
             return Answer("proved", f"{text}precedence")
     jumps = subject.assigned(there) or subject.assigned(back)
+    beside = [each for edge in (there, back) for each in rivals(prover, edge)]
     guards = [subject.guard(edge) for edge in (there, back)]
-    resting = prover.at_rest(there.source, back.source)
+    resting = prover.within(there.source, back.source)
     of_flows, of_guards = Reading(), Reading()
     moved = [moving(prover, of_flows, edge.source, prover.still) for edge in (there, back)]
     at_break = z3.Or([u == 0 for u in of_flows.breaks])
@@ -274,7 +340,7 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
         if not _at_one_time(prover, [*pair[0], *pair[1]]):
             continue
         if jumps:
-            raise Undecided("an edge assigns variables; the flow after a jump is not followed")
+            raise Undecided(JUMPS)
         crossed, touched, growing, not_falling, reached = [], [], [], [], []
         for way, own, other in zip(pair, moved, reversed(moved), strict=True):
             here = [of_guards.margin(part, own) for part in way]
@@ -292,17 +358,85 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     breaks = [*of_flows.breaks, *of_guards.breaks]
     prover.defined(of_flows)
     prover.defined(of_guards)
-    names = moving_names(prover, guards, (there.source, back.source))
-    point = prover.example(names, z3.Or(strict), *resting, *(u != 0 for u in breaks))
+    names = moving_names(
+        prover, [*guards, *map(subject.guard, beside)], (there.source, back.source)
+    )
+    calm, firm = (
+        [u != 0 for u in breaks],
+        [
+            u
+            for edge, here in zip((there, back), moved, strict=True)
+            for u in passed_over(prover, edge, here)
+        ],
+    )
+    point = prover.example(names, z3.Or(strict), *resting, *calm, *firm)
     if point is not None:
         place = _surface(guards[0], point)
-        text = f"on {place} each flow pushes into the other's guard: endless switching"
+        one = all(isinstance(split(guard), Requirement) for guard in guards)
+        follows = "a sliding mode, if not endless switching" if one else "endless switching"
+        text = f"on {place} each flow pushes into the other's guard: {follows}"
         return refuted(text, point)
     if of_guards.breaks:
         raise Undecided("sgn jumps in a guard")
-    if prover.find(z3.Or(loose), *resting) is not None:
-        raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
-    return Answer("proved", "there is no surface on which both flows push into the other's guard")
+    sure = [
+        formula
+        for edge in (there, back)
+        for formula in untaken(prover, edge, prover.still, certain=True)
+    ]
+    if prover.find(z3.Or(loose), *resting, *sure) is None:
+        text = "there is no surface on which both flows push into the other's guard"
+        return Answer("proved", text)
+    if beside and prover.find(z3.Or(strict), *resting, *calm) is not None:
+        raise Undecided("another edge may be taken instead")
+    raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
+
+
+def rivals(prover: Prover, edge: Transition) -> list[Transition]:
+    """Return the other edges that leave the same state."""
+    return [each for _, each in prover.chart.leaving(edge.source) if each.name != edge.name]
+
+
+def _steady(prover: Prover, state: str, part: Requirement) -> Any:
+    """Return when a comparison stays as it is, since its velocity does not change; None if unknown.
+
+    A load that does not change makes the velocity linear in time.
+    """
+    subject, known = prover.subject, {*prover.chart.parameter_names}
+    if not subject.moves or len(prover.chart.velocities) > 1:
+        return None
+    v, load = prover.chart.velocities[0], subject.load
+    if not names_in(part.relation) <= known | {v}:
+        return None
+    if not names_in(subject.flows[state, v]) <= known | {load, subject.mobility}:
+        return None
+    return prover.rates[f"d{load}/dt"] == 0
+
+
+def passed_over(prover: Prover, edge: Transition, here: Duals, by_order: bool = False) -> list[Any]:
+    """Return when no other edge of the same state holds at a point, or just after it.
+
+    Of those later in order it may suffice that they do not hold at the point, if the edge itself
+    holds just after it.
+    """
+    z3, found, first = prover.z3, [], earlier(prover.subject, edge)
+    for each in rivals(prover, edge):
+        reading = Reading()
+        if by_order and each not in first:
+            found.append(reading.truth(Not(prover.subject.guard(each)), here))
+        else:
+            for way in ways(split(prover.subject.guard(each))):
+                margins = [(part, reading.margin(part, here)) for part in way]
+                strict = [(part, m) for part, m in margins if not inclusive(part)]
+                falls = [z3.And(m.value == 0, m.slope < 0) for _, m in strict]
+                rest = [
+                    z3.And(m.value == 0, m.slope == 0, steady)
+                    for part, m in strict
+                    if (steady := _steady(prover, edge.source, part)) is not None
+                ]
+                found.append(z3.Or(*(m.value < 0 for _, m in margins), *falls, *rest))
+        prover.defined(reading)
+        found += [u != 0 for u in reading.breaks]
+    return found
 
 
 Ways: TypeAlias = list[tuple[Requirement, ...]]
@@ -319,6 +453,11 @@ def ways(parts: Split) -> Ways:
     if math.prod(map(len, found)) > MOST_WAYS:
         raise Undecided(f"a guard has more than {MOST_WAYS} alternatives")
     return [tuple(part for way in some for part in way) for some in product(*found)]
+
+
+def inclusive(part: Requirement) -> bool:
+    """Return whether a comparison holds where both sides are equal."""
+    return part.comparison.strict != part.holds
 
 
 def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import textwrap
 
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import names_in, parse_value
 from gms_fsm.systems.system import System
-from plots.charts.labels import printable
 from plots.style import PANEL, PAPER, RC, TEXT_GREY
 from plots.style.matplotlib import Figure, rc_context
 from plots.systems.mechanical_layout import (
@@ -60,7 +60,7 @@ def mechanical_figure(system: System) -> Figure:
         foot = _sources(system)
         for k, line in enumerate(foot):
             pen.text(left, bottom - 0.45 - LINE * k, line, ha="left", colour=TEXT_GREY)
-        title = printable(system.name)
+        title = visible(system.name)
         pen.text(left, top + 0.5, title, size=10, bold=True, ha="left", gid="title")
         bottom -= 0.3 + LINE * len(foot) if foot else 0.0
         widest = max([width(title, 10, bold=True), *(width(line) for line in foot)])
@@ -338,5 +338,5 @@ def _folded(text: str) -> list[str]:
     """Return an equation as a formula, or a long one as lines of plain text."""
     if "=" in text and len(text) <= FOOT:
         return [written(text)]
-    lines = textwrap.wrap(printable(text), FOOT, subsequent_indent="    ")
+    lines = textwrap.wrap(visible(text), FOOT, subsequent_indent="    ")
     return [line.replace("$", r"\$") for line in lines]

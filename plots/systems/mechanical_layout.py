@@ -17,6 +17,7 @@ from itertools import permutations
 
 from gms_fsm.charts.registry import charts
 from gms_fsm.foundation.quantities import JOINED
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     MATLAB_LIKE,
     Negative,
@@ -28,7 +29,7 @@ from gms_fsm.language import (
     spell,
 )
 from gms_fsm.systems.system import Body, Contact, Spring, System
-from plots.charts.labels import printable, wrapped
+from plots.charts.labels import wrapped
 from plots.systems.mechanical_symbols import LINE, NAME, formula, width
 
 LONGEST = 30  # characters of a line of a force
@@ -153,7 +154,7 @@ class BodyColumn:
         """What stands in the box: the name, and the inertia as a formula."""
         inertia = self.body.inertia
         shown = "" if inertia is None else written(inertia)
-        return printable(self.body.name), shown if len(shown) <= 2 * LONGEST else ""
+        return visible(self.body.name), shown if len(shown) <= 2 * LONGEST else ""
 
     @property
     def motion(self) -> str:
@@ -256,7 +257,7 @@ def label_of(touch: Touch) -> list[str]:
     """Return the lines under the symbol of a contact."""
     contact = touch.contact
     count = f" × {contact.n}" if contact.n > 1 else ""
-    name = printable(contact.chart.name).replace(" law", f"{JOINED}law")
+    name = visible(contact.chart.name).replace(" law", f"{JOINED}law")
     lines = _wrapped(f"{name}{count.replace(' ', JOINED)}")
     if _of_many(touch):
         lines += [formula(v) for v in contact.v]

@@ -22,6 +22,7 @@ from typing import Any
 
 import graphviz
 
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     MATLAB_LIKE,
     Binary,
@@ -37,7 +38,7 @@ from gms_fsm.language import (
 from gms_fsm.systems.signals import Corners, Formula, Signal
 from gms_fsm.systems.springs import field_of, pull, summed
 from gms_fsm.systems.system import Body, Contact, Spring, System
-from plots.charts.labels import escape, printable, wrapped
+from plots.charts.labels import escape, wrapped
 from plots.output.drawings import DrawnGraph
 from plots.style import INK, MONO, PANEL, PAPER, SANS, TEXT_GREY
 from plots.systems.system_routes import Box, DiagramSheet, Join, routed
@@ -105,7 +106,7 @@ class DiagramBlock:
 def system_diagram(system: System) -> DrawnGraph:
     """Draw a system."""
     blocks = list(_blocks(system))
-    graph = blank(graphviz.escape(printable(system.name)))
+    graph = blank(graphviz.escape(visible(system.name)))
     graph.text = "\n".join([system.name, *map(_in_words, blocks)])
     columns = sorted({LOOKS[block.kind][0] for block in blocks})
     boxes = [Box(block.id, *_size(block), columns.index(LOOKS[block.kind][0])) for block in blocks]
@@ -330,7 +331,7 @@ def _draw_title(graph: graphviz.Digraph, system: System, sheet: DiagramSheet) ->
     key = "thick: motion one way, force back to the body; thin: values that are read"
     if system.sampled:
         key += "; dashed: at ticks only"
-    rows = [_text(printable(system.name), bold=True), _text(key, size=10, colour=TEXT_GREY)]
+    rows = [_text(visible(system.name), bold=True), _text(key, size=10, colour=TEXT_GREY)]
     wide = max(BOLD * len(system.name), NARROW * len(key))
     box = Box("title", wide, 40.0, 0)
     at = (sheet.left + 0.5 * wide, sheet.top + 42.0)

@@ -12,6 +12,7 @@ from xml.etree import ElementTree as ET
 
 from gms_fsm.charts.files.imported import ImportedEdge, Texts, built
 from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
+from gms_fsm.charts.parts import check_size
 from gms_fsm.errors import ChartError, why
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.language import ECMASCRIPT
@@ -47,6 +48,8 @@ def load(kind: type[Chart], path: Path, texts: Mapping[str, Any]) -> Chart:
     given = Texts.of(texts, here)  # unknown names first
     root = _root(path, here)
     states = _states(root, here)
+    events = [one.get("event") for state in states for one in _all(state, "transition")]
+    check_size(len(states), sum(event != VALUES for event in events), here)
     rows = [row for state in states for row in _rows(state, here)]
     rows = _named(_ordered(rows, here))
     edges = _edges(rows)

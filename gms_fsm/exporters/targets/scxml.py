@@ -23,9 +23,9 @@ from gms_fsm.exporters.alone import (
     check_moved_from_outside,
     element_numbers,
     fields_of,
-    one_line,
 )
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import visible
 from gms_fsm.systems.system import LEAST_LOAD, Contact, loaded
 
 __all__: list[str] = []
@@ -182,7 +182,7 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
     numbers = (
         "The chart has no numbers: set every <data> without expr before the first step."
         if contact is None
-        else f"Numbers: those of {one_line(contact.title)}, one document for each element."
+        else f"Numbers: those of {visible(contact.title)}, one document for each element."
     )
     curve = ""
     if contact is not None and contact.stribeck is not None:
@@ -197,7 +197,7 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
         f"\n- python-statemachine keeps the names {', '.join(kept)} for itself." if kept else ""
     )
     return f"""\
-# {one_line(chart.name)} as SCXML
+# {visible(chart.name)} as SCXML
 
 Written by gms-fsm {__version__}, format scxml.
 

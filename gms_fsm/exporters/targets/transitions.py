@@ -26,10 +26,10 @@ from gms_fsm.exporters.alone import (
     check_moved_from_outside,
     element_numbers,
     fields_of,
-    one_line,
     slow_velocity,
 )
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import ELEMENTARY, NAMESPACE, Condition, Node, Value, parse_value, sgn, spell
 from gms_fsm.language.normal import renamed
 from gms_fsm.lowering.generated import bare, elementary_text
@@ -61,7 +61,7 @@ def _write(subject: Subject) -> dict[str, str]:
 
 def _head(chart: Chart) -> str:
     return (
-        f"# {one_line(chart.name)}: elements as models of one transitions.Machine.\n"
+        f"# {visible(chart.name)}: elements as models of one transitions.Machine.\n"
         f"# Written by gms-fsm {__version__}; needs only the package transitions.\n"
     )
 
@@ -370,10 +370,10 @@ def _readme(name: str, chart: Chart, contact: Contact | None) -> str:
     numbers = (
         "none: fill in VALUES, one mapping for each element"
         if contact is None
-        else f"those of {one_line(contact.title)}, {contact.n} element{'s' * (contact.n != 1)}"
+        else f"those of {visible(contact.title)}, {contact.n} element{'s' * (contact.n != 1)}"
     )
     return f"""\
-# {one_line(chart.name)} as a transitions machine
+# {visible(chart.name)} as a transitions machine
 
 Written by gms-fsm {__version__}, format transitions.
 

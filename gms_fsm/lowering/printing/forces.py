@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Literal, TypeAlias
 
 from gms_fsm.language import Name, names_in
+from gms_fsm.lowering.places import Places
 from gms_fsm.lowering.printing.lines import TABLES, CodeLine, ProgramWriter, Signs
 from gms_fsm.lowering.printing.locks import Locks
 from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import BankPlan, Computed, Gradient, ProgramPlan, gradient_of
 from gms_fsm.systems.reading.assembly import Bank, of
+from gms_fsm.systems.reading.order import is_deferred, order_of
 
 Part: TypeAlias = Literal["all", "outputs", "rates"]  # of what a machine gives out
 
@@ -48,18 +50,18 @@ class ForceWriter(ProgramWriter):
         """Write the rates and the forces of all contacts, and the accelerations."""
         lines: list[CodeLine] = []
         made: set[str] = set()
-        for bank in self.read.order:
+        for bank in order_of(self.read):
             lines += self.late_definitions(made, signs) if wanted else []
             plan = self.plan.banks[bank.index]
             # Rates that read what machines give out are computed after all of it.
-            part: Part = "outputs" if self.read.is_deferred(bank) else "all"
+            part: Part = "outputs" if is_deferred(self.read, bank) else "all"
             lines += self.bank_forces(
                 plan, signs, wanted, rates=rates, observed=observed, part=part
             )
             made |= {*bank.forces}
         lines += self.late_definitions(made, signs) if wanted else []
         for bank in self.read.banks if rates or observed else ():
-            if self.read.is_deferred(bank):
+            if is_deferred(self.read, bank):
                 plan = self.plan.banks[bank.index]
                 lines += self.bank_forces(
                     plan, signs, wanted, rates=rates, observed=observed, part="rates"
@@ -128,34 +130,21 @@ class ForceWriter(ProgramWriter):
                 else:
                     branch += self.computed(several[force], each.forces[force], signs, "  # (3)")
             branches[each.state] = branch
-        after: list[CodeLine] = []
-        for force in bank.forces if forces else ():
-            total = self.local(force)
-            if force not in plan.common:
-                after.append(CodeLine(f"{total} += {several[force]}"))
-            elif observed or held:
-                after.append(self.put(several[force], plan.common[force], "  # (3)"))
-                after.append(CodeLine(f"{total} += {several[force]}"))
-            else:
-                tree = plan.common[force]
-                after.append(
-                    CodeLine(f"{total} += {self.spell(tree)}  # (3)", computed_names(tree))
-                )
+        after = self.summed(plan, several, stored=observed or held) if forces else []
         if observed and part != "rates":
             after += self.elements_seen(plan, several)
-        if observed and not later:
-            seen = self.layout.observed
-            after += [
-                self.store("out", seen, bank.rate(v), self.local(bank.rate(v)))
-                for v in bank.variables
-            ]
-        if rates and not later:
-            after += [self.store("dy", y, v, self.local(bank.rate(v))) for v in bank.variables]
+        places: list[tuple[str, Places[str], Callable[[str], str]]] = []
+        if not later:
+            places += [("out", self.layout.observed, bank.rate)] * observed
+            places += [("dy", y, str)] * rates
         if held:
+            places.append(("y", y, lambda v: bank.held(bank.rate(v))))
+        for array, layout, place in places:
             after += [
-                self.store("y", y, bank.held(bank.rate(v)), self.local(bank.rate(v)))
+                self.store(array, layout, place(v), self.local(bank.rate(v)))
                 for v in bank.variables
             ]
+        if held:
             after += [
                 self.store("y", y, bank.held(f"{force}_elements"), several[force])
                 for force in bank.forces
@@ -169,6 +158,21 @@ class ForceWriter(ProgramWriter):
                 CodeLine(f"y[{y.text(bank.held(force))}] = {self.local(force)}")
                 for force in bank.forces
             ]
+        return lines
+
+    def summed(self, plan: BankPlan, several: Mapping[str, str], *, stored: bool) -> list[CodeLine]:
+        """Add what an element gives out to what its machine does."""
+        lines: list[CodeLine] = []
+        for force in plan.bank.forces:
+            total, tree = self.local(force), plan.common.get(force)
+            if tree is None:
+                lines.append(CodeLine(f"{total} += {several[force]}"))
+            elif stored:
+                lines.append(self.put(several[force], tree, "  # (3)"))
+                lines.append(CodeLine(f"{total} += {several[force]}"))
+            else:
+                text = f"{total} += {self.spell(tree)}  # (3)"
+                lines.append(CodeLine(text, computed_names(tree)))
         return lines
 
     def held_forces(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from gms_fsm.language import Binary, Call, Name, Node, Value, spell
@@ -22,6 +23,8 @@ from integrators import LIVE
 # may be marked as live.
 Signs = Literal["held", "live", "given"]
 QUICK = ("abs", "min", "max", "sgn", "sqrt")  # functions that need no library
+# A chain of elif is a tree as deep as it is long, and readers call themselves at each level.
+MOST_BRANCHES = 50
 TABLES = "the tables"  # what a signal that is a table reads
 
 
@@ -34,6 +37,22 @@ class CodeLine(NamedTuple):
     text: str
     reads: frozenset[str] = frozenset()
     lazy: str = ""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A part of what happens when an edge is taken.
+
+    Parameters
+    ----------
+    lines : list of CodeLine
+        Assignments.
+    hits : bool
+        An impulse follows them, and the next phase starts with the velocities after it.
+    """
+
+    lines: list[CodeLine]
+    hits: bool
 
 
 def reads_of(lines: Iterable[CodeLine]) -> frozenset[str]:
@@ -49,6 +68,35 @@ def _does_something(lines: Iterable[CodeLine]) -> bool:
 def indented(lines: Iterable[CodeLine]) -> list[CodeLine]:
     """Return lines one level deeper."""
     return [line._replace(text="    " + line.text) for line in lines]
+
+
+class Case(NamedTuple):
+    """Lines for some values of an integer: the first of them, and the test of being one."""
+
+    first: str
+    test: str
+    lines: list[CodeLine]
+    note: str = ""
+    reads: frozenset[str] = frozenset()
+
+
+def chosen(number: str, branches: Sequence[Case], *, all_values: bool = False) -> list[CodeLine]:
+    """Write an if-else over an integer, in the order of its values; a long one as two halves."""
+    if len(branches) > MOST_BRANCHES:
+        half = len(branches) // 2
+        first, rest = branches[:half], branches[half:]
+        return [
+            CodeLine(f"if {number} < {rest[0].first}:", rest[0].reads),
+            *indented(chosen(number, first, all_values=all_values)),
+            CodeLine("else:"),
+            *indented(chosen(number, rest, all_values=all_values)),
+        ]
+    lines = []
+    for k, each in enumerate(branches):
+        last, word = all_values and k == len(branches) - 1, "elif" if k else "if"
+        head = f"else:  # {each.first}" if last else f"{word} {number} {each.test}:{each.note}"
+        lines += [CodeLine(head, each.reads), *indented(each.lines)]
+    return lines
 
 
 class ProgramWriter(ABC):
@@ -240,21 +288,18 @@ class ProgramWriter(ABC):
         """Write an if-else over the element's state."""
         states = self.names.states[bank]
         filled = [
-            (states[state], body if _does_something(body) else [*body, CodeLine("pass")])
+            Case(
+                states[state],
+                f"== {states[state]}",
+                body if _does_something(body) else [*body, CodeLine("pass")],
+            )
             for state, body in branches.items()
         ]
         if not any(_does_something(body) for body in branches.values()):
             return []
         if len(filled) == 1:
             return next(iter(branches.values()))
-        mode = self.mode(bank)
-        lines = []
-        for number, (constant, body) in enumerate(filled):
-            word = "if" if number == 0 else "elif"
-            last = number == len(filled) - 1
-            head = f"else:  # {constant}" if last else f"{word} {mode} == {constant}:"
-            lines += [CodeLine(head), *indented(body)]
-        return lines
+        return chosen(self.mode(bank), filled, all_values=True)
 
     def mode(self, bank: int, element: str = "i") -> str:
         """Spell the mode of an element of a contact."""
@@ -376,8 +421,3 @@ class ProgramWriter(ABC):
         """Spell the corners of a signal: their times and values."""
         places = (self.plan.tables.text((name, column)) for column in ("times", "values"))
         return ", ".join(f"tables[{place}]" for place in places)
-
-
-def one_line(text: str) -> str:
-    """Return text fit for a comment: a line break would end it."""
-    return "".join(c if c.isprintable() else " " for c in text)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from gms_fsm.charts.chart import SUPPLIED
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     Binary,
     Comparison,
@@ -19,7 +19,16 @@ from gms_fsm.language import (
     split,
 )
 from gms_fsm.lowering.places import total
-from gms_fsm.lowering.printing.lines import CodeLine, Signs, indented, one_line, reads_of
+from gms_fsm.lowering.printing.lines import (
+    MOST_BRANCHES,
+    Case,
+    CodeLine,
+    Phase,
+    Signs,
+    chosen,
+    indented,
+    reads_of,
+)
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
 from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sides
@@ -42,22 +51,6 @@ FUNCTIONS = (
 )
 
 
-@dataclass(frozen=True)
-class Phase:
-    """A part of what happens when an edge is taken.
-
-    Parameters
-    ----------
-    lines : list of CodeLine
-        Assignments.
-    hits : bool
-        An impulse follows them, and the next phase starts with the velocities after it.
-    """
-
-    lines: list[CodeLine]
-    hits: bool
-
-
 def python(plan: ProgramPlan) -> str:
     """Return a program as Python text.
 
@@ -74,7 +67,7 @@ def python(plan: ProgramPlan) -> str:
     """
     printer = _PythonPrinter(plan)
     lines = [
-        f"# {one_line(plan.title)}",
+        f"# {visible(plan.title)}",
         "# Generated from the chart; parameters are arguments, so one text serves all values.",
         "",
     ]
@@ -122,16 +115,19 @@ class _PythonPrinter(LockFunctions):
                 leaving = self.leaving(bank, state)
                 # Where the velocity has jumped, an arrest would take it: another edge, or none.
                 refused = [(edge, f"-2 - {constant}") for edge, constant in leaving if edge.arrests]
-                for edge, constant in (*leaving, *refused):
-                    word, guard = "elif" if rows else "if", self.spell(edge.guard)
+                for k, (edge, constant) in enumerate((*leaving, *refused)):
+                    word, guard = "elif" if k % MOST_BRANCHES else "if", self.spell(edge.guard)
                     if edge.arrests and not constant.startswith("-"):
                         guard = f"{jolt} != {JUMPED} and ({guard})"
                     if edge.name in skipped:
                         guard = f"skip != {constant} and {guard}"
-                    rows += [
+                    pair = [
                         CodeLine(f"{word} {guard}:", computed_names(edge.guard)),
                         CodeLine(f"    edge = {constant}  # {state} -> {edge.target}"),
                     ]
+                    if k and k % MOST_BRANCHES == 0:
+                        rows.append(CodeLine("if edge == -1:"))
+                    rows += pair if k < MOST_BRANCHES else indented(pair)
                 branches[state] = rows
             place = f"out[{self.machine(bank.index)}]"
             before = [CodeLine("edge = -1")] + [CodeLine(f"skip = {place}")] * bool(skipped)
@@ -196,11 +192,11 @@ class _PythonPrinter(LockFunctions):
         """Write one phase of what the edges do, by contact and edge."""
         lines, several, word = list[CodeLine](), len(self.read.banks) > 1, "if"
         for bank, found in zip(self.read.banks, phases, strict=True):
-            inner: list[CodeLine] = []
-            for edge, constant in zip(bank.edges, self.names.edges[bank.index], strict=True):
-                if edge.name in found:
-                    test = f"{'elif' if inner else 'if'} edge == {constant}:"
-                    inner += [CodeLine(test), *indented(found[edge.name].lines)]
+            edges = zip(bank.edges, self.names.edges[bank.index], strict=True)
+            inner = chosen(
+                "edge",
+                [Case(k, f"== {k}", found[e.name].lines) for e, k in edges if e.name in found],
+            )
             first = self.element(bank.index, self.own(bank.index, reads_of(inner)), "live")
             body = self.outward(bank.index, [*first, *inner])
             if several and inner:
@@ -338,27 +334,28 @@ class _PythonPrinter(LockFunctions):
         return lines
 
     def normal(self) -> list[str]:
-        lines: list[CodeLine] = []
+        branches = []
         for each in self.plan.gradients:
-            word, inner = "elif" if lines else "if", self.gradient(each)
+            inner = self.gradient(each)
             surfaces, note = self.plan.surfaces, f"  # {self.spell(each.value)}"
             sizes = frozenset(f"#{size}" for size in surfaces.sizes(each.surface))
             if each.surface in surfaces.shared:
-                place = surfaces.text(each.surface)
-                lines.append(CodeLine(f"{word} surface == {place}:{note}"))
+                start = surfaces.text(each.surface)
+                test, reads = f"== {start}", frozenset[str]()
             else:
                 end, start = (surfaces.start_text(each.surface, k) for k in (1, 0))
                 u = each.surface
                 bank = u.bank if isinstance(u, Pair) else self.read.bank_of(each.value)
                 assert bank is not None
                 size = frozenset({f"#{self.sizes[bank]}"})
-                lines.append(CodeLine(f"{word} surface < {end}:{note}", sizes | size))
+                test, reads = f"< {end}", sizes | size
                 first = self.element(bank, self.own(bank, reads_of(inner)), "live")
                 inner = [
                     CodeLine(f"i = surface - ({start})"),
                     *self.outward(bank, [*first, *inner]),
                 ]
-            lines += indented(inner or [CodeLine("pass")])
+            branches.append(Case(start, test, inner or [CodeLine("pass")], note, reads))
+        lines = chosen("surface", branches)
         if lines:
             y = self.layout.y
             every = frozenset(f"#{block.size}" for block in y.blocks if block.names)

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.language import (
     Binary,
     Number,
@@ -24,7 +25,6 @@ from gms_fsm.language import (
     spell,
     split,
 )
-from gms_fsm.systems.reading.texts import ByIdentity
 
 INF = math.inf
 # A velocity in a guard is a window to pass through, not a typical size of motion: its weight.

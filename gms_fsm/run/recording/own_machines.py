@@ -29,7 +29,7 @@ def own_machines(given: Any, start: Problem) -> dict[str, ElementMachines]:
         contact = start.system.contact(name)
         place = f"machines[{name!r}]" if named else "machines"
         checked_kind(place, each, ElementMachines, "an ElementMachines, or left out")
-        if each.model is not contact and each.model is not contact.model:
+        if each.model not in (contact, contact.model):
             advice = f"make them as ElementMachines(system.contact({name!r}))" if named else ""
             raise ParameterError(
                 f"{place}: these ElementMachines were made for a different model", advice=advice

@@ -16,7 +16,9 @@ from gms_fsm.charts.registry import chart_named, charts
 from gms_fsm.errors import OutputError, ParameterError, ScenarioError
 from gms_fsm.foundation.files import inside
 from gms_fsm.foundation.tables import ONE, TABLE, Table, built, read_file, write_file
+from gms_fsm.foundation.toml import parsed
 from gms_fsm.records.record import Record
+from gms_fsm.scenarios import shipped
 from gms_fsm.systems.files.tables import (
     ContactTable,
     CornersTable,
@@ -41,6 +43,11 @@ if TYPE_CHECKING:
 
 KNOWN, OWN = "<known>", "<own>"
 FILE, HERE = "<file>", "<here>"
+# Keys of scenario files, by what reads them.
+OF_A_SCENARIO = {
+    "load_scenario": ("model", "rig"),
+    "load_system": ("title", "notes", "run", "initial", "output", "record", "fit"),
+}
 
 
 def _chart_form(given: Any) -> str:
@@ -191,8 +198,23 @@ class SystemFile(SystemTable):
 
 def load(path: Path, kind: type[System]) -> System:
     """Read a system file; errors name file, line, key and text."""
+    if not path.exists() and str(path) in shipped():
+        raise _scenario(path, f"load_system({str(path)!r})")
+    given = parsed(path)
+    for reader, keys in OF_A_SCENARIO.items():
+        if found := [name for name in given if name in keys]:
+            raise _scenario(path, f"{reader}({str(path)!r})", f", with the key {found[0]!r}")
     build = functools.partial(SystemFile.chosen, folder=path.parent, kind=kind)
     return read_file(path, SystemFile, ScenarioError, build)
+
+
+def _scenario(path: Path, call: str, why: str = "") -> ScenarioError:
+    """Return the error of a scenario file, which has more than a system."""
+    return ScenarioError(
+        f"it is a scenario{why}",
+        place=str(path),
+        advice=f"read it with gms_fsm.app.scenario.{call}",
+    )
 
 
 def save(system: System, path: Path) -> Path:

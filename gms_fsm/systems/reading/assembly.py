@@ -8,7 +8,6 @@ the velocity of a driven body, a relative velocity, an input, a named expression
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,15 +24,15 @@ from gms_fsm.language import (
     Number,
     Value,
     derivative,
-    evaluate,
     names_in,
     parse_value,
     renamed,
 )
 from gms_fsm.language.normal import renamed_in
-from gms_fsm.systems.given import derivative_free, is_positive
+from gms_fsm.systems.given import derivative_free, is_positive, rank_of
 from gms_fsm.systems.parts import COUNTS, LEAST_LOAD, LOAD, Body, Contact
 from gms_fsm.systems.reading.definitions import ContactEdge, Definition
+from gms_fsm.systems.reading.order import check_loops, in_order
 from gms_fsm.systems.reading.values import numbers_of, of
 from gms_fsm.systems.signals import Formula
 from gms_fsm.systems.springs import added, spring_forces
@@ -205,46 +204,6 @@ class Assembly:
         return frozenset(given) | {name for name in shared if self.closure([name]) & given}
 
     @cached_property
-    def order(self) -> tuple[Bank, ...]:
-        """The machines, each after those whose outputs its flows and outputs read."""
-        found: list[Bank] = []
-        waiting = [*self.banks]
-        while waiting:
-            given = {name: each for each in waiting for name in each.forces}
-            ready = [each for each in waiting if not self.read_by(each) & given.keys()]
-            if not ready:
-                raise ParameterError(
-                    f"the outputs of {', '.join(each.name for each in waiting)} follow from each "
-                    f"other: {' and '.join(sorted(self.read_by(waiting[0]) & given.keys()))} "
-                    "closes the loop (an algebraic loop)",
-                    place=f"system {self.system.name!r}",
-                    advice="put a further state between them, or give one of them a period",
-                )
-            found += ready[:1]
-            waiting.remove(ready[0])
-        return tuple(found)
-
-    def read_by(self, bank: Bank) -> frozenset[str]:
-        """Return what the outputs of a machine are computed from, but for its own."""
-        if bank.periodic:  # what it gives out is held
-            return frozenset()
-        trees = [
-            *(each for each in bank.outputs.values() if each is not None),
-            *bank.totals.values(),
-        ]
-        names = self.closure(name for tree in trees for name in names_in(tree))
-        rates = [tree for (_, name), tree in bank.flows.items() if bank.rate(name) in names]
-        names |= self.closure(name for tree in rates for name in names_in(tree))
-        return names - {*bank.forces, *bank.rates}
-
-    def is_deferred(self, bank: Bank) -> bool:
-        """Return whether rates of a machine, on which no output depends, read outputs."""
-        if bank.periodic:
-            return False
-        names = self.closure(name for tree in bank.flows.values() for name in names_in(tree))
-        return bool(names & self.late - self.read_by(bank))
-
-    @cached_property
     def free(self) -> tuple[Body, ...]:
         """The bodies that are not driven."""
         return tuple(body for body in self.system.bodies if not body.driven)
@@ -302,7 +261,6 @@ class Assembly:
         return renamed(tree, inside) if inside else tree
 
 
-@functools.lru_cache(maxsize=64)
 def assembled(system: System) -> Assembly:
     """Read all texts of a system; a system is read once, when it is constructed."""
     return SystemReader(system).read()
@@ -379,7 +337,7 @@ class SystemReader:
         used |= {name for bank in banks for tree in bank.means.values() for name in names_in(tree)}
         read = Assembly(
             system,
-            _ordered(each for each in self.definitions if each.counts is None or each.name in used),
+            in_order(each for each in self.definitions if each.counts is None or each.name in used),
             banks,
             forces,
             inertias,
@@ -388,7 +346,7 @@ class SystemReader:
             self.shared,
             self.own,
         )
-        _ = read.order  # refuses loops
+        check_loops(read)
         return read
 
     def see_machines(self) -> None:
@@ -544,7 +502,9 @@ class SystemReader:
                         )
             if all(state.locked for state in chart.states):
                 always.append(bank)
-                if _rank(always, free, self.system.numbers) < sum(len(b.jacobian) for b in always):
+                if rank_of(always, free, self.system.numbers) < sum(
+                    len(b.jacobian) for b in always
+                ):
                     names = ", ".join(repr(each.name) for each in always)
                     raise ParameterError(
                         f"the contacts {names} are always locked, and the lock of "
@@ -636,25 +596,3 @@ class SystemReader:
                 Definition(of(c, name), renamed(tree, names), index if per_element else None)
             )
             names[name] = Name(of(c, name))
-
-
-def _ordered(definitions: Iterable[Definition]) -> tuple[Definition, ...]:
-    """Return definitions, each after those that it names; others keep their order."""
-    waiting, found = [*definitions], list[Definition]()
-    while waiting:
-        left = {each.name for each in waiting}
-        ready = (each for each in waiting if each.tree is None or not names_in(each.tree) & left)
-        each = next(ready, waiting[0])  # a loop is refused later
-        found.append(each)
-        waiting.remove(each)
-    return tuple(found)
-
-
-def _rank(banks: Iterable[Bank], free: list[str], numbers: Mapping[str, float]) -> int:
-    """Return how many velocities of contacts are independent of each other."""
-    rows = [
-        [float(evaluate(row.get(body, ZERO), numbers)) for body in free]
-        for bank in banks
-        for row in bank.jacobian
-    ]
-    return int(np.linalg.matrix_rank(np.array(rows)))
