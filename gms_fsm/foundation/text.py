@@ -45,6 +45,11 @@ def visible_lines(text: str) -> str:
     return _UNSEEN.sub(lambda match: _escape(match[0]), text)
 
 
+def referenced(xml: str) -> str:
+    """Return XML whose control codes and invisible marks are references: readers give them back."""
+    return _UNSEEN.sub(lambda match: f"&#{ord(match[0])};", xml)
+
+
 def encoded(text: str) -> bytes:
     """Return the bytes of a text that leaves the program."""
     return visible_lines(text).encode()

@@ -82,11 +82,11 @@ def _in_blocks(program: Program, rows: Rows, kept: range) -> FloatArray:
     if len(rows) <= count:
         return observe_rows(program, rows.t, rows.y, rows.mode, kept)
     table = np.empty((len(rows), len(kept)))
-    for first in range(0, len(rows), count):
-        start = max(0, first - BESIDE)
-        part = rows.at(slice(start, first + count + BESIDE))
-        seen = observe_rows(program, part.t, part.y, part.mode, kept)
-        table[first : first + count] = seen[first - start :][:count]
+    for row in range(0, len(rows), count):
+        start = max(0, row - BESIDE)
+        part = rows.at(slice(start, row + count + BESIDE))
+        own = observe_rows(program, part.t, part.y, part.mode, kept)[row - start :][:count]
+        table[row:][:count] = own
     return table
 
 

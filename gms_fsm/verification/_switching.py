@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, islice
 from typing import Any
 
 from gms_fsm.charts.chart import Transition
@@ -222,7 +222,7 @@ class Walks:
             [state.name for state in self.prover.chart.states], self.n
         ):
             here: list[dict[str, Dual]] = [dict(self.prover.still)]
-            here += map(dict, self.prover.others[: self.n - 1])
+            here += map(dict, islice(self.prover.others, self.n - 1))
             formulas = self.prover.within(states[0]) if self.n == 1 else []
             if (found := self.follow([(states, here)], [], formulas, [])) is not None:
                 return found

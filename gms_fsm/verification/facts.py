@@ -11,7 +11,6 @@ from gms_fsm.foundation.arguments import unknown
 from gms_fsm.systems.models import is_model
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.reading.assembly import Assembly, Bank
-from gms_fsm.systems.system import System
 
 
 @dataclass(frozen=True)
@@ -46,19 +45,24 @@ class ContactFacts:
     struck: bool = False
 
 
+def _chosen(read: Assembly, contact: str) -> Bank:
+    """Return the contact of a system that is meant: the only one, or the one named."""
+    banks = {bank.name: bank for bank in read.banks}
+    if not contact and len(banks) > 1:
+        raise ParameterError(
+            f"system {read.system.name!r} has the contacts {', '.join(map(repr, banks))}",
+            place="contact",
+            advice=f"say which one: prove(system, contact={next(iter(banks))!r})",
+        )
+    if contact and contact not in banks:
+        raise unknown("contact", contact, [*banks], ParameterError, place="contact")
+    return banks[contact or next(iter(banks))]
+
+
 def facts_of(what: Any, contact: str = "") -> ContactFacts:
     """Return the facts of a chart alone, of a model or contact, or of a contact of a system."""
-    if isinstance(what, System):
-        banks = {bank.name: bank for bank in what.assembly.banks}
-        if not contact and len(banks) > 1:
-            raise ParameterError(
-                f"system {what.name!r} has the contacts {', '.join(map(repr, banks))}",
-                place="contact",
-                advice=f"say which one: prove(system, contact={next(iter(banks))!r})",
-            )
-        if contact and contact not in banks:
-            raise unknown("contact", contact, [*banks], ParameterError, place="contact")
-        return _in_system(what.assembly, banks[contact or next(iter(banks))])
+    if read := getattr(what, "assembly", None):  # a system
+        return _in_system(read, _chosen(read, contact))
     if contact:
         raise ParameterError(
             "only a system has contacts", place="contact", value=contact, advice="leave it out"

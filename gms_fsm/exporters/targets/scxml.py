@@ -25,7 +25,7 @@ from gms_fsm.exporters.alone import (
     fields_of,
 )
 from gms_fsm.formats import Format, register
-from gms_fsm.foundation.text import visible
+from gms_fsm.foundation.text import referenced, visible
 from gms_fsm.systems.system import LEAST_LOAD, Contact, loaded
 
 __all__: list[str] = []
@@ -98,7 +98,7 @@ def _document(name: str, chart: Chart, numbers: Mapping[str, float]) -> str:
         write.state(root, state.name)
     ET.indent(root, "  ")
     head = f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- Written by gms-fsm {__version__}. -->\n'
-    return head + ET.tostring(root, encoding="unicode") + "\n"
+    return head + referenced(ET.tostring(root, encoding="unicode")) + "\n"
 
 
 def _outside(chart: Chart) -> dict[str, str]:
