@@ -1272,7 +1272,6 @@ rows = {
 group("chart", ChartError, chart, rows)
 rows = {
     "no states": ({"states": (), "transitions": ()},),
-    "no velocity": ({"velocities": ()},),
     "outputs by state": ({"outputs": {"F": {"stick": "k * z"}}},),
     "let and parameter": ({"let": {"k": "1"}},),
     "force and parameter": ({"velocities": ("v", "w"), "parameters": (*K, "F_w")},),
@@ -1353,7 +1352,7 @@ rows = {
         lambda: call(Transition, "go", "stick", dest="slip"),
     ),
     "edge without a guard": (
-        "transition 'go'",
+        "edge 'go'",
         ...,
         lambda: call(Transition, "go", "stick", "slip"),
     ),

@@ -145,9 +145,9 @@ class Transition:
         for each in (*emitted, *[event][: bool(event)]):
             if not isinstance(each, str) or not each.isidentifier():
                 raise ChartError("it is not a name", place=f"{here}: event", value=each)
-        if guard is NO_GUARD and not event:
+        if guard == NO_GUARD and not event:
             raise ChartError("it has no guard", place=here, advice="give one; 'True' is always")
-        guard = "True" if guard is NO_GUARD else guard
+        guard = "True" if guard == NO_GUARD else guard
         if not isinstance(source, str) and not isinstance(source, Sequence):
             raise ChartError(
                 "it must be the name of a state, or several",

@@ -367,7 +367,14 @@ class _Reader:
         raise self.refuse(
             f"unknown name {shown(name)}{_suggestion(name, [*self.names, *CONSTANTS])}",
             node,
-            f"the names {some_of(self.names)}, and pi",
+            f"the names {some_of(self.listed)}, and pi",
+        )
+
+    @property
+    def listed(self) -> list[str]:
+        """The names that messages list: those of others after one's own, without states."""
+        return sorted(
+            (name for name in self.names if "(" not in name), key=lambda name: "." in name
         )
 
     @functools.cached_property

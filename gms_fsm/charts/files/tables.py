@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from gms_fsm.charts.parameters import Parameter
-from gms_fsm.charts.parts import State, Transition
+from gms_fsm.charts.parts import NO_GUARD, State, Transition
 from gms_fsm.charts.reader import AGE
 from gms_fsm.errors import ChartError
 from gms_fsm.foundation.tables import ONE, TABLE, Table, Texts, built, read_file, write_file
@@ -55,7 +55,9 @@ class EdgeTable(Table):
     name: str
     source: Texts = Field(alias="from", description="the state it leaves, its source")
     target: str = Field(alias="to", description="the state it enters, its target")
-    guard: str = Field(description="the condition under which it is taken")
+    guard: str = Field(NO_GUARD, description="the condition under which it is taken")
+    event: str = Field("", description="the event that it waits for; the guard may be left out")
+    emit: Texts = Field([], description="events for the machines of the system")
     actions: dict[str, str] = Field({}, alias="do", description="actions: new values of variables")
     impulse: bool = False
 
@@ -114,6 +116,7 @@ class ChartTable(Table):
         edges: dict[str, dict[str, Any]] = {}
         for edge in chart.transitions:
             one = {name: getattr(edge, name) for name in EdgeTable.model_fields}
+            one["emit"] = list(edge.emit)
             one["source"] = edges[edge.name]["source"] if edge.name in edges else []
             one["source"].append(edge.source)
             edges[edge.name] = one
