@@ -2170,7 +2170,7 @@ rows = {
     "no chart": ("chart", 3, lambda: prove(3)),  # type: ignore[arg-type]
     "contact of a chart": ("contact", "pad", lambda: prove(gms_element("signed"), contact="pad")),
     "which contact": ("contact", ..., lambda: prove(TWO_PADS)),
-    "unknown contact": ("contact", ..., lambda: prove(TWO_PADS, contact="pat")),
+    "unknown contact": ("", ..., lambda: prove(TWO_PADS, contact="pat")),
 }
 group("prove", ParameterError, lambda call: call(), rows)
 

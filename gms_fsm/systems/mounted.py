@@ -13,6 +13,8 @@ from typing import Any
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import spell
 from gms_fsm.systems.models import Model, is_model
+from gms_fsm.systems.parts import Contact
+from gms_fsm.systems.reading.assembly import Assembly
 from gms_fsm.systems.rigs import Prescribed, Rig
 from gms_fsm.systems.signals import Signal
 from gms_fsm.systems.system import System, system_of
@@ -199,6 +201,31 @@ def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
             value=model,
         )
     return mounted(model, Prescribed("0"))
+
+
+def contact_of(what: object, name: str) -> tuple[Contact, Assembly | None]:
+    """Return a contact of a system, with the system read; or a model as a contact of its own."""
+    if isinstance(what, System):
+        known = [each.name for each in what.contacts]
+        if not name and len(known) > 1:
+            raise ParameterError(
+                f"system {what.name!r} has the contacts {', '.join(map(repr, known))}",
+                place="contact",
+                advice=f"say which one: contact={known[0]!r}",
+            )
+        return what.contact(name or known[0]), what.assembly
+    if name:
+        raise ParameterError(
+            "only a system has contacts", place="contact", value=name, advice="leave it out"
+        )
+    if isinstance(what, Contact):
+        return what, None
+    if not is_model(what):
+        raise ParameterError(
+            "it must be a chart, a model, a contact or a system", place="chart", value=what
+        )
+    model: Any = what
+    return Contact("friction", model), None
 
 
 def shifted(call: str, model: Model | System, rig: Any, *rest: Any) -> tuple[Any, ...]:

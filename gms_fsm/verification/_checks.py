@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations, islice, product
-from typing import Any, TypeAlias
+from collections.abc import Iterator, Sequence
+from itertools import combinations, islice
+from typing import Any
 
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.language import (
-    Condition,
-    Not,
-    Requirement,
-    Split,
     Value,
-    evaluate,
     names_in,
     parse_value,
-    split,
 )
 from gms_fsm.verification._prover import (
     Answer,
@@ -33,27 +26,24 @@ from gms_fsm.verification._prover import (
     refuted,
     shown,
 )
-from gms_fsm.verification._subject import ChartSubject
 from gms_fsm.verification._switching import (
     after,
     by_turns,
     changed,
     earlier,
     endless,
+    follow_impulses,
     interrupted,
-    jolts_and_arrests,
+    is_hidden,
     may_change,
     others,
     others_switch,
     read_by,
-    renewed,
     untaken,
 )
 from gms_fsm.verification.findings import Finding
 
 MOST_CYCLES = 200  # cycles; a friction chart has a handful
-MOST_WAYS = 64  # alternatives per guard
-JUMPS = "an edge assigns variables; the flow after a jump is not followed"
 
 
 # --------------------------------------------------------------------------- determinism
@@ -77,7 +67,7 @@ def _at_once(prover: Prover, pair: Sequence[Transition]) -> Answer:
     point = prover.example(names_of(*guards), *formulas, *prover.within(pair[0].source))
     if point is None:
         return Answer("proved", "never enabled at the same time")
-    if prover.subject.arrests(pair[0]) and _is_hidden(prover, pair[1], pair[:1]):
+    if prover.subject.arrests(pair[0]) and is_hidden(prover, pair[1], pair[:1]):
         return Answer("proved", f"{pair[1].name} is taken only where the velocity jumps")
     text = f"both are enabled at the same time; the machine takes the earlier, {first}"
     return by_example("settled by order", text, point, enabled(guards, point))
@@ -127,7 +117,7 @@ def _at_one_instant(prover: Prover, cycles: Sequence[tuple[Transition, ...]]) ->
     if several and (answer := interrupted(prover, cycles)) is not None:
         return answer
     if several and others_switch(prover):
-        return Answer("undecided", f"{others(prover)} may switch at the same instant")
+        return Answer("undecided", f"{others(prover)} at the same instant are not followed")
     return by_turns(prover, facts.n if several else 1)
 
 
@@ -178,9 +168,8 @@ def _all_around(
     closed = [end[name].value == prover.symbols[name] for name in sorted(assigned)]
     names = read_by(subject, cycle) | assigned
     point = prover.example(names, *once, *closed)
-    if point is not None and jolts_and_arrests(subject, cycle):
-        raise Undecided("an arrest is not taken where an impulse changes the velocity")
     if point is not None:
+        follow_impulses(subject, cycle)
         text = "all are enabled at one point: endless switching"
         return refuted(text, point, endless(subject, [cycle[0].source], [point]))
     if prover.find(*around(2, certain=True)[0]) is None:
@@ -232,20 +221,11 @@ def _can_hold(prover: Prover, edge: Transition) -> Answer:
     prover.apart(names_of(subject.guard(edge)))
     # Where the velocity has jumped, arrests are not taken.
     before = [each for each in earlier(subject, edge) if not subject.arrests(each)]
-    if _is_hidden(prover, edge, before):
+    if is_hidden(prover, edge, before):
         names = ", ".join(each.name for each in before)
         text = f"never taken: wherever its guard holds, an earlier edge takes precedence ({names})"
         return Answer("refuted", text)
     return Answer("proved", "its guard can hold")
-
-
-def _is_hidden(prover: Prover, edge: Transition, earlier: Sequence[Transition]) -> bool:
-    """Return whether one of these edges is enabled wherever another one is."""
-    subject, reading = prover.subject, Reading()
-    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.within(edge.source)]
-    formulas += [reading.truth(Not(subject.guard(each)), prover.still) for each in earlier]
-    prover.defined(reading)
-    return prover.find(*formulas) is None
 
 
 def _entered(chart: Chart, edges: Sequence[Transition]) -> set[str]:
@@ -262,258 +242,6 @@ def _in_graph(state: str, certain: set[str], possible: set[str], yes: str, no: s
         text = f"perhaps {no}: a guard is undecided"
         return Finding("reachability", "undecided", (state,), text)
     return Finding("reachability", "refuted", (state,), no)
-
-
-# --------------------------------------------------------------------------- chattering
-def chattering(prover: Prover) -> Iterator[Finding]:
-    """Check that no two flows push toward each other across a guard surface."""
-    if prover.subject.facts.period is not None:
-        yield Finding("chattering", "proved", (), "it switches at ticks only")
-        return
-    pairs = [
-        (there, back)
-        for there, back in combinations(prover.chart.transitions, 2)
-        if there.source == back.target != there.target == back.source
-    ]
-    if not pairs:
-        yield Finding("chattering", "proved", (), "no two states have edges in both directions")
-    for there, back in pairs:
-        where = (there.source, there.name, back.source, back.name)
-        yield prover.settle("chattering", where, _pushed, there, back)
-    if pairs and may_change(prover):
-        yield prover.settle("chattering", (), _pushed_by_others, pairs)
-
-
-def _pushed_by_others(prover: Prover, pairs: Sequence[tuple[Transition, Transition]]) -> Answer:
-    """Prove that no two states alternate, whatever others give in each of them."""
-    z3 = prover.z3
-    for there, back in pairs:
-        if prover.subject.assigned(there) or prover.subject.assigned(back):
-            raise Undecided(JUMPS)
-        other, assumed = renewed(prover, prover.still, "!")
-        formulas, touched = [*assumed, *prover.within(there.source)], list[Any]()
-        for edge, names in ((there, prover.still), (back, other)):
-            reading = Reading()
-            moved = moving(prover, reading, edge.source, names)
-            loose = []
-            for way in ways(split(prover.subject.guard(edge))):
-                margins = [reading.margin(part, moved) for part in way]
-                loose.append(z3.And([z3.Or(m.value > 0, rests(z3, m)) for m in margins]))
-                touched += [m.value == 0 for m in margins]
-            prover.defined(reading)
-            jumps = [u == 0 for u in reading.breaks]
-            touched += jumps
-            formulas.append(z3.Or(*loose, *jumps))
-        if prover.find(*formulas, z3.Or(touched)) is not None:
-            return Answer("undecided", f"{others(prover)} may switch at the same instant")
-    return Answer("proved", f"nor where {others(prover)} switch at the same instant")
-
-
-def rests(z3: Any, margin: Dual) -> Any:
-    """Return the formula that a margin is zero and does not fall."""
-    return z3.And(margin.value == 0, margin.slope >= 0)
-
-
-def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
-    """Search for a point at which each flow pushes into the guard that leaves its state.
-
-    A comparison is on its surface where its margin is zero. Each guard needs one such comparison,
-    whose margin grows under its own flow and falls under the other; its other margins must be
-    positive, or zero and growing. A margin at rest at zero, or a point where a flow jumps, is not
-    decided to first order.
-    """
-    subject, z3 = prover.subject, prover.z3
-    for edge in (there, back):
-        arrests = [each for each in earlier(subject, edge) if subject.arrests(each)]
-        if arrests and _is_hidden(prover, edge, arrests):
-            text = f"{edge.name} is taken only where the velocity jumps: {arrests[0].name} has "
-            return Answer("proved", f"{text}precedence")
-    jumps = subject.assigned(there) or subject.assigned(back)
-    beside = [each for edge in (there, back) for each in rivals(prover, edge)]
-    guards = [subject.guard(edge) for edge in (there, back)]
-    resting = prover.within(there.source, back.source)
-    of_flows, of_guards = Reading(), Reading()
-    moved = [moving(prover, of_flows, edge.source, prover.still) for edge in (there, back)]
-    at_break = z3.Or([u == 0 for u in of_flows.breaks])
-    strict, loose = [], []
-    for pair in product(*(ways(split(guard)) for guard in guards)):
-        if not _at_one_time(prover, [*pair[0], *pair[1]]):
-            continue
-        if jumps:
-            raise Undecided(JUMPS)
-        crossed, touched, growing, not_falling, reached = [], [], [], [], []
-        for way, own, other in zip(pair, moved, reversed(moved), strict=True):
-            here = [of_guards.margin(part, own) for part in way]
-            across = [of_guards.margin(part, other).slope for part in way]
-            turning = zip(here, across, strict=True)
-            crossed.append(z3.Or([z3.And(m.value == 0, m.slope > 0, n < 0) for m, n in turning]))
-            touched.append(z3.Or([m.value == 0 for m in here]))
-            growing += [z3.Or(m.value > 0, z3.And(m.value == 0, m.slope > 0)) for m in here]
-            not_falling += [z3.Or(m.value > 0, z3.And(m.value == 0, m.slope >= 0)) for m in here]
-            reached += [m.value >= 0 for m in here]
-        strict.append(z3.And(*crossed, *growing))
-        loose += [z3.And(*crossed, *not_falling), z3.And(at_break, *touched, *reached)]
-    if not strict:
-        return Answer("proved", "their guards never become true at the same place and time")
-    breaks = [*of_flows.breaks, *of_guards.breaks]
-    prover.defined(of_flows)
-    prover.defined(of_guards)
-    names = moving_names(
-        prover, [*guards, *map(subject.guard, beside)], (there.source, back.source)
-    )
-    calm, firm = (
-        [u != 0 for u in breaks],
-        [
-            u
-            for edge, here in zip((there, back), moved, strict=True)
-            for u in passed_over(prover, edge, here)
-        ],
-    )
-    point = prover.example(names, z3.Or(strict), *resting, *calm, *firm)
-    if point is not None:
-        place = _surface(guards[0], point)
-        one = all(isinstance(split(guard), Requirement) for guard in guards)
-        follows = "a sliding mode, if not endless switching" if one else "endless switching"
-        text = f"on {place} each flow pushes into the other's guard: {follows}"
-        return refuted(text, point)
-    if of_guards.breaks:
-        raise Undecided("sgn jumps in a guard")
-    sure = [
-        formula
-        for edge in (there, back)
-        for formula in untaken(prover, edge, prover.still, certain=True)
-    ]
-    if prover.find(z3.Or(loose), *resting, *sure) is None:
-        text = "there is no surface on which both flows push into the other's guard"
-        return Answer("proved", text)
-    if beside and prover.find(z3.Or(strict), *resting, *calm) is not None:
-        raise Undecided("another edge may be taken instead")
-    raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
-
-
-def rivals(prover: Prover, edge: Transition) -> list[Transition]:
-    """Return the other edges that leave the same state."""
-    return [each for _, each in prover.chart.leaving(edge.source) if each.name != edge.name]
-
-
-def _steady(prover: Prover, state: str, part: Requirement) -> Any:
-    """Return when a comparison stays as it is, since its velocity does not change; None if unknown.
-
-    A load that does not change makes the velocity linear in time.
-    """
-    subject, known = prover.subject, {*prover.chart.parameter_names}
-    if not subject.moves or len(prover.chart.velocities) > 1:
-        return None
-    v, load = prover.chart.velocities[0], subject.load
-    if not names_in(part.relation) <= known | {v}:
-        return None
-    if not names_in(subject.flows[state, v]) <= known | {load, subject.mobility}:
-        return None
-    return prover.rates[f"d{load}/dt"] == 0
-
-
-def passed_over(prover: Prover, edge: Transition, here: Duals, by_order: bool = False) -> list[Any]:
-    """Return when no other edge of the same state holds at a point, or just after it.
-
-    Of those later in order it may suffice that they do not hold at the point, if the edge itself
-    holds just after it.
-    """
-    z3, found, first = prover.z3, [], earlier(prover.subject, edge)
-    for each in rivals(prover, edge):
-        reading = Reading()
-        if by_order and each not in first:
-            found.append(reading.truth(Not(prover.subject.guard(each)), here))
-        else:
-            for way in ways(split(prover.subject.guard(each))):
-                margins = [(part, reading.margin(part, here)) for part in way]
-                strict = [(part, m) for part, m in margins if not inclusive(part)]
-                falls = [z3.And(m.value == 0, m.slope < 0) for _, m in strict]
-                rest = [
-                    z3.And(m.value == 0, m.slope == 0, steady)
-                    for part, m in strict
-                    if (steady := _steady(prover, edge.source, part)) is not None
-                ]
-                found.append(z3.Or(*(m.value < 0 for _, m in margins), *falls, *rest))
-        prover.defined(reading)
-        found += [u != 0 for u in reading.breaks]
-    return found
-
-
-Ways: TypeAlias = list[tuple[Requirement, ...]]
-
-
-def ways(parts: Split) -> Ways:
-    """Return the alternatives under which a split condition holds."""
-    if isinstance(parts, Requirement):
-        return [(parts,)]
-    word, inner = parts
-    found = [ways(part) for part in inner]
-    if word == "either":
-        return [way for some in found for way in some]
-    if math.prod(map(len, found)) > MOST_WAYS:
-        raise Undecided(f"a guard has more than {MOST_WAYS} alternatives")
-    return [tuple(part for way in some for part in way) for some in product(*found)]
-
-
-def inclusive(part: Requirement) -> bool:
-    """Return whether a comparison holds where both sides are equal."""
-    return part.comparison.strict != part.holds
-
-
-def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
-    """Return whether the comparisons of inputs alone allow both guards.
-
-    Inputs are the same in both states, so both guards must allow them at one time: ``v > v_c`` in
-    one and ``abs(v) <= v_c`` in the other is not chattering, though both are about to change at
-    v_c.
-    """
-    variables = {*prover.subject.variables}
-    alike = [part.relation for part in parts if not names_in(part.relation) & variables]
-    reading = Reading()
-    formulas = [reading.truth(relation, prover.still) for relation in alike]
-    prover.defined(reading)
-    return prover.find(*formulas) is not None
-
-
-def moving(prover: Prover, reading: Reading, state: str, here: Duals) -> Duals:
-    """Return every name with its rate of change in a state, at some values of the names."""
-    subject = prover.subject
-    rates = {name: prover.rates[f"d{name}/dt"] for name in subject.inputs}
-    if "t" in rates:
-        rates["t"] = prover.z3.RealVal(1)
-    if subject.mobility:
-        rates[subject.mobility] = prover.z3.RealVal(0)
-    if "x" in rates and (velocity := _velocity(subject)):
-        rates["x"] = here[velocity].value
-    for name in subject.variables:
-        rates[name] = reading.value(subject.flows[state, name], here).value
-    return {**here, **{name: Dual(here[name].value, rate) for name, rate in rates.items()}}
-
-
-def _velocity(subject: ChartSubject) -> str:
-    """Return the name of the rate of x; empty if the chart has none."""
-    v = subject.chart.velocities[0]
-    return v if v in (*subject.inputs, *subject.variables) else ""
-
-
-def moving_names(
-    prover: Prover, guards: Sequence[Condition], states: Sequence[str]
-) -> frozenset[str]:
-    """Return what decides how guards change in states: their names, rates, and the flows."""
-    subject = prover.subject
-    flows = [subject.flows[state, name] for state in states for name in subject.variables]
-    names = names_of(*guards, *flows)
-    steady = {"t", "x", subject.mobility}
-    names |= {f"d{name}/dt" for name in names_of(*guards) & {*subject.inputs} - steady}
-    return names | (names & {"x"} and frozenset({_velocity(subject)}))
-
-
-def _surface(guard: Condition, point: Mapping[str, float]) -> str:
-    """Describe the surface of a guard on which a point lies."""
-    for part in (part.comparison for way in ways(split(guard)) for part in way):
-        if evaluate(part.left, point) == evaluate(part.right, point):
-            return f"{shown(part.left)} = {shown(part.right)}"
-    return f"the surface of {shown(guard)}"
 
 
 # --------------------------------------------------------------------------- stability

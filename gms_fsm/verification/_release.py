@@ -7,7 +7,7 @@ from typing import Any
 
 from gms_fsm.charts.chart import Transition
 from gms_fsm.language import split
-from gms_fsm.verification._checks import (
+from gms_fsm.verification._flows import (
     inclusive,
     moving,
     moving_names,
@@ -79,8 +79,8 @@ def _pushed_back_by_others(
         for each in (of_edge, reading):
             prover.defined(each)
         if prover.find(*formulas, z3.Or(*loose, *(u == 0 for u in reading.breaks))) is not None:
-            return Answer("undecided", f"{others(prover)} may switch at the same instant")
-    return Answer("proved", f"nor where {others(prover)} switch at the same instant")
+            return Answer("undecided", f"{others(prover)} at the same instant are not followed")
+    return Answer("proved", f"nor with {others(prover)} at the same instant")
 
 
 def _for_ever(prover: Prover, edge: Transition, back: Transition, there: Duals) -> list[Any]:
@@ -143,9 +143,13 @@ def _pushed_back(prover: Prover, edge: Transition, back: Transition) -> Answer:
     point = prover.example(names, *pushed, *firm)
     if point is not None:
         return refuted(text, point)
-    if prover.find(*pushed) is not None:
+    sure = [
+        *untaken(prover, edge, prover.still, certain=True),
+        *untaken(prover, back, there, certain=True),
+    ]
+    if prover.find(*pushed, *sure) is not None:
         raise Undecided("another edge may be taken instead")
     at_break = z3.And(z3.Or([u == 0 for u in breaks]), z3.Or(reached))
-    if prover.find(*let_go, z3.Or(*loose, at_break)) is not None:
+    if prover.find(*let_go, *sure, z3.Or(*loose, at_break)) is not None:
         raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
     return Answer("proved", f"{back.name} cannot follow at once")

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.language import (
     Binary,
     Condition,
@@ -143,9 +143,9 @@ class ChartSubject:
             lines.append(f"a = ({H} - F) {W} while the contact moves{held}")
         if self.rest:
             others = "the other element" if facts.n == 2 else f"the other {facts.n - 1} elements"
-            lines.append(
-                f"F is the sum over {facts.n} elements; {self.rest['F']} is that of {others}"
-            )
+            own = [f"; {name}2 is the {name} of element 2" for name in self.elements[-1:]]
+            lines.append(f"F is the sum over {facts.n} elements, {self.rest['F']} that of {others}")
+            lines[-1] += "".join(own)
         if facts.period is not None:
             lines.append(f"machines are asked once at each tick, every {facts.period:g} s")
         return tuple(lines)
@@ -174,25 +174,17 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
         lets[name] = renamed(tree, lets)
     declared = {*chart.inputs, *chart.velocities, *chart.variables, *chart.parameter_names, *lets}
     late = [name for name in (*chart.force_names, *chart.rate_names) if name not in declared]
-    steps = {
-        (edge.source, edge.name): tuple(
-            (name, renamed(tree, lets))
-            for place in (("exit", edge.source), ("action", edge.name), ("entry", edge.target))
-            for name, tree in chart.assignments[place].items()
-        )
-        for edge in chart.transitions
-    }
+    steps = _steps(chart, lets)
     guards = {name: renamed_in(tree, lets) for name, tree in chart.guards.items()}
     read = _names(guards.values()) | _names(tree for row in steps.values() for _, tree in row)
     driven = bool(read & {*late}) or chart.locks or chart.sets_velocity
-    moves = driven or (facts.free and bool(read & {*chart.velocities}))
+    moves = driven or (facts.free and bool(read & {"x", *chart.velocities}))
     load, mobility = _fresh("H", declared), _fresh("W", declared)
     flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
-    several = moves and facts.n > 1
     rest = {
         force: _fresh(_called("R", chart, force), declared)
         for force in chart.force_names
-        if several
+        if moves and facts.n > 1
     }
     viscous = _fresh("sigma_2", declared) if moves and facts.viscous else ""
     own: dict[str, dict[str, Value]] = {}
@@ -204,33 +196,17 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
             for name in chart.force_names
             if (given := chart.forces[state.name, name]) is not None
         }
-        found = values[state.name] = {}
-        for force in chart.force_names:
-            if force not in own[state.name]:  # locked
-                found[force] = Name(_called(load, chart, force))
-                continue
-            total: Value = own[state.name][force]
-            if several:
-                total = Binary("+", total, Name(rest[force]))
-            if force in chart.totals:
-                total = renamed(chart.totals[force], {**inside, force: total})
-            if viscous and force == chart.force_names[0]:
-                drag = Binary("*", Name(viscous), Name(chart.velocities[0]))
-                total = Binary("+", total, drag)
-            found[force] = total
+        found = values[state.name] = {
+            force: _total(chart, force, own[state.name].get(force), inside, (load, rest, viscous))
+            for force in chart.force_names
+        }
         if state.locked:
             found |= {name: ZERO for name in chart.rate_names if name in late}
-    if moves and len(chart.velocities) == 1:
-        for state in chart.states:
-            net = Binary("-", Name(load), values[state.name]["F"])
-            rate = ZERO if state.locked else Binary("*", net, Name(mobility))
-            flows[state.name, chart.velocities[0]] = rate
-            if chart.rate_names[0] in late:
-                values[state.name][chart.rate_names[0]] = rate
-    elif moves:  # the accelerations are coupled, which is not encoded: their names stay
-        for state in chart.states:
-            for velocity, name in zip(chart.velocities, chart.rate_names, strict=True):
-                flows[state.name, velocity] = ZERO if state.locked else Name(name)
+    for state in chart.states if moves else ():
+        rates = _accelerations(chart, state, values[state.name]["F"], load, mobility)
+        flows |= {(state.name, velocity): rate for velocity, rate in rates.items()}
+        if len(rates) == 1 and chart.rate_names[0] in late:
+            values[state.name] |= dict.fromkeys(chart.rate_names, *rates.values())
     inputs = [name for name in chart.inputs if not (moves and name in chart.velocities)]
     if moves:
         loads = [_called(load, chart, force) for force in chart.force_names]
@@ -269,6 +245,53 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
         ),
         facts=facts,
     )
+
+
+def _steps(
+    chart: Chart, lets: Mapping[str, Value]
+) -> dict[tuple[str, str], tuple[tuple[str, Value], ...]]:
+    return {
+        (edge.source, edge.name): tuple(
+            (name, renamed(tree, lets))
+            for place in (("exit", edge.source), ("action", edge.name), ("entry", edge.target))
+            for name, tree in chart.assignments[place].items()
+        )
+        for edge in chart.transitions
+    }
+
+
+def _total(
+    chart: Chart,
+    force: str,
+    own: Value | None,
+    inside: Mapping[str, Value],
+    called: tuple[str, Mapping[str, str], str],
+) -> Value:
+    """Return the force of a contact, given that of one element; None stands for a lock.
+
+    `called` are the names of the load, of the forces of the others, and of viscous friction.
+    """
+    load, rest, viscous = called
+    if own is None:
+        return Name(_called(load, chart, force))
+    total = Binary("+", own, Name(rest[force])) if rest else own
+    if force in chart.totals:
+        total = renamed(chart.totals[force], {**inside, force: total})
+    if viscous and force == chart.force_names[0]:
+        total = Binary("+", total, Binary("*", Name(viscous), Name(chart.velocities[0])))
+    return total
+
+
+def _accelerations(
+    chart: Chart, state: State, force: Value, load: str, mobility: str
+) -> dict[str, Value]:
+    """Return the rate of each velocity; several are coupled, which is not encoded."""
+    if state.locked:
+        return dict.fromkeys(chart.velocities, ZERO)
+    if len(chart.velocities) > 1:
+        return {v: Name(rate) for v, rate in zip(chart.velocities, chart.rate_names, strict=True)}
+    net = Binary("-", Name(load), force)
+    return {chart.velocities[0]: Binary("*", net, Name(mobility))}
 
 
 def _names(trees: Iterable[Value | Condition]) -> frozenset[str]:

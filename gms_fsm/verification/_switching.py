@@ -59,6 +59,15 @@ def untaken(prover: Prover, edge: Transition, here: Duals, certain: bool) -> lis
     return found
 
 
+def is_hidden(prover: Prover, edge: Transition, before: Sequence[Transition]) -> bool:
+    """Return whether one of these edges is enabled wherever another one is."""
+    subject, reading = prover.subject, Reading()
+    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.within(edge.source)]
+    formulas += [reading.truth(Not(subject.guard(each)), prover.still) for each in before]
+    prover.defined(reading)
+    return prover.find(*formulas) is None
+
+
 def after(prover: Prover, reading: Reading, edge: Transition, here: Duals) -> dict[str, Dual]:
     """Return the values after an edge; F and a are those before it."""
     subject = prover.subject
@@ -80,12 +89,15 @@ def changed(subject: ChartSubject, edges: Sequence[Transition]) -> frozenset[str
     )
 
 
-def jolts_and_arrests(subject: ChartSubject, edges: Sequence[Transition]) -> bool:
-    """Return whether edges set the velocity, and arrest the contact, which then is not taken."""
-    sets = {*subject.chart.velocities} & {
-        name for edge in edges for name, _ in subject.assigned(edge)
-    }
-    return bool(sets) and any(map(subject.arrests, edges))
+def follow_impulses(subject: ChartSubject, edges: Sequence[Transition]) -> None:
+    """Raise `Undecided` if edges set the velocity, and what follows from that is not encoded."""
+    sets = {name for edge in edges for name, _ in subject.assigned(edge)}
+    if not sets & {*subject.chart.velocities}:
+        return
+    if any(map(subject.arrests, edges)):
+        raise Undecided("an arrest is not taken where an impulse changes the velocity")
+    if subject.facts.jumping:
+        raise Undecided("inputs jump with an impulse")
 
 
 def read_by(subject: ChartSubject, edges: Sequence[Transition]) -> frozenset[str]:
@@ -145,7 +157,7 @@ def _share(subject: ChartSubject, states: Sequence[str], here: list[dict[str, fl
 def may_change(prover: Prover) -> frozenset[str]:
     """Return the names that other elements, and other contacts, can change within an instant."""
     subject, facts, chart = prover.subject, prover.subject.facts, prover.chart
-    found = {*subject.rest.values()}
+    found = {*subject.rest.values(), *facts.jumping}
     if facts.pulled and subject.moves:
         loads = (subject.load + force.removeprefix("F") for force in chart.force_names)
         found |= {*loads, subject.mobility}
@@ -165,15 +177,16 @@ def renewed(prover: Prover, here: Duals, mark: str) -> tuple[dict[str, Dual], li
 
 
 def others_switch(prover: Prover) -> bool:
-    """Return whether it is other contacts that change something within an instant."""
-    return bool(may_change(prover) - {*prover.subject.rest.values()}) and (
-        prover.subject.facts.pulled or prover.subject.facts.struck
-    )
+    """Return whether it is not only other elements that change something within an instant."""
+    return bool(may_change(prover) - {*prover.subject.rest.values()})
 
 
 def others(prover: Prover) -> str:
-    """Return in words who may switch at the same instant."""
-    return "other contacts" if others_switch(prover) else "other elements"
+    """Return in words what may happen at the same instant."""
+    facts = prover.subject.facts
+    if others_switch(prover):
+        return "switches of other contacts" if facts.pulled or facts.struck else "jumps of inputs"
+    return "switches of other elements"
 
 
 def interrupted(prover: Prover, cycles: Sequence[tuple[Transition, ...]]) -> Answer | None:
@@ -195,7 +208,7 @@ def interrupted(prover: Prover, cycles: Sequence[tuple[Transition, ...]]) -> Ans
         prover.defined(reading)
         if prover.find(*formulas) is not None:
             return None
-    text = f"no cycle can be passed at one instant, whatever {others(prover)} do"
+    text = f"no cycle can be passed at one instant, even with {others(prover)}"
     return Answer("proved", text)
 
 
@@ -335,8 +348,7 @@ class Walks:
     ) -> Answer:
         """Return an example, confirmed in floats."""
         prover, subject, (states, here) = self.prover, self.prover.subject, start
-        if jolts_and_arrests(subject, walk):
-            raise Undecided("an arrest is not taken where an impulse changes the velocity")
+        follow_impulses(subject, walk)
         forces = [tree for each in subject.own.values() for tree in each.values()]
         # Of several elements some may wait, in states that the walk does not leave.
         asked = walk if self.n == 1 else prover.chart.transitions
@@ -358,7 +370,8 @@ class Walks:
             mine = {name: point[text] for text, (k, name) in called.items() if k == number}
             points.append({**points[0], **mine})
         edges = tuple(dict.fromkeys(edge.name for edge in walk))
-        text = f"from {', '.join(states)} they are taken at one instant: endless switching"
+        who = f"{self.n} elements, in {', '.join(states)}, switch together" if self.n > 1 else ""
+        text = f"{who or 'by turns they are taken'} at one instant: endless switching"
         answer = refuted(text, point, endless(subject, states, points))
         return replace(answer, where=(*states, *edges))
 

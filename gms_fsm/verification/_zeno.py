@@ -7,7 +7,7 @@ from typing import Any
 
 from gms_fsm.charts.chart import Transition
 from gms_fsm.language import Condition, Requirement, Value, derivative, names_in, split
-from gms_fsm.verification._checks import inclusive, moving, ways
+from gms_fsm.verification._flows import inclusive, moving, ways
 from gms_fsm.verification._prover import (
     Answer,
     Dual,

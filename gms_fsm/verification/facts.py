@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import unknown
-from gms_fsm.systems.models import is_model
+from gms_fsm.language import names_in
+from gms_fsm.systems.mounted import contact_of
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.reading.assembly import Assembly, Bank
 
@@ -33,6 +32,8 @@ class ContactFacts:
         Whether its force moves the bodies, so that dv/dt jumps where the force does.
     pulled, struck : bool
         Whether other contacts can change forces, or velocities, within an instant.
+    jumping : tuple of str
+        Inputs that follow velocities which an impulse can change within an instant.
     """
 
     chart: Chart
@@ -43,57 +44,53 @@ class ContactFacts:
     free: bool = False
     pulled: bool = False
     struck: bool = False
-
-
-def _chosen(read: Assembly, contact: str) -> Bank:
-    """Return the contact of a system that is meant: the only one, or the one named."""
-    banks = {bank.name: bank for bank in read.banks}
-    if not contact and len(banks) > 1:
-        raise ParameterError(
-            f"system {read.system.name!r} has the contacts {', '.join(map(repr, banks))}",
-            place="contact",
-            advice=f"say which one: prove(system, contact={next(iter(banks))!r})",
-        )
-    if contact and contact not in banks:
-        raise unknown("contact", contact, [*banks], ParameterError, place="contact")
-    return banks[contact or next(iter(banks))]
+    jumping: tuple[str, ...] = ()
 
 
 def facts_of(what: Any, contact: str = "") -> ContactFacts:
     """Return the facts of a chart alone, of a model or contact, or of a contact of a system."""
-    if read := getattr(what, "assembly", None):  # a system
-        return _in_system(read, _chosen(read, contact))
-    if contact:
-        raise ParameterError(
-            "only a system has contacts", place="contact", value=contact, advice="leave it out"
-        )
-    if isinstance(what, Chart):
+    if isinstance(what, Chart) and not contact:
         return ContactFacts(what)
-    if isinstance(what, Contact):
-        return _of_contact(what)
-    if is_model(what):
-        return _of_contact(Contact("friction", what))
-    raise ParameterError(
-        "prove takes a Chart, a model, a Contact or a System", place="chart", value=what
-    )
+    given, read = contact_of(what, contact)
+    if read is None:
+        return _of_contact(given)
+    return _in_system(read, next(bank for bank in read.banks if bank.name == given.name))
 
 
-def _of_contact(contact: Contact, **beside: bool) -> ContactFacts:
+def _of_contact(contact: Contact, **beside: Any) -> ContactFacts:
+    chart, curved = contact.chart, contact.stribeck is not None
+    strikes = chart.sets_velocity or any(edge.impulse for edge in chart.transitions)
+    jumping = ("s",) if curved and strikes else ()
     return ContactFacts(
-        contact.chart,
+        chart,
         contact.n,
         contact.period,
-        contact.stribeck is not None,
+        curved,
         contact.sigma_2 != 0.0,
-        **beside,
+        **{"jumping": jumping, **beside},
     )
 
 
 def _in_system(read: Assembly, bank: Bank) -> ContactFacts:
     others = [other for other in _coupled(read, bank) if other.edges]
-    struck = any(other.is_impulse(edge) for other in others for edge in other.edges)
-    free = {body.name for body in read.free} & {body for row in bank.jacobian for body in row}
-    return _of_contact(bank.contact, free=bool(free), pulled=bool(others), struck=struck)
+    struck = any(map(_strikes, others))
+    moved = {body.name: body.v for body in read.free}
+    free = {*moved} & {body for row in bank.jacobian for body in row}
+    jumping = [
+        name
+        for name in bank.chart.inputs
+        if name not in ("t", "x", *bank.chart.velocities)
+        and any(map(_strikes, read.banks))
+        and read.closure(names_in(bank.means[name])) & {*moved.values()}
+    ]
+    return _of_contact(
+        bank.contact, free=bool(free), pulled=bool(others), struck=struck, jumping=tuple(jumping)
+    )
+
+
+def _strikes(bank: Bank) -> bool:
+    """Return whether a contact changes velocities by impulses."""
+    return any(map(bank.is_impulse, bank.edges))
 
 
 def _coupled(read: Assembly, bank: Bank) -> list[Bank]:

@@ -28,9 +28,11 @@ order would be a different model.
 - With a period a machine takes one edge at a tick at most: it has no livelock, does not chatter,
   and is not pushed back at once.
 - Where other contacts move the same bodies, a statement about one instant is also tried with other
-  values of H, W and v after each switch. What then fails is undecided.
-- Of the edges that leave a state the earlier one is taken. Edges into a lock that take no impulse
-  have precedence only where the velocity does not jump.
+  values of H, W and v after each switch; where an impulse changes what an input follows, with
+  others of that input. What then fails is undecided.
+- Switches are located: an edge that waits for a time in the state is taken at that time, or with a
+  period at the next tick. Of the edges that leave a state the earlier one is taken. Edges into a
+  lock that take no impulse have precedence only where the velocity does not jump.
 
 The checks. *determinism*: no two edges of one state are enabled at the same time, or their
 order decides which is taken. *livelock*: no cycle of edges is taken at one point, nor cycles by
@@ -57,7 +59,8 @@ from gms_fsm.foundation.arguments import listed
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.system import System
-from gms_fsm.verification._checks import chattering, determinism, livelock, reachability, stability
+from gms_fsm.verification._chattering import chattering
+from gms_fsm.verification._checks import determinism, livelock, reachability, stability
 from gms_fsm.verification._prover import Prover
 from gms_fsm.verification._release import release
 from gms_fsm.verification._subject import ChartSubject, subject_of

@@ -62,7 +62,7 @@ def test_a_guard_that_one_element_never_meets_is_met_by_two() -> None:
     alone, both = (prove(ChartModel(FORCED, {}, n=n)) for n in (1, 2))
     told = [{f.where: f.status for f in report.of("reachability")} for report in (alone, both)]
     assert [each["down",] for each in told] == ["refuted", "proved"]
-    assert "F is the sum over 2 elements; R is that of the other element" in str(both)
+    assert "F is the sum over 2 elements, R that of the other element" in str(both)
 
 
 def test_the_example_of_several_elements_begins_a_livelock() -> None:
@@ -158,10 +158,27 @@ def test_two_contacts_on_one_body_are_not_proved_free_of_livelock() -> None:
     assert len(simulate(system("one"), 1.0).transitions) == 0
     told = prove(system("one", "two"), OF_1_KG, contact="two").of("livelock")
     assert [(f.status, f.text) for f in told if f.status != "proved"] == [
-        ("undecided", "other contacts may switch at the same instant")
+        ("undecided", "switches of other contacts at the same instant are not followed")
     ]
     with pytest.raises(LivelockError):
         simulate(system("one", "two"), 1.0)
+
+
+def test_an_input_that_jumps_with_an_impulse_is_not_held_through_a_cycle() -> None:
+    """u follows the body that the impulse of the chart itself turns round."""
+    edges = (
+        Transition("down", "off", "off", guard="u > 0 and v > 0", actions={"v": "-v"}),
+        Transition("up", "off", "off", guard="u < 0 and v < 0", actions={"v": "-v"}),
+    )
+    chart = Chart("turning", ("u", "v"), (), (), OFF_ON[:1], edges)
+    contact = Contact("c", chart, inputs={"u": "v"})
+    turning = System("one body", bodies=(Body("b", inertia=1.0),), contacts=(contact,))
+    told = prove(turning).of("livelock")
+    assert [f.text for f in told if f.status == "undecided"] == [
+        "jumps of inputs at the same instant are not followed"
+    ]
+    with pytest.raises(LivelockError):
+        simulate(turning, 1.0, initial={"v": 1.0})
 
 
 def test_a_neighbour_on_another_body_changes_nothing() -> None:
@@ -184,6 +201,17 @@ def test_a_free_body_chatters_where_a_driven_one_does_not() -> None:
     assert finding.counterexample["v"] == 0
     with pytest.raises(LivelockError):
         simulate(model, rig, 1.0)
+
+
+def test_forces_that_bend_a_path_back_from_both_sides_are_not_decided() -> None:
+    """At x = 0 and v = 0 both flows touch the surface, and each acceleration leads across it."""
+    states = (State("off", outputs={"F": "-1"}), State("on", outputs={"F": "1"}))
+    model = ChartModel(switch("x > 0", "x <= 0", states=states, inputs=("x",)), {})
+    on_a_body = System("free", bodies=(Body("b", inertia=1.0),), contacts=(Contact("c", model),))
+    (finding,) = prove(on_a_body).of("chattering")
+    assert (finding.status, "first order" in finding.text) == ("undecided", True)
+    with pytest.raises(LivelockError):
+        simulate(model, Slider(1.0, "0"), 1.0)
 
 
 def test_the_model_s_viscous_force_is_part_of_f() -> None:

@@ -17,7 +17,7 @@ from argparse import Namespace
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import permutations, takewhile
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,7 @@ FLOWS = ("v", "0", "1", "-z", "1 - z", "-1", "1", "-1")
 CLAUSES = (
     "F > 1", "F < 1", "F <= 0", "F >= 2", "F < -1", "abs(F) > 1.5", "a > 0", "a < 0", "z > 1",
     "z <= 0", "abs(z) < 0.5", "v > 0", "v < 0", "x >= 0.5", "after(0.2)", "after(0.5)", "True",
-    "z < 1", "z >= 1", "v >= 0.1",
+    "z < 1", "z >= 1", "v >= 0.1", "u > 0", "u < 0",
 )  # fmt: skip
 ACTIONS: tuple[dict[str, str], ...] = ({}, {}, {}, {}, {"z": "0"}, {"z": "-z"}, {"z": "1"})
 IMPACTS: tuple[dict[str, str], ...] = ({"v": "-0.5 * v"}, {"v": "-v"}, {"v": "0"})
@@ -90,7 +90,7 @@ def _chart(dice: Dice, name: str, n: int) -> Chart:
         ]
     return Chart(
         name,
-        ("x", "v"),
+        ("x", "v", "u"),
         ("z",),
         ("k",),
         [
@@ -116,8 +116,10 @@ def _system(dice: Dice) -> System:
         x, v = dice.one_of(*motions)
         period = dice.one_of(None, None, None, 0.05, 0.3)
         values = {"k": np.array([dice.one_of(0.5, 1.0, 2.0) for _ in range(n)])}
-        chart = _chart(dice, name, n)
-        contacts.append(Contact(name, chart, values, v=v, n=n, inputs={"x": x}, period=period))
+        chart, u = _chart(dice, name, n), dice.one_of("v", "v - 0.2", "x", "sin(5 * t)")
+        contacts.append(
+            Contact(name, chart, values, v=v, n=n, inputs={"x": x, "u": u}, period=period)
+        )
     return System("random", bodies=bodies, contacts=contacts)
 
 
@@ -150,7 +152,8 @@ def contradicted(report: Report, contact: Contact, trace: Trace, end: str) -> It
         never = seen.get(finding.text.partition(":")[0], ()) if finding.status == "refuted" else ()
         if finding.where[-1] in {str(name) for name in never}:
             yield f"{finding} but a run shows it"
-    if contact.period is None:  # else rows have the force that is held
+    # Rows at ticks have the force that was held, those that slide a force between two states.
+    if contact.period is None and not len(trace.sliding):
         yield from _both_enabled(report, trace)
     if end.startswith("LivelockError"):
         yield from (f"{check} is proved, but {end}" for check in _endless(report, log[-40:], end))
@@ -229,18 +232,14 @@ def unconfirmed(report: Report, contact: Contact) -> Iterator[str]:
 def _run_from(finding: Finding, contact: Contact) -> tuple[Trace | None, str]:
     """Run a contact of its own from a point, under the load given there."""
     chart, point = contact.chart, {"age": 0.0, **finding.counterexample}
-    names = {state.name for state in chart.states}
-    states = [part for part in finding.where if part in names][:1]
-    n = 1
-    if "from " in finding.text:
-        states = finding.text.split(" they are")[0].removeprefix("from ").split(", ")
-        n = len(states)
+    states = [*takewhile(lambda part: part not in chart.guards, finding.where)]
+    n = len(states)
     own = [{**point, **{u: point.get(f"{u}{i}", 0.0) for u in "zk"}} for i in range(2, n + 1)]
     each = [point, *own]
     k = np.array([mine.get("k", 1.0) for mine in each])
-    states_of = [*states, *states[:1] * (n - len(states))]
-    model = ChartModel(chart, {"k": k}, n=n)
-    start: dict[str, Any] = {"z": [mine.get("z", 0.0) for mine in each], "states": states_of}
+    rate = f"{point.get('u', 0.0)!r} + {point.get('du/dt', 0.0)!r} * t"
+    model = ChartModel(chart, {"k": k}, n=n, inputs={"u": rate})
+    start: dict[str, Any] = {"z": [mine.get("z", 0.0) for mine in each], "states": states}
     start["x"] = point.get("x", 0.0)
     mass, v = 1.0 / point.get("W", 1.0), f"{point.get('v', 0.0)!r}"
     load = f"{point.get('H', 0.0)!r} + {point.get('dH/dt', 0.0)!r} * t"
