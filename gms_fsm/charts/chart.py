@@ -22,6 +22,7 @@ from gms_fsm.charts.parts import (
     places_of,
     texts_of,
     tuple_of,
+    values_of,
 )
 from gms_fsm.charts.reader import ChartReader
 from gms_fsm.errors import ChartError, cut, shown
@@ -79,6 +80,8 @@ class Chart:
     contact_outputs : mapping of str to str, optional
         The force of a contact, where it is not just the sum of its elements' forces, which is
         called ``F`` here: ``{"F": "F + sigma_2 * v"}``.
+    initial : mapping of str to float, optional
+        Values with which variables start, where a run gives none; 0 for the others.
     layout : mapping of str to (float, float), optional
         Where pictures show the centre of each state: points to the right and down. Charts that
         differ in nothing else are equal.
@@ -110,6 +113,7 @@ class Chart:
     let: Mapping[str, str] = field(default_factory=dict)
     velocities: tuple[str, ...] = ("v",)
     contact_outputs: Mapping[str, str] = field(default_factory=dict)
+    initial: Mapping[str, float] = field(default_factory=dict)
     layout: Mapping[str, tuple[float, float]] = field(default_factory=dict, compare=False)
     guards: Mapping[str, Condition] = field(init=False, repr=False, compare=False)
     flows: Mapping[tuple[str, str], Value] = field(init=False, repr=False, compare=False)
@@ -135,6 +139,7 @@ class Chart:
         let: Mapping[str, str] | None = None,
         velocities: Iterable[str] = ("v",),
         contact_outputs: Mapping[str, str] | None = None,
+        initial: Mapping[str, float] | None = None,
         layout: Mapping[str, Sequence[float]] | None = None,
     ) -> None:
         here = f"chart {name!r}"
@@ -159,6 +164,7 @@ class Chart:
             object.__setattr__(self, each, value)
         self._check_names()
         self._check_rules()
+        object.__setattr__(self, "initial", values_of(initial or {}, self.variables, here))
         object.__setattr__(self, "layout", places_of(layout or {}, self.states, here))
         expanded = tuple(each for edge in self.transitions for each in edge.each())
         for each, value in {**ChartReader(self).trees(), "transitions": expanded}.items():
@@ -303,9 +309,9 @@ class Chart:
         path : str or Path
             With the keys ``name``, ``reference``, ``inputs``, ``velocities``, ``variables``,
             ``parameters`` (a list of names) or ``[[parameter]]`` (name, unit, rule, per_element,
-            meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[[state]]`` (name,
-            flow, entry, exit, outputs, locked) and ``[[edge]]`` (name, from, to, guard, do,
-            impulse).
+            meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[initial]``,
+            ``[[state]]`` (name, flow, entry, exit, outputs, locked) and ``[[edge]]`` (name, from,
+            to, guard, do, impulse).
 
         Returns
         -------
@@ -375,8 +381,8 @@ class Chart:
         from gms_fsm.charts.files import from_transitions, imported
 
         given = imported.Texts.of(texts, from_transitions.HERE)
-        states, edges = from_transitions.read(machine)
-        return imported.built(cls, states, edges, given, from_transitions.HERE)
+        read = from_transitions.read(machine, given.callbacks)
+        return imported.built(cls, *read, given, from_transitions.HERE)[0]
 
     @classmethod
     def from_scxml(cls, path: str | Path, **texts: Unpack[GivenTexts]) -> Chart:
