@@ -1250,6 +1250,13 @@ rows = {
         {"layout": {"stick": (0, 0), "slip": (9, "right")}},
     ),
     "layout that is no mapping": ("chart 'rubber': layout", "right", {"layout": "right"}),
+    "start of no variable": ("chart 'rubber': initial", ..., {"initial": {"y": 1.0}}),
+    "start that is no number": (
+        "chart 'rubber': initial, 'z'",
+        "far",
+        {"initial": {"z": "far"}},
+    ),
+    "start that is no mapping": ("chart 'rubber': initial", 1.0, {"initial": 1.0}),
     "let of a parameter": (
         "contact_outputs 'F'",
         ...,

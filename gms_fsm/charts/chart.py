@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from gms_fsm.charts.parameters import QUANTITIES, Parameter
+from gms_fsm.charts.parameters import QUANTITIES, Parameter, check_rules
 from gms_fsm.charts.parts import (
     State,
     Transition,
@@ -163,7 +163,7 @@ class Chart:
         for each, value in given.items():  # copies: nobody else can change a frozen chart
             object.__setattr__(self, each, value)
         self._check_names()
-        self._check_rules()
+        check_rules(self.parameters, here)
         object.__setattr__(self, "initial", values_of(initial or {}, self.variables, here))
         object.__setattr__(self, "layout", places_of(layout or {}, self.states, here))
         expanded = tuple(each for edge in self.transitions for each in edge.each())
@@ -257,17 +257,6 @@ class Chart:
                     key=("transitions", i, "impulse"),
                 )
 
-    def _check_rules(self) -> None:
-        for i, each in enumerate(self.parameters):
-            known = {*self.parameter_names} - {each.name}
-            for name in sorted(each.others - known):
-                raise ChartError(
-                    f"chart {self.name!r}, parameter {each.name!r}: its rule names {name!r}, "
-                    "which is not another parameter",
-                    advice=f"there are {_listed(sorted(known))}",
-                    key=("parameters", i, "rule"),
-                )
-
     # ------------------------------------------------------------------ forces
     @property
     def force_names(self) -> tuple[str, ...]:
@@ -335,26 +324,28 @@ class Chart:
 
         return load(checked_path("path", path), cls)
 
-    # ------------------------------------------------------------------ from other programs
     @classmethod
     def from_transitions(cls, machine: Any, **texts: Unpack[GivenTexts]) -> Chart:
         """Build a chart from a machine of the package transitions, and texts given beside it.
 
-        The machine gives the states, the edges (one for each trigger, of its name) and their
-        priority (the order of the triggers). Functions cannot be read: a text of `guards` stands
-        for the conditions of its trigger.
+        The machine gives states, edges and their priority: the order of the triggers and of their
+        transitions, those of inner states first. States in states become ``outer__inner``. An edge
+        has the name of its trigger, or ``source_target`` if the trigger has edges that differ.
 
         Parameters
         ----------
         machine : transitions.Machine
-            Plain, without callbacks.
+            Of any class but the asynchronous ones.
         **texts
             ``inputs``, ``variables``, ``parameters``, ``outputs``, ``name``, ``reference``,
-            ``let``, ``velocities`` and ``contact_outputs`` as for `Chart`; a parameter may be a
-            mapping of the fields of `Parameter`. By the name of an edge: ``guards``, all of them,
-            and ``actions``. By the name of a state: ``flows``, ``entry``, ``exit`` and
-            ``state_outputs``. ``locked`` names the states that lock the contact, ``impulses`` the
-            edges that take an impulse to do so.
+            ``let``, ``velocities``, ``contact_outputs`` and ``initial`` as for `Chart`; a parameter
+            may be a mapping of the fields of `Parameter`. ``callbacks`` says what the functions of
+            the machine do, by their names: a condition as a text, what others assign as a mapping,
+            empty for those that only look on. By the name of an edge or of a trigger: ``guards``,
+            which stand for conditions without a text, and ``actions``. By the name of a state, with
+            or without states inside: ``flows``, ``entry``, ``exit`` and ``state_outputs``.
+            ``locked`` names the states that lock the contact, ``impulses`` the edges that take an
+            impulse to do so.
 
         Returns
         -------
@@ -365,7 +356,7 @@ class Chart:
         ------
         ChartError, ExpressionError
             If the machine has something without counterpart in a chart, which is named, such as a
-            callback, ``unless``, a nested state or an internal transition; or if a text is wrong.
+            function without a text, parallel states or a timeout; or if a text is wrong.
 
         Examples
         --------
@@ -388,17 +379,20 @@ class Chart:
     def from_scxml(cls, path: str | Path, **texts: Unpack[GivenTexts]) -> Chart:
         """Build a chart from an SCXML document, and texts given beside it.
 
-        The document gives the states, the transitions in their order, and what is assigned. What
-        the export ``scxml`` keeps there in a namespace of its own need not be given.
+        The document gives the states, the transitions in their order, what is assigned, and data:
+        a variable with its value at the start, or a named expression if nothing assigns it. What
+        the export ``scxml`` keeps there in a namespace of its own need not be given. ``<log>`` is
+        left out, with a warning.
 
         Parameters
         ----------
         path : str or Path
-            The document. The name of an edge is the event of the transition, if no other has the
-            same, or else ``source_target``.
+            The document. Names are as for `from_transitions`, from the events of the transitions;
+            a dot in a name becomes ``__``, a hyphen ``_``.
         **texts
             As for `from_transitions`; they replace what the document says. Guards that are not
-            given are read from ``cond``, if that is written as in Python or ECMAScript.
+            given are read from ``cond``, if that is written as in Python or ECMAScript. A guard
+            that is given for an event with several edges is joined to their own.
 
         Returns
         -------
@@ -409,8 +403,7 @@ class Chart:
         ------
         ChartError, ExpressionError
             If the document cannot be read, or has something without counterpart in a chart, which
-            is named, such as a parallel or nested state, a history, a script; or if a text is
-            wrong.
+            is named, such as a parallel state, a history, a script; or if a text is wrong.
 
         Examples
         --------
@@ -426,7 +419,6 @@ class Chart:
 
         return from_scxml.load(cls, checked_path("path", path), texts)
 
-    # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
         """Write the chart to a TOML file, from which `load` returns an equal one.
 

@@ -312,7 +312,7 @@ class MachineEngine:
         self.states[machine] = state
         graphs = getattr(self.parts[machine].machine, "model_graphs", {})
         if id(element) in graphs:  # the state that it shows as active changes only with a firing
-            element.get_graph(force_new=True)
+            vars(element)["get_graph"](force_new=True)
 
     def show(self, t: float, y: list[float], mode: list[int], jolt: list[int]) -> None:
         """Show the present values to every element."""

@@ -15,12 +15,14 @@ import pytest
 from hypothesis import given, settings
 from transitions import Machine
 from transitions import State as MachineState
-from transitions.extensions import HierarchicalMachine
+from transitions.extensions import HierarchicalMachine, LockedMachine
 from transitions.extensions.asyncio import AsyncMachine
+from transitions.extensions.markup import MarkupMachine
 from transitions.extensions.states import Timeout, Volatile, add_state_features
 
 from gms_fsm import Chart, State, Transition, export
 from gms_fsm.charts import CHARTS
+from gms_fsm.charts.files.from_scxml import _read_back
 from gms_fsm.errors import ChartError, ExpressionError, ParameterError
 from tests.exporters.charts_to_export import MODELS, imported, model, rebuilt
 from tests.strategies import charts
@@ -154,6 +156,67 @@ def test_one_event_for_one_edge_that_leaves_several_states(tmp_path: Path) -> No
     (tmp_path / "a.scxml").write_text(text.replace("</onentry>", f"</onentry>{edge}"))
     chart = Chart.from_scxml(tmp_path / "a.scxml", variables=("z",), outputs={"F": "z"})
     assert {edge.name: edge.sources for edge in chart.transitions}["slips"] == ("stick", "slip")
+
+
+ORDINARY = """\
+<scxml xmlns="http://www.w3.org/2005/07/scxml" initial="lamp.red" datamodel="ecmascript">
+  <datamodel>
+    <data id="count" expr="3"/><data id="limit" expr="2 * count"/><data id="share">0.5</data>
+  </datamodel>
+  <state id="lamp.red">
+    <onentry><log label="red" expr="count"/></onentry>
+    <transition event="timer.fast timer.slow" target="lamp-green"/>
+    <transition event="tick" cond="count &lt; limit &amp;&amp; v &gt; share">
+      <assign location="count" expr="count + 1"/>
+    </transition>
+  </state>
+  <state id="lamp-green"><transition event="off.*" target="end"/></state>
+  <final id="end"/>
+</scxml>
+"""
+
+
+def test_an_ordinary_document(tmp_path: Path) -> None:
+    """Several events, dotted names, data, a final state, a log, a transition without target."""
+    (tmp_path / "own.scxml").write_text(ORDINARY, encoding="utf-8")
+    guards = {"timer__fast": "v > 4", "timer__slow": "v > 3", "off": "v < 0"}
+    with pytest.warns(UserWarning, match="<log> is left out.*: state 'lamp.red', onentry"):
+        chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"}, guards=guards)
+    assert chart == Chart(
+        "imported chart",
+        variables=("count",),
+        states=(State("lamp__red"), State("lamp_green"), State("end")),
+        transitions=(
+            Transition("timer__fast", "lamp__red", "lamp_green", "v > 4"),
+            Transition("timer__slow", "lamp__red", "lamp_green", "v > 3"),
+            Transition(
+                "tick",
+                "lamp__red",
+                "lamp__red",
+                "count < limit and v > share",
+                {"count": "count + 1"},
+            ),
+            Transition("off", "lamp_green", "end", "v < 0"),
+        ),
+        outputs={"F": "0"},
+        let={"limit": "6.0", "share": "0.5"},
+        initial={"count": 3.0},
+    )
+
+
+def test_a_state_that_is_done_is_left_from_its_final_state(tmp_path: Path) -> None:
+    text = """<scxml xmlns="http://www.w3.org/2005/07/scxml"><state id="work">
+      <state id="work.busy"><transition cond="v &gt; 1" target="work.idle"/></state>
+      <final id="work.idle"/>
+      <transition event="done.state.work" target="rest"/></state><state id="rest"/></scxml>"""
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
+    edges = {(edge.source, edge.target, edge.guard) for edge in chart.transitions}
+    assert edges == {("work__busy", "work__idle", "v > 1"), ("work__idle", "rest", "True")}
+
+
+def test_words_of_ecmascript() -> None:
+    assert _read_back("v > 1 || Math.PI === v && n !== 2") == "v > 1 or pi == v and n != 2"
 
 
 STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/>'
@@ -306,6 +369,100 @@ def test_a_text_stands_for_a_condition() -> None:
         Chart.from_transitions(machine, outputs={"F": "v"})
     with pytest.raises(ChartError, match=r"trigger 'slips': no guard is given for it; give one"):
         Chart.from_transitions(row(), outputs={"F": "v"})
+
+
+def test_one_trigger_with_several_edges_whose_conditions_decide_in_order() -> None:
+    machine = Machine(states=["a", "b", "c"], initial="a", auto_transitions=False)
+    machine.add_transition("go", "a", "b", conditions=["is_hot", "is_big"], unless="is_still")
+    machine.add_transition("go", "a", "c", after="count")
+    machine.add_transition("go", ["b", "c"], "=", before="count")
+    callbacks: Any = {"is_hot": "T > 80", "is_big": "n > 3 or n < -3", "is_still": "v < 1"}
+    chart = Chart.from_transitions(
+        machine,
+        inputs=("v", "T"),
+        variables=("n",),
+        outputs={"F": "0"},
+        guards={"go": "v > 2", "c_c": "v > 3"},
+        callbacks={**callbacks, "count": {"n": "n + 1"}},
+    )
+    hot = "v > 2 and (T > 80 and (n > 3 or n < -3) and not (v < 1))"
+    assert chart.transitions == (
+        Transition("a_b", "a", "b", hot),
+        Transition("a_c", "a", "c", "v > 2", {"n": "n + 1"}),
+        Transition("b_b", "b", "b", "v > 2", {"n": "n + 1"}),
+        Transition("c_c", "c", "c", "v > 3", {"n": "n + 1"}),
+    )
+
+
+@pytest.mark.parametrize("kind", [Machine, LockedMachine, MarkupMachine, HierarchicalMachine])
+def test_ordered_transitions_of_any_class_of_machines(kind: Any) -> None:
+    machine = kind(states=["green", "yellow", "red"], initial="green", queued=True)
+    machine.add_ordered_transitions()
+    chart = Chart.from_transitions(machine, outputs={"F": "0"}, guards={"next_state": "after(3)"})
+    edges = [(edge.source, edge.target, edge.guard) for edge in chart.transitions]
+    assert edges == [(*ends, "after(3)") for ends in
+                     (("green", "yellow"), ("yellow", "red"), ("red", "green"))]  # fmt: skip
+
+
+def test_callbacks_are_a_table_of_actions() -> None:
+    states = [MachineState("a", on_exit="leave"), MachineState("b", on_enter=["enter", print])]
+    machine = Machine(
+        states=states,
+        initial="a",
+        transitions=[["go", "a", "b"], {"trigger": "again", "source": "b", "dest": None,
+                                        "after": "count"}],
+        prepare_event="look",
+    )  # fmt: skip
+    callbacks: Any = {"leave": {"n": "0"}, "enter": {"m": "1"}, "print": {}, "look": {}}
+    texts: Any = {"variables": ("n", "m"), "outputs": {"F": "0"}}
+    texts["guards"] = {"go": "v > 1", "again": "v > 2"}
+    with pytest.raises(ChartError, match="'again': it leaves nothing, but a chart performs exit"):
+        Chart.from_transitions(machine, callbacks={**callbacks, "count": {"n": "n + 1"}}, **texts)
+    machine.states["b"].on_enter.clear()
+    left = {name: callbacks[name] for name in ("leave", "look")}
+    chart = Chart.from_transitions(machine, callbacks={**left, "count": {"n": "n + 1"}}, **texts)
+    assert chart.states[0].exit == {"n": "0"}
+    assert chart.transitions[1] == Transition("again", "b", "b", "v > 2", {"n": "n + 1"})
+    for wrong, said in (
+        ({**left, "count": "n > 1"}, "'again': its callback after 'count' has no text"),
+        ({**left, "count": {}, "cout": {}}, "callbacks: there is no function 'cout'; did you mean"),
+        ({**left, "count": {}, "look": {"n": "1"}}, "its callback prepare_event 'look' has no cou"),
+        (3, "callbacks is 3; it gives for each function what it says"),
+    ):
+        with pytest.raises(ChartError, match=said):
+            Chart.from_transitions(machine, callbacks=wrong, **texts)
+
+
+def test_states_in_states_are_joined_by_two_underscores() -> None:
+    slip = {"name": "slip", "children": ["forward", "backward"], "initial": "forward",
+            "on_enter": "begin", "on_exit": "end"}  # fmt: skip
+    edges = [["slips", "stick", "slip"], ["turns", "slip_forward", "slip_backward"],
+             ["sticks", "slip", "stick"]]  # fmt: skip
+    machine = HierarchicalMachine(states=["stick", slip], initial="stick", transitions=edges)
+    chart = Chart.from_transitions(
+        machine,
+        variables=("n", "z"),
+        outputs={"F": "z"},
+        flows={"slip": {"z": "v", "n": "1"}, "slip__backward": {"z": "-v"}},
+        guards={"slips": "v > 1", "turns": "v < 0", "sticks": "n > 3"},
+        callbacks={"begin": {"n": "0"}, "end": {"z": "0"}},
+    )
+    inner = ("slip__forward", "slip__backward")
+    assert chart == Chart(
+        "imported chart",
+        variables=("n", "z"),
+        states=(
+            State("stick"),
+            State("slip__forward", flow={"z": "v", "n": "1"}),
+            State("slip__backward", flow={"z": "-v", "n": "1"}),
+        ),
+        transitions=(
+            Transition("turns", inner[0], inner[1], "v < 0"),
+            Transition("slips", "stick", inner[0], "v > 1", {"n": "0"}),
+            Transition("sticks", inner, "stick", "n > 3", {"z": "0"}),
+        ),
+        outputs={"F": "z"},
+    )
 
 
 @add_state_features(Timeout)

@@ -74,16 +74,7 @@ def load(kind: type[Chart], path: Path, texts: Mapping[str, Any]) -> Chart:
         beside = getattr(given, part)
         if isinstance(beside, Mapping):
             merged[part] = {**found[part], **beside}
-    written = [*document.states, *(row.edge for row in rows)]
-    assigned = {
-        name
-        for each in written
-        for texts_of in (
-            (each.entry, each.exit) if isinstance(each, ImportedState) else (each.actions,)
-        )
-        for name in texts_of
-    }
-    data = _Data.of(root, Texts(**merged), assigned, here)
+    data = _DataModel.of(root, Texts(**merged), document.variables, here)
     merged |= {"variables": data.variables, "let": data.let, "initial": data.initial}
     chart, flat = built(kind, document.states, document.first, edges, Texts(**merged), here)
     _check_kept(chart, rows, flat, document, given)
@@ -179,7 +170,7 @@ class _Document:
     """
 
     def __init__(self, root: ET.Element, here: str) -> None:
-        self.here, self.logs = here, list[str]()
+        self.here, self.logs, self.variables = here, list[str](), set[str]()
         self.routes: dict[str, Route] = {}  # by id
         self.elements: dict[Route, ET.Element] = {}
         if root.get("binding") == "late":
@@ -253,7 +244,8 @@ class _Document:
         for number, each in enumerate(_all(state, "transition"), start=1):
             place = f"{self.here}, state {state.get('id')!r}, transition"
             if not _brings_values(each):
-                for event in (each.get("event") or "").split() or [None]:
+                events: list[str | None] = [*(each.get("event") or "").split()]
+                for event in events or [None]:
                     yield self._row(source, each, event, place, number)
 
     def _row(
@@ -332,6 +324,7 @@ class _Document:
                         advice="a chart assigns one expression to a variable",
                     )
                 found[name] = expression, _own(each, "text")
+                self.variables.add(name)
         return found
 
 
@@ -383,7 +376,7 @@ def _texts(assigned: Mapping[str, tuple[str, str | None]]) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class _Data:
+class _DataModel:
     """What the data of a document are in a chart: variables that start, or named expressions."""
 
     variables: list[str]
@@ -392,7 +385,7 @@ class _Data:
     values: dict[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, root: ET.Element, given: Texts, assigned: Iterable[str], here: str) -> _Data:
+    def of(cls, root: ET.Element, given: Texts, assigned: set[str], here: str) -> _DataModel:
         """Read them; inputs and parameters get their values from the run and the model."""
         parameters = [
             str(each.get("name") if isinstance(each, Mapping) else getattr(each, "name", each))
@@ -405,7 +398,7 @@ class _Data:
         for each in root.iter():
             if _tag(each) != "data" or each.get("id") in outside:
                 continue
-            data.take(each, outside, {*assigned}, f"{here}, <data id={each.get('id')!r}>")
+            data.take(each, outside, assigned, f"{here}, <data id={each.get('id')!r}>")
         return cls(data.variables, {**data.let, **given.let}, {**data.initial, **given.initial})
 
     def take(self, element: ET.Element, outside: set[str], assigned: set[str], place: str) -> None:

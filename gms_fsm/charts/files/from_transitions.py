@@ -104,7 +104,7 @@ def read(
             place=HERE,
             advice="write it as a machine without Async",
         )
-    reader = _Reader(machine, Callbacks({} if callbacks is None else callbacks))
+    reader = _MachineReader(machine, Callbacks({} if callbacks is None else callbacks))
     for name in LOOKING:
         reader.callbacks.nothing(getattr(machine, name), name, HERE)
     states = [*reader.states(machine, ())]
@@ -147,7 +147,7 @@ def _only_name(initial: Any, place: str) -> str | None:
     return None if one is None else str(getattr(one, "name", one))
 
 
-class _Reader:
+class _MachineReader:
     """Reads a machine, with the states in its states."""
 
     def __init__(self, machine: Any, callbacks: Callbacks) -> None:
@@ -214,14 +214,14 @@ class _Reader:
         self.callbacks.nothing(row.prepare, "prepare", place)
         before = self.callbacks.actions(row.before, "before", place)
         after = self.callbacks.actions(row.after, "after", place)
-        guard, missing = self.callbacks.guard(row.conditions, place)
+        also, missing = self.callbacks.guard(row.conditions, place)
         return ImportedEdge(
             trigger,
             source,
             target,
             place,
-            guard,
-            missing,
+            also=also,
+            missing=missing,
             before=joined((self.before, before), place),
             after=joined((after, self.after), place),
         )

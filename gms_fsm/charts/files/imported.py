@@ -44,6 +44,8 @@ class ImportedEdge:
         Where it is written, for messages.
     guard : str or None
         Its condition, if it has one.
+    also : str or None
+        A condition that holds beside whatever is given as guard.
     missing : str
         A condition whose text is not known.
     actions, before, after : mapping of str to str
@@ -58,6 +60,7 @@ class ImportedEdge:
     target: Route | None
     place: str
     guard: str | None = None
+    also: str | None = None
     missing: str = ""
     actions: Assigned = field(default_factory=dict)
     before: Assigned = field(default_factory=dict)
@@ -230,28 +233,30 @@ def built(
 
 
 def _guard(each: FlatEdge, edges: list[ImportedEdge], guards: Mapping[str, str]) -> str:
-    """Return the guard of an edge; what is given for several edges is joined to their own."""
+    """Return the guard of an edge: what is given by its name, or by that of its trigger.
+
+    What is given for a trigger with several kinds of edges is joined to their own conditions.
+    """
     edge = edges[each.number]
+    alike = {(one.target, one.guard, one.also) for one in edges if one.trigger == edge.trigger}
     shared = guards.get(edge.trigger)
-    alike = {(one.target, one.guard) for one in edges if one.trigger == edge.trigger}
-    if each.name in guards or (shared is not None and len(alike) == 1):
-        return guards.get(each.name, shared or "")
-    if edge.missing:
+    whole = guards.get(each.name, shared if len(alike) == 1 else None)
+    if whole is None and edge.missing:
         raise ChartError(
             f"no guard is given for it, nor a text for its condition {edge.missing!r}",
             place=edge.place,
             advice=f"give one as text, guards={{{each.name!r}: 'z > s'}}, or "
             f"callbacks={{{edge.missing!r}: 'z > s'}}",
         )
-    if shared is not None:
-        return shared if edge.guard is None else all_of([shared, edge.guard])
-    if edge.guard is None:
+    parts = [shared, edge.guard] if whole is None else [whole]
+    found = [text for text in (*parts, edge.also) if text is not None]
+    if not found:
         raise ChartError(
             "no guard is given for it",
             place=edge.place,
             advice=f"give one as text, guards={{{each.name!r}: 'z > s'}}; 'True' for always",
         )
-    return edge.guard
+    return all_of(found)
 
 
 def _actions(
@@ -286,7 +291,10 @@ def _actions(
 
 def all_of(conditions: Iterable[str]) -> str:
     """Return conditions as one."""
-    return " and ".join(f"({each})" if " or " in each else each for each in conditions)
+    several = [*conditions]
+    if len(several) == 1:
+        return several[0]
+    return " and ".join(f"({each})" if " or " in each else each for each in several)
 
 
 def joined(texts: Iterable[Assigned], place: str) -> dict[str, str]:
@@ -396,7 +404,7 @@ def named(rows: list[FlatEdge], edges: list[ImportedEdge], taken: list[str]) -> 
 
     def alike(group: list[FlatEdge]) -> bool:
         kinds = {
-            repr((row.target, edge.guard, edge.missing, edge.actions, row.around))
+            repr((row.target, edge.guard, edge.also, edge.missing, edge.actions, row.around))
             for row in group
             for edge in [edges[row.number]]
         }

@@ -197,7 +197,7 @@ def _element(chart: Chart, contact: Contact | None) -> Iterator[str]:
     yield "    def __init__(self, numbers, weight):"
     yield "        vars(self).update(numbers)"
     yield "        self._weight = weight"
-    starts = dict.fromkeys(chart.variables, 0.0) | chart.initial
+    starts = {name: chart.initial.get(name, 0.0) for name in chart.variables}
     yield f"        vars(self).update({starts!r})"
     yield ""
     if contact is not None and contact.stribeck is not None:
