@@ -104,6 +104,9 @@ def outputs() -> None:
 
 def time_in_a_state() -> None:
     assert run(go("after(0.75)")).transitions.t.tolist() == [pytest.approx(0.75, abs=1e-9)]
+    later = '<onentry><send event="e" delay="750ms"/></onentry><transition event="e" target="b"/>'
+    found = document(f'<state id="a">{later}</state><state id="b"/>')
+    assert found.transitions[0].guard == "after(0.75)"
 
 
 def data() -> None:
@@ -177,7 +180,10 @@ YES: dict[str, Callable[[], object]] = {
 }
 NO: dict[str, tuple[str, Callable[[], object]]] = {
     "condition actions": ("guard, column 10", lambda: chart(go("t > 1 {n = 1}"))),
-    "events sent later": ("<send>", lambda: document('<onentry><send delay="1s"/></onentry>')),
+    "events sent later to others": (
+        "<send>",
+        lambda: document('<onentry><send delay="1s"/></onentry>'),
+    ),
     "the same with entry or exit": ("performs exit and entry of 'a'", lambda: document(INNER)),
     "parallel states": ("<parallel>", lambda: document('<state id="a"/><parallel id="b"/>')),
     "several targets": ("'a b'", lambda: document('<transition target="a b"/>')),

@@ -20,7 +20,7 @@ from transitions.extensions.asyncio import AsyncMachine
 from transitions.extensions.markup import MarkupMachine
 from transitions.extensions.states import Timeout, Volatile, add_state_features
 
-from gms_fsm import Chart, State, Transition, export
+from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, export, simulate
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.files.from_scxml import _read_back
 from gms_fsm.errors import ChartError, ExpressionError, ParameterError
@@ -215,6 +215,41 @@ def test_a_state_that_is_done_is_left_from_its_final_state(tmp_path: Path) -> No
     assert edges == {("work__busy", "work__idle", "v > 1"), ("work__idle", "rest", "True")}
 
 
+def test_an_event_that_a_state_sends_itself_later_is_the_time_in_it(tmp_path: Path) -> None:
+    def state(name: str, delay: str, target: str, more: str = "") -> str:
+        sent = f'<onentry><send event="timeout" delay="{delay}"/></onentry>'
+        edge = f'<transition event="timeout" target="{target}"/>'
+        return f'<state id="{name}">{sent}{edge}{more}</state>'
+
+    stopped = '<onexit><cancel sendid="timeout"/></onexit><transition cond="v>9" target="green"/>'
+    states = state("green", "30s", "yellow") + state("yellow", "500ms", "red")
+    states += state("red", "1.5s", "green", stopped)
+    text = f'<scxml xmlns="http://www.w3.org/2005/07/scxml">{states}</scxml>'
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
+    edges = [(edge.source, edge.target, edge.guard) for edge in chart.transitions]
+    assert edges == [
+        ("green", "yellow", "after(30)"),
+        ("yellow", "red", "after(0.5)"),
+        ("red", "green", "after(1.5)"),
+        ("red", "green", "v>9"),
+    ]
+
+
+def test_what_outer_states_assign_at_the_start_are_initial_values(tmp_path: Path) -> None:
+    outer = '<onentry><assign location="n" expr="n + 1"/></onentry>'
+    inner = '<onentry><assign location="n" expr="2 * n"/></onentry>'
+    text = f"""<scxml xmlns="http://www.w3.org/2005/07/scxml">
+      <datamodel><data id="n" expr="3"/></datamodel>
+      <state id="a">{outer}<state id="b">{inner}</state></state></scxml>"""
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
+    assert simulate(ChartModel(chart, {}), Prescribed("0"), 0.1).F[0] == 8
+    (tmp_path / "own.scxml").write_text(text.replace("n + 1", "v"), encoding="utf-8")
+    with pytest.raises(ChartError, match="at the start its entry assigns 'v' to 'n', which is no"):
+        Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
+
+
 def test_words_of_ecmascript() -> None:
     assert _read_back("v > 1 || Math.PI === v && n !== 2") == "v > 1 or pi == v and n != 2"
 
@@ -237,7 +272,12 @@ STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/
         (STATE, "<state/>" + STATE, "a <state> has no id"),
         ('initial="stick"', 'initial="stuck"', "there is no initial state 'stuck'"),
         ('initial="stick"', 'initial="stick slip"', "its initial states are 'stick slip'"),
-        ('initial="stick"', 'initial="stick" binding="late"', "binding='late' has no counterpart"),
+        (
+            'initial="stick">',
+            'initial="stick" binding="late"><state id="q"><datamodel><data id="i"/>'
+            "</datamodel></state>",
+            "binding='late' has no counterpart",
+        ),
         (STATE, '<final id="stick"/>' + STATE, "its state 'stick' is there twice"),
         (
             STATE,
@@ -263,7 +303,19 @@ STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/
             "transition 4: it leaves nothing, and the chart reads",
         ),
         ('event="slips"', 'event="*"', "its event is '*'"),
-        ('event="slips"', 'event="done.state.slip"', "its event is 'done.state.slip'"),
+        ('event="slips"', 'event="done.state.slip"', "its event is 'done.state.slip', and it has"),
+        (
+            STATE,
+            f'{STATE}<onentry><send event="q" delay="1s"/></onentry><transition event="q"'
+            ' target="slip"/>',
+            "state 'stick', onentry: <send> has no",
+        ),
+        (
+            STATE,
+            f'{STATE}<onentry><send event="q" delay="1s"/></onentry><onexit><cancel '
+            'sendid="q"/></onexit><transition event="q" target="slip" cond="z &gt; 1"/>',
+            "state 'stick', onentry: <send> has no",
+        ),
         ('cond="!(v &gt;= 1 || z &gt; 9)"', "", "transition sticks: no guard is given for it"),
         (ASSIGN, '<send event="x"/>', "<send> has no"),
         (ASSIGN, "<if cond='1'/>", "<if> has no"),

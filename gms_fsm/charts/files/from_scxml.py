@@ -128,7 +128,9 @@ def _all(parent: ET.Element, tag: str) -> list[ET.Element]:
     return [each for each in parent if _tag(each) == tag]
 
 
-def _only(parent: ET.Element, allowed: tuple[str, ...], place: str) -> Iterator[ET.Element]:
+def _only(
+    parent: Iterable[ET.Element], allowed: tuple[str, ...], place: str
+) -> Iterator[ET.Element]:
     """Yield the parts in SCXML's namespace, all of them known."""
     for each in parent:
         tag = _tag(each)
@@ -147,7 +149,8 @@ NO_COUNTERPART = {
     "parallel": "write one state for each combination: a chart has one active state",
     "history": "write one state for each that is remembered",
     "script": "write what it computes as let={...}",
-    "send": "write an edge with the guard 'after(T)' for a timer",
+    "send": "a timer is read if it is the only way out of a state, or <cancel> stops it there; for "
+    "others write the guard 'after(T)'",
     "raise": "write the guard of the edge that waits for it",
     "if": "write an edge for each case",
 }
@@ -173,7 +176,7 @@ class _Document:
         self.here, self.logs, self.variables = here, list[str](), set[str]()
         self.routes: dict[str, Route] = {}  # by id
         self.elements: dict[Route, ET.Element] = {}
-        if root.get("binding") == "late":
+        if root.get("binding") == "late" and _inner_data(root):
             raise ChartError("binding='late' has no counterpart in a chart", place=here)
         for each in _only(root, AT_TOP, here):
             if _tag(each) != "datamodel":
@@ -186,6 +189,10 @@ class _Document:
         self.elements = dict(
             sorted(self.elements.items(), key=lambda each: each[0][:1] != outermost)
         )
+        self.timers: dict[tuple[Route, str], str] = {}
+        self.timed: set[ET.Element] = set()  # <send> and <cancel> that they stand for
+        for route, each in self.elements.items():
+            self._find_timers(route, each)
         self.states = [self._state(*each) for each in self.elements.items()]
         self.rows = [row for each in self.elements.items() for row in self._rows(*each)]
 
@@ -206,6 +213,37 @@ class _Document:
         for each in _only(element, allowed, f"{self.here}, state {name!r}"):
             if _tag(each) in ("state", "final"):
                 self._find(each, route, name)
+
+    def _find_timers(self, route: Route, state: ET.Element) -> None:
+        """Find events that a state sends itself after a time, and gets in that state only."""
+        edges = [
+            each
+            for k in range(1, len(route) + 1)
+            for each in _all(self.elements[route[:k]], "transition")
+        ]
+        if any(_tag(each) in ("state", "final") for each in state):
+            return
+        for send in (each for part in _all(state, "onentry") for each in _all(part, "send")):
+            event, name = send.get("event", ""), send.get("id", send.get("event"))
+            delay = re.fullmatch(r"([0-9]*\.?[0-9]+)(m?s)", send.get("delay", ""))
+            known = {*send.keys()} <= {"event", "delay", "id"} and not len(send)
+            if delay is None or not known or (route, event) in self.timers:
+                continue
+            stops = [
+                each
+                for part in _all(state, "onexit")
+                for each in _all(part, "cancel")
+                if each.get("sendid") in (name, event)
+            ]
+            own = [each for each in _all(state, "transition") if each.get("event") == event]
+            others = [each for each in edges if each not in own]
+            heard = any(_is_for(event, each) for each in others)
+            # If others lead away, it could come after the state has been left and entered again.
+            plain = own and not heard and not any(each.get("cond") for each in own)
+            if plain and (stops or not others):
+                seconds = float(delay[1]) * (0.001 if delay[2] == "ms" else 1.0)
+                self.timers[route, event] = f"after({repr(seconds).removesuffix('.0')})"
+                self.timed |= {send, *stops}
 
     def _route(self, name: str, kind: str, place: str) -> Route:
         """Return where a state is."""
@@ -260,16 +298,21 @@ class _Document:
         if to is not None and element.get("type") == "internal":
             inner = len(to) > len(source) and to[: len(source)] == source
             stays = len(source) if inner else stays
-        cond, guard, order = element.get("cond"), _own(element, "guard"), _own(element, "order")
+        cond, guard, order = (
+            element.get("cond") or None,
+            _own(element, "guard"),
+            _own(element, "order"),
+        )
         if name.startswith(DONE):
-            at, name = self._end(source, name.removeprefix(DONE), place), ""
+            at, name = self._end(source, name.removeprefix(DONE), cond, place), ""
             event = None
         if name and not re.fullmatch(r"[\w.-]+", name):
             raise ChartError(
                 f"its event is {event!r}", place=place, advice="give names of events without *"
             )
-        if cond is None and event is None:
-            cond = ECMASCRIPT.true
+        timer = self.timers.get((source, str(event)))
+        if cond is None and (event is None or timer is not None):
+            cond = ECMASCRIPT.true if timer is None else timer
         assigned = self.assigned([element], place)
         edge = ImportedEdge(
             _plain(name),
@@ -283,18 +326,19 @@ class _Document:
         number_of = int(order) if order is not None and order.isdecimal() else None
         return ScxmlTransition(edge, cond, guard, assigned, number_of)
 
-    def _end(self, source: Route, name: str, place: str) -> Route:
+    def _end(self, source: Route, name: str, cond: str | None, place: str) -> Route:
         """Return the final state that is meant by the event that a state is done."""
         ends = [
             route
             for route, each in self.elements.items()
             if route[:-1] == source and _tag(each) == "final"
         ]
-        if self.routes.get(name) != source or len(ends) != 1:
+        if self.routes.get(name) != source or len(ends) != 1 or cond is not None:
             raise ChartError(
-                f"its event is {DONE + name!r}",
+                f"its event is {DONE + name!r}" + (", and it has a cond" if cond else ""),
                 place=place,
-                advice="a chart has edges instead: one from each final state",
+                advice="that of the state itself is read, if it has one <final>, without a cond; "
+                "for others write an edge from the final state",
             )
         return ends[0]
 
@@ -311,7 +355,8 @@ class _Document:
                         place=place,
                         advice="leave it out",
                     )
-            for each in _only(parent, ("assign", "log"), place):
+            own = (each for each in parent if each not in self.timed)
+            for each in _only(own, ("assign", "log"), place):
                 if _tag(each) == "log":
                     self.logs.append(place.removeprefix(f"{self.here}, "))
                     continue
@@ -326,6 +371,18 @@ class _Document:
                 found[name] = expression, _own(each, "text")
                 self.variables.add(name)
         return found
+
+
+def _is_for(event: str, transition: ET.Element) -> bool:
+    """Return whether a transition waits for an event."""
+    waits = [each.removesuffix(".*") for each in (transition.get("event") or "").split()]
+    return any(event == each or event.startswith(f"{each}.") for each in waits)
+
+
+def _inner_data(root: ET.Element) -> bool:
+    """Return whether states have data of their own."""
+    every = [each for each in root.iter() if _tag(each) == "data"]
+    return len(every) > sum(len(_all(each, "data")) for each in _all(root, "datamodel"))
 
 
 def _brings_values(element: ET.Element) -> bool:

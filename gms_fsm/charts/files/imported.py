@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.parts import State, Transition, texts_of
-from gms_fsm.errors import ChartError
+from gms_fsm.errors import ChartError, ExpressionError
 from gms_fsm.foundation.arguments import unknown
+from gms_fsm.language import evaluate, parse_value
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
@@ -175,13 +176,16 @@ def built(
         )
         for each in states
     ]
-    leaves, flat, start = flattened(states, first, edges)
+    leaves, flat, outer = flattened(states, first, edges)
+    start = _started(outer, dict.fromkeys(given.variables, 0.0) | {**given.initial})
     names = [spelled(each.route) for each in leaves]
-    flat = named(flat, edges, names)
+    used = [*given.inputs, *given.velocities, *given.variables, *given.let]
+    flat = named(flat, edges, [*names, *used])
     known = [*dict.fromkeys([each.name for each in flat] + [each.trigger for each in edges])]
     actions = _known(given.actions, known, "edge", f"{here}: actions")
     guards = texts_of(given.guards, f"{here}: guards")
     _check_known(guards, known, "edge", f"{here}: guards")
+    conditions = _guards(flat, edges, guards)
     locked = dict.fromkeys(map(str, _several(given.locked, f"{here}: locked")))
     _check_known(locked, [*map(spelled, _routes(states))], "state", f"{here}: locked")
     impulses = dict.fromkeys(map(str, _several(given.impulses, f"{here}: impulses")))
@@ -208,7 +212,7 @@ def built(
                 each.name,
                 each.sources,
                 each.target,
-                _guard(each, edges, guards),
+                conditions[each.name],
                 _actions(each, edges[each.number], actions, parts),
                 impulse=each.name in impulses or edges[each.number].trigger in impulses,
             )
@@ -219,7 +223,7 @@ def built(
         let=given.let,
         velocities=given.velocities,
         contact_outputs=given.contact_outputs,
-        initial={**start, **given.initial},
+        initial=start,
     )
     for each in edges:
         if each.target is None and "age" in chart.variables:
@@ -232,31 +236,38 @@ def built(
     return chart, flat
 
 
-def _guard(each: FlatEdge, edges: list[ImportedEdge], guards: Mapping[str, str]) -> str:
-    """Return the guard of an edge: what is given by its name, or by that of its trigger.
+def _guards(
+    flat: list[FlatEdge], edges: list[ImportedEdge], given: Mapping[str, str]
+) -> dict[str, str]:
+    """Return the guard of each edge: what is given by its name, or by that of its trigger.
 
     What is given for a trigger with several kinds of edges is joined to their own conditions.
     """
-    edge = edges[each.number]
-    alike = {(one.target, one.guard, one.also) for one in edges if one.trigger == edge.trigger}
-    shared = guards.get(edge.trigger)
-    whole = guards.get(each.name, shared if len(alike) == 1 else None)
-    if whole is None and edge.missing:
+    found: dict[str, str] = {}
+    lacking: dict[str, ImportedEdge] = {}
+    for each in flat:
+        edge = edges[each.number]
+        alike = {(one.target, one.guard, one.also) for one in edges if one.trigger == edge.trigger}
+        shared = given.get(edge.trigger)
+        whole = given.get(each.name, shared if len(alike) == 1 else None)
+        parts = [shared, edge.guard] if whole is None else [whole]
+        texts = [text for text in (*parts, edge.also) if text is not None]
+        if not texts or (whole is None and edge.missing):
+            lacking.setdefault(each.name if edge.missing else edge.trigger, edge)
+        else:
+            found[each.name] = all_of(texts)
+    if lacking:
+        (name, edge), *others = lacking.items()
+        more = f", and for {', '.join(repr(each) for each, _ in others)}" if others else ""
+        told = f", nor a text for its condition {edge.missing!r}" if edge.missing else ""
+        either = f", or callbacks={{{edge.missing!r}: 'z > s'}}" if edge.missing else ""
         raise ChartError(
-            f"no guard is given for it, nor a text for its condition {edge.missing!r}",
+            f"no guard is given for it{told}",
             place=edge.place,
-            advice=f"give one as text, guards={{{each.name!r}: 'z > s'}}, or "
-            f"callbacks={{{edge.missing!r}: 'z > s'}}",
+            advice=f"give one as text, guards={{{name!r}: 'z > s'}}{either}{more}; 'True' for "
+            "always",
         )
-    parts = [shared, edge.guard] if whole is None else [whole]
-    found = [text for text in (*parts, edge.also) if text is not None]
-    if not found:
-        raise ChartError(
-            "no guard is given for it",
-            place=edge.place,
-            advice=f"give one as text, guards={{{each.name!r}: 'z > s'}}; 'True' for always",
-        )
-    return all_of(found)
+    return found
 
 
 def _actions(
@@ -337,11 +348,11 @@ def _inherited(texts: Mapping[str, Assigned], route: Route) -> dict[str, str]:
 
 def flattened(
     states: list[ImportedState], first: Route, edges: list[ImportedEdge]
-) -> tuple[list[ImportedState], list[FlatEdge], dict[str, float]]:
-    """Return the states without parts, the default one first, all edges between them, and values.
+) -> tuple[list[ImportedState], list[FlatEdge], list[ImportedState]]:
+    """Return the states without parts, the default one first, and all edges between them.
 
-    Edges of inner states go before those of outer ones. The values are what the outer states
-    assign when the chart starts.
+    Edges of inner states go before those of outer ones. The third list has the states around the
+    default one, which are entered when the chart starts.
     """
     by_route = {each.route: each for each in states}
 
@@ -366,7 +377,7 @@ def flattened(
             entered = [by_route[each].entry for each in _outwards(target[:-1]) if len(each) > kept]
             around = tuple(filter(None, left)), tuple(filter(None, reversed(entered)))
             rows.append(FlatEdge(number, (spelled(source),), spelled(target), around))
-    return leaves, rows, _starts([by_route[each] for each in reversed(_outwards(default[:-1]))])
+    return leaves, rows, [by_route[each] for each in reversed(_outwards(default[:-1]))]
 
 
 def _shared(source: Route, target: Route) -> int:
@@ -376,20 +387,19 @@ def _shared(source: Route, target: Route) -> int:
     return count - 1 if count == len(target) else count
 
 
-def _starts(outer: list[ImportedState]) -> dict[str, float]:
-    """Return what outer states assign at the start, which must be numbers."""
-    found: dict[str, float] = {}
+def _started(outer: list[ImportedState], values: dict[str, float]) -> dict[str, float]:
+    """Return the values at the start, after the entries of outer states; zeros are left out."""
     for each in outer:
         for name, text in each.entry.items():
             try:
-                found[name] = float(text)
-            except ValueError:
+                values[name] = float(evaluate(parse_value(text, values), values))
+            except ExpressionError:
                 raise ChartError(
-                    f"at the start its entry assigns {text!r} to {name!r}, which is no number",
+                    f"at the start its entry assigns {text!r} to {name!r}, which is no number yet",
                     place=each.place,
                     advice="assign it in the state that is entered inside of it",
                 ) from None
-    return found
+    return {name: value for name, value in values.items() if value}
 
 
 # --------------------------------------------------------------------------- names
