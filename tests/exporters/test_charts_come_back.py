@@ -456,6 +456,25 @@ def test_ordered_transitions_of_any_class_of_machines(kind: Any) -> None:
                      (("green", "yellow"), ("yellow", "red"), ("red", "green"))]  # fmt: skip
 
 
+def test_conditions_that_differ_are_not_one_guard() -> None:
+    machine = Machine(states=["a", "b"], initial="a", auto_transitions=False)
+    machine.add_transition("go", "a", "b", conditions="is_hot")
+    machine.add_transition("go", "b", "b", conditions="is_big")
+    with pytest.raises(ChartError, match=r"condition 'is_hot'; .*and for 'b_b'"):
+        Chart.from_transitions(machine, outputs={"F": "0"}, guards={"go": "v > 1"})
+
+
+def test_the_time_in_a_state_with_states_inside_is_refused() -> None:
+    slip = {"name": "slip", "children": ["b", "c"], "initial": "b"}
+    edges = [["slips", "stick", "slip"], ["sticks", "slip", "stick"]]
+    machine = HierarchicalMachine(states=["stick", slip], initial="stick", transitions=edges)
+    texts: Any = {"outputs": {"F": "0"}, "guards": {"slips": "after(1)", "sticks": "v < 1"}}
+    assert "age" in Chart.from_transitions(machine, **texts).variables
+    texts["guards"] |= {"sticks": "after(2)"}
+    with pytest.raises(ChartError, match="'sticks': its guard reads the time in 'slip', which has"):
+        Chart.from_transitions(machine, **texts)
+
+
 def test_callbacks_are_a_table_of_actions() -> None:
     states = [MachineState("a", on_exit="leave"), MachineState("b", on_enter=["enter", print])]
     machine = Machine(
@@ -554,6 +573,12 @@ BEYOND: list[tuple[Any, str]] = [
       for each in ("before", "after", "prepare")),
     (small(transitions=[["slips", "stick", "slip"], ["sticks", "slip", "stick"],
                         ["go", "slip", "stick"]]), "trigger 'go': no guard is given for it"),
+    (row(dest="nowhere"), "trigger 'slips': there is no target 'nowhere'"),
+    (row(source="nowhere"), "trigger 'slips': there is no source 'nowhere'"),
+    (HierarchicalMachine(states=["stick", {"name": "slip", "children": "b", "initial": "c"}],
+                         initial="stick", transitions=[["slips", "stick", "slip"],
+                                                       ["sticks", "stick", "stick"]]),
+     "state 'slip': its initial state 'slip__c' is not"),
 ]  # fmt: skip
 
 
@@ -580,6 +605,8 @@ def test_what_a_machine_has_beyond_a_chart_is_named(machine: Any, said: str) -> 
         ({"locked": ["stuck"]}, "locked: there is no state 'stuck'"),
         ({"parameters": "k"}, "parameters is 'k'; give a tuple"),
         ({"parameters": [{"unit": "N"}]}, "a parameter has no name"),
+        ({"variables": 5}, "variables is 5; give a tuple"),
+        ({"initial": 5}, "initial is 5; it gives a text for each name"),
         ({"parameters": [{"name": "k", "size": 1}]}, "a parameter has unknown fields size"),
         ({"outputs": {}}, "no output 'F'"),
     ],

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.parts import State, Transition, texts_of
+from gms_fsm.charts.reader import AGE
 from gms_fsm.errors import ChartError, ExpressionError
 from gms_fsm.foundation.arguments import unknown
-from gms_fsm.language import evaluate, parse_value
+from gms_fsm.language import evaluate, names_in, parse_value
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
@@ -67,6 +68,11 @@ class ImportedEdge:
     before: Assigned = field(default_factory=dict)
     after: Assigned = field(default_factory=dict)
     stays: int | None = None
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What edges that are given one guard have in common."""
+        return self.target, self.guard, self.also, self.missing
 
 
 @dataclass(frozen=True)
@@ -125,6 +131,10 @@ class Texts:
         for name in given:
             if name not in known:
                 raise unknown("argument", name, known, ChartError, place=here)
+        for name in given.keys() & {"inputs", "velocities", "variables", "parameters"}:
+            _several(given[name], f"{here}: {name}")
+        for name in given.keys() & {"let", "initial"}:
+            texts_of(given[name], f"{here}: {name}")
         return cls(**given)
 
 
@@ -225,15 +235,29 @@ def built(
         contact_outputs=given.contact_outputs,
         initial=start,
     )
-    for each in edges:
-        if each.target is None and "age" in chart.variables:
-            raise ChartError(
-                "it leaves nothing, and the chart reads the time in a state, which an edge from a "
-                "state to itself starts again",
-                place=each.place,
-                advice="count the time in a variable with the flow '1'",
-            )
+    for each in flat:
+        _check_time(chart, each, edges[each.number], parts)
     return chart, flat
+
+
+def _check_time(
+    chart: Chart, each: FlatEdge, edge: ImportedEdge, leaves: Mapping[str, ImportedState]
+) -> None:
+    """Refuse an edge for which the time in a state would mean something else."""
+    if AGE in names_in(chart.guards[each.name]) and spelled(edge.source) not in leaves:
+        raise ChartError(
+            f"its guard reads the time in {spelled(edge.source)!r}, which has states inside: a "
+            "chart knows the time in these",
+            place=edge.place,
+            advice="count the time in a variable with the flow '1'",
+        )
+    if edge.target is None and AGE in chart.variables:
+        raise ChartError(
+            "it leaves nothing, and the chart reads the time in a state, which an edge from a "
+            "state to itself starts again",
+            place=edge.place,
+            advice="count the time in a variable with the flow '1'",
+        )
 
 
 def _guards(
@@ -247,7 +271,7 @@ def _guards(
     lacking: dict[str, ImportedEdge] = {}
     for each in flat:
         edge = edges[each.number]
-        alike = {(one.target, one.guard, one.also) for one in edges if one.trigger == edge.trigger}
+        alike = {one.kind for one in edges if one.trigger == edge.trigger}
         shared = given.get(edge.trigger)
         whole = given.get(each.name, shared if len(alike) == 1 else None)
         parts = [shared, edge.guard] if whole is None else [whole]
@@ -357,8 +381,22 @@ def flattened(
     by_route = {each.route: each for each in states}
 
     def inside(route: Route) -> Route:
-        found = by_route[route].first
-        return route if found is None else inside(found)
+        state = by_route[route]
+        if state.first is None:
+            return route
+        if state.first not in by_route or state.first[: len(route)] != route:
+            raise ChartError(
+                f"its initial state {spelled(state.first)!r} is not inside of it",
+                place=state.place,
+            )
+        return inside(state.first)
+
+    for edge in edges:
+        for end, route in (("source", edge.source), ("target", edge.target)):
+            if route is not None and route not in by_route:
+                raise unknown(
+                    end, spelled(route), map(spelled, by_route), ChartError, place=edge.place
+                )
 
     default = inside(first)
     leaves = [each for each in states if each.first is None]
@@ -414,7 +452,7 @@ def named(rows: list[FlatEdge], edges: list[ImportedEdge], taken: list[str]) -> 
 
     def alike(group: list[FlatEdge]) -> bool:
         kinds = {
-            repr((row.target, edge.guard, edge.also, edge.missing, edge.actions, row.around))
+            repr((row.target, edge.kind, edge.actions, edge.before, edge.after, row.around))
             for row in group
             for edge in [edges[row.number]]
         }
