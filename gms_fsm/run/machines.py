@@ -220,6 +220,12 @@ def _new_machine(kind: Callable[..., Machine], **given: Any) -> Machine:
             place="machine",
             advice="take the class without Async",
         )
+    if made.model_attribute != "state":
+        raise ParameterError(
+            f"it keeps the state of an element in {made.model_attribute!r}",
+            place="machine",
+            advice="leave model_attribute out",
+        )
     return made
 
 
@@ -357,6 +363,8 @@ class MachineEngine:
         bank = self.program.layout.bank(machine)
         row = self.parts[machine].model.chart.transitions[edge - bank.first_edge]
         place = f"{self.called(machine)}, edge {row.name!r}"
+        guard = self.parts[machine].guards[row.name]
+        guard.held = False  # not what the trigger returns: with a queue that is always True
         # The trigger evaluates the guard once more; assignments follow, as in Stateflow, where the
         # whole set is selected before any of them.
         try:
@@ -365,8 +373,7 @@ class MachineEngine:
             raise Interference(
                 f"a callback changed a state ({error.value}); {ONLY_LOOK}", place, t
             ) from error
-        # Not what the trigger returned: with a queue that is always True.
-        if not self.parts[machine].guards[row.name].held:
+        if not guard.held:
             raise Interference(
                 "the edge was enabled, but a callback changed the element's values before "
                 f"it fired; {ONLY_LOOK}",

@@ -164,6 +164,11 @@ def test_a_queue_hides_no_interference(engine: str) -> None:
     machines.machine.prepare_event = [lambda event: setattr(event.model, "v", 0.0)]
     with pytest.raises(CallbackError, match="a callback changed the element's values before"):
         ran(machines, engine)
+    machines = ElementMachines(
+        MODEL, machine=functools.partial(QUEUED, ignore_invalid_triggers=True)
+    )
+    with pytest.raises(CallbackError, match="a callback changed the element's values before"):
+        ran(machines, progress=lambda _: setattr(machines.elements[0], "state", "slip"))
     machines = ElementMachines(MODEL, machine=QUEUED)
     machines.machine.on_enter_slip(lambda event: event.model.break_away_forward())
     with pytest.raises(CallbackError, match="a callback changed a state"):
@@ -172,7 +177,11 @@ def test_a_queue_hides_no_interference(engine: str) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "said"),
-    [(AsyncMachine, "the triggers of an AsyncMachine are awaited"), (list, "a class of the pack")],
+    [
+        (AsyncMachine, "the triggers of an AsyncMachine are awaited"),
+        (list, "a class of the package transitions"),
+        (functools.partial(Machine, model_attribute="mode"), "the state of an element in 'mode'"),
+    ],
 )
 def test_what_is_no_machine_of_this_kind_is_refused(kind: Any, said: str) -> None:
     with pytest.raises(ParameterError, match=said):

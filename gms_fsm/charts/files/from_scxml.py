@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
 
 LARGEST = 10_000_000  # bytes: no chart needs as many
+DEEPEST = 8  # levels of states: deeper ones nobody could read
 AT_TOP = ("datamodel", "state", "final")
 IN_STATE = ("onentry", "onexit", "transition", "datamodel", "initial", "state", "final")
 WORDS = {
@@ -176,6 +177,7 @@ class _Document:
         self.here, self.logs, self.variables = here, list[str](), set[str]()
         self.routes: dict[str, Route] = {}  # by id
         self.elements: dict[Route, ET.Element] = {}
+        self.spelled: set[str] = set()
         if root.get("binding") == "late" and _inner_data(root):
             raise ChartError("binding='late' has no counterpart in a chart", place=here)
         for each in _only(root, AT_TOP, here):
@@ -201,14 +203,18 @@ class _Document:
         name = element.get("id")
         if not name:
             raise ChartError(f"a <{_tag(element)}> has no id", place=self.here)
-        route = (*around, _plain(name.removeprefix(f"{outer}.") if outer else name))
-        if name in self.routes or spelled(route) in map(spelled, self.elements):
+        local = _own(element, "name") or name.removeprefix(f"{outer}.").removeprefix(f"{outer}__")
+        route = (*around, _plain(local))
+        if len(route) > DEEPEST:
+            raise ChartError(f"it has states on more than {DEEPEST} levels", place=self.here)
+        if name in self.routes or spelled(route) in self.spelled:
             raise ChartError(
                 f"its state {name!r} is there twice, or is spelled {spelled(route)!r} as another",
                 place=self.here,
                 advice="give each state a name of its own",
             )
         self.routes[name], self.elements[route] = route, element
+        self.spelled.add(spelled(route))
         allowed = IN_STATE if _tag(element) == "state" else ("onentry", "onexit")
         for each in _only(element, allowed, f"{self.here}, state {name!r}"):
             if _tag(each) in ("state", "final"):
