@@ -18,7 +18,7 @@ from transitions import State as MachineState
 from transitions.extensions import HierarchicalMachine, LockedMachine
 from transitions.extensions.asyncio import AsyncMachine
 from transitions.extensions.markup import MarkupMachine
-from transitions.extensions.states import Timeout, Volatile, add_state_features
+from transitions.extensions.states import Error, Timeout, Volatile, add_state_features
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, export, simulate
 from gms_fsm.charts import CHARTS
@@ -475,6 +475,16 @@ def test_the_time_in_a_state_with_states_inside_is_refused() -> None:
         Chart.from_transitions(machine, **texts)
 
 
+def test_a_timeout_that_triggers_an_edge_is_the_time_in_its_state() -> None:
+    states = ["off", {"name": "on", "timeout": 2.5, "on_timeout": "expire"}]
+    machine = Timed(states=states, initial="off", auto_transitions=False)
+    machine.add_transition("start", "off", "on")
+    machine.add_transition("expire", "on", "off")
+    chart = Chart.from_transitions(machine, outputs={"F": "0"}, guards={"start": "v > 1"})
+    edges = [(edge.name, edge.source, edge.guard) for edge in chart.transitions]
+    assert edges == [("start", "off", "v > 1"), ("expire", "on", "after(2.5)")]
+
+
 def test_callbacks_are_a_table_of_actions() -> None:
     states = [MachineState("a", on_exit="leave"), MachineState("b", on_enter=["enter", print])]
     machine = Machine(
@@ -553,6 +563,11 @@ class Passing(Machine):  # type: ignore[misc]
     """A machine whose states make an object while they are active."""
 
 
+@add_state_features(Error)
+class Failing(Machine):  # type: ignore[misc]
+    """A machine with states that must not be reached."""
+
+
 TIMEOUT = {"name": "b", "timeout": 2, "on_timeout": "x"}
 OF_MACHINES = "before_state_change after_state_change prepare_event finalize_event on_exception"
 BEYOND: list[tuple[Any, str]] = [
@@ -569,6 +584,8 @@ BEYOND: list[tuple[Any, str]] = [
     (Timed(states=["a", TIMEOUT], initial="a"),
      r"state 'b': its timeout of 2 s has no counterpart.*after\(T\)"),
     (Passing(states=["a"], initial="a"), "state 'a'.*a volatile state has no counterpart"),
+    (Failing(states=["a"], initial="a", auto_transitions=False),
+     "state 'a'.*an error state has no counterpart"),
     *((row(**{each: "look"}), f"trigger 'slips': its callback {each} 'look'")
       for each in ("before", "after", "prepare")),
     (small(transitions=[["slips", "stick", "slip"], ["sticks", "slip", "stick"],

@@ -8,6 +8,7 @@ from typing import Any
 
 from transitions import Machine
 from transitions.extensions.asyncio import AsyncMachine
+from transitions.extensions.states import Error
 
 from gms_fsm.charts.files.imported import (
     Assigned,
@@ -116,6 +117,7 @@ def read(
         )
     start = reader.route(first)
     entered = {start, *(edge.target for edge in edges), *(state.first for state in states)}
+    reader.check_timers(edges)
     reader.callbacks.check_all_known()
     return [*_rested(states, entered)], start, edges
 
@@ -153,6 +155,7 @@ class _MachineReader:
     def __init__(self, machine: Any, callbacks: Callbacks) -> None:
         self.machine, self.callbacks = machine, callbacks
         self.separator = getattr(machine.state_cls, "separator", None)
+        self.timers: dict[tuple[Route, tuple[Any, ...]], float] = {}  # by what they call
         self.before, self.after = (
             callbacks.actions(getattr(machine, name), name, HERE)
             for name in ("before_state_change", "after_state_change")
@@ -171,13 +174,12 @@ class _MachineReader:
             entry = self.callbacks.actions(state.on_enter, "on_enter", place)
             exit_ = self.callbacks.actions(state.on_exit, "on_exit", place)
             if getattr(state, "timeout", 0):
-                raise ChartError(
-                    f"its timeout of {state.timeout!r} s has no counterpart in a chart",
-                    place=place,
-                    advice="write an edge with the guard 'after(T)'",
-                )
+                self.timers[route, tuple(state.on_timeout)] = state.timeout
             if hasattr(state, "volatile_cls"):
                 raise ChartError("a volatile state has no counterpart in a chart", place=place)
+            accepted = getattr(state, "is_accepted", False) or self.left(route)
+            if isinstance(state, Error) and not accepted:
+                raise ChartError("an error state has no counterpart in a chart", place=place)
             self.callbacks.nothing(getattr(state, "on_final", []), "on_final", place)
             inner = getattr(state, "states", {})
             first = None
@@ -188,6 +190,22 @@ class _MachineReader:
             yield ImportedState(route, place, entry, exit_, first)
             if inner:
                 yield from self.states(state, route)
+
+    def left(self, route: Route) -> bool:
+        """Return whether an edge leaves a state."""
+        return bool(self.machine.get_triggers((self.separator or "").join(route)))
+
+    def check_timers(self, edges: list[ImportedEdge]) -> None:
+        """Refuse timeouts that do more than to trigger an edge out of their state."""
+        for (route, called), seconds in self.timers.items():
+            waiting = [each for each in edges if (each.source, (each.trigger,)) == (route, called)]
+            if not waiting or any(each.also or each.missing for each in waiting):
+                raise ChartError(
+                    f"its timeout of {seconds!r} s has no counterpart in a chart",
+                    place=f"{HERE}, state {spelled(route)!r}",
+                    advice="let it call a trigger that leaves the state without conditions, or "
+                    "write an edge with the guard 'after(T)'",
+                )
 
     def edges(
         self, owner: Any, around: Route, states: list[ImportedState]
@@ -215,11 +233,13 @@ class _MachineReader:
         before = self.callbacks.actions(row.before, "before", place)
         after = self.callbacks.actions(row.after, "after", place)
         also, missing = self.callbacks.guard(row.conditions, place)
+        seconds = self.timers.get((source, (trigger,)))
         return ImportedEdge(
             trigger,
             source,
             target,
             place,
+            None if seconds is None else f"after({seconds!r})",
             also=also,
             missing=missing,
             before=joined((self.before, before), place),
