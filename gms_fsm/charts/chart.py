@@ -356,7 +356,7 @@ class Chart:
         ------
         ChartError, ExpressionError
             If the machine has something without counterpart in a chart, which is named, such as a
-            function without a text, parallel states or a timeout; or if a text is wrong.
+            function without a text, or parallel states; or if a text is wrong.
 
         Examples
         --------

@@ -148,6 +148,8 @@ def test_texts_beside_go_before_those_of_the_document(tmp_path: Path) -> None:
     assert chart.guard_text("sticks") == "!(v >= 1 || z > 9)"
     assert not chart.transitions[0].actions
     assert chart.states[1].entry == {"z": "2"}
+    given = '<data id="z" expr="Math.random()"/>'
+    assert read(tmp_path, '<data id="z" expr="0"/>', given, initial={"z": 2.0}).initial == {"z": 2}
 
 
 def test_one_event_for_one_edge_that_leaves_several_states(tmp_path: Path) -> None:
@@ -290,6 +292,7 @@ STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/
         ('<data id="z" expr="0"/>', '<data id="q"/>', "<data id='q'>: it has no expr"),
         ('<data id="z" expr="0"/>', '<data id="q">[1, 2]</data>', "<data id='q'>, column 1"),
         ('<data id="z" expr="0"/>', '<data id="z" expr="2 * v"/>', "begins as '2 * v', which is"),
+        ('<data id="z" expr="0"/>', '<data id="z" expr="1 / 0"/>', "initial, 'z' is nan; it must"),
         ('target="slip"/>', 'target="slip stick"/>', "its targets are 'slip stick'"),
         ('target="slip"/>', 'target="nowhere"/>', "there is no target 'nowhere'"),
         (

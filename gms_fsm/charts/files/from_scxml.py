@@ -18,13 +18,14 @@ from gms_fsm.charts.files.imported import (
     Route,
     Texts,
     built,
+    number_of,
     spelled,
 )
 from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
 from gms_fsm.charts.reader import AGE
 from gms_fsm.errors import ChartError, ExpressionError, Part, why
 from gms_fsm.foundation.arguments import unknown
-from gms_fsm.language import ECMASCRIPT, evaluate, names_in, parse_value
+from gms_fsm.language import ECMASCRIPT, names_in, parse_value
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
@@ -304,11 +305,8 @@ class _Document:
         if to is not None and element.get("type") == "internal":
             inner = len(to) > len(source) and to[: len(source)] == source
             stays = len(source) if inner else stays
-        cond, guard, order = (
-            element.get("cond") or None,
-            _own(element, "guard"),
-            _own(element, "order"),
-        )
+        cond, guard, order = element.get("cond"), _own(element, "guard"), _own(element, "order")
+        cond = cond or None  # an empty one is none
         if name.startswith(DONE):
             at, name = self._end(source, name.removeprefix(DONE), cond, place), ""
             event = None
@@ -454,12 +452,17 @@ class _DataModel:
             str(each.get("name") if isinstance(each, Mapping) else getattr(each, "name", each))
             for each in given.parameters
         ]
-        outside = {*given.inputs, *given.velocities, *parameters}
+        outside = {*given.inputs, *given.velocities, *parameters, *given.let}
         if root.find(f"{{{OURS}}}chart") is not None:
             outside |= {AGE}  # a chart makes it by itself
-        data = cls([*given.variables], {}, {})
+        data = cls([*given.variables], {}, {}, dict(given.initial))
         for each in root.iter():
-            if _tag(each) != "data" or each.get("id") in outside:
+            name = each.get("id", "")
+            if _tag(each) != "data" or name in outside:
+                continue
+            if name in given.initial:
+                if name not in data.variables:
+                    data.variables.append(name)
                 continue
             data.take(each, outside, assigned, f"{here}, <data id={each.get('id')!r}>")
         return cls(data.variables, {**data.let, **given.let}, {**data.initial, **given.initial})
@@ -486,12 +489,12 @@ class _DataModel:
             raise error.at(Part(place)) from None
         used = names_in(tree)
         if used <= {*self.values}:
-            self.values[name] = float(evaluate(tree, self.values))
+            self.values[name] = number_of(tree, self.values)
         elif changes or used & {*self.variables}:
             raise ChartError(
                 f"it begins as {text!r}, which is no number",
                 place=place,
-                advice="give its value, initial={...} of a run",
+                advice=f"give its value, initial={{{name!r}: 1.0}}",
             )
         if not changes:
             self.let[name] = repr(self.values[name]) if used & {*self.variables} else text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, TypedDict
@@ -12,7 +13,7 @@ from gms_fsm.charts.parts import State, Transition, texts_of
 from gms_fsm.charts.reader import AGE
 from gms_fsm.errors import ChartError, ExpressionError
 from gms_fsm.foundation.arguments import unknown
-from gms_fsm.language import evaluate, names_in, parse_value
+from gms_fsm.language import Value, evaluate, names_in, parse_value
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
@@ -430,7 +431,7 @@ def _started(outer: list[ImportedState], values: dict[str, float]) -> dict[str, 
     for each in outer:
         for name, text in each.entry.items():
             try:
-                values[name] = float(evaluate(parse_value(text, values), values))
+                values[name] = number_of(parse_value(text, values), values)
             except ExpressionError:
                 raise ChartError(
                     f"at the start its entry assigns {text!r} to {name!r}, which is no number yet",
@@ -438,6 +439,14 @@ def _started(outer: list[ImportedState], values: dict[str, float]) -> dict[str, 
                     advice="assign it in the state that is entered inside of it",
                 ) from None
     return {name: value for name, value in values.items() if value}
+
+
+def number_of(tree: Value, values: Mapping[str, float]) -> float:
+    """Return the value of an expression at the start; NaN, which a chart refuses, without one."""
+    try:
+        return float(evaluate(tree, values))
+    except (ArithmeticError, ValueError):
+        return math.nan
 
 
 # --------------------------------------------------------------------------- names
