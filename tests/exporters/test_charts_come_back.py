@@ -287,6 +287,11 @@ STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/
             f'<state id="b"/></state>{STATE}',
             "<initial>: <log> has no counterpart",
         ),
+        (
+            STATE,
+            "".join(f'<state id="{c}">' for c in "abcdefghi") + "</state>" * 9 + STATE,
+            "it has states on more than 8 levels",
+        ),
         (STATE, '<final id="e"><donedata/></final>' + STATE, "state 'e': <donedata> has no"),
         ('<data id="z" expr="0"/>', '<data id="z" src="z.json"/>', "<data src=...> has no"),
         ('<data id="z" expr="0"/>', '<data id="q"/>', "<data id='q'>: it has no expr"),
@@ -379,6 +384,8 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         Chart.from_scxml(tmp_path / "none.scxml")
     with pytest.raises(ParameterError, match="path is 5"):
         Chart.from_scxml(5)  # type: ignore[arg-type]
+    with pytest.raises(ChartError, match="callbacks: a document calls no functions"):
+        Chart.from_scxml(tmp_path / "none.scxml", callbacks={"look": {}})
     with pytest.raises(ChartError, match="there is no argument 'flow'"):
         Chart.from_scxml(tmp_path / "none.scxml", flow={})  # type: ignore[call-arg]
 
@@ -457,6 +464,19 @@ def test_ordered_transitions_of_any_class_of_machines(kind: Any) -> None:
     edges = [(edge.source, edge.target, edge.guard) for edge in chart.transitions]
     assert edges == [(*ends, "after(3)") for ends in
                      (("green", "yellow"), ("yellow", "red"), ("red", "green"))]  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "way"), [("before", "on_exit"), ("after", "on_enter")])
+def test_actions_around_those_of_the_states_are_refused(place: str, way: str) -> None:
+    states = [MachineState("a", **{way: "move"}), MachineState("b", **{way: "move"})]
+    edge = {"trigger": "go", "source": "a", "dest": "b", place: "count"}
+    machine = Machine(states=states, initial="a", transitions=[edge])
+    texts: Any = {"variables": ("m", "n"), "outputs": {"F": "0"}, "guards": {"go": "v > 1"}}
+    texts["callbacks"] = {"move": {"m": "1"}, "count": {"n": "n + 1"}}
+    with pytest.raises(ChartError, match=f"what it assigns {place} the states change cannot be"):
+        Chart.from_transitions(machine, **texts)
+    texts["callbacks"] |= {"move": {}}
+    assert Chart.from_transitions(machine, **texts).transitions[0].actions == {"n": "n + 1"}
 
 
 def test_conditions_that_differ_are_not_one_guard() -> None:
