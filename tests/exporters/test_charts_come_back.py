@@ -256,6 +256,19 @@ def test_words_of_ecmascript() -> None:
     assert _read_back("v > 1 || Math.PI === v && n !== 2") == "v > 1 or pi == v and n != 2"
 
 
+def test_one_event_is_two_edges_where_one_would_change_the_priority(tmp_path: Path) -> None:
+    go = '<transition event="go" cond="v > 1" target="c"/>'
+    turn = '<transition event="turn" cond="v > 2" target="d"/>'
+    rest = '<state id="c"/><state id="d"/>'
+    text = f'<state id="a">{go}{turn}</state><state id="b">{turn}{go}</state>{rest}'
+    text = f'<scxml xmlns="http://www.w3.org/2005/07/scxml">{text}</scxml>'
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
+    first = {state: chart.leaving(state)[0][1].target for state in ("a", "b")}
+    assert first == {"a": "c", "b": "d"}
+    assert {edge.name for edge in chart.transitions} == {"turn", "a_c", "b_c"}
+
+
 STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/>'
 
 
@@ -263,6 +276,7 @@ STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/
     ("old", "new", "said"),
     [
         (FOREIGN, "<scxml", "it is not XML"),
+        (FOREIGN, '<scxml xmlns="http://www.w3.org/2005/07/scxml"/>', "it has no <state>"),
         (FOREIGN, "<html/>", "its root is <html>, not <scxml"),
         ("<scxml ", '<!DOCTYPE x [<!ENTITY a "b">]><scxml ', "a document type definition"),
         (STATE, f"<parallel></parallel>{STATE}", "<parallel> has no counterpart in a chart"),
@@ -535,6 +549,12 @@ def test_callbacks_are_a_table_of_actions() -> None:
     ):
         with pytest.raises(ChartError, match=said):
             Chart.from_transitions(machine, callbacks=wrong, **texts)
+
+
+def test_a_variable_that_two_callbacks_assign_is_refused() -> None:
+    machine = state(on_enter=["one", "two"])
+    with pytest.raises(ChartError, match="'slip': 'n' is assigned twice in a row, '1' and '2'"):
+        Chart.from_transitions(machine, callbacks={"one": {"n": "1"}, "two": {"n": "2"}}, **TEXTS)
 
 
 def test_states_in_states_are_joined_by_two_underscores() -> None:
