@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -229,6 +229,20 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
         if not isinstance(bound.limit, str) and not bound.holds(number, bound.limit):
             raise ParameterError(f"it must be {bound.text}", place=name, value=number)
     return number
+
+
+def check_rules(parameters: Sequence[Parameter], here: str) -> None:
+    """Refuse rules that name what is not another parameter."""
+    names = [each.name for each in parameters]
+    for i, each in enumerate(parameters):
+        known = sorted({*names} - {each.name})
+        for name in sorted(each.others - {*known}):
+            raise ChartError(
+                f"{here}, parameter {each.name!r}: its rule names {name!r}, "
+                "which is not another parameter",
+                advice=f"there are {', '.join(map(repr, known)) or 'none'}",
+                key=("parameters", i, "rule"),
+            )
 
 
 def check_names(

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from math import isfinite, nan
 from typing import Any
 
-from gms_fsm.charts.parameters import Parameter
-from gms_fsm.errors import ChartError, shown
+from gms_fsm.charts.parameters import Parameter, checked_scalar
+from gms_fsm.errors import ChartError, ParameterError, shown
 from gms_fsm.foundation.arguments import refusing, unknown
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import EVENT
@@ -220,6 +220,25 @@ def parameter_of(given: object, here: str) -> Parameter:
         place=here,
         advice="write it as 'k', or as Parameter('k', 'N/m', '> 0') with its unit and rule",
     )
+
+
+def values_of(given: object, variables: Sequence[str], here: str) -> dict[str, float]:
+    """Return the values with which variables start."""
+    owner = f"{here}: initial"
+    if not isinstance(given, Mapping):
+        raise ChartError(
+            "it gives a value for a variable, like {'z': 1.0}", place=owner, value=given
+        )
+    for name in given:
+        if name not in variables:
+            raise unknown("variable", name, variables, ChartError, place=owner)
+    try:
+        return {
+            name: checked_scalar(f"{owner}, {name!r}", value, "finite")
+            for name, value in given.items()
+        }
+    except ParameterError as error:
+        raise ChartError(error.reason, place=error.place, value=error.value) from None
 
 
 def places_of(given: object, parts: Sequence[State], here: str) -> dict[str, tuple[float, float]]:

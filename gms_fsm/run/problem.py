@@ -406,11 +406,12 @@ def _given(
     for name in layout.y.shared:
         if name in given:
             y[name] = checked_scalar(f"initial[{name!r}]", given[name], "finite")
-    for bank in layout.banks:
+    for bank, part in zip(layout.banks, system.contacts, strict=True):
         for variable in bank.variables:
+            start = part.chart.initial.get(variable, 0.0)
             name, label = bank.of(variable), layout.label(bank.of(variable))
             values = checked_array(
-                f"initial[{label!r}]", given.get(name, [0.0] * bank.n), None, "finite"
+                f"initial[{label!r}]", given.get(name, [start] * bank.n), None, "finite"
             )
             if values.size != bank.n:
                 raise ParameterError(
@@ -440,9 +441,9 @@ def _given(
 @functools.lru_cache(maxsize=64)
 def _is_plain(key: ByIdentity[System]) -> bool:
     """Return whether systems of a shape start with 0 everywhere unless something else is given."""
-    shape = key.it
-    locked = any(contact.chart.default_state.locked for contact in shape.machines)
-    return not (shape.sampled or locked or _enters(shape))
+    charts = [contact.chart for contact in key.it.machines]
+    special = any(chart.default_state.locked or chart.initial for chart in charts)
+    return not (key.it.sampled or special or _enters(key.it))
 
 
 def _check_locks(

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.language import Value
+from gms_fsm.language import Value, parse_value
 from plots.charts.notation import ChartWriter
 
 SAID_ONCE = 3  # states: what so many have alike, forces and flows, is said once for all of them
@@ -51,6 +51,7 @@ def chart_texts(write: ChartWriter) -> Texts:
     chart = write.chart
     shared = _forces(chart, chart.default_state) if _force_below(chart) else {}
     return [
+        ("at the start", [write.assignment(*each) for each in _starts(chart)]),
         ("let", _equations(write, chart.lets)),
         (
             "during in all states",
@@ -62,6 +63,12 @@ def chart_texts(write: ChartWriter) -> Texts:
             [write.total(name, tree) for name, tree in chart.totals.items()],
         ),
     ]
+
+
+def _starts(chart: Chart) -> Iterator[tuple[str, Value]]:
+    """Yield the variables that start with a value of their chart."""
+    for name, value in chart.initial.items():
+        yield name, parse_value(repr(value), [])
 
 
 def _equations(write: ChartWriter, trees: Mapping[str, Value]) -> list[str]:

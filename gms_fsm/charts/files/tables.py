@@ -85,6 +85,7 @@ class ChartTable(Table):
     let: dict[str, str] = Field({})
     outputs: dict[str, str] = Field({})
     contact_outputs: dict[str, str] = Field({})
+    initial: dict[str, float] = Field({})
     states: list[StateTable] = Field(alias="state")
     transitions: list[EdgeTable] = Field([], alias="edge")
     layout: dict[str, list[float]] = Field({})
@@ -100,8 +101,9 @@ class ChartTable(Table):
     def _plain_names(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Write plain names of parameters as one list; else each as a table."""
         data: dict[str, Any] = write(self)
-        if not self.layout:  # most charts have none
-            data.pop("layout", None)
+        for name in ("initial", "layout"):  # most charts have none
+            if not getattr(self, name):
+                data.pop(name, None)
         given = data.get("parameter", [])
         if not all(isinstance(each, str) for each in given):
             data["parameter"] = [
@@ -137,6 +139,7 @@ class ChartTable(Table):
                 "let": chart.let,
                 "outputs": chart.outputs,
                 "contact_outputs": chart.contact_outputs,
+                "initial": chart.initial,
                 "states": [dict(vars(state)) for state in chart.states],
                 "transitions": list(edges.values()),
                 "layout": {name: list(place) for name, place in chart.layout.items()},

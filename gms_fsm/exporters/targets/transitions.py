@@ -109,6 +109,7 @@ def _data(chart: Chart) -> dict[str, Any]:
         "OUTPUTS": dict(chart.outputs),
         "STATE_OUTPUTS": _filled({state.name: dict(state.outputs) for state in chart.states}),
         "CONTACT_OUTPUTS": dict(chart.contact_outputs),
+        "INITIAL": dict(chart.initial),
     }
 
 
@@ -196,7 +197,8 @@ def _element(chart: Chart, contact: Contact | None) -> Iterator[str]:
     yield "    def __init__(self, numbers, weight):"
     yield "        vars(self).update(numbers)"
     yield "        self._weight = weight"
-    yield f"        vars(self).update(dict.fromkeys({tuple(chart.variables)!r}, 0.0))"
+    starts = {name: chart.initial.get(name, 0.0) for name in chart.variables}
+    yield f"        vars(self).update({starts!r})"
     yield ""
     if contact is not None and contact.stribeck is not None:
         curve = parse_value(contact.stribeck.text, [*contact.stribeck.numbers, "v"])
@@ -401,7 +403,7 @@ Build the chart again
         velocities=file.VELOCITIES, variables=file.VARIABLES, parameters=file.PARAMETERS,
         let=file.LET, flows=file.FLOWS, guards=file.GUARDS, entry=file.ENTRY, exit=file.EXIT,
         actions=file.ACTIONS, outputs=file.OUTPUTS, state_outputs=file.STATE_OUTPUTS,
-        contact_outputs=file.CONTACT_OUTPUTS,
+        contact_outputs=file.CONTACT_OUTPUTS, initial=file.INITIAL,
     )
 
 States: {states}
