@@ -25,6 +25,9 @@ from unittest import mock
 import numpy as np
 import scipy.integrate
 from scipy.integrate import RK45
+from transitions import Machine
+from transitions.extensions.asyncio import AsyncMachine
+from transitions.extensions.nesting import HierarchicalMachine
 
 from gms_fsm import (
     GMS,
@@ -1203,6 +1206,59 @@ rows = {
     ),
 }
 group("document", ChartError, document, rows, "own.toml")
+SCXML = '<scxml xmlns="http://www.w3.org/2005/07/scxml">{}</scxml>'
+
+
+def inside(text: str) -> None:
+    """Read a chart with the state a, and what is given inside of it."""
+    document(SCXML.format(f'<state id="a">{text}</state>'))
+
+
+TWICE = '<assign location="n" expr="1"/>' * 2
+rows = {
+    "parallel states": ("state 'a'", ..., "<parallel/>"),
+    "message": ("state 'a', onentry", ..., '<onentry><send event="b" delay="1s"/></onentry>'),
+    "no end": ("done.state.a", ..., '<transition event="done.state.a" target="a"/>'),
+    "any event": ("transition *", ..., '<transition event="*" target="a"/>'),
+    "two targets": ("transition 1", ..., '<transition target="a b"/>'),
+    "no target, with exit": ("1", ..., f"<onexit>{TWICE[:31]}</onexit><transition/>"),
+    "assigned twice": ("onentry", ..., f"<onentry>{TWICE}</onentry>"),
+    "data without a value": ("<data id='n'>", ..., '<datamodel><data id="n"/></datamodel>'),
+}
+group("state of a document", ChartError, inside, rows)
+rows = {"words": ("", ..., "<datamodel><data id='n' expr='\"red\"'/></datamodel>")}
+group("data of a document", ExpressionError, inside, rows)
+
+
+def machine(kind: Callable[..., Any], second: Any, callbacks: Any, more: Mapping[str, Any]) -> None:
+    """Read a chart from a machine with one edge."""
+    made = kind(states=["a", second], initial="a", auto_transitions=False)
+    made.add_transition("go", "a", "b", **more)
+    Chart.from_transitions(made, outputs={"F": "0"}, callbacks=callbacks)
+
+
+rows = {
+    "awaited": ("machine", ..., AsyncMachine, "b", {}, {}),
+    "parallel": (
+        "state 'b'",
+        ...,
+        HierarchicalMachine,
+        {"name": "b", "parallel": ["c", "d"]},
+        {},
+        {},
+    ),
+    "no guard": ("trigger 'go'", ..., Machine, "b", {}, {}),
+}
+group("machine", ChartError, machine, rows)
+rows = {
+    "condition": ("trigger 'go'", ..., {}, {"conditions": "is_hot"}),
+    "action": ("trigger 'go'", ..., {}, {"after": "count"}),
+    "before the condition": ("trigger 'go'", ..., {"look": {"n": "1"}}, {"prepare": "look"}),
+    "no such function": ("callbacks", ..., {"is_hot": "v > 1"}, {}),
+    "no table": ("callbacks", 3, 3, {}),
+    "mapping for a condition": ("'go'", ..., {"is_hot": {"n": "1"}}, {"conditions": "is_hot"}),
+}
+group("function of a machine", ChartError, partial(machine, Machine, "b"), rows)
 STICK = State("stick", flow={"z": "v"})
 SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})
 GO = Transition("go", "stick", "slip", guard="z >= s and v > v_c")
@@ -1271,6 +1327,13 @@ rows = {
         {"layout": {"stick": (0, 0), "slip": (9, "right")}},
     ),
     "layout that is no mapping": ("chart 'rubber': layout", "right", {"layout": "right"}),
+    "start of no variable": ("chart 'rubber': initial", ..., {"initial": {"y": 1.0}}),
+    "start that is no number": (
+        "chart 'rubber': initial, 'z'",
+        "far",
+        {"initial": {"z": "far"}},
+    ),
+    "start that is no mapping": ("chart 'rubber': initial", 1.0, {"initial": 1.0}),
     "let of a parameter": (
         "contact_outputs 'F'",
         ...,
@@ -1280,7 +1343,6 @@ rows = {
 group("chart", ChartError, chart, rows)
 rows = {
     "no states": ({"states": (), "transitions": ()},),
-    "no velocity": ({"velocities": ()},),
     "outputs by state": ({"outputs": {"F": {"stick": "k * z"}}},),
     "let and parameter": ({"let": {"k": "1"}},),
     "force and parameter": ({"velocities": ("v", "w"), "parameters": (*K, "F_w")},),
@@ -1402,7 +1464,7 @@ rows = {
         lambda: call(Transition, "go", "stick", dest="slip"),
     ),
     "edge without a guard": (
-        "transition 'go'",
+        "edge 'go'",
         ...,
         lambda: call(Transition, "go", "stick", "slip"),
     ),

@@ -63,7 +63,7 @@ class OwnFile:
                 )
             return {self.path.stem: facts_of(self.chart)}
         assert self.system is not None
-        chosen = [self.system.contact(contact)] if contact else self.system.contacts
+        chosen = [self.system.contact(contact)] if contact else self.system.machines
         found: list[tuple[list[str], ContactFacts]] = []
         for each in chosen:
             facts = facts_of(self.system, each.name)
@@ -82,7 +82,7 @@ class OwnFile:
                 place=str(self.path),
                 advice="give a scenario file",
             )
-        several = self.system.contacts
+        several = self.system.machines
         if len(several) > 1 and not contact:
             raise contacts_error(self.path, [each.name for each in several], "give")
         chosen: Any = self.system.contact(contact) if contact else several[0]
@@ -94,7 +94,7 @@ class OwnFile:
         first, *others = self.charts(contact).values()
         if any(each != first for each in others):
             assert self.system is not None
-            names = [each.name for each in self.system.contacts]
+            names = [each.name for each in self.system.machines]
             raise contacts_error(self.path, names, "give", ", with different charts")
         return first
 

@@ -19,11 +19,13 @@ from gms_fsm.charts.parameters import QUANTITIES, Parameter, check_rules
 from gms_fsm.charts.parts import (
     State,
     Transition,
-    check_size,
+    check_parts,
+    event_name,
     parameter_of,
     places_of,
     texts_of,
     tuple_of,
+    values_of,
 )
 from gms_fsm.charts.reader import ChartReader
 from gms_fsm.errors import ChartError, cut, shown
@@ -82,10 +84,13 @@ class Chart:
         Named expressions that all other texts can use; later ones can use earlier ones.
     velocities : sequence of str
         What the contact moves by. With several (a planar contact) the forces are ``F``,
-        ``F_<second>`` and so on, the accelerations ``a``, ``a_<second>``.
+        ``F_<second>`` and so on, the accelerations ``a``, ``a_<second>``. With none it is the chart
+        of a `Supervisor`, whose outputs have any names.
     contact_outputs : mapping of str to str, optional
         The force of a contact, where it is not just the sum of its elements' forces, which is
         called ``F`` here: ``{"F": "F + sigma_2 * v"}``.
+    initial : mapping of str to float, optional
+        Values with which variables start, where a run gives none; 0 for the others.
     layout : mapping of str to (float, float), optional
         Where pictures show the centre of each state: points to the right and down. Charts that
         differ in nothing else are equal.
@@ -117,6 +122,7 @@ class Chart:
     let: Mapping[str, str] = field(default_factory=dict)
     velocities: tuple[str, ...] = ("v",)
     contact_outputs: Mapping[str, str] = field(default_factory=dict)
+    initial: Mapping[str, float] = field(default_factory=dict)
     layout: Mapping[str, tuple[float, float]] = field(default_factory=dict, compare=False)
     guards: Mapping[str, Condition] = field(init=False, repr=False, compare=False)
     flows: Mapping[tuple[str, str], Value] = field(init=False, repr=False, compare=False)
@@ -146,6 +152,7 @@ class Chart:
         let: Mapping[str, str] | None = None,
         velocities: Iterable[str] = ("v",),
         contact_outputs: Mapping[str, str] | None = None,
+        initial: Mapping[str, float] | None = None,
         layout: Mapping[str, Sequence[float]] | None = None,
     ) -> None:
         here = f"chart {name!r}"
@@ -172,6 +179,7 @@ class Chart:
         self._check_names()
         check_rules(self.parameters, here)
         object.__setattr__(self, "states", self.nesting.leaves())
+        object.__setattr__(self, "initial", values_of(initial or {}, self.variables, here))
         object.__setattr__(self, "layout", places_of(layout or {}, self.states, here))
         object.__setattr__(self, "transitions", self.nesting.rows())
         for each, value in ChartReader(self).trees().items():
@@ -179,12 +187,9 @@ class Chart:
 
     def __repr__(self) -> str:
         states, edges = len(self.states), len(self.transitions)
-        return (
-            f"<Chart {cut(self.name)!r}: {states} state{'s' * (states != 1)}, "
-            f"{edges} edge{'s' * (edges != 1)}>"
-        )
+        counts = f"{states} state{'s' * (states != 1)}, {edges} edge{'s' * (edges != 1)}"
+        return f"<Chart {cut(self.name)!r}: {counts}>"
 
-    # ------------------------------------------------------------------ checks
     def _check_names(self) -> None:
         here = f"chart {self.name!r}"
         for text in ("name", "reference"):
@@ -192,23 +197,7 @@ class Chart:
                 raise ChartError(
                     "it must be a text", place=f"{here}: {text}", value=getattr(self, text)
                 )
-        for each, wanted, example in (
-            ("states", State, "State('stick', flow={'z': 'v'})"),
-            ("transitions", Transition, "Transition('slips', 'stick', 'slip', guard='z > s')"),
-        ):
-            for given in getattr(self, each):
-                if not isinstance(given, wanted):
-                    raise ChartError(
-                        f"{each} has {shown(given)}", place=here, advice=f"write it as {example}"
-                    )
-        check_size(len(self.states), sum(len(each.sources) for each in self.transitions), here)
-        if not self.velocities:
-            raise ChartError(
-                "it has no velocity",
-                place=here,
-                advice="give at least one, for example ('v',)",
-                key=("velocities",),
-            )
+        check_parts(self.states, self.transitions, here)
         groups = (
             ("input", "inputs", dict.fromkeys([*self.inputs, *self.velocities])),
             ("variable", "variables", self.variables),
@@ -246,16 +235,25 @@ class Chart:
             raise ChartError(f"{owner[name]} name {name!r} is taken by a force", place=here)
         check_ends(self.nesting, owner, here)
 
-    # ------------------------------------------------------------------ forces
     @property
     def force_names(self) -> tuple[str, ...]:
-        """Name of the force along each velocity: ``F``, then ``F_<velocity>``."""
+        """What it gives out: ``F``, then ``F_<velocity>``; without velocity its outputs."""
+        if not self.velocities:
+            levels = self.nesting.levels.values()
+            own = [name for level in levels for name in level.state.outputs]
+            return tuple(dict.fromkeys([*self.outputs, *own]))
         return ("F", *(f"F_{each}" for each in self.velocities[1:]))
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """The events that edges wait for or emit, as trees call them."""
+        used = (name for edge in self.transitions for name in (edge.event, *edge.emit))
+        return tuple(dict.fromkeys(event_name(name) for name in used if name))
 
     @property
     def rate_names(self) -> tuple[str, ...]:
         """Name of the acceleration along each velocity: ``a``, then ``a_<velocity>``."""
-        return ("a", *(f"a_{each}" for each in self.velocities[1:]))
+        return ("a", *(f"a_{each}" for each in self.velocities[1:]))[: len(self.velocities)]
 
     @property
     def locks(self) -> bool:
@@ -277,7 +275,6 @@ class Chart:
         """Whether an assignment sets a velocity of the contact."""
         return any({*self.velocities} & {*steps} for steps in self.assignments.values())
 
-    # ------------------------------------------------------------------ files
     @classmethod
     def load(cls, path: str | Path) -> Chart:
         """Read a chart from a TOML file.
@@ -287,9 +284,9 @@ class Chart:
         path : str or Path
             With the keys ``name``, ``reference``, ``inputs``, ``velocities``, ``variables``,
             ``parameters`` (a list of names) or ``[[parameter]]`` (name, unit, rule, per_element,
-            meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[[state]]`` (name,
-            flow, entry, exit, outputs, locked, initial, history; those inside one as
-            ``[[state.state]]``) and ``[[edge]]`` (name, from, to, guard, do, impulse).
+            meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[initial]``,
+            ``[[state]]`` (name, flow, entry, exit, outputs, locked, initial, history; those inside
+            one as ``[[state.state]]``) and ``[[edge]]`` (name, from, to, guard, do, impulse).
 
         Returns
         -------
@@ -313,6 +310,101 @@ class Chart:
 
         return load(checked_path("path", path), cls)
 
+    @classmethod
+    def from_transitions(cls, machine: Any, **texts: Unpack[GivenTexts]) -> Chart:
+        """Build a chart from a machine of the package transitions, and texts given beside it.
+
+        The machine gives states, edges and their priority: the order of the triggers and of their
+        transitions, those of inner states first. States in states become ``outer__inner``. An edge
+        has the name of its trigger, or ``source_target`` if the trigger has edges that differ.
+
+        Parameters
+        ----------
+        machine : transitions.Machine
+            Of any class but the asynchronous ones.
+        **texts
+            ``inputs``, ``variables``, ``parameters``, ``outputs``, ``name``, ``reference``,
+            ``let``, ``velocities``, ``contact_outputs`` and ``initial`` as for `Chart`; a parameter
+            may be a mapping of the fields of `Parameter`. ``callbacks`` says what the functions of
+            the machine do, by their names: a condition as a text, what others assign as a mapping,
+            empty for those that only look on. By the name of an edge or of a trigger: ``guards``,
+            which stand for conditions without a text, and ``actions``. By the name of a state, with
+            or without states inside: ``flows``, ``entry``, ``exit`` and ``state_outputs``.
+            ``locked`` names the states that lock the contact, ``impulses`` the edges that take an
+            impulse to do so.
+
+        Returns
+        -------
+        Chart
+            Checked, as any chart.
+
+        Raises
+        ------
+        ChartError, ExpressionError
+            If the machine has something without counterpart in a chart, which is named, such as a
+            function without a text, or parallel states; or if a text is wrong.
+
+        Examples
+        --------
+        >>> from transitions import Machine
+        >>> edges = [["slips", "stick", "slip"], ["sticks", "slip", "stick"]]
+        >>> machine = Machine(states=["stick", "slip"], initial="stick", transitions=edges)
+        >>> chart = Chart.from_transitions(machine, name="a spring that slips", variables=("z",),
+        ...     parameters=("k", "z_s"), outputs={"F": "k * z"}, flows={"stick": {"z": "v"}},
+        ...     guards={"slips": "abs(z) >= z_s", "sticks": "z * v < 0"})
+        >>> chart.guard_text("slips")
+        '|z| >= z_s'
+        """
+        from gms_fsm.charts.files import from_transitions, imported
+
+        given = imported.Texts.of(texts, from_transitions.HERE)
+        read = from_transitions.read(machine, given.callbacks)
+        return imported.built(cls, *read, given, from_transitions.HERE)[0]
+
+    @classmethod
+    def from_scxml(cls, path: str | Path, **texts: Unpack[GivenTexts]) -> Chart:
+        """Build a chart from an SCXML document, and texts given beside it.
+
+        The document gives the states, the transitions in their order, what is assigned, and data:
+        a variable with its value at the start, or a named expression if nothing assigns it. What
+        the export ``scxml`` keeps there in a namespace of its own need not be given. ``<log>`` is
+        left out, with a warning.
+
+        Parameters
+        ----------
+        path : str or Path
+            The document. Names are as for `from_transitions`, from the events of the transitions;
+            a dot in a name becomes ``__``, a hyphen ``_``.
+        **texts
+            As for `from_transitions`; they replace what the document says. Guards that are not
+            given are read from ``cond``, if that is written as in Python or ECMAScript. A guard
+            that is given for an event with several edges is joined to their own.
+
+        Returns
+        -------
+        Chart
+            Checked, as any chart.
+
+        Raises
+        ------
+        ChartError, ExpressionError
+            If the document cannot be read, or has something without counterpart in a chart, which
+            is named, such as a parallel state, a history, a script; or if a text is wrong.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from gms_fsm import export
+        >>> from gms_fsm.charts import GMS_ELEMENT
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     _ = export(GMS_ELEMENT["signed"], "scxml", folder, name="gms")
+        ...     Chart.from_scxml(f"{folder}/gms.scxml") == GMS_ELEMENT["signed"]
+        True
+        """
+        from gms_fsm.charts.files import from_scxml
+
+        return from_scxml.load(cls, checked_path("path", path), texts)
+
     def save(self, path: str | Path) -> Path:
         """Write the chart to a TOML file, from which `load` returns an equal one.
 
@@ -334,96 +426,6 @@ class Chart:
         from gms_fsm.charts.files.tables import save
 
         return save(self, checked_path("path", path))
-
-    # ------------------------------------------------------------------ from other programs
-    @classmethod
-    def from_transitions(cls, machine: Any, **texts: Unpack[GivenTexts]) -> Chart:
-        """Build a chart from a machine of the package transitions, and texts given beside it.
-
-        The machine gives the states, the edges (one for each trigger, of its name) and their
-        priority (the order of the triggers). Functions cannot be read: a text of `guards` stands
-        for the conditions of its trigger.
-
-        Parameters
-        ----------
-        machine : transitions.Machine
-            Plain, without callbacks.
-        **texts
-            ``inputs``, ``variables``, ``parameters``, ``outputs``, ``name``, ``reference``,
-            ``let``, ``velocities`` and ``contact_outputs`` as for `Chart`; a parameter may be a
-            mapping of the fields of `Parameter`. By the name of an edge: ``guards``, all of them,
-            and ``actions``. By the name of a state: ``flows``, ``entry``, ``exit`` and
-            ``state_outputs``. ``locked`` names the states that lock the contact, ``impulses`` the
-            edges that take an impulse to do so.
-
-        Returns
-        -------
-        Chart
-            Checked, as any chart.
-
-        Raises
-        ------
-        ChartError, ExpressionError
-            If the machine has something without counterpart in a chart, which is named, such as a
-            callback, ``unless``, a nested state or an internal transition; or if a text is wrong.
-
-        Examples
-        --------
-        >>> from transitions import Machine
-        >>> edges = [["slips", "stick", "slip"], ["sticks", "slip", "stick"]]
-        >>> machine = Machine(states=["stick", "slip"], initial="stick", transitions=edges)
-        >>> chart = Chart.from_transitions(machine, name="a spring that slips", variables=("z",),
-        ...     parameters=("k", "z_s"), outputs={"F": "k * z"}, flows={"stick": {"z": "v"}},
-        ...     guards={"slips": "abs(z) >= z_s", "sticks": "z * v < 0"})
-        >>> chart.guard_text("slips")
-        '|z| >= z_s'
-        """
-        from gms_fsm.charts.files import from_transitions, imported
-
-        given = imported.Texts.of(texts, from_transitions.HERE)
-        states, edges = from_transitions.read(machine)
-        return imported.built(cls, states, edges, given, from_transitions.HERE)
-
-    @classmethod
-    def from_scxml(cls, path: str | Path, **texts: Unpack[GivenTexts]) -> Chart:
-        """Build a chart from an SCXML document, and texts given beside it.
-
-        The document gives the states, the transitions in their order, and what is assigned. What
-        the export ``scxml`` keeps there in a namespace of its own need not be given.
-
-        Parameters
-        ----------
-        path : str or Path
-            The document. The name of an edge is the event of the transition, if no other has the
-            same, or else ``source_target``.
-        **texts
-            As for `from_transitions`; they replace what the document says. Guards that are not
-            given are read from ``cond``, if that is written as in Python or ECMAScript.
-
-        Returns
-        -------
-        Chart
-            Checked, as any chart.
-
-        Raises
-        ------
-        ChartError, ExpressionError
-            If it cannot be read, or has something without counterpart in a chart, which is named,
-            such as a parallel or nested state, a history, a script; or if a text is wrong.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from gms_fsm import export
-        >>> from gms_fsm.charts import GMS_ELEMENT
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     _ = export(GMS_ELEMENT["signed"], "scxml", folder, name="gms")
-        ...     Chart.from_scxml(f"{folder}/gms.scxml") == GMS_ELEMENT["signed"]
-        True
-        """
-        from gms_fsm.charts.files import from_scxml
-
-        return from_scxml.load(cls, checked_path("path", path), texts)
 
     def placed(self, layout: Mapping[str, Sequence[float]]) -> Chart:
         """Return the same chart with another layout; `plots.layout` has one to begin with.
@@ -532,9 +534,8 @@ class Chart:
         tuple of (str, Value)
             Variables and velocities, each with its new value.
         """
-        if edge is not None:
-            checked_kind("edge", edge, Transition, "a Transition of the chart")
-        performed = self.nesting.begins() if edge is None else edge.performs
+        given = checked_kind("edge", edge, (Transition, type(None)), "a Transition of the chart")
+        performed = self.nesting.begins() if given is None else given.performs
         return tuple(each for key in performed for each in self.assignments[key].items())
 
     def leaving(self, state: str) -> tuple[tuple[int, Transition], ...]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -231,6 +231,20 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
     return number
 
 
+def check_rules(parameters: Sequence[Parameter], here: str) -> None:
+    """Refuse rules that name what is not another parameter."""
+    names = [each.name for each in parameters]
+    for i, each in enumerate(parameters):
+        known = sorted({*names} - {each.name})
+        for name in sorted(each.others - {*known}):
+            raise ChartError(
+                f"{here}, parameter {each.name!r}: its rule names {name!r}, "
+                "which is not another parameter",
+                advice=f"there are {', '.join(map(repr, known)) or 'none'}",
+                key=("parameters", i, "rule"),
+            )
+
+
 def check_names(
     parameters: Iterable[Parameter],
     given: Iterable[str],
@@ -345,16 +359,3 @@ def as_floats(values: FloatArray) -> list[float]:
     """Return plain Python floats; the readable engine is three times as fast with lists."""
     floats: list[float] = values.tolist()
     return floats
-
-
-def check_rules(parameters: tuple[Parameter, ...], here: str) -> None:
-    """Refuse rules that name what is not another parameter."""
-    for i, each in enumerate(parameters):
-        known = {other.name for other in parameters} - {each.name}
-        for name in sorted(each.others - known):
-            raise ChartError(
-                f"{here}, parameter {each.name!r}: its rule names {name!r}, "
-                "which is not another parameter",
-                advice=f"there are {', '.join(map(repr, sorted(known))) or 'none'}",
-                key=("parameters", i, "rule"),
-            )

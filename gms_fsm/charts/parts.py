@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 from math import isfinite, nan
 from typing import Any
 
-from gms_fsm.charts.parameters import Parameter
-from gms_fsm.errors import ChartError, shown
+from gms_fsm.charts.parameters import Parameter, checked_scalar
+from gms_fsm.errors import ChartError, ParameterError, shown
 from gms_fsm.foundation.arguments import refusing, unknown
 from gms_fsm.foundation.equality import by_value
+from gms_fsm.language import EVENT
 
 DEEPEST_STATE = 8  # levels; deeper ones nobody could read
 MOST_PARTS = 5_000  # states and edges of a chart; more would take minutes to read and to compile
+NO_GUARD = "an event alone"  # what stands for a guard that is left out
 
 
 def check_size(states: int, edges: int, place: str) -> None:
@@ -163,6 +165,11 @@ class Transition:
     actions : mapping of str to str, optional
         Assignments ``variable: expression`` performed when it is taken. An assignment to a velocity
         is an impulse that keeps the momentum of the bodies.
+    event : str
+        The event that the edge waits for; its guard then has to hold at that instant, and may be
+        left out.
+    emit : sequence of str
+        Events for the machines of the system; they are asked for them next, at the same instant.
     impulse : bool
         Whether an edge into a locked state takes the velocity that is left as an impulse, on
         purpose: an engaging clutch, a rest speed. Other edges lock the contact where its velocity
@@ -180,6 +187,8 @@ class Transition:
     guard: str
     actions: Mapping[str, str]
     impulse: bool = field(repr=False)
+    event: str = field(repr=False)
+    emit: tuple[str, ...] = field(repr=False)
     sources: tuple[str, ...] = field(init=False, repr=False)
     # Whose assignments are performed, in this order: ("exit", "stick"), ("action", "slips") ...
     performs: tuple[tuple[str, str], ...] = field(init=False, repr=False, compare=False)
@@ -189,11 +198,21 @@ class Transition:
         name: str,
         source: str | Sequence[str],
         target: str,
-        guard: str,
+        guard: str = NO_GUARD,
         actions: Mapping[str, str] | None = None,
         *,
+        event: str = "",
+        emit: str | Sequence[str] = (),
         impulse: bool = False,
     ) -> None:
+        here = f"edge {shown(name)}"
+        emitted = (emit,) if isinstance(emit, str) else tuple_of(emit, f"{here}: emit")
+        for each in (*emitted, *[event][: bool(event)]):
+            if not isinstance(each, str) or not each.isidentifier():
+                raise ChartError("it is not a name", place=f"{here}: event", value=each)
+        if guard == NO_GUARD and not event:
+            raise ChartError("it has no guard", place=here, advice="give one; 'True' is always")
+        guard = "True" if guard == NO_GUARD else guard
         if not isinstance(source, str) and not isinstance(source, Sequence):
             raise ChartError(
                 "it must be the name of a state, or several",
@@ -215,6 +234,8 @@ class Transition:
             ("guard", guard),
             ("actions", given),
             ("impulse", impulse),
+            ("event", event),
+            ("emit", emitted),
             ("sources", sources),
             ("performs", ()),
         ):
@@ -225,6 +246,31 @@ class Transition:
         one = copy(self)
         object.__setattr__(one, "source", source)
         return one
+
+
+def event_name(event: str) -> str:
+    """Return what an event is called in trees, where it is 1 while machines are asked for it."""
+    return EVENT + event
+
+
+def check_parts(states: Sequence[object], transitions: Sequence[object], here: str) -> None:
+    """Refuse what is no state or no transition, and too many of them."""
+    for each, given, wanted, example in (
+        ("states", states, State, "State('stick', flow={'z': 'v'})"),
+        (
+            "transitions",
+            transitions,
+            Transition,
+            "Transition('slips', 'stick', 'slip', guard='z > s')",
+        ),
+    ):
+        for part in given:
+            if not isinstance(part, wanted):
+                raise ChartError(
+                    f"{each} has {shown(part)}", place=here, advice=f"write it as {example}"
+                )
+    edges = [each for each in transitions if isinstance(each, Transition)]
+    check_size(len(states), sum(len(each.sources) for each in edges), here)
 
 
 def texts_of(given: object, owner: str) -> dict[str, str]:
@@ -259,6 +305,25 @@ def parameter_of(given: object, here: str) -> Parameter:
         place=here,
         advice="write it as 'k', or as Parameter('k', 'N/m', '> 0') with its unit and rule",
     )
+
+
+def values_of(given: object, variables: Sequence[str], here: str) -> dict[str, float]:
+    """Return the values with which variables start."""
+    owner = f"{here}: initial"
+    if not isinstance(given, Mapping):
+        raise ChartError(
+            "it gives a value for a variable, like {'z': 1.0}", place=owner, value=given
+        )
+    for name in given:
+        if name not in variables:
+            raise unknown("variable", name, variables, ChartError, place=owner)
+    try:
+        return {
+            name: checked_scalar(f"{owner}, {name!r}", value, "finite")
+            for name, value in given.items()
+        }
+    except ParameterError as error:
+        raise ChartError(error.reason, place=error.place, value=error.value) from None
 
 
 def places_of(given: object, parts: Sequence[State], here: str) -> dict[str, tuple[float, float]]:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from gms_fsm.charts.nesting import AGE, Level, joined
+from gms_fsm.charts.parts import event_name
 from gms_fsm.errors import ChartError, ExpressionError, Part
 from gms_fsm.language import (
+    Both,
     Condition,
     Name,
     Number,
+    Relation,
     Value,
     names_in,
     parse_condition,
@@ -75,10 +79,13 @@ class ChartReader:
             owner = here.of(f"edge {edge.name!r}", "transitions", i)
             age = self.age_of(edge, owner)
             guard = self.guard(edge.guard, owner.of("guard", "guard"), age)
+            guard = _awaiting(edge.event, guard) if edge.event else guard
             for name, conditions, _ in chart.nesting.entries(edge):
                 guards[name] = joined(guard, conditions)
-            found = self.assignments(edge.actions, owner.of("action", "actions"), age)
-            assignments["action", edge.name] = found
+            assignments["action", edge.name] = {
+                **self.assignments(edge.actions, owner.of("action", "actions"), age),
+                **{event_name(each): Number(1.0) for each in edge.emit},
+            }
         totals = {
             force: self.total(chart.contact_outputs[force], force)
             for force in chart.force_names
@@ -95,6 +102,18 @@ class ChartReader:
             "guards": guards,
             "totals": totals,
         }
+
+    def forces_for(self, variable: str) -> list[str]:
+        """Return the forces that the flow of a variable can read: wear and heat need them.
+
+        They must not follow from that rate, and no state may be locked, which would hold any force.
+        """
+        chart, rate = self.chart, f"d{variable}"
+        texts = [*chart.outputs.values(), *chart.contact_outputs.values()]
+        texts += [text for state in chart.states for text in state.outputs.values()]
+        if chart.locks or any(re.search(rf"\b{rate}\b", str(text)) for text in texts):
+            return []
+        return [name for name in chart.force_names if name in self.late]
 
     @property
     def known_now(self) -> list[str]:
@@ -133,7 +152,8 @@ class ChartReader:
         if level is None:
             return Number(0.0)
         part = self.state(level).of(f"flow of {variable!r}", "flow", variable)
-        return self.value(level.state.flow[variable], self.known_now, part, level.age)
+        names = [*self.known_now, *self.forces_for(variable)]
+        return self.value(level.state.flow[variable], names, part, level.age)
 
     def force(self, state: State, force: str) -> Value | None:
         """Read a force in a state; None where the state is locked."""
@@ -275,6 +295,15 @@ class ChartReader:
                     advice="it is one text for all states; where the force differs by state, give "
                     "it there: State('forward', outputs={'F': 'F_c'})",
                 )
+
+
+def _awaiting(event: str, guard: Condition) -> Condition:
+    """Return a guard that holds only at its event."""
+    arrived = Relation(">", Name(event_name(event)), Number(0.5))
+    match guard:
+        case Both(parts):
+            return Both((arrived, *parts)) if parts else arrived
+    return Both((arrived, guard))
 
 
 def _age(text: object) -> list[str]:

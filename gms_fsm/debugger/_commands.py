@@ -139,12 +139,12 @@ class Commands:
     @property
     def states(self) -> list[str]:
         """Names of the states of all charts, composite ones among them."""
-        charts = (contact.chart for contact in self.session.system.contacts)
+        charts = (contact.chart for contact in self.session.system.machines)
         return list(dict.fromkeys(path for chart in charts for path in chart.nesting.levels))
 
     @property
     def _edges(self) -> list[str]:
-        charts = (contact.chart for contact in self.session.system.contacts)
+        charts = (contact.chart for contact in self.session.system.machines)
         return list(dict.fromkeys(edge.name for chart in charts for edge in chart.transitions))
 
     def _usage(self, name: str) -> str:

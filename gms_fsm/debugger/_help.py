@@ -176,8 +176,8 @@ Ctrl-C interrupts a long move."""
 def names_for(session: Session) -> dict[str, str]:
     """Return the replacements for the names in braces, as far as the chart has them."""
     start, system = session.start, session.system
-    given, several = start.what.named, len(system.contacts) > 1
-    contact = system.contacts[0]
+    given, several = start.what.named, len(system.machines) > 1
+    contact = system.machines[0]
     chart, n = contact.chart, min(2, contact.n)
     lead = f"{contact.name}." if several else ""
     begin = session.branch.raw(0).t
@@ -191,7 +191,7 @@ def names_for(session: Session) -> dict[str, str]:
         "t": f"{begin + 0.25 * (session.t_end - begin):.9g}",
         "n": str(n),
         "lead": lead,
-        "v": chart.velocities[0],
+        "v": (*chart.velocities, "t")[0],
         "bodies": "bodies, sampled values and signals, then the contacts: " if given else "",
         "ELEMENT": "CONTACT [N]" if several else "ELEMENT",
         "NUMBER": "CONTACT [N]" if several else "N",
@@ -219,7 +219,7 @@ def names_for(session: Session) -> dict[str, str]:
 
 def _names(session: Session) -> str:
     """Return in words which names expressions can use."""
-    system, first = session.system, session.system.contacts[0]
+    system, first = session.system, session.system.machines[0]
     own = [*first.chart.variables, *(["s"] if first.stribeck is not None else []), "F", "state"]
     numbered = [f"{name}1" if name != "state" else "state(1)" for name in own]
     if not session.start.what.named:

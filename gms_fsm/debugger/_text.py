@@ -63,7 +63,7 @@ def _contact_lines(
     shared = "  (shared with other locks)" if contact.here.shared else ""
     if contact.name:
         yield contact.title
-        yield f"  {contact.here.written('v', 'F', *contact.here.more)}{shared}"
+        yield f"  {contact.here.said}{shared}".rstrip()
     else:
         yield contact.here.written("v", "x", "F")
         yield from ending_lines(view.ending)

@@ -128,7 +128,7 @@ def _parameter(
 def _declared(system: System, label: str) -> Parameter:
     """Return unit and meaning of a name in the trees."""
     owner, _, name = label.rpartition(".")
-    contact = next((each for each in system.contacts if each.name == owner), None)
+    contact = next((each for each in system.machines if each.name == owner), None)
     known: dict[str, Parameter] = {}
     if contact is not None:
         known = dict(_of_contact(contact))

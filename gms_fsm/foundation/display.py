@@ -24,6 +24,7 @@ Form: TypeAlias = str  # as in the names of the methods that IPython asks: html,
 Shown = TypeVar("Shown", bound=type)
 
 GROUP = "gms_fsm.display"  # of entry points
+ALWAYS = {"trust": "gms_fsm.session.trust:trust_of"}  # this package's, installed or not
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"  # in a checkout
 MOST_NUMBERS = 8  # of an array in a short repr
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
@@ -96,7 +97,8 @@ def asked(name: str) -> Callable[..., Any] | None:
 
 
 def _declared() -> Iterator[EntryPoint]:
-    """Yield the entry points of the checkout, which need not be installed, then the others."""
+    """Yield what is always there, the entry points of the checkout, and those installed."""
+    yield from (EntryPoint(name, value, GROUP) for name, value in ALWAYS.items())
     if PROJECT.is_file():
         project = tomllib.loads(PROJECT.read_text(encoding="utf-8")).get("project", {})
         for name, value in project.get("entry-points", {}).get(GROUP, {}).items():

@@ -325,6 +325,8 @@ class _Reader:
                 return Binary(
                     _OPERATORS[type(op)], self.value(left, depth), self.value(right, depth)
                 )
+            case ast.Call(func=ast.Name(id="is_in" | "count" as f), args=[ast.Attribute() as of]):
+                return self.name(node, f"{f}({ast.unparse(of)})")
             case ast.Call(func=ast.Name(id="after")) if "age" in self.names:
                 raise self.refuse(
                     "found a comparison where a number is needed",
@@ -365,7 +367,14 @@ class _Reader:
         raise self.refuse(
             f"unknown name {shown(name)}{_suggestion(name, [*self.names, *CONSTANTS])}",
             node,
-            f"the names {some_of(self.names)}, and pi",
+            f"the names {some_of(self.listed)}, and pi",
+        )
+
+    @property
+    def listed(self) -> list[str]:
+        """The names that messages list: those of others after one's own, without states."""
+        return sorted(
+            (name for name in self.names if "(" not in name), key=lambda name: "." in name
         )
 
     @functools.cached_property

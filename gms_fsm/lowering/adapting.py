@@ -190,7 +190,7 @@ class _AdaptingPrinter(LockFunctions):
             yield f"dy[{self.layout.y.index(body.v)}]"
             inertia = self.read.inertias[body.name]
             for bank in self.read.banks:
-                for force, row in zip(bank.forces, bank.jacobian, strict=True):
+                for force, row in zip(bank.forces, bank.jacobian, strict=False):
                     if body.name in row:
                         place = self.layout.observed.index(force)
                         ratio, mass = (

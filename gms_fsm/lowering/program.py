@@ -97,6 +97,8 @@ class Program:
         For each machine the bit of its contact if this has a period, else 0.
     impulses : list of int
         For each edge 1 if it is an impulse, 2 if it lets go of a lock, else 0; empty if all are 0.
+    events : int
+        The bit of a tick that forgets events; 0 if there are none.
     velocities : int
         Number of velocities that locks may hold or impulses set; 0 if nothing locks.
     leaps : bool
@@ -121,6 +123,7 @@ class Program:
     impulses: list[int]
     velocities: int
     leaps: bool
+    events: int = 0
     ticks: integrators.Ticks = field(default_factory=integrators.Ticks.none)
 
     @property
@@ -185,7 +188,7 @@ def _key(system: System) -> tuple[Any, ...]:
     spelled = tuple(map(_spelling, system.signals.values()))
     # A ratio that is 1 or 0 is left out of no text; an inertia that is not positive is refused.
     zeros = tuple(name for name, value in system.numbers.items() if value == 0.0)
-    sizes = tuple(contact.n for contact in system.contacts)
+    sizes = tuple(contact.n for contact in system.machines)
     return id(system.shape), sizes, spelled, zeros
 
 
@@ -240,6 +243,7 @@ def _lowered(shape: _ProgramShape) -> Program:
         surface_names=_surface_names(plan),
         knots=[],
         jumps=[],
+        events=plan.read.events_bit,
         discrete=[bit for bank in plan.read.banks for bit in [plan.read.bit(bank)] * bank.n],
         **_jolts(plan),
     )
@@ -313,6 +317,7 @@ def equations(program: Program) -> integrators.Equations:
         impulses=program.impulses,
         velocities=program.velocities,
         leaps=program.leaps,
+        events=program.events,
     )
 
 

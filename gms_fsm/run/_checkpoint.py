@@ -202,7 +202,7 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
     }
     groups = [[name for name in kept if name.startswith(kind)] for kind in ("rows_", "stops_")]
     if "log" in kept:  # from a run in Python
-        contacts = {each.name: each for each in start.system.contacts}
+        contacts = {each.name: each for each in start.system.machines}
         _check_log(kept["log"], contacts, named=start.what.named)
     else:  # from a compiled run
         groups.append(["t", "machine", "edge", "numbers"])

@@ -7,7 +7,8 @@ that callbacks registered by a user (``on_enter_slip``, ``after`` ...) run once 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import inspect
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from transitions import Machine, MachineError
@@ -90,7 +91,8 @@ class Guard:
     def __init__(self, edge: str, condition: Condition) -> None:
         self.edge, self.condition = edge, condition
         names = {name: f"element.{name}" for name in names_in(condition)}
-        self.text = spell(condition, PYTHON)
+        self.text = self.__name__ = spell(condition, PYTHON)  # transitions draws the name
+        self.held = False  # at the last call
         source = f"def holds(element):\n    return {spell(condition, PYTHON, names)}\n"
         self.holds: Callable[[Element], bool] = ieee(
             load(f"guard {edge}", source)["holds"], load_careful(f"guard {edge}", source)["holds"]
@@ -100,7 +102,8 @@ class Guard:
         return Guard, (self.edge, self.condition)  # its function is generated
 
     def __call__(self, event: Any) -> bool:
-        return self.holds(event.model)
+        self.held = self.holds(event.model)
+        return self.held
 
     def __repr__(self) -> str:
         return f"<guard {self.text}>"
@@ -115,6 +118,10 @@ class ElementMachines:
         The model, or the contact of a system, whose elements are created.
     element : type, optional
         Class of the element objects: `Element` or a class derived from it.
+    machine : callable, optional
+        Makes the machine: a class such as `transitions.extensions.GraphMachine`, or one with
+        arguments of its own, ``functools.partial(GraphMachine, graph_engine="mermaid")``. Not an
+        asynchronous one.
 
     Attributes
     ----------
@@ -136,7 +143,12 @@ class ElementMachines:
     ([0, 1, 2, 3], 'slip')
     """
 
-    def __init__(self, model: Model, element: type[Element] = Element) -> None:
+    def __init__(
+        self,
+        model: Model,
+        element: type[Element] = Element,
+        machine: Callable[..., Machine] = Machine,
+    ) -> None:
         if not hasattr(model, "chart"):
             raise ParameterError(
                 "it must be a model, for example GMS(parameters, law='signed')",
@@ -147,7 +159,8 @@ class ElementMachines:
         self.model = model
         self.guards = {edge: Guard(edge, guard) for edge, guard in chart.guards.items()}
         self.elements = [_new_element(element, model, i) for i in range(model.n)]
-        self.machine = Machine(
+        self.machine = _new_machine(
+            machine,
             model=self.elements,
             states=[spelled(state.name) for state in chart.states],
             transitions=[
@@ -223,6 +236,38 @@ class ElementMachines:
                     advice="add a Transition to the chart",
                 )
         return table
+
+
+def _new_machine(kind: Callable[..., Machine], **given: Any) -> Machine:
+    known = issubclass(kind, Machine) if isinstance(kind, type) else callable(kind)
+    made = kind(**given) if known and _takes(kind, given) else None
+    if not isinstance(made, Machine):
+        raise ParameterError(
+            "it must be a class of the package transitions, or make a machine of one",
+            place="machine",
+            value=kind,
+        )
+    if inspect.iscoroutinefunction(type(made).dispatch):
+        raise ParameterError(
+            f"the triggers of an {type(made).__name__} are awaited, and a run cannot wait",
+            place="machine",
+            advice="take the class without Async",
+        )
+    if made.model_attribute != "state":
+        raise ParameterError(
+            f"it keeps the state of an element in {made.model_attribute!r}",
+            place="machine",
+            advice="leave model_attribute out",
+        )
+    return made
+
+
+def _takes(function: Callable[..., Any], given: Mapping[str, Any]) -> bool:
+    try:
+        inspect.signature(function).bind(**given)
+    except (TypeError, ValueError):  # a ValueError for what has no signature
+        return False
+    return True
 
 
 def _new_element(kind: type[Element], model: Model, index: int) -> Element:
@@ -313,8 +358,12 @@ class MachineEngine:
 
     def set_state(self, machine: int, state: str) -> None:
         """Put one element into a state, without callbacks."""
+        element = self.elements[machine]
+        self.parts[machine].machine.set_state(spelled(state), element)
         self.states[machine] = spelled(state)
-        self.parts[machine].machine.set_state(self.states[machine], self.elements[machine])
+        graphs = getattr(self.parts[machine].machine, "model_graphs", {})
+        if id(element) in graphs:  # the state that it shows as active changes only with a firing
+            vars(element)["get_graph"](force_new=True)
 
     def show(self, t: float, y: list[float], mode: list[int], jolt: list[int]) -> None:
         """Show the present values to every element."""
@@ -359,11 +408,13 @@ class MachineEngine:
         bank = self.program.layout.bank(machine)
         row = self.parts[machine].model.chart.transitions[edge - bank.first_edge]
         place = f"{self.called(machine)}, edge {row.name!r}"
+        guard = self.parts[machine].guards[row.name]
+        guard.held = False  # not what the trigger returns: with a queue that is always True
         # The trigger evaluates the guard once more; assignments follow, as in Stateflow, where the
         # whole set is selected before any of them.
         self.firing[0] = True
         try:
-            fired = getattr(self.elements[machine], row.name)()
+            getattr(self.elements[machine], row.name)()
         except Interference as error:
             raise Interference(error.reason, place, t, error.advice) from None
         except MachineError as error:
@@ -372,7 +423,7 @@ class MachineEngine:
             ) from error
         finally:
             self.firing[0] = False
-        if not fired:
+        if not guard.held:
             raise Interference(
                 "the edge was enabled, but a callback changed the element's values before "
                 f"it fired; {ONLY_LOOK}",

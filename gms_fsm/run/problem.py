@@ -406,11 +406,12 @@ def _given(
     for name in layout.y.shared:
         if name in given:
             y[name] = checked_scalar(f"initial[{name!r}]", given[name], "finite")
-    for bank in layout.banks:
+    for bank, part in zip(layout.banks, system.machines, strict=True):
         for variable in bank.variables:
+            start = part.chart.initial.get(variable, 0.0)
             name, label = bank.of(variable), layout.label(bank.of(variable))
             values = checked_array(
-                f"initial[{label!r}]", given.get(name, [0.0] * bank.n), None, "finite"
+                f"initial[{label!r}]", given.get(name, [start] * bank.n), None, "finite"
             )
             if values.size != bank.n:
                 raise ParameterError(
@@ -424,7 +425,7 @@ def _given(
             if name not in y and name.startswith(bank.of(""))
         }
     mode = list[int]()
-    for bank, part in zip(layout.banks, system.contacts, strict=True):
+    for bank, part in zip(layout.banks, system.machines, strict=True):
         chart = part.chart
         default = [chart.default_state.name] * bank.n
         wanted = names.get(bank.name, default)
@@ -445,9 +446,9 @@ def _given(
 @functools.lru_cache(maxsize=64)
 def _is_plain(key: ByIdentity[System]) -> bool:
     """Return whether systems of a shape start with 0 everywhere unless something else is given."""
-    shape = key.it
-    locked = any(contact.chart.default_state.locked for contact in shape.contacts)
-    return not (shape.sampled or locked or _enters(shape))
+    charts = [contact.chart for contact in key.it.machines]
+    special = any(chart.default_state.locked or chart.initial for chart in charts)
+    return not (key.it.sampled or special or _enters(key.it))
 
 
 def _check_locks(
@@ -457,7 +458,7 @@ def _check_locks(
     layout, out = program.layout, [0.0] * program.layout.shown.size
     locked = [
         (bank, contact.chart, state)
-        for bank, contact in zip(layout.banks, system.contacts, strict=True)
+        for bank, contact in zip(layout.banks, system.machines, strict=True)
         for state in [contact.chart.states[i] for i in mode[bank.elements]]
         if state.locked
     ]
@@ -487,7 +488,7 @@ def _not_locked(chart: Chart) -> str:
 
 def _enters(system: System) -> bool:
     """Return whether the default state of some chart has an entry."""
-    charts = (contact.chart for contact in system.contacts)
+    charts = (contact.chart for contact in system.machines)
     return any(chart.assigned() for chart in charts)
 
 
@@ -506,7 +507,7 @@ def _entered(
     if not _enters(system):
         return y
     layout = program.layout
-    for bank, contact in zip(layout.banks, system.contacts, strict=True):
+    for bank, contact in zip(layout.banks, system.machines, strict=True):
         chart = contact.chart
         for name, _ in chart.assigned():
             if name in chart.velocities and 0 in mode[bank.elements]:

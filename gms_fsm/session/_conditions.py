@@ -19,7 +19,7 @@ from gms_fsm.traces.system_scope import in_si, names_of, owners_of
 def read(start: Problem, text: str) -> Condition:
     """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``."""
     states, n, owners = [], 0, {}
-    if len(start.system.contacts) == 1:
+    if len(start.system.machines) == 1:
         states, n = [state.name for state in start.model.chart.states], start.model.n
     if start.what.named:
         owners = owners_of(start.system)
@@ -61,7 +61,7 @@ def _explained(start: Problem) -> Iterator[None]:
 def _complete(start: Problem) -> dict[str, str]:
     """Return how to complete names that are incomplete."""
     known, found = names_of(start.what), dict[str, str]()
-    for contact in start.system.contacts:
+    for contact in start.system.machines:
         lead = start.what.of(contact.name, "")
         for name in contact.chart.variables:
             for each in (name, f"{lead}{name}"):

@@ -90,7 +90,7 @@ def element_name(start: Problem, machine: int) -> str:
 def title_of(start: Problem) -> str:
     """Return what runs: titles of model and rig, or of a system and its contacts."""
     if start.what.named:
-        titles = [start.system.name, *(each.title for each in start.system.contacts)]
+        titles = [start.system.name, *(each.title for each in start.system.machines)]
     else:
         titles = [start.model.title, start.rig.title]
     return visible("; ".join(titles))

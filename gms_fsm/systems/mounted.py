@@ -70,15 +70,15 @@ class Several:
         self._system = system
 
     def __repr__(self) -> str:
-        return f"<{len(self._system.contacts)} contacts of {self._system!r}>"
+        return f"<{len(self._system.machines)} contacts of {self._system!r}>"
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
-        known = ", ".join(repr(each.name) for each in self._system.contacts)
+        known = ", ".join(repr(each.name) for each in self._system.machines)
         raise ParameterError(
             f"system {self._system.name!r} has the contacts {known}",
-            advice=f"say which one: trace.contact({self._system.contacts[0].name!r})",
+            advice=f"say which one: trace.contact({self._system.machines[0].name!r})",
         )
 
 
@@ -111,7 +111,7 @@ class Mounted:
     @property
     def several(self) -> bool:
         """Whether there are several contacts, of which a model must be named."""
-        return self.named and len(self.system.contacts) > 1
+        return self.named and len(self.system.machines) > 1
 
     @property
     def made_of(self) -> Model | System:
@@ -126,7 +126,7 @@ class Mounted:
     @property
     def contacts(self) -> tuple[str, ...]:
         """The names of contacts that the user can say."""
-        return tuple(each.name for each in self.system.contacts) if self.named else ()
+        return tuple(each.name for each in self.system.machines) if self.named else ()
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -172,11 +172,11 @@ def mounted(model: Model | System, rig: Rig | None = None, period: float | None 
     >>> from gms_fsm import GMS, GMSParameters, PulledSlider
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> what = mounted(model, PulledSlider(1.0, 2.0, 0.1))
-    >>> what.system.contacts[0].name, what.whose("friction")
+    >>> what.system.machines[0].name, what.whose("friction")
     ('friction', '')
     """
     if isinstance(model, System):
-        single: Any = model.contacts[0] if len(model.contacts) == 1 else Several(model)
+        single: Any = model.machines[0] if len(model.machines) == 1 else Several(model)
         return Mounted(model, single, Mounting(model), named=True)
     for what, given, mark, example in (
         ("model", model, "chart", "GMS(parameters, law='signed')"),

@@ -51,7 +51,7 @@ def system_names(system: System) -> list[str]:
     ['t', 'x', 'v', 'pad.x', 'pad.v', 'pad.F', 'pad.F1', 'F', 'F1']
     """
     names = [*system.names]
-    for contact in system.contacts:
+    for contact in system.machines:
         names += [f"{contact.name}.{name}" for name in _names_of(contact)]
     if len(system.contacts) == 1:
         names += _names_of(system.contacts[0])
@@ -62,13 +62,14 @@ def _names_of(contact: Contact) -> list[str]:
     """Return the names that belong to a contact, without its own."""
     chart = contact.chart
     own = [name for name in watch_names(contact) if name not in ("t", "x", "v", "F")]
-    return ["x", *chart.velocities, *chart.force_names, *own]
+    own = own if chart.velocities else [name for name in own if not name.startswith("F")]
+    return [*["x"][: len(chart.velocities)], *chart.velocities, *chart.force_names, *own]
 
 
 def owners_of(system: System) -> dict[str, Owner]:
     """Return whose states conditions may name: those of each contact's elements."""
     found, first = {}, 0
-    for contact in system.contacts:
+    for contact in system.machines:
         states = tuple(state.name for state in contact.chart.states)
         found[contact.name] = Owner(first, contact.n, states)
         first += contact.n
@@ -142,7 +143,7 @@ class SystemScope:
         observed = program.layout.observed.named(observe(program, t, y, mode))
         contacts = {
             each.name: Scope.of(each, program, t, y, mode, each.name, observed)
-            for each in system.contacts
+            for each in system.machines
         }
         return cls(system, program.layout, t, y, given_values(system, t), contacts)
 
@@ -152,7 +153,8 @@ class SystemScope:
         system, rows = trace.what.system, trace.rows
         at_rows = [given_values(system, t) for t in rows.t.tolist()]
         given = {name: np.array([at[name] for at in at_rows]) for name in (at_rows or [{}])[0]}
-        contacts = {name: Scope.over(trace.contact(name)) for name in trace.contacts}
+        every = (bank.name for bank in trace.program.layout.banks)
+        contacts = {name: Scope.over(trace.contact(name)) for name in every}
         return cls(system, trace.program.layout, rows.t, rows.y.T, given, contacts)
 
     def value(self, name: str) -> Any:
@@ -163,6 +165,9 @@ class SystemScope:
             return self.system.numbers[name]
         if name in self.given:
             return self.given[name]
+        if name not in self.layout.y.shared:  # an output of a supervisor
+            owner, _, output = name.partition(".")
+            return self.contacts[owner].seen[output]
         return self.y[self.layout.y.index(name)]
 
     def watches(self) -> dict[str, Any]:
@@ -199,7 +204,7 @@ def units_of(what: Mounted, names: Iterable[str] = ()) -> dict[str, str]:
     """
     every = [*names] or names_of(what)
     found: dict[str, str] = {}
-    for contact in what.system.contacts:
+    for contact in what.system.machines:
         chart = contact.chart
         for name in every:
             owner, _, last = name.rpartition(".")

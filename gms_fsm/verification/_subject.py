@@ -179,6 +179,7 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
     read = _names(guards.values()) | _names(tree for row in steps.values() for _, tree in row)
     driven = bool(read & {*late}) or chart.locks or chart.sets_velocity
     moves = driven or (facts.free and bool(read & {"x", *chart.velocities}))
+    moves = moves and bool(chart.velocities)  # a supervisor does not
     load, mobility = _fresh("H", declared), _fresh("W", declared)
     flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
     rest = {

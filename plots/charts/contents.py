@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.nesting import AGE, Level, written_guard
-from gms_fsm.language import MATLAB_LIKE, Condition, Name, Value, renamed, spell
+from gms_fsm.language import MATLAB_LIKE, Condition, Name, Value, parse_value, renamed, spell
 from gms_fsm.language.normal import renamed_in
 from plots.charts.notation import ChartWriter
 
@@ -92,6 +92,7 @@ def chart_texts(write: ChartWriter) -> Texts:
     chart = write.chart
     shared = _forces(chart, chart.default_state) if _force_below(chart) else {}
     return [
+        ("at the start", [write.assignment(*each) for each in _starts(chart)]),
         ("let", _equations(write, chart.lets)),
         (
             "during in all states",
@@ -103,6 +104,12 @@ def chart_texts(write: ChartWriter) -> Texts:
             [write.total(name, tree) for name, tree in chart.totals.items()],
         ),
     ]
+
+
+def _starts(chart: Chart) -> Iterator[tuple[str, Value]]:
+    """Yield the variables that start with a value of their chart."""
+    for name, value in chart.initial.items():
+        yield name, parse_value(repr(value), [])
 
 
 def _equations(write: ChartWriter, trees: Mapping[str, Value]) -> list[str]:

@@ -24,12 +24,13 @@ from gms_fsm.foundation.quantities import Scale, scale_of, trimmed
 from gms_fsm.language import Condition, clauses, evaluate, names_in
 from gms_fsm.session.explain import values_at
 from gms_fsm.traces.scope import guard_columns, unit_of
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from plots.charts.labels import FALSE, TRUE, UNKNOWN, Piece, Row, edge_id, element_id, part_id
 from plots.charts.statechart import ChartSheet, chosen
 from plots.output.drawings import Svg, image
 from plots.output.graphviz import picture
+from plots.views.traces import check_trace
 
 SVG = "http://www.w3.org/2000/svg"
 THIN, THICK, BORDER = "1.1", "2.6", "3"

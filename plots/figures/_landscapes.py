@@ -7,7 +7,7 @@ from typing import Any
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.quantities import Scale
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.findings import Report
 from plots import panels
 from plots.figures._layout import fitted, low, sheet
@@ -27,6 +27,7 @@ from plots.style import INK, LINE_GREY
 from plots.style.matplotlib import Axes, Figure, Line2D, rc_context
 from plots.style.presets import current, font, inches, pt, room, settings
 from plots.views.plane import Plane
+from plots.views.traces import check_trace
 from plots.views.window import Window
 
 # Inches: figure, panels, above them, a line of text.

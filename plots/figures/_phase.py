@@ -9,7 +9,7 @@ import numpy as np
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import fitted, narrow, sheet
 from plots.figures._parts import head, letter_panels
@@ -24,6 +24,7 @@ from plots.panels.parts.selection import (
 from plots.style import PAPER, VERMILION
 from plots.style.matplotlib import Axes, Figure, LineCollection, rc_context
 from plots.style.presets import pt, settings
+from plots.views.traces import check_trace
 from plots.views.window import Window
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import (
@@ -27,6 +27,7 @@ from plots.panels.parts.selection import checked_elements, checked_window, scale
 from plots.style import LINE_GREY, PALE_GREY
 from plots.style.matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
 from plots.style.presets import pt, settings
+from plots.views.traces import check_trace
 from plots.views.window import Window
 
 LOW = 2  # panels below each other, on a slide

@@ -24,7 +24,7 @@ from gms_fsm.foundation.text import visible
 from gms_fsm.language import parse_value
 from gms_fsm.systems.models import Model, is_model
 from gms_fsm.systems.system import loaded
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.charts.live_chart import plain_tree
 from plots.charts.statechart import statechart
@@ -35,6 +35,7 @@ from plots.output.svg_artists import EXACT, drawn, smallest
 from plots.style import INK, MONO_FONT, PALE_GREY, SANS_FONT, TEXT_GREY, presets
 from plots.style.mathtext import Formulas, formula
 from plots.style.matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
+from plots.views.traces import check_trace
 
 PAGE = (595.276, 841.89)  # A4
 MARGIN, GAP = 40.0, 14.0

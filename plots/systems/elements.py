@@ -15,7 +15,7 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.quantities import scale_of, trimmed
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots.panels.parts.selection import checked_row, dotted, scaled
 from plots.style import (
     INK,
@@ -33,6 +33,7 @@ from plots.systems.mechanical_symbols import (
     hatched,
     spring_points,
 )
+from plots.views.traces import check_trace
 
 ROW = 1.35  # height of one element
 WALL = 6.0  # position of the slider's face, to which springs and dampers are attached

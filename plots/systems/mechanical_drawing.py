@@ -313,12 +313,12 @@ def _sources(system: System) -> list[str]:
     """Return where signals, states and sampled values come from that stand in the picture."""
     given = [each.velocity for each in system.bodies if each.velocity is not None]
     given += [each.rest for each in system.springs]
-    used = {name for text in given for name in names_in(parse_value(str(text), system.names))}
+    used = {name for text in given for name in names_in(parse_value(str(text), system.readable))}
     used |= {name for body in system.bodies for name in names_in(force_of(system, body))}
     lines = []
     flows = {name: text for name, text in system.flow.items() if name in used}
     for text in flows.values():
-        used |= names_in(parse_value(text, system.names))
+        used |= names_in(parse_value(text, system.readable))
     for name, signal in system.signals.items():
         if name in used:
             lines += _folded(signal_text(name, signal))

@@ -285,7 +285,7 @@ def _wrapped(text: str) -> list[str]:
 
 def force_of(system: System, body: Body) -> Value:
     """Return what the text of a body's force says; 0 for a driven one."""
-    return Number(0.0) if body.driven else parse_value(str(body.force), system.names)
+    return Number(0.0) if body.driven else parse_value(str(body.force), system.readable)
 
 
 def written(text: str | float) -> str:
@@ -298,7 +298,7 @@ def written(text: str | float) -> str:
 def _touch(system: System, contact: Contact) -> Touch:
     shares: dict[str, tuple[int, str]] = {}
     for text in contact.v:
-        tree = parse_value(text, system.names)
+        tree = parse_value(text, system.readable)
         for body in system.bodies:
             share = derivative(tree, body.v)
             if share is not None and share != Number(0.0):
@@ -377,7 +377,7 @@ def _sprung(system: System) -> Iterator[Item]:
 
 def _rest(system: System, spring: Spring) -> tuple[str, bool]:
     """Return where a spring is at rest, as a formula, and whether that is an end that moves."""
-    tree = parse_value(str(spring.rest), system.names)
+    tree = parse_value(str(spring.rest), system.readable)
     moves = spring.second is None and bool(names_in(tree) - {*system.numbers})
     return ("" if tree == Number(0.0) else written(spring.rest)), moves
 

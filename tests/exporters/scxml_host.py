@@ -78,7 +78,7 @@ def run(
     }
     # The tool keeps histories by itself.
     kept = chart.nesting.histories
-    variables = {name: 0.0 for name in chart.variables if name not in kept}
+    variables = {name: chart.initial.get(name, 0.0) for name in chart.variables if name not in kept}
     paths = {spelled(each.name): each.name for each in chart.states}
     state, t, x, count, found = chart.default_state.name, 0.0, 0.0, 0, list[Switch]()
     while True:

@@ -59,7 +59,7 @@ def test_a_document_is_counted_before_it_is_read(
     def read(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(from_scxml, "_rows", read)
+    monkeypatch.setattr(from_scxml, "_Document", read)
     path = tmp_path / "large.scxml"
     states = "".join(f'<state id="s{i}"/>' for i in range(5_001))
     path.write_text(f'<scxml xmlns="{from_scxml.SCXML}">{states}</scxml>')

@@ -7,6 +7,7 @@ tests/laws/test_own_machines_see_every_firing.py.
 from __future__ import annotations
 
 import copy
+import functools
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +15,15 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from transitions import Machine
+from transitions.extensions import (
+    GraphMachine,
+    HierarchicalGraphMachine,
+    HierarchicalMachine,
+    LockedMachine,
+)
+from transitions.extensions.asyncio import AsyncMachine
+from transitions.extensions.markup import MarkupMachine
 
 from gms_fsm import (
     Chart,
@@ -153,6 +163,69 @@ def test_a_copy_is_a_machine_of_its_own(engine: str, first: float, again: Any) -
     assert [(each.state, each.slips) for each in machines.elements] == before  # type: ignore[attr-defined]
     pairs = zip(other.elements, before, strict=True)
     assert [each.slips - earlier for each, (_, earlier) in pairs] == [2] * 4
+
+
+# --------------------------------------------------------------------------- other machines
+QUEUED = functools.partial(Machine, queued=True)
+DRAWN = functools.partial(GraphMachine, graph_engine="mermaid", show_conditions=True)
+OTHERS = [QUEUED, LockedMachine, MarkupMachine, DRAWN, HierarchicalMachine]
+
+
+@pytest.mark.parametrize("kind", OTHERS, ids=str)
+def test_any_class_of_machines_sees_the_same_firings(kind: Any) -> None:
+    seen: list[list[tuple[Any, ...]]] = []
+    for each in (Machine, kind):
+        machines = ElementMachines(MODEL, machine=each)
+        calls: list[tuple[Any, ...]] = []
+        machines.machine.after_state_change = [
+            lambda event, calls=calls: calls.append((event.model.t, event.event.name))
+        ]
+        simulate(MODEL, Prescribed("0.2"), 3.0, engine=machines)
+        assert [element.state for element in machines.elements] == ["slip"] * 4
+        seen.append(calls)
+    assert seen[0] == seen[1] != []
+
+
+@pytest.mark.parametrize(
+    "kind", [DRAWN, functools.partial(HierarchicalGraphMachine, **DRAWN.keywords)]
+)
+def test_the_graph_of_an_element_shows_guards_and_its_state(kind: Any) -> None:
+    machines = ElementMachines(MODEL, machine=kind)
+    simulate(MODEL, Prescribed("0.1"), 0.5, engine=machines, initial=STARTED)
+    graphs = [element.get_graph().source for element in machines.elements]  # type: ignore[attr-defined]
+    assert all("abs(v) <= v_c and abs(z) < s" in graph for graph in graphs)
+    active = [[name for name in ("stick", "slip") if f"Class {name} s_active" in g] for g in graphs]
+    assert active == [[each] for each in STARTED["states"]]
+
+
+@called
+def test_a_queue_hides_no_interference(engine: str) -> None:
+    machines = ElementMachines(MODEL, machine=QUEUED)
+    machines.machine.prepare_event = [lambda event: setattr(event.model, "v", 0.0)]
+    with pytest.raises(CallbackError, match="a callback set v of element 1"):
+        ran(machines, engine)
+    machines = ElementMachines(
+        MODEL, machine=functools.partial(QUEUED, ignore_invalid_triggers=True)
+    )
+    with pytest.raises(CallbackError, match="a callback changed the element's values before"):
+        ran(machines, progress=lambda _: setattr(machines.elements[0], "state", "slip"))
+    machines = ElementMachines(MODEL, machine=QUEUED)
+    machines.machine.on_enter_slip(lambda event: event.model.break_away_forward())
+    with pytest.raises(CallbackError, match="a callback changed a state"):
+        ran(machines, engine)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        (AsyncMachine, "the triggers of an AsyncMachine are awaited"),
+        (list, "a class of the package transitions"),
+        (functools.partial(Machine, model_attribute="mode"), "the state of an element in 'mode'"),
+    ],
+)
+def test_what_is_no_machine_of_this_kind_is_refused(kind: Any, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        ElementMachines(MODEL, machine=kind)
 
 
 # --------------------------------------------------------------------------- callbacks

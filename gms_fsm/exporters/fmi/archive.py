@@ -257,7 +257,7 @@ def units_of(variables: Iterable[FmuVariable]) -> dict[str, dict[str, int]]:
 # --------------------------------------------------------------------------- documentation
 def _readme(subject: Subject, described: Described, version: int, why: str) -> str:
     variables, (folder, ending) = described.variables, _platform(version)
-    charts = dict.fromkeys(contact.chart.name for contact in subject.start.system.contacts)
+    charts = dict.fromkeys(contact.chart.name for contact in subject.start.system.machines)
     inputs, outputs = (
         "\n".join(_line(each) for each in variables if each.causality == causality)
         for causality in ("input", "output")

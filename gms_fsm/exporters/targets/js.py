@@ -149,7 +149,7 @@ class _Module(ABC):
             states=_table(
                 {
                     contact.name: [state.name for state in contact.chart.states]
-                    for contact in self.start.system.contacts
+                    for contact in self.start.system.machines
                 }
             ),
             edges=_rows(self._edges()),
@@ -231,7 +231,7 @@ class _Module(ABC):
                 "source": edge.source,
                 "target": edge.target,
             }
-            for contact in self.start.system.contacts
+            for contact in self.start.system.machines
             for edge in contact.chart.transitions
         ]
 

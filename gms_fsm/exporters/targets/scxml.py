@@ -139,7 +139,7 @@ def _data(root: ET.Element, chart: Chart, numbers: Mapping[str, float]) -> None:
         value = {"expr": repr(numbers[name])} if name in numbers else {}
         ET.SubElement(model, "data", {"id": name, **value})
     for name in _outside(chart):
-        ET.SubElement(model, "data", {"id": name, "expr": "0.0"})
+        ET.SubElement(model, "data", {"id": name, "expr": repr(chart.initial.get(name, 0.0))})
 
 
 @dataclass(frozen=True)

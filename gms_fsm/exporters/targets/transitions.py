@@ -111,6 +111,7 @@ def _data(chart: Chart) -> dict[str, Any]:
         "OUTPUTS": dict(chart.outputs),
         "STATE_OUTPUTS": _filled({name: each.state.outputs for name, each in levels.items()}),
         "CONTACT_OUTPUTS": dict(chart.contact_outputs),
+        "INITIAL": dict(chart.initial),
         **(_nested(chart) if chart.nesting.composite else {}),
     }
 
@@ -118,7 +119,7 @@ def _data(chart: Chart) -> dict[str, Any]:
 def _nested(chart: Chart) -> dict[str, Any]:
     """Return what the loop needs to know of states in states."""
     return {
-        "INITIAL": spelled(chart.default_state.name),
+        "DEFAULT": spelled(chart.default_state.name),
         "START": _methods(chart.nesting.begins()),
         "EDGES": {
             spelled(state.name): {
@@ -236,7 +237,8 @@ def _element(chart: Chart, contact: Contact | None) -> Iterator[str]:
     yield "    def __init__(self, numbers, weight):"
     yield "        vars(self).update(numbers)"
     yield "        self._weight = weight"
-    yield f"        vars(self).update(dict.fromkeys({tuple(chart.variables)!r}, 0.0))"
+    starts = {name: chart.initial.get(name, 0.0) for name in chart.variables}
+    yield f"        vars(self).update({starts!r})"
     yield ""
     if contact is not None and contact.stribeck is not None:
         curve = parse_value(contact.stribeck.text, [*contact.stribeck.numbers, "v"])
@@ -414,7 +416,7 @@ def _loop() -> str:
     before, switch, after = re.split(r"(def switch.*?return None\n)", LOOP, flags=re.DOTALL)
     assert switch
     before = before.replace("return Machine(", "return NestedMachine(")
-    before = before.replace("initial=STATES[0]", "initial=INITIAL")
+    before = before.replace("initial=STATES[0]", "initial=DEFAULT")
     entry = 'getattr(each, f"_entry_{STATES[0]}", nothing)()\n'
     for_each = "for part in START:\n            getattr(each, part, nothing)()\n"
     return NESTED_MACHINE + before + NESTED_SWITCH + after.replace(entry, for_each)
@@ -453,7 +455,7 @@ Build the chart again
         velocities=file.VELOCITIES, variables=file.VARIABLES, parameters=file.PARAMETERS,
         let=file.LET, flows=file.FLOWS, guards=file.GUARDS, entry=file.ENTRY, exit=file.EXIT,
         actions=file.ACTIONS, outputs=file.OUTPUTS, state_outputs=file.STATE_OUTPUTS,
-        contact_outputs=file.CONTACT_OUTPUTS,
+        contact_outputs=file.CONTACT_OUTPUTS, initial=file.INITIAL,
     )
 
 """

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from gms_fsm.language import Binary, Call, Name, Node, Value, spell
@@ -36,6 +37,22 @@ class CodeLine(NamedTuple):
     text: str
     reads: frozenset[str] = frozenset()
     lazy: str = ""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A part of what happens when an edge is taken.
+
+    Parameters
+    ----------
+    lines : list of CodeLine
+        Assignments.
+    hits : bool
+        An impulse follows them, and the next phase starts with the velocities after it.
+    """
+
+    lines: list[CodeLine]
+    hits: bool
 
 
 def reads_of(lines: Iterable[CodeLine]) -> frozenset[str]:
@@ -96,9 +113,7 @@ class ProgramWriter(ABC):
         self.names, self.layout = plan.names, plan.layout
         self.sizes = [block.size for block in plan.layout.y.blocks]
         # What is computed with the forces, never at the head of a function.
-        self.late = {name for bank in plan.read.banks for name in (*bank.forces, *bank.rates)} | {
-            f"{body.name} a" for body in plan.read.system.bodies
-        }
+        self.late = plan.read.late
 
     # ------------------------------------------------------------------ values
     def spell(self, node: Node) -> str:
@@ -370,6 +385,16 @@ class ProgramWriter(ABC):
             if name.endswith(".curve S"):
                 return self.curve(name, value, signs)
             return [*self.computed(target, value, signs), *self.rounded(name)]
+        if (counts := self.read.defined[name].counts) is not None:
+            bank = self.read.banks[counts[0]]
+            state = self.names.states[bank.index][counts[1]]
+            size = self.sizes[bank.index]
+            return [
+                CodeLine(f"{target} = 0.0"),
+                CodeLine(f"for i in range({size}):", frozenset({f"#{size}"})),
+                CodeLine(f"    if {self.mode(bank.index)} == {state}:"),
+                CodeLine(f"        {target} += 1.0"),
+            ]
         if (name, "times") in self.plan.tables.shared:
             return [
                 CodeLine(f"{target} = piecewise_linear(t, {self.table(name)})", frozenset({TABLES}))

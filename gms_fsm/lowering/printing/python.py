@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.foundation.text import visible
@@ -24,6 +23,7 @@ from gms_fsm.lowering.printing.lines import (
     MOST_BRANCHES,
     Case,
     CodeLine,
+    Phase,
     Signs,
     chosen,
     indented,
@@ -49,22 +49,6 @@ FUNCTIONS = (
     "follow",
     "jolts",
 )
-
-
-@dataclass(frozen=True)
-class Phase:
-    """A part of what happens when an edge is taken.
-
-    Parameters
-    ----------
-    lines : list of CodeLine
-        Assignments.
-    hits : bool
-        An impulse follows them, and the next phase starts with the velocities after it.
-    """
-
-    lines: list[CodeLine]
-    hits: bool
 
 
 def python(plan: ProgramPlan) -> str:
@@ -231,7 +215,9 @@ class _PythonPrinter(LockFunctions):
         for name, value in edge.steps:
             # What is computed from variables is computed again from what they are now.
             tree = self.fresh(value, bank, moved=bool(found))
-            if name in bank.variables:
+            if name in bank.chart.events:
+                lines.append(CodeLine(f"y[{self.layout.y.text(name)}] = 1.0  # {name}"))
+            elif name in bank.variables:
                 lines.append(self.put(self.local(name), tree))
                 place, sizes = self.at("y", self.layout.y, name)
                 lines.append(CodeLine(f"{place} = {self.local(name)}", sizes))
@@ -274,7 +260,8 @@ class _PythonPrinter(LockFunctions):
     def flow(self, signs: Signs) -> list[str]:
         y = self.layout.y
         free = {body.name for body in self.read.free}
-        lines = self.forces(signs, wanted=bool(free), rates=True)
+        seen = any(plan.moves for plan in self.plan.banks)
+        lines = self.forces(signs, wanted=bool(free) or seen, rates=True)
         for body in self.read.system.bodies:
             lines.append(
                 CodeLine(f"dy[{y.text(body.x)}] = {self.local(body.v)}", frozenset({body.v}))
@@ -287,6 +274,7 @@ class _PythonPrinter(LockFunctions):
                     lines += self.computed(place, self.plan.accelerations[body.name], signs)
         for name, value in self.plan.flow.items():
             lines += self.computed(f"dy[{y.text(name)}]", value, signs)
+        lines += [CodeLine(f"dy[{y.text(name)}] = 0.0") for name in self.read.system.events]
         for each in self.read.system.sampled:
             lines += [CodeLine(f"dy[{y.text(name)}] = 0.0") for name in each.updates]
         if signs == "live":
@@ -543,7 +531,11 @@ class _PythonPrinter(LockFunctions):
     def values(self) -> list[str]:
         shown, late = self.layout.shown, []
         for name in shown.shared:
-            late.append(frozenset({name}) if name in self.late else frozenset())
+            late.append(self.closure(frozenset({name})))
+        for bank in self.read.banks:
+            for name in (*bank.chart.inputs, *bank.chart.let):
+                if (tree := bank.means.get(name)) is not None:
+                    late.append(computed_names(tree))
         lines = [*self.before_guards(late), *self.moved_locks()]
         for bank in self.read.banks:
             start = of(bank.name, "")
@@ -580,6 +572,11 @@ class _PythonPrinter(LockFunctions):
             if bit := self.read.bit(plan.bank):
                 lines += [CodeLine(f"if bits & {bit}:  # {plan.bank.name}")]
                 lines += indented(self.bank_forces(plan, "live", True, held=True))
+        if bit := self.read.events_bit:
+            lines.append(CodeLine(f"if bits & {bit}:  # all machines were asked"))
+            lines += [CodeLine(f"    y[{y.text(name)}] = 0.0") for name in self.read.system.events]
+        if reads_of(lines) & self.late:
+            lines = [*self.forces("live", wanted=True), *lines]
         return self.function(
             "tick(bits, t, y, mode, p)",
             "Update what ticks: samplers, and what discrete machines give out.",

@@ -13,7 +13,7 @@ from gms_fsm.run.problem import Problem
 
 def own_machines(given: Any, start: Problem) -> dict[str, ElementMachines]:
     """Return the user's machines by contact."""
-    contacts, named = start.system.contacts, start.what.named
+    contacts, named = start.system.machines, start.what.named
     if not isinstance(given, Mapping):
         if len(contacts) > 1:
             raise ParameterError(
@@ -40,6 +40,6 @@ def own_machines(given: Any, start: Problem) -> dict[str, ElementMachines]:
 
 def engine_of(start: Problem, machines: Mapping[str, ElementMachines]) -> MachineEngine:
     """Return the machines of all contacts: the user's, and new ones for the others."""
-    contacts = start.system.contacts
+    contacts = start.system.machines
     parts = [machines.get(each.name) or ElementMachines(each) for each in contacts]
     return MachineEngine(parts, start.program, start.mode)

@@ -150,7 +150,7 @@ def _resolved(start: Problem, key: object) -> tuple[str, int | None]:
             raise _constant(key, "number", "system")
         if key in start.system.signals:
             raise _constant(key, "signal", "system")
-        for contact in start.system.contacts:
+        for contact in start.system.machines:
             plain = key.removeprefix(f"{contact.name}.")
             if plain in contact.chart.parameter_names:
                 raise _constant(key, "parameter", "system")

@@ -26,6 +26,7 @@ from gms_fsm.systems.files.tables import (
     ModelTable,
     SignalField,
     StribeckTable,
+    SupervisorTable,
     SystemTable,
     contact_from,
     described,
@@ -35,7 +36,7 @@ from gms_fsm.systems.files.tables import (
 )
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model
-from gms_fsm.systems.parts import Contact
+from gms_fsm.systems.parts import Contact, Supervisor
 
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
@@ -98,6 +99,18 @@ class ContactInFile(ContactTable):
         return contact_from(self, chart, model)
 
 
+class SupervisorInFile(SupervisorTable):
+    """A supervisor of a system file."""
+
+    chart: ChartField = Field(  # type: ignore[assignment]
+        description="a chart file next to this one, the name of an included chart, or a table"
+    )
+
+    def chosen(self, folder: Path) -> Supervisor:
+        """Return the supervisor; its chart may be a file in a folder."""
+        return self.build(built(_chart, "chart", given=self.chart, folder=folder))
+
+
 def _chart(given: str | ChartTable, folder: Path) -> Chart:
     if isinstance(given, ChartTable):
         return given.build(Chart)
@@ -154,7 +167,8 @@ class SystemFile(SystemTable):
     """A system file."""
 
     signals: dict[str, SignalInFile] = Field({})  # type: ignore[assignment]
-    contacts: list[ContactInFile] = Field(alias="contact")  # type: ignore[assignment]
+    contacts: list[ContactInFile] = Field([], alias="contact")  # type: ignore[assignment]
+    supervisors: list[SupervisorInFile] = Field([], alias="supervisor")  # type: ignore[assignment]
 
     def chosen(self, folder: Path, kind: type[System]) -> System:
         """Return the system; its charts may be files in a folder."""
@@ -174,7 +188,12 @@ class SystemFile(SystemTable):
             else each
             for name, each in self.signals.items()
         }
-        return system_from(kind, self.model_copy(update={"signals": signals}), contacts)
+        machines = [
+            built(each.chosen, "supervisors", i, folder=folder)
+            for i, each in enumerate(self.supervisors)
+        ]
+        table = self.model_copy(update={"signals": signals})
+        return system_from(kind, table, contacts, machines)
 
 
 def load(path: Path, kind: type[System]) -> System:
@@ -206,7 +225,8 @@ def save(system: System, path: Path) -> Path:
 def save_as(kind: type[SystemFile], system: System, path: Path, **further: Any) -> Path:
     """Write a file that holds a system and more."""
     contacts = [ContactInFile(**described(each), **_numbers(each)) for each in system.contacts]
-    table = kind(**{**plain(system), "contacts": contacts, **further})
+    machines = [SupervisorInFile.of(each, **_numbers(each)) for each in system.supervisors]
+    table = kind(**{**plain(system), "contacts": contacts, "supervisors": machines, **further})
     for name, signal in table.signals.items():
         if isinstance(signal, FunctionTable):
             raise OutputError(

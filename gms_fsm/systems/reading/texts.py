@@ -28,7 +28,7 @@ def texts_of_system(system: System) -> tuple[Any, ...]:
             contact.period is None,
             contact.stribeck and contact.stribeck.text,
         )
-        for contact in system.contacts
+        for contact in system.machines
     ]
     signals = [
         (name, signal if isinstance(signal, str) else (type(signal), getattr(signal, "text", "")))

@@ -130,7 +130,7 @@ def _kinds(ran: RunDescription, head: Sequence[str]) -> dict[str, Kind]:
             kinds |= {column_name(title, i): NUMBER for i in range(count)}
         else:
             kinds[title] = NUMBER
-    for bank, contact in zip(layout.banks, ran.what.system.contacts, strict=True):
+    for bank, contact in zip(layout.banks, ran.what.system.machines, strict=True):
         states = {state.name: k for k, state in enumerate(contact.chart.states)}
         title = column_title(layout, bank.of("state"), short=short)
         kind = Kind(states.__getitem__, np.dtype(np.int64))

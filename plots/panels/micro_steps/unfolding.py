@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from plots.panels.parts.axes import Artists, beside
 from plots.panels.parts.selection import checked_elements, checked_window, is_number, scaled
 from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, VERMILION, state_look
 from plots.style.matplotlib import Axes, Rectangle
 from plots.style.presets import font, inches, pt, to_scale
+from plots.views.traces import check_trace
 from plots.views.window import Window
 
 __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
 from gms_fsm.foundation.quantities import scale_of
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import picked
+from plots.views.traces import check_trace
 from plots.views.window import Window, window_of
 
 __all__ = ["has_threshold", "shown"]
