@@ -12,13 +12,17 @@ import numpy as np
 import pytest
 
 from gms_fsm import (
+    Body,
     Chart,
     ChartModel,
+    Contact,
     ElementMachines,
     Parameter,
     Prescribed,
     Slider,
     State,
+    Supervisor,
+    System,
     Trace,
     Transition,
     prove,
@@ -274,6 +278,28 @@ def test_breakpoints_conditions_and_pokes_take_composite_states() -> None:
     assert float(found.here.t) == pytest.approx(1.14, abs=1e-9)
     found.poke(state={0: "on.red"})
     assert str(found.here.states[0]) == "on.red"
+
+
+def test_supervisors_see_composite_states() -> None:
+    """The watch is on just while the light is green or amber."""
+    watch = Chart(
+        "watch",
+        velocities=(),
+        inputs=("b",),
+        states=(State("off"), State("on")),
+        transitions=(
+            Transition("begins", "off", "on", "b > 0.5"),
+            Transition("ends", "on", "off", "b < 0.5"),
+        ),
+        outputs={"u": "b"},
+    )
+    seen = Supervisor("watch", watch, {}, inputs={"b": "is_in(pad.on.go)"})
+    body, pad = Body("body", velocity="0 * t"), Contact("pad", LIGHT)
+    one = simulate(System("seen", bodies=(body,), contacts=(pad,), supervisors=(seen,)), 3.0)
+    log = one.transitions
+    own = log[log.contact == "watch"]
+    assert own.edge.tolist() == ["begins", "ends"] * 3
+    assert own.t.tolist() == pytest.approx([0.3, 0.75, 1.14, 1.59, 2.49, 2.94])
 
 
 def test_a_state_is_named_with_those_around_it() -> None:

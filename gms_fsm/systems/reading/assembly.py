@@ -353,10 +353,12 @@ class SystemReader:
         """Define how many elements are in a state, and what the velocities of contacts are."""
         moved = {body.v for body in self.system.bodies}
         for index, machine in enumerate(self.system.machines):
-            for state in machine.chart.states:
+            nesting = machine.chart.nesting
+            for path in nesting.levels:
+                inside = tuple(nesting.leaves_of(path))
                 for word in COUNTS:
-                    name = f"{word}({machine.name}.{state.name})"
-                    self.definitions.append(Definition(name, None, counts=(index, state.name)))
+                    name = f"{word}({machine.name}.{path})"
+                    self.definitions.append(Definition(name, None, counts=(index, inside)))
             for text, name in zip(machine.v, machine.chart.velocities, strict=True):
                 if text in moved:
                     self.aliases[of(machine.name, name)] = Name(text)
