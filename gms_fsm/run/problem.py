@@ -406,7 +406,7 @@ def _given(
     for name in layout.y.shared:
         if name in given:
             y[name] = checked_scalar(f"initial[{name!r}]", given[name], "finite")
-    for bank, part in zip(layout.banks, system.contacts, strict=True):
+    for bank, part in zip(layout.banks, system.machines, strict=True):
         for variable in bank.variables:
             start = part.chart.initial.get(variable, 0.0)
             name, label = bank.of(variable), layout.label(bank.of(variable))
