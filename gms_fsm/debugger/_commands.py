@@ -17,7 +17,7 @@ from gms_fsm.debugger._view import branches, chart_states, ending, view
 from gms_fsm.errors import ExpressionError, GMSError, SessionError
 from gms_fsm.foundation.arguments import meant, there_are
 from gms_fsm.foundation.quantities import WIDTH, in_words
-from gms_fsm.language import evaluate
+from gms_fsm.language import EVENT, evaluate
 from gms_fsm.session.explain import holds
 from gms_fsm.session.session import KINDS, Breakpoint, Session
 from gms_fsm.traces.system_scope import asked_unit, in_si, units_of
@@ -444,6 +444,16 @@ class Commands:
         number = self.session.poke(edits.variables, edits.v, edits.state)
         yield f"branch {number}, from branch {parent}: {self.session.branch.edits}"
         yield from self.here()
+
+    def do_send(self, arg: str) -> Iterator[str]:
+        """Send an event in a new branch."""
+        events = [name.removeprefix(EVENT) for name in self.session.system.events]
+        if not events:
+            yield "no machine here waits for events"
+        elif arg not in events:
+            raise SessionError(f"there is no event {arg!r}", advice=there_are(arg, events))
+        else:
+            yield from self.do_poke(f"{arg}=1")
 
     def do_branches(self, arg: str) -> Iterator[str]:
         """Show branches."""

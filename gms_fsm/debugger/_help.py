@@ -133,6 +133,12 @@ COMMANDS = {
             "poke {lead}state{n}={state}",
         ),
     ),
+    "send": Command(
+        "change",
+        "send EVENT",
+        "Send an event to the machines here and continue in a new branch.",
+        ("send overheat",),
+    ),
     "run": Command("change", "run", "Compute this branch to its end, without moving.", ("run",)),
     "branches": Command("change", "branches", "Show all branches.", ("branches",)),
     "branch": Command("change", "branch N", "Switch to another branch.", ("branch 0",)),

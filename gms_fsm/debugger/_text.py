@@ -81,7 +81,7 @@ def _contact_lines(
             cells += [f"{scales['s'].number(each.s):>9}", f"{shown:>7}"]
             if len(each.variables) == 1:  # further variables take the place of the bar
                 cells.append(_bar(each.ratio, marks, bar))
-        cells.append(f"{scales['F'].number(each.F):>10}")
+        cells += [f"{scales['F'].number(each.F):>10}"][: len(chart.velocities)]
         line = lead + " ".join([f"{short(each.state, wide):<{wide}}", *cells])
         edges = " ".join(
             f"{edge.priority}:"
@@ -110,7 +110,7 @@ def _heads(contact: ContactView, bar: int) -> list[str]:
         heads += [f"{heading['s']:>9}", f"{short(f'|{chart.variables[0]}|/s', 7):>7}"]
         if len(names) == 1:
             heads.append(" " * (bar + 2))
-    return [*heads, f"{heading['F']:>10}"]
+    return [*heads, *[f"{heading['F']:>10}"][: len(chart.velocities)]]
 
 
 def _bar(ratio: float, marks: Marks, wide: int) -> str:

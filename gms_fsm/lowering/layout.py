@@ -157,7 +157,8 @@ class SystemLayout:
         )
         held = [bank.held(force) for bank in read.banks if bank.periodic for force in bank.forces]
         y = Places((*moved, *system.flow, *updated, *system.events, *held), blocks)
-        keys = {name: name for name, _ in y}
+        keys = {name.removeprefix(EVENT): name for name in system.events}
+        keys |= {name: name for name, _ in y}
         for body in system.bodies:
             keys |= {f"{body.name}.x": body.x, f"{body.name}.v": body.v}
         if len(banks) == 1:

@@ -439,7 +439,7 @@ class Session:
         variables : mapping of str to float, or to mapping of int to float, optional
             New values of the variables of the chart, by element index, from 0:
             ``{"z": {0: 0.1}, "w": {1: 2.0}}``. In a system by the names of ``initial``:
-            ``{"load.x": 0.1, "gear.z": {0: 0.1}, "gear.z2": 0.2, "u": 0.0}``.
+            ``{"load.x": 0.1, "gear.z": {0: 0.1}, "u": 0.0}``; ``{"overheat": 1}`` sends an event.
         v : float, optional
             New velocity, m/s; not allowed if the velocity is prescribed.
         state : mapping of int or str to str, optional

@@ -81,7 +81,7 @@ def _texts(
     return [
         ("entry", actions["entry"]),
         ("during", flows),
-        ("force", _equations(write, forces)),
+        (_given(chart), _equations(write, forces)),
         ("locked", [write.held()] if state.locked else []),
         ("exit", actions["exit"]),
     ]
@@ -98,12 +98,17 @@ def chart_texts(write: ChartWriter) -> Texts:
             "during in all states",
             [write.flow(name, tree) for name, tree in _flows_below(chart).items()],
         ),
-        ("force in all states", _equations(write, shared)),
+        (f"{_given(chart)} in all states", _equations(write, shared)),
         (
             "force of the contact",
             [write.total(name, tree) for name, tree in chart.totals.items()],
         ),
     ]
+
+
+def _given(chart: Chart) -> str:
+    """Return what a state gives out: the force of a contact, or an output of a supervisor."""
+    return "force" if chart.velocities else "output"
 
 
 def _starts(chart: Chart) -> Iterator[tuple[str, Value]]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.language import (
+    EVENT,
     MATHEMATICS,
     MATLAB_LIKE,
     Both,
@@ -116,7 +117,13 @@ class ChartWriter:
         chart = self.chart
         done = edge.performs[1:-1] or (("action", edge.name),)
         pairs = [pair for key in done for pair in chart.assignments[key].items()]
-        texts = [self.assignment(*pair) for pair in pairs if pair[0] not in chart.hidden]
+        texts = [
+            f"send({name.removeprefix(EVENT)})" + ";" * (not self.math)
+            if name.startswith(EVENT)
+            else self.assignment(name, tree)
+            for name, tree in pairs
+            if name not in chart.hidden
+        ]
         if not texts:
             return ""
         return "/ " + ", ".join(texts) if self.math else "{" + " ".join(texts) + "}"

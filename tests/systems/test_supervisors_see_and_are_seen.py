@@ -190,3 +190,11 @@ def test_a_session_steps_through_a_supervisor():
     assert "heater: u = 1, on" in str(here)
     assert session.until("heater.u < 0.5").t == pytest.approx(HEATING[0])
     assert session.why("heater 1")[0].edge.name == "switch_off"
+
+
+def test_an_event_is_sent_to_a_session():
+    case = crossing()
+    session = Session(case.system, 20.0)
+    session.goto(3.0)
+    session.poke({"red": 1.0})
+    assert str(session.next_transition().fired) == "cycles 1: counting -> counting by count_one"

@@ -91,6 +91,7 @@ def pokeable(start: Problem) -> list[str]:
     updated = (name for each in system.sampled for name in each.updates)
     moved = (name for body in system.bodies for name in (body.x, body.v))
     shared = [name for name in (*moved, *system.flow, *updated) if name in layout.y.shared]
+    shared += layout.events
     own = [
         bank.of(name)
         for bank in layout.banks
