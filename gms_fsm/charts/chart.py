@@ -389,7 +389,7 @@ class Chart:
         ------
         ChartError, ExpressionError
             If the document cannot be read, or has something without counterpart in a chart, which
-            is named, such as a parallel state, a history, a script; or if a text is wrong.
+            is named, such as a parallel state, a deep history, a script; or if a text is wrong.
 
         Examples
         --------

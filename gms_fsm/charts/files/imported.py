@@ -24,13 +24,17 @@ Assigned = Mapping[str, str]
 
 @dataclass(frozen=True)
 class ImportedState:
-    """A state as another program has it; `first` is what is entered inside of one with parts."""
+    """A state as another program has it; `first` is what is entered inside of one with parts.
+
+    With a history it is entered only if nothing inside has been left before.
+    """
 
     route: Route
     place: str
     entry: Assigned = field(default_factory=dict)
     exit: Assigned = field(default_factory=dict)
     first: Route | None = None
+    history: bool = False
 
 
 @dataclass(frozen=True)
@@ -187,7 +191,12 @@ def built(
         )
         for each in states
     ]
-    leaves, flat, outer = flattened(states, first, edges)
+    nests = _nests(states, edges)
+    leaves, flat, outer = (
+        (states, _written(edges), list[ImportedState]())
+        if nests
+        else flattened(states, first, edges)
+    )
     start = _started(outer, dict.fromkeys(given.variables, 0.0) | {**given.initial})
     names = [spelled(each.route) for each in leaves]
     used = [*given.inputs, *given.velocities, *given.variables, *given.let]
@@ -202,12 +211,15 @@ def built(
     impulses = dict.fromkeys(map(str, _several(given.impulses, f"{here}: impulses")))
     _check_known(impulses, known, "edge", f"{here}: impulses")
     parts = {spelled(each.route): each for each in leaves}
+    paths = {name: ".".join(each.route) for name, each in parts.items()} if nests else {}
     chart = kind(
         given.name,
         given.inputs,
         given.variables,
         tuple(_parameter(each, here) for each in _several(given.parameters, f"{here}: parameters")),
-        tuple(
+        _tree(states, first, (), texts, {*locked})
+        if nests
+        else tuple(
             State(
                 name,
                 flow=_inherited(texts["flows"], each.route),
@@ -221,8 +233,8 @@ def built(
         tuple(
             Transition(
                 each.name,
-                each.sources,
-                each.target,
+                [paths.get(source, source) for source in each.sources],
+                paths.get(each.target, each.target),
                 conditions[each.name],
                 _actions(each, edges[each.number], actions, parts),
                 impulse=each.name in impulses or edges[each.number].trigger in impulses,
@@ -236,7 +248,7 @@ def built(
         contact_outputs=given.contact_outputs,
         initial=start,
     )
-    for each in flat:
+    for each in [] if nests else flat:
         _check_time(chart, each, edges[each.number], parts)
     return chart, flat
 
@@ -363,6 +375,75 @@ def _routes(states: list[ImportedState]) -> list[Route]:
     return [each.route for each in states]
 
 
+def _nests(states: list[ImportedState], edges: list[ImportedEdge]) -> bool:
+    """Return whether states are nested as a chart nests them; else they are flattened."""
+    nested = [each for each in states if each.first is not None]
+    return bool(nested) and all(
+        [
+            *(each.first is not None and each.first[:-1] == each.route for each in nested),
+            *map(_is_plain, edges),
+        ]
+    )
+
+
+def _check_no_history(states: list[ImportedState]) -> None:
+    """Refuse histories where states are flattened, because an edge is none of a chart."""
+    for each in states:
+        if each.history:
+            raise ChartError(
+                "its history cannot be kept, because some edge is internal, or assigns before or "
+                "after the states change",
+                place=each.place,
+                advice="write that edge as an external one, with its actions between exit and "
+                "entry",
+            )
+
+
+def _is_plain(edge: ImportedEdge) -> bool:
+    """Return whether an edge leaves and enters states as an edge of a chart does."""
+    if edge.target is None or edge.before or edge.after:
+        return False
+    around = _shared(edge.source[:-1], (*edge.target[:-1], ""))
+    shorter = min(len(edge.source), len(edge.target))
+    related = edge.source[:shorter] == edge.target[:shorter]
+    return not related if edge.stays is None else edge.stays == around
+
+
+def _written(edges: list[ImportedEdge]) -> list[FlatEdge]:
+    """Return the edges as a chart of nested states has them."""
+    return [
+        FlatEdge(number, (spelled(edge.source),), spelled(edge.target or ()), ((), ()))
+        for number, edge in enumerate(edges)
+    ]
+
+
+def _tree(
+    states: list[ImportedState],
+    first: Route,
+    around: Route,
+    texts: Mapping[str, Mapping[str, Assigned]],
+    locked: set[str],
+) -> tuple[State, ...]:
+    """Return the states in a state, or of the whole chart; that the default one is first."""
+    own = [each for each in states if each.route[:-1] == around]
+    if not around:
+        own.sort(key=lambda each: each.route[:1] != first[:1])
+    return tuple(
+        State(
+            each.route[-1],
+            flow=texts["flows"].get(spelled(each.route), {}),
+            entry=each.entry,
+            exit=each.exit,
+            outputs=texts["state_outputs"].get(spelled(each.route), {}),
+            locked=spelled(each.route) in locked,
+            states=_tree(states, first, each.route, texts, locked),
+            initial=each.first[-1] if each.first else "",
+            history=each.history,
+        )
+        for each in own
+    )
+
+
 def _inherited(texts: Mapping[str, Assigned], route: Route) -> dict[str, str]:
     """Return the texts of a state over those of the states around it."""
     found: dict[str, str] = {}
@@ -379,6 +460,7 @@ def flattened(
     Edges of inner states go before those of outer ones. The third list has the states around the
     default one, which are entered when the chart starts.
     """
+    _check_no_history(states)
     by_route = {each.route: each for each in states}
 
     def inside(route: Route) -> Route:

@@ -205,9 +205,6 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
             f"\nThe host computes s = weight * ({contact.stribeck.text}){load} with {given}, "
             f"weights {[float(each) for each in contact.weights]!r}."
         )
-    again = f' `gms_fsm.Chart.from_scxml("{files[0]}")` reads the whole chart from it.'
-    if chart.nesting.composite:
-        again = " States in states have gms:name, and ids that are their paths."
     kept = [name for name in _names(chart) if name in KEPT]
     warning = (
         f"\n- python-statemachine keeps the names {', '.join(kept)} for itself." if kept else ""
@@ -246,7 +243,7 @@ Run in Python
 
 What it does not express
 - Flows, forces, units and rules are texts in the namespace {OURS}: other tools keep or
-  ignore them.{again}
+  ignore them. `gms_fsm.Chart.from_scxml("{files[0]}")` reads the whole chart from it.
 - Several transitions in a row at one time need several events "step".
 - Locked contacts, impulses, forces and accelerations in guards cannot be written.{warning}
 """

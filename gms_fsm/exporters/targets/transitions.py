@@ -84,7 +84,10 @@ def _imports(source: str) -> str:
 def _data(chart: Chart) -> dict[str, Any]:
     """Return the chart as what stands at the top of the file, by name."""
     edges = {edge.name: edge for edge in chart.transitions}
-    levels = chart.nesting.levels
+    # A machine has no histories: there each edge has one of the innermost states as target.
+    levels, plain = chart.nesting.levels, not chart.nesting.histories
+    if plain:
+        edges = {edge.name: edges[edge.name] for edge in chart.nesting.transitions}
     return {
         "NAME": chart.name,
         "REFERENCE": chart.reference,
@@ -98,7 +101,7 @@ def _data(chart: Chart) -> dict[str, Any]:
             {
                 "trigger": edge.name,
                 "source": _sources(chart, edge),
-                "dest": spelled(edge.target),
+                "dest": spelled(_written(chart, edge).target if plain else edge.target),
                 "conditions": f"_guard_{edge.name}",
             }
             for edge in edges.values()
@@ -144,13 +147,17 @@ def _state(state: State) -> str | dict[str, Any]:
 
 def _sources(chart: Chart, edge: Transition) -> str | list[str]:
     """Return the states that an edge is written to leave."""
-    written = next(
+    names = [spelled(each) for each in _written(chart, edge).sources]
+    return names[0] if len(names) == 1 else names
+
+
+def _written(chart: Chart, edge: Transition) -> Transition:
+    """Return an edge as it is written."""
+    return next(
         each
         for each in chart.nesting.transitions
         if edge.name in [name for name, *_ in chart.nesting.entries(each)]
     )
-    names = [spelled(each) for each in written.sources]
-    return names[0] if len(names) == 1 else names
 
 
 def _parameter(given: Parameter) -> str | dict[str, Any]:
@@ -468,7 +475,7 @@ def _readme(name: str, chart: Chart, contact: Contact | None) -> str:
         if contact is None
         else f"those of {visible(contact.title)}, {contact.n} element{'s' * (contact.n != 1)}"
     )
-    again = "" if chart.nesting.composite else AGAIN.format(name=name)
+    again = "" if chart.nesting.histories else AGAIN.format(name=name)
     return f"""\
 # {visible(chart.name)} as a transitions machine
 
