@@ -315,8 +315,8 @@ class Chart:
         """Build a chart from a machine of the package transitions, and texts given beside it.
 
         The machine gives states, edges and their priority: the order of the triggers and of their
-        transitions, those of inner states first. States in states become ``outer__inner``. An edge
-        has the name of its trigger, or ``source_target`` if the trigger has edges that differ.
+        transitions, those of inner states first. Texts name an inner state ``outer__inner``. An
+        edge has the name of its trigger, or ``source_target`` if the trigger has edges that differ.
 
         Parameters
         ----------
