@@ -29,6 +29,11 @@ def spelled(path: str) -> str:
     return path.replace(".", "__")
 
 
+def is_age(name: str) -> bool:
+    """Return whether a variable is the time in a state."""
+    return name == AGE or name.endswith(f"__{AGE}")
+
+
 @dataclass(frozen=True)
 class Level:
     """A state as it is written, at its place.

@@ -215,8 +215,9 @@ def _hidden(line: Sequence[Point], blocks: list[Box]) -> int:
     count = 0
     for k in range(0, len(line) - 1, 3):
         a, d = line[k], line[k + 3]
-        for i in range(SAMPLES):
-            x, y = (a[n] + (d[n] - a[n]) * i / SAMPLES for n in (0, 1))
+        for step in range(SAMPLES):
+            part = step / SAMPLES
+            x, y = (begin + (end - begin) * part for begin, end in zip(a, d, strict=True))
             count += any(
                 abs(x - at[0]) < size[0] / 2 and abs(y - at[1]) < size[1] / 2 for at, size in blocks
             )

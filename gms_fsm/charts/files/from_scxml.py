@@ -11,18 +11,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-from gms_fsm.charts.files.imported import (
+from gms_fsm.charts.files.imported import Texts, built, number_of
+from gms_fsm.charts.files.routes import (
     FlatEdge,
     ImportedEdge,
     ImportedState,
     Route,
-    Texts,
-    built,
-    number_of,
+    outside,
     spelled,
 )
 from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
-from gms_fsm.charts.nesting import AGE
+from gms_fsm.charts.nesting import AGE, is_age
 from gms_fsm.charts.parts import check_size
 from gms_fsm.errors import ChartError, ExpressionError, Part, why
 from gms_fsm.foundation.arguments import unknown
@@ -324,7 +323,7 @@ class _Document:
         place = f"{place} {name or number}"
         target = element.get("target")
         to = None if target is None else self._route(target, "target", place)
-        at, stays = source, 0 if to is None else _outside(source, to)
+        at, stays = source, 0 if to is None else outside(source, to)
         if to is not None and element.get("type") == "internal":
             inner = len(to) > len(source) and to[: len(source)] == source
             stays = len(source) if inner else stays
@@ -419,12 +418,6 @@ def _brings_values(element: ET.Element) -> bool:
     return all(each.get("expr") == f"_event.data.{each.get('location')}" for each in element)
 
 
-def _outside(source: Route, target: Route) -> int:
-    """Return how many states around both there are."""
-    pairs = zip(source[:-1], target[:-1], strict=False)
-    return len([*itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)])
-
-
 # --------------------------------------------------------------------------- edges
 def _ordered(rows: list[ScxmlTransition], here: str) -> list[ScxmlTransition]:
     """Return the rows in the chart's own order, if the document keeps it."""
@@ -455,13 +448,8 @@ def _texts(assigned: Mapping[str, tuple[str, str | None]]) -> dict[str, str]:
     return {
         name: _read_back(expression) if text is None else text
         for name, (expression, text) in assigned.items()
-        if not (_is_age(name) and (ours or expression == "0.0"))
+        if not (is_age(name) and (ours or expression == "0.0"))
     }
-
-
-def _is_age(name: str) -> bool:
-    """Return whether a chart makes a variable by itself: the time in a state."""
-    return name == AGE or name.endswith(f"__{AGE}")
 
 
 @dataclass(frozen=True)
@@ -483,7 +471,7 @@ class _DataModel:
         outside = {*given.inputs, *given.velocities, *parameters, *given.let}
         if root.find(f"{{{OURS}}}chart") is not None:
             ids = (each.get("id", "") for each in root.iter() if _tag(each) == "data")
-            outside |= {AGE, *filter(_is_age, ids)}  # a chart makes them by itself
+            outside |= {AGE, *filter(is_age, ids)}  # a chart makes them by itself
         data = cls([*given.variables], {}, {}, dict(given.initial))
         for each in root.iter():
             name = each.get("id", "")
