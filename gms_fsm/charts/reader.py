@@ -112,7 +112,7 @@ class ChartReader:
         chart, rate = self.chart, f"d{variable}"
         texts = [*chart.outputs.values(), *chart.contact_outputs.values()]
         texts += [text for state in chart.states for text in state.outputs.values()]
-        if chart.locks or any(re.search(rf"\b{rate}\b", str(text)) for text in texts):
+        if chart.locks or any(re.search(rf"\b{re.escape(rate)}\b", str(text)) for text in texts):
             return []
         return [name for name in chart.force_names if name in self.late]
 
