@@ -21,8 +21,8 @@ from __future__ import annotations
 import math
 
 __all__ = [
-    "acos", "asin", "asinh", "atan", "atan2", "cos", "cosh", "exp", "log", "power", "sin", "sinh",
-    "tan", "tanh",
+    "acos", "asin", "asinh", "atan", "atan2", "cos", "cosh", "exp", "floor", "log", "nearest",
+    "power", "sin", "sinh", "tan", "tanh", "tooth",
 ]  # fmt: skip
 
 INF, NAN = math.inf, math.nan
@@ -187,6 +187,31 @@ def _scaled(x: float, k: int) -> float:
     """Return x * 2**k for -1088 < k < 1024; only the last product may round."""
     high = k >> 5 if k >= 0 else -(-k >> 5)
     return x * LOW[k - 32 * high + 31] * HIGH[high + 33]
+
+
+# --------------------------------------------------------------------------- whole numbers
+def nearest(x: float) -> float:
+    """Return the nearest whole number, the even one of two, with the sign of x."""
+    size = abs(x)
+    if not size < 4503599627370496.0:  # 2**52: there is nothing behind the point, or it is NaN
+        return x
+    return math.copysign((size + 4503599627370496.0) - 4503599627370496.0, x)
+
+
+def floor(x: float) -> float:
+    """Return the largest whole number that is not above x."""
+    whole = nearest(x)
+    return whole - 1.0 if whole > x else whole
+
+
+def tooth(x: float) -> float:
+    """Return how far x is from a whole number, negative where the one below x is odd."""
+    if not abs(x) < INF:
+        return NAN
+    rest = x - 2.0 * nearest(0.5 * x)
+    if rest > 0.5:
+        return 1.0 - rest
+    return -1.0 - rest if rest < -0.5 else rest
 
 
 # --------------------------------------------------------------------------- exp and log

@@ -27,7 +27,7 @@ from gms_fsm.charts.reader import ChartReader
 from gms_fsm.errors import ChartError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path
 from gms_fsm.foundation.display import displayed
-from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, Condition, Value, spell
+from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, YIELDING, Condition, Value, spell
 
 if TYPE_CHECKING:
     from gms_fsm.charts.files.imported import GivenTexts
@@ -39,7 +39,7 @@ SUPPLIED = ("t", "x", "v", "s")  # inputs that a model supplies to its chart
 RESERVED = frozenset(
     {"F", "age", "after", "index", "machine", "pow", "state", "states", "trigger"}
     | set(CONSTANTS)
-    | set(FUNCTIONS)
+    | set(FUNCTIONS) - set(YIELDING)
 )
 
 

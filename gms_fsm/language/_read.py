@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import itertools
 import math
 import re
 import warnings
@@ -17,7 +18,15 @@ from typing import NamedTuple
 from gms_fsm.errors import ExpressionError, shown
 from gms_fsm.foundation.arguments import nearest, some_of
 from gms_fsm.foundation.parser import PARSER
-from gms_fsm.language.functions import CONSTANTS, FUNCTIONS, NAMESPACE, SEVERAL
+from gms_fsm.language.functions import (
+    CHOICES,
+    CONSTANTS,
+    FUNCTIONS,
+    NAMESPACE,
+    SEVERAL,
+    SHORT,
+    YIELDING,
+)
 from gms_fsm.language.tree import (
     Binary,
     Both,
@@ -31,12 +40,14 @@ from gms_fsm.language.tree import (
     Number,
     Relation,
     Value,
+    walk,
 )
 
 LONGEST_TEXT = 10_000  # characters; a chart's text is a line, not a program
 DEEPEST_TREE = 60  # levels; keeps every recursive reader far below Python's recursion limit
 MOST_ARGUMENTS = 50  # of min and max
 MOST_COMPARISONS = 100  # in one text; a guard is a line, and each comparison is watched separately
+MOST_PARTS = 2_000  # of a value that is read from short forms, in which arguments are repeated
 
 _OPERATORS: Mapping[type[ast.operator], str] = {
     ast.Add: "+",
@@ -80,6 +91,11 @@ _DECIMAL_COMMA = re.compile(r"(?<![\w.])(\d+),(\d+)")
 _NO_SIGN_BETWEEN = re.compile(r"[\w.)]\s+[\w(]|\)[\w(]|\d[^\W\d_eE]")  # 2 pi, 2pi, (a)(b)
 _QUANTITIES = {"time": "t", "position": "x", "velocity": "v", "force": "F"}  # of records, of runs
 _ALIASES: Mapping[str, str] = {
+    "quantize": "quantise",
+    "clip": "saturate",
+    "clamp": "saturate",
+    "nearest": "round",
+    "rint": "round",
     "sign": "sgn",
     "signum": "sgn",
     "fabs": "abs",
@@ -88,7 +104,10 @@ _ALIASES: Mapping[str, str] = {
     **_QUANTITIES,
     **{short: name for name, short in _QUANTITIES.items()},
 }
-_GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(FUNCTIONS) + " pi"
+_CALLED = (*FUNCTIONS, *SHORT)
+_GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(_CALLED) + " pi"
+# A call of if: nothing, an operator, a bracket, a comma or a word of conditions stands before it.
+_IF = re.compile(r"(?:(?<![\w.)\]\s])|(?<=\band)|(?<=\bor)|(?<=\bnot)|(?<=\belse))(\s*)\bif(?=\s*\()")
 
 
 class Owner(NamedTuple):
@@ -225,6 +244,8 @@ def _parsed(text: str) -> ast.expr:
             f"{'==' if state else _INSTEAD[mark]} instead",
         )
     flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay correct
+    # Python has a word if, but no function: these letters are the same name to it, and no word.
+    flat = _IF.sub(r"\1𝑖𝑓", flat)
     lead = len(flat) - len(flat.lstrip())
     if lead == len(flat):
         raise ExpressionError("the text is empty", text, 1, _GRAMMAR)
@@ -319,6 +340,8 @@ class _Reader:
             case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
                 self.known(node, function)
                 return self.call(node, function, arguments, depth)
+            case ast.IfExp(test=test, body=yes, orelse=no):
+                return self.choice(node, [test, yes, no], depth)
             case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
                 raise self.refuse("found a comparison where a number is needed", node)
         raise self.foreign(node)
@@ -336,8 +359,6 @@ class _Reader:
                 )
             case ast.Call(func=ast.Attribute(attr=function)) if function in FUNCTIONS:
                 instead = f"{function}(...), without a module before it"
-            case ast.IfExp():
-                instead = "min, max, abs, sgn; a case in a chart is a state of its own"
         return self.refuse(f"{_plain(node)} is not part of the language", node, instead)
 
     def name(self, node: ast.expr, name: str) -> Value:
@@ -345,7 +366,7 @@ class _Reader:
             return Name(name)
         if name in CONSTANTS:
             return Number(CONSTANTS[name])
-        if name in FUNCTIONS:
+        if name in _CALLED:
             raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
         raise self.refuse(
             f"unknown name {shown(name)}{_suggestion(name, [*self.names, *CONSTANTS])}",
@@ -359,11 +380,13 @@ class _Reader:
         return any("." in name for name in self.names)
 
     def known(self, node: ast.expr, function: str) -> None:
-        if function not in NAMESPACE:
+        if function in self.names and function in YIELDING:
+            raise self.refuse(f"{function!r} is a declared name here", node, "another name for it")
+        if function not in NAMESPACE and function not in SHORT:
             raise self.refuse(
-                f"unknown function {shown(function)}{_suggestion(function, FUNCTIONS)}",
+                f"unknown function {shown(function)}{_suggestion(function, _CALLED)}",
                 node,
-                "the functions " + ", ".join(FUNCTIONS),
+                "the functions " + ", ".join(_CALLED),
             )
 
     def call(self, node: ast.expr, function: str, arguments: list[ast.expr], depth: int) -> Value:
@@ -371,6 +394,13 @@ class _Reader:
             if len(arguments) != 2:
                 raise self.refuse(f"pow got {len(arguments)} arguments", node, "two arguments")
             return Binary("**", self.value(arguments[0], depth), self.value(arguments[1], depth))
+        if function in SHORT:
+            if len(arguments) != SHORT[function]:
+                wanted = "three arguments" if SHORT[function] == 3 else "two arguments"
+                raise self.refuse(f"{function} got {len(arguments)} arguments", node, wanted)
+            if function == "if":
+                return self.choice(node, arguments, depth)
+            return self.short(node, function, arguments, depth)
         several = function in SEVERAL
         if (len(arguments) < 2) if several else (len(arguments) != 1):
             wanted = "two or more arguments" if several else "one argument"
@@ -389,6 +419,46 @@ class _Reader:
         for value in values[2:]:
             result = Call(function, (result, value))
         return result
+
+    def short(self, node: ast.expr, function: str, given: list[ast.expr], depth: int) -> Value:
+        """Read a function that stands for others."""
+        a, b, *more = (self.value(each, depth + 2) for each in given)
+        if function == "saturate":
+            return Call("min", (Call("max", (a, b)), *more))
+        whole = Call("floor" if function == "mod" else "round", (Binary("/", a, b),))
+        parts = Binary("*", b, whole)
+        return self.within(node, parts if function == "quantise" else Binary("-", a, parts))
+
+    def choice(self, node: ast.expr, given: list[ast.expr], depth: int) -> Value:
+        """Read a choice between two values, one comparison at a time."""
+        test, *values = given
+        levels = sum(isinstance(each, ast.cmpop) for each in ast.walk(test))
+        condition = self.condition(test, depth)
+        yes, no = (self.value(each, depth + levels) for each in values)
+        return self.within(node, self.chosen(test, condition, yes, no))
+
+    def chosen(self, node: ast.expr, condition: Condition, yes: Value, no: Value) -> Value:
+        match condition:
+            case Relation(op, left, right):
+                name = next(each for each, known in CHOICES.items() if known == op)
+                return Call(name, (left, right, yes, no))
+            case Not(operand):
+                return self.chosen(node, operand, no, yes)
+            case Both(operands):
+                for each in reversed(operands):
+                    yes = self.chosen(node, each, yes, no)
+                return yes
+            case Either(operands):
+                for each in reversed(operands):
+                    no = self.chosen(node, each, yes, no)
+                return no
+        raise self.refuse("a value depends on numbers, not on states", node)
+
+    def within(self, node: ast.expr, value: Value) -> Value:
+        """Refuse a value whose repeated parts make it too large."""
+        if next(itertools.islice(walk(value), MOST_PARTS, None), None) is not None:
+            raise self.refuse("the value is too large", node, f"at most {MOST_PARTS} parts")
+        return value
 
     def condition(self, node: ast.expr, depth: int) -> Condition:
         depth = self.deeper(node, depth)
@@ -430,19 +500,18 @@ class _Reader:
                     )
                 parts: list[Condition] = []
                 for i, op in enumerate(ops):
-                    if type(op) not in _COMPARISONS:
+                    a, b = self.value(sides[i], depth), self.value(sides[i + 1], depth)
+                    if type(op) in _COMPARISONS:
+                        parts.append(Relation(_COMPARISONS[type(op)], a, b))
+                    elif isinstance(op, ast.Eq | ast.NotEq) and _whole(a) and _whole(b):
+                        equal = Both((Relation("<=", a, b), Relation(">=", a, b)))
+                        parts.append(equal if isinstance(op, ast.Eq) else Not(equal))
+                    else:
                         raise self.refuse(
                             "only < <= > >= compare floats (== and != are almost never true)",
                             sides[i + 1],
-                            "< <= > >=, for example a <= x <= b",
+                            "< <= > >=, for example a <= x <= b; whole numbers, round(x) == 2",
                         )
-                    parts.append(
-                        Relation(
-                            _COMPARISONS[type(op)],
-                            self.value(sides[i], depth),
-                            self.value(sides[i + 1], depth),
-                        )
-                    )
                 return parts[0] if len(parts) == 1 else Both(tuple(parts))
             case ast.BoolOp(op=op, values=values):
                 operands = tuple(self.condition(value, depth) for value in values)
@@ -488,6 +557,20 @@ class _Reader:
             raise self.refuse("states are compared by == or !=", name, self.compared())
         found = InState(element, name.id)
         return found if isinstance(op, ast.Eq) else Not(found)
+
+
+def _whole(value: Value) -> bool:
+    """Tell whether a value is a whole number, whatever its names stand for."""
+    match value:
+        case Number(number):
+            return number.is_integer()
+        case Call("floor" | "round" | "sgn"):
+            return True
+        case Call(function, arguments) if function in CHOICES:
+            return all(map(_whole, arguments[2:]))
+        case Negative() | Binary("+" | "-" | "*") | Call("abs" | "min" | "max"):
+            return all(map(_whole, value.parts))
+    return False
 
 
 def _plain(node: ast.expr) -> str:

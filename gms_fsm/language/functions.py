@@ -50,11 +50,25 @@ FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "tanh": elementary.tanh,
     "atan": elementary.atan,
     "asinh": elementary.asinh,
+    "floor": elementary.floor,
+    "round": elementary.nearest,
 }
-NAMESPACE: Mapping[str, Callable[..., float]] = {**FUNCTIONS, "pow": elementary.power}
+# What generated text calls besides: powers, and a value whose sign changes where floor jumps.
+NAMESPACE: Mapping[str, Callable[..., float]] = {
+    **FUNCTIONS,
+    "pow": elementary.power,
+    "tooth": elementary.tooth,
+}
+# Functions that are read as others, with the number of their arguments.
+SHORT = {"mod": 2, "quantise": 2, "saturate": 3, "if": 3}
+# ``if(a > b, c, d)`` is the call ``if_gt(a, b, c, d)``.
+CHOICES: Mapping[str, str] = {"if_lt": "<", "if_le": "<=", "if_gt": ">", "if_ge": ">="}
+# Words that are younger than files which use them as names: a declared name wins.
+YIELDING = ("floor", "round", *SHORT)
 CONSTANTS: Mapping[str, float] = {"pi": math.pi}
 SEVERAL = ("min", "max")  # functions of two or more arguments; the others take one
-ROUGH = ("sgn", "abs", "min", "max")  # functions whose flow has a corner or a jump
+# Functions whose flow has a corner or a jump.
+ROUGH = ("sgn", "abs", "min", "max", "floor", "round", *CHOICES)
 # Those of them that are ours.
 ELEMENTARY: Mapping[str, Callable[..., float]] = {
     name: each for name, each in NAMESPACE.items() if each.__module__ == elementary.__name__

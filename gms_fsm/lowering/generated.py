@@ -97,7 +97,8 @@ def standalone(source: str) -> str:
             case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name):
                 own.add(name)
     known: dict[str, Any] = {**NAMESPACE, **SIGNALS}
-    missing = sorted(used - own - set(dir(builtins)))
+    python = {name for name, each in vars(builtins).items() if known.get(name, each) is each}
+    missing = sorted(used - own - python)
     if foreign := [name for name in missing if name not in known]:
         raise ParameterError(
             "a Python function, which cannot be written as text",

@@ -299,7 +299,7 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
         text = f"on {place} each flow pushes into the other's guard: endless switching"
         return refuted(text, point)
     if of_guards.breaks:
-        raise Undecided("sgn jumps in a guard")
+        raise Undecided("a value jumps in a guard")
     if prover.find(z3.Or(loose), *resting) is not None:
         raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
     return Answer("proved", "there is no surface on which both flows push into the other's guard")

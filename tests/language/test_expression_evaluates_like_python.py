@@ -18,9 +18,12 @@ from hypothesis import strategies as st
 
 from gms_fsm.errors import ExpressionError
 from gms_fsm.language import (
+    CHOICES,
     ELEMENTARY,
+    FUNCTIONS,
     NAMESPACE,
     PYTHON,
+    SEVERAL,
     Binary,
     Both,
     Call,
@@ -53,7 +56,7 @@ NAMES = ("a", "b", "c")
 numbers = st.floats(min_value=0.0, allow_nan=False, allow_infinity=False).map(Number)
 simple_numbers = st.sampled_from([0.0, 0.5, 1.0, 2.0, 3.0, 1e-3, 1 / 3, 1e16, 5e-324]).map(Number)
 leaves = st.one_of(st.sampled_from(NAMES).map(Name), simple_numbers, numbers)
-ONE_ARGUMENT = ("abs", "exp", "log", "sqrt", "sgn", "sin", "cos", "tanh", "atan", "asinh")
+ONE_ARGUMENT = tuple(name for name in FUNCTIONS if name not in SEVERAL)
 
 
 def _power(base: Value, whole: int) -> Value:
@@ -67,7 +70,8 @@ def _grow(inner: st.SearchStrategy[Value]) -> st.SearchStrategy[Value]:
         st.builds(Binary, st.sampled_from("+-*/"), inner, inner),
         st.builds(_power, inner, st.sampled_from([-2, 2, 3])),
         st.builds(lambda f, u: Call(f, (u,)), st.sampled_from(ONE_ARGUMENT), inner),
-        st.builds(lambda f, u, w: Call(f, (u, w)), st.sampled_from(["min", "max"]), inner, inner),
+        st.builds(lambda f, u, w: Call(f, (u, w)), st.sampled_from(SEVERAL), inner, inner),
+        st.builds(lambda f, *u: Call(f, u), st.sampled_from([*CHOICES]), *[inner] * 4),
     )
 
 
@@ -264,7 +268,7 @@ def test_functions_of_columns_are_the_elementary_ones_to_the_last_bit(name: str)
 
 
 def test_the_functions_of_our_own_are_those_of_elementary() -> None:
-    ours = {"exp", "log", "sin", "cos", "tanh", "atan", "asinh", "pow"}
+    ours = {"exp", "log", "sin", "cos", "tanh", "atan", "asinh", "pow", "floor", "round", "tooth"}
     assert set(ELEMENTARY) == ours
     assert all(NAMESPACE[name].__module__ == elementary.__name__ for name in ours)
 

@@ -316,6 +316,9 @@ TEXTS = [
     "1 > 2 > not v > 0", "**v > 1", "F neg 1 > 0", "F not > 1", "F > 1; x",
     *(f"{name}({'v, z1' if name in SEVERAL else 'v'}) > 0.1" for name in FUNCTIONS),
     *(f"{name} * v > 0.1" for name in CONSTANTS),
+    "mod(t, 2) < 1", "quantise(F, 2) > 2", "saturate(v, 0, 0.1) > 0.05", "if(v > 0, F, 1 / 0) > 1",
+    "if(not v > 0 and F < 1, 1, 2) == 2", "floor(t) == 3 or round(t) != 4", "t == 3", "if(v, 1, 2) > 1",
+    "mod(t) > 1", "round(t) == 1.5", "floor(t) < 3 == 1", "min(v) > 1", "if(v > 0, 1) > 0",
 ]  # fmt: skip
 
 

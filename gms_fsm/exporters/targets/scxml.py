@@ -221,7 +221,7 @@ Run in Python
     Math = SimpleNamespace(
         abs=abs, min=min, max=max, exp=math.exp, log=math.log, sqrt=math.sqrt, sin=math.sin,
         cos=math.cos, tanh=math.tanh, atan=math.atan, asinh=math.asinh, pow=math.pow,
-        sign=lambda u: float((u > 0) - (u < 0)),
+        floor=math.floor, sign=lambda u: float((u > 0) - (u < 0)),
     )
     machine = load(Path("{files[0]}"), trusted=True)(SimpleNamespace(Math=Math))
     machine.send("values", {values})

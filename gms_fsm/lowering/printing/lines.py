@@ -10,7 +10,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
-from gms_fsm.language import Binary, Call, Name, Node, Value, spell
+from gms_fsm.language import Binary, Call, Name, Node, Value, frozen, spell
+from gms_fsm.language.functions import ROUGH
 from gms_fsm.language.tree import walk
 from gms_fsm.lowering.places import Places, total
 from gms_fsm.lowering.printing.names import computed_names
@@ -21,7 +22,7 @@ from integrators import LIVE
 # Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
 # may be marked as live.
 Signs = Literal["held", "live", "given"]
-QUICK = ("abs", "min", "max", "sgn", "sqrt")  # functions that need no library
+QUICK = (*ROUGH, "sqrt")  # functions that need no library
 TABLES = "the tables"  # what a signal that is a table reads
 
 
@@ -111,16 +112,10 @@ class ProgramWriter(ABC):
         held = self.plan.held
         sizes = frozenset(f"#{size}" for size in held.sizes(rough.turning))
         sign = f"held[{held.text(rough.turning)}]"
-        first = self.spell(call.arguments[0])
-        match call.function:
-            case "sgn":
-                value = sign
-            case "abs":
-                value = self.spell(Binary("*", Name(sign), call.arguments[0]))
-            case "min":
-                value = f"{first} if {sign} <= 0.0 else {self.spell(call.arguments[1])}"
-            case _:
-                value = f"{first} if {sign} >= 0.0 else {self.spell(call.arguments[1])}"
+        frame = frozen(call, Name(sign))
+        value = self.spell(frame)
+        if isinstance(frame, Call):  # a choice: without brackets around it
+            value = value[1:-1]
         if signs == "given":
             value = f"{live} if {sign} == {LIVE} else {value}"
         elif call.function == "sgn":

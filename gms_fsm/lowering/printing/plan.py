@@ -28,6 +28,7 @@ from gms_fsm.language import (
     turning_inside,
 )
 from gms_fsm.language.functions import ROUGH
+from gms_fsm.language.tree import walk
 from gms_fsm.lowering.layout import SystemLayout, sizes_of
 from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.lowering.printing.names import QuantityNames, names_of
@@ -210,6 +211,8 @@ class ProgramPlan:
         For each contact, by state, the values whose signs decide corners and jumps.
     gradients : tuple of Gradient
         One for each value on whose surface the motion can slide, in the order of `surfaces`.
+    steps : tuple of Value
+        Values that grow steadily with the time, at whole numbers of which a comparison jumps.
     """
 
     title: str
@@ -227,6 +230,7 @@ class ProgramPlan:
     always: tuple[Comparison, ...]
     rough: tuple[Mapping[str, tuple[Value, ...]], ...]
     gradients: tuple[Gradient, ...]
+    steps: tuple[Value, ...]
 
 
 def plan_of(read: Assembly) -> ProgramPlan:
@@ -262,6 +266,7 @@ def plan_of(read: Assembly) -> ProgramPlan:
     landmarks = [r for bank in read.banks if _reads_curve(bank) for r in _landmarks(bank)]
     always = [relation for u in outer for relation in both_sides(u)] + landmarks
     smoothing = _Smoothing(held, names)
+    relations = _relations(read, held, landmarks)
     charts = " and ".join(dict.fromkeys(bank.chart.name for bank in read.banks))
     return ProgramPlan(
         title=f"{charts}, {read.system.name}",
@@ -285,13 +290,14 @@ def plan_of(read: Assembly) -> ProgramPlan:
         flow={name: smoothing(tree) for name, tree in read.flow.items()},
         held=held,
         surfaces=surfaces,
-        relations=_relations(read, held, landmarks),
+        relations=relations,
         always=tuple(dict.fromkeys(always)),
         rough=rough,
         gradients=tuple(
             replace(gradient_of(u.value if isinstance(u, Pair) else u, read), surface=u)
             for u in (*surfaces.shared, *surfaces.own)
         ),
+        steps=tuple(dict.fromkeys(_steps([*relations.shared, *relations.own], read))),
     )
 
 
@@ -520,6 +526,18 @@ def _relations(
             for bank, size in zip(read.banks, sizes, strict=True)
         ),
     )
+
+
+def _steps(relations: Iterable[Comparison], read: Assembly) -> Iterator[Value]:
+    """Find floor and round of values that grow steadily with the time."""
+    numbers = {*read.shared, *read.own}
+    for side in (side for each in relations for side in (each.left, each.right)):
+        for part in walk(read.expanded(side)):
+            if isinstance(part, Call) and part.function in ("floor", "round", "tooth"):
+                (u,) = part.arguments
+                slope = derivative(u, "t")
+                if "t" in names_in(u) <= numbers | {"t"} and slope and "t" not in names_in(slope):
+                    yield Binary("+", u, Number(0.5)) if part.function == "round" else u
 
 
 # --------------------------------------------------------------------------- what is computed
