@@ -418,12 +418,12 @@ def _parted(found: Iterable[Value], read: Assembly) -> Places[Value]:
 def _can_be_slid_on(u: Value, read: Assembly) -> bool:
     """Tell whether u depends on the state, through quantities that have a derivative."""
     expanded = read.expanded(u)
-    moving = _moving(expanded, read)
+    names = moving(expanded, read)
     signals = read.system.signals
     return (
         not any(isinstance(signals.get(name), Function) for name in names_in(expanded))
-        and bool({*moving} - {"t", *signals})
-        and all(derivative(expanded, name) is not None for name in moving)
+        and bool({*names} - {"t", *signals})
+        and all(derivative(expanded, name) is not None for name in names)
     )
 
 
@@ -476,7 +476,7 @@ def _difference(comparison: Comparison) -> tuple[Value, Value]:
     return comparison.left, comparison.right
 
 
-def _moving(expanded: Value, read: Assembly) -> tuple[str, ...]:
+def moving(expanded: Value, read: Assembly) -> tuple[str, ...]:
     """Return the names in an expanded value that change while the motion flows."""
     system, order = read.system, dict[str, None]()
     for body in system.bodies:
@@ -577,7 +577,7 @@ def _bank(read: Assembly, bank: Bank, smoothing: _Smoothing) -> BankPlan:
 def gradient_of(u: Value, read: Assembly) -> Gradient:
     """Return the rate of a value: its slopes by what moves."""
     expanded, signals = read.expanded(u), read.system.signals
-    slopes = {name: derivative(expanded, name) for name in _moving(expanded, read)}
+    slopes = {name: derivative(expanded, name) for name in moving(expanded, read)}
     known = {name: slope for name, slope in slopes.items() if slope is not None}
     return Gradient(
         surface=u,

@@ -22,7 +22,7 @@ from gms_fsm.lowering.places import total
 from gms_fsm.lowering.printing.lines import CodeLine, Signs, indented, one_line, reads_of
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
 from gms_fsm.lowering.printing.names import computed_names
-from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sides
+from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sides, moving
 from gms_fsm.systems.reading.assembly import Bank, ContactEdge, of
 from integrators import FOR_A_GUARD, FOR_A_SIGN, JUMPED, LIVE, WAITING
 
@@ -392,7 +392,7 @@ class _PythonPrinter(LockFunctions):
         lines = self.before_guards(
             computed_names(side) for each in watched for side in (each.left, each.right)
         )
-        lines += [self.watch(relation) for relation in self.plan.always]
+        lines += [self.watch(relation, self.why(relation.left)) for relation in self.plan.always]
         lines += [self.hold(u) for u in held.shared]
         for bank, rough in zip(self.read.banks, self.plan.rough, strict=True):
             branches = {}
@@ -401,7 +401,7 @@ class _PythonPrinter(LockFunctions):
                 for u in rough[state]:
                     if u in held.own:
                         rows.append(self.hold(u))
-                    rows += [self.watch(relation) for relation in both_sides(u)]
+                    rows += [self.watch(relation, self.why(u)) for relation in both_sides(u)]
                 for edge, _ in self.leaving(bank, state) if not bank.periodic else ():
                     rows.append(CodeLine(f"# {edge.name}: {self.spell(edge.guard)}"))
                     rows += self.witness(split(edge.guard), self.waits(bank, state, edge))
@@ -421,6 +421,16 @@ class _PythonPrinter(LockFunctions):
         sizes = frozenset(f"#{size}" for size in held.sizes(u))
         text = f"held[{held.text(u)}] = sgn({self.spell(u)})"
         return CodeLine(text, sizes | computed_names(u))
+
+    def why(self, u: Value) -> int:
+        """Say why a sign is watched; one of the time alone changes while nothing moves.
+
+        Not the sign of a given motion: there something moves, and errors limit the steps.
+        """
+        motions = {name for body in self.read.system.bodies for name in (body.x, body.v)}
+        alone = {*moving(self.read.expanded(u), self.read)} == {"t"}
+        alone = alone and not self.read.closure(names_in(u)) & motions
+        return FOR_A_SIGN | (WAITING if alone else 0)
 
     def watch(self, relation: Comparison, why: int = FOR_A_SIGN) -> CodeLine:
         relations = self.plan.relations
