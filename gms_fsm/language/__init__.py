@@ -8,8 +8,8 @@ the checked tree alone. Every reader of a tree is an algebra for `fold`.
 
 Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains are split),
 ``and or not``, ``abs exp log sqrt sgn min max sin cos tanh
-atan asinh floor round mod quantise saturate if``. ``==`` compares whole numbers, such as ``round(n)``;
-on floats it is refused.
+atan asinh floor round mod quantise saturate if``. ``==`` compares whole numbers, such as
+``round(n)``; on floats it is refused.
 ``pow(a, b)`` and ``a if c else b``, which generated code contains, are read as ``a**b`` and
 ``if(c, a, b)``.
 

@@ -237,19 +237,14 @@ def _calls(names: str, pattern: str = "{0}") -> dict[str, str]:
 
 
 def _choices(pattern: str, operators: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return choices between two values; ``{op}`` stands for the comparison of ``{0}`` and ``{1}``."""
+    """Return choices between two values; ``{op}`` compares ``{0}`` and ``{1}``."""
     return {
         name: pattern.replace("{op}", (operators or {}).get(op, op)) for name, op in CHOICES.items()
     }
 
 
-# The nearest whole number, the even one of two, where a language rounds halves otherwise.
-_WHOLE, _REST = "floor({0})", "(({0}) - floor({0}))"
-_EVEN = "2.0 * floor(0.5 * floor({0}) + 0.5)"
-
 # --------------------------------------------------------------------------- the table
 _ALL = " ".join(NAMESPACE)
-_IN_C = "({0} {op} {1} ? {2} : {3})"
 
 # Generated code. A small integer power is a product, so that all engines round identically.
 PYTHON = Dialect(
@@ -283,23 +278,22 @@ MATHEMATICS = Dialect(
     _typeset,
     true="⊤",
 )
-# The data model of SCXML. Negation is written as a comparison, which Python's readers of SCXML know
-# as well; they do not know "!".
+# The data model of SCXML. Negation is written as a comparison, and a choice as a sum in which a
+# truth counts as 1: Python's readers of SCXML know these as well; they do not know "!" and "?".
 ECMASCRIPT = Dialect(
     _ARITHMETIC | _logic(" && ", " || ", Form("{0} == false", LEVELS["<"], (ATOM,))),
     _calls(_ALL, "Math.{0}")
-    | _choices(_IN_C)
+    | _choices("(({0} {op} {1}) * ({2}) + (1.0 - ({0} {op} {1})) * ({3}))")
     | {
         "sgn": "Math.sign({0})",
-        "round": f"({_REST} < 0.5 ? {_WHOLE} : {_REST} > 0.5 ? {_WHOLE} + 1.0 : {_EVEN})".replace(
-            "floor", "Math.floor"
-        ),
+        "round": "(Math.floor({0}) + (({0}) - Math.floor({0}) > 0.5) + (({0}) - Math.floor({0})"
+        " == 0.5) * (Math.floor({0}) - 2.0 * Math.floor(0.5 * Math.floor({0}))))",
     },
 )
 # The elementary functions of C are our own, with the same bits everywhere: exports name them.
 C99 = Dialect(
     _compiled(" && ", " || ", "!"),
-    {"abs": "fabs({0})", "sqrt": "sqrt({0})"} | _choices(_IN_C),
+    {"abs": "fabs({0})", "sqrt": "sqrt({0})"} | _choices("({0} {op} {1} ? {2} : {3})"),
     _with_point,
     true="1",
 )
@@ -320,8 +314,8 @@ MODELICA = Dialect(
     _calls("exp log sqrt sin cos tanh atan floor")
     | _choices("(if {0} {op} {1} then {2} else {3})")
     | {
-        "round": f"(if {_REST} < 0.5 then {_WHOLE} elseif {_REST} > 0.5 then {_WHOLE} + 1.0"
-        f" else {_EVEN})",
+        "round": "(if ({0}) - floor({0}) < 0.5 then floor({0}) elseif ({0}) - floor({0}) > 0.5"
+        " then floor({0}) + 1.0 else 2.0 * floor(0.5 * floor({0}) + 0.5))",
         "abs": "(if {0} >= 0.0 then {0} else -({0}))",
         "sgn": "(if {0} > 0.0 then 1.0 elseif {0} < 0.0 then -1.0 else 0.0)",
         "min": "(if {1} < {0} then {1} else {0})",

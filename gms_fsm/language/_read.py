@@ -107,7 +107,9 @@ _ALIASES: Mapping[str, str] = {
 _CALLED = (*FUNCTIONS, *SHORT)
 _GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(_CALLED) + " pi"
 # A call of if: nothing, an operator, a bracket, a comma or a word of conditions stands before it.
-_IF = re.compile(r"(?:(?<![\w.)\]\s])|(?<=\band)|(?<=\bor)|(?<=\bnot)|(?<=\belse))(\s*)\bif(?=\s*\()")
+_IF = re.compile(
+    r"(?:(?<![\w.)\]\s])|(?<=\band)|(?<=\bor)|(?<=\bnot)|(?<=\belse))(\s*)\bif(?=\s*\()"
+)
 
 
 class Owner(NamedTuple):

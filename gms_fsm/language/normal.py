@@ -255,7 +255,9 @@ def frozen(call: Call, sign: Value) -> Value:
         case "abs":
             return Binary("*", sign, a)
         case "min" | "max":
-            return Call("if_le" if call.function == "min" else "if_ge", (sign, zero, *call.arguments))
+            return Call(
+                "if_le" if call.function == "min" else "if_ge", (sign, zero, *call.arguments)
+            )
         case "floor":
             there = Call("if_lt", (sign, zero, _below(a, odd=True), Call("round", (a,))))
             return Call("if_gt", (sign, zero, _below(a), there))

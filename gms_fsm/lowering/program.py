@@ -35,7 +35,7 @@ from typing import Any
 import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError, shown
-from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
+from gms_fsm.language import Binary, Call, Comparison, Requirement, Value, rough_points, spell
 from gms_fsm.lowering.adapting import Adaptive, adaptive
 from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful, quickened
 from gms_fsm.lowering.layout import SystemLayout
@@ -349,10 +349,16 @@ def guarded(name: str, call: Callable[[float], float]) -> Callable[[float], floa
 def _relation_names(plan: ProgramPlan) -> list[str]:
     """Return each relation in words."""
     return [
-        spell(Requirement(relation, True).relation, rename=plan.names.plain)
-        + _of_element(plan, Binary("-", relation.left, relation.right), i)
+        _in_words(relation, plan) + _of_element(plan, Binary("-", relation.left, relation.right), i)
         for relation, i in plan.relations
     ]
+
+
+def _in_words(relation: Comparison, plan: ProgramPlan) -> str:
+    match relation.left:
+        case Call("tooth", inside):
+            return spell(Call("floor", inside), rename=plan.names.plain)
+    return spell(Requirement(relation, True).relation, rename=plan.names.plain)
 
 
 def _surface_names(plan: ProgramPlan) -> list[str]:

@@ -196,9 +196,7 @@ class _Formulas:
         self.reading.breaks.append(a.value - b.value)
         holds = compare(a.value, b.value)
         yes, no = of
-        return Dual(
-            self.z3.If(holds, yes.value, no.value), self.z3.If(holds, yes.slope, no.slope)
-        )
+        return Dual(self.z3.If(holds, yes.value, no.value), self.z3.If(holds, yes.slope, no.slope))
 
     def relation(self, node: Relation, parts: Iterator[Dual]) -> Any:
         _refuse_high_degree(node.left)

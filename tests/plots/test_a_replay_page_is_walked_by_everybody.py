@@ -317,8 +317,9 @@ TEXTS = [
     *(f"{name}({'v, z1' if name in SEVERAL else 'v'}) > 0.1" for name in FUNCTIONS),
     *(f"{name} * v > 0.1" for name in CONSTANTS),
     "mod(t, 2) < 1", "quantise(F, 2) > 2", "saturate(v, 0, 0.1) > 0.05", "if(v > 0, F, 1 / 0) > 1",
-    "if(not v > 0 and F < 1, 1, 2) == 2", "floor(t) == 3 or round(t) != 4", "t == 3", "if(v, 1, 2) > 1",
-    "mod(t) > 1", "round(t) == 1.5", "floor(t) < 3 == 1", "min(v) > 1", "if(v > 0, 1) > 0",
+    "if(not v > 0 and F < 1, 1, 2) == 2", "floor(t) == 3 or round(t) != 4", "t == 3",
+    "if(v, 1, 2) > 1", "mod(t) > 1", "round(t) == 1.5", "floor(t) < 3 == 1", "min(v) > 1",
+    "if(v > 0, 1) > 0",
 ]  # fmt: skip
 
 

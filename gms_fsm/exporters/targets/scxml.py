@@ -232,6 +232,7 @@ What it does not express
 - Flows, forces, units and rules are texts in the namespace {OURS}: other tools keep or
   ignore them. `gms_fsm.Chart.from_scxml("{files[0]}")` reads the whole chart from it.
 - Several transitions in a row at one time need several events "step".
+- A choice, if(c, a, b), is written as a sum: both a and b must be finite.
 - Locked contacts, impulses, forces and accelerations in guards cannot be written.{warning}
 """
 
