@@ -245,7 +245,7 @@ JUMPING = Chart(
                 "n": "0",
             },
         ),
-        State("off", {"z": "0.2 * floor(2 * v) - z", "n": "0"}),
+        State("off", {"z": "0.2 * floor(2 * v) - z + 0.1 * noise(t / 0.3, 7)", "n": "0"}),
     ),
     transitions=(
         Transition("rest", "on", "off", "floor(2 * z) > n", actions={"n": "mod(n + 1, 3)"}),

@@ -8,7 +8,7 @@ the checked tree alone. Every reader of a tree is an algebra for `fold`.
 
 Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains are split),
 ``and or not``, ``abs exp log sqrt sgn min max sin cos tanh
-atan asinh floor round mod quantise saturate if``. ``==`` compares whole numbers, such as
+atan asinh floor round mod quantise saturate if noise``. ``==`` compares whole numbers, such as
 ``round(n)``; on floats it is refused.
 ``pow(a, b)`` and ``a if c else b``, which generated code contains, are read as ``a**b`` and
 ``if(c, a, b)``.
@@ -40,6 +40,7 @@ from gms_fsm.language._print import spell
 from gms_fsm.language._read import Owner, parse_condition, parse_value
 from gms_fsm.language._vectors import truths, values_of
 from gms_fsm.language.functions import (
+    ARGUMENTS,
     CHOICES,
     COMPARISONS,
     CONSTANTS,
@@ -84,6 +85,7 @@ from gms_fsm.language.tree import (
 )
 
 __all__ = [
+    "ARGUMENTS",
     "C99",
     "CHOICES",
     "COMPARISONS",

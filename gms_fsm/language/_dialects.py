@@ -245,6 +245,7 @@ def _choices(pattern: str, operators: Mapping[str, str] | None = None) -> dict[s
 
 # --------------------------------------------------------------------------- the table
 _ALL = " ".join(NAMESPACE)
+_MATH = " ".join(name for name in NAMESPACE if name not in ("noise", "tooth"))
 
 # Generated code. A small integer power is a product, so that all engines round identically.
 PYTHON = Dialect(
@@ -282,7 +283,7 @@ MATHEMATICS = Dialect(
 # truth counts as 1: Python's readers of SCXML know these as well; they do not know "!" and "?".
 ECMASCRIPT = Dialect(
     _ARITHMETIC | _logic(" && ", " || ", Form("{0} == false", LEVELS["<"], (ATOM,))),
-    _calls(_ALL, "Math.{0}")
+    _calls(_MATH, "Math.{0}")
     | _choices("(({0} {op} {1}) * ({2}) + (1.0 - ({0} {op} {1})) * ({3}))")
     | {
         "sgn": "Math.sign({0})",

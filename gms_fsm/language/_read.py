@@ -425,6 +425,8 @@ class _Reader:
     def short(self, node: ast.expr, function: str, given: list[ast.expr], depth: int) -> Value:
         """Read a function that stands for others."""
         a, b, *more = (self.value(each, depth + 2) for each in given)
+        if function == "noise":
+            return Call("noise", tuple(u if _whole(u) else Call("floor", (u,)) for u in (a, b)))
         if function == "saturate":
             return Call("min", (Call("max", (a, b)), *more))
         whole = Call("floor" if function == "mod" else "round", (Binary("/", a, b),))

@@ -58,9 +58,10 @@ NAMESPACE: Mapping[str, Callable[..., float]] = {
     **FUNCTIONS,
     "pow": elementary.power,
     "tooth": elementary.tooth,
+    "noise": elementary.noise,
 }
-# Functions that are read as others, with the number of their arguments.
-SHORT = {"mod": 2, "quantise": 2, "saturate": 3, "if": 3}
+# Functions that are read as others, or as one of whole numbers, with the number of their arguments.
+SHORT = {"mod": 2, "quantise": 2, "saturate": 3, "if": 3, "noise": 2}
 # ``if(a > b, c, d)`` is the call ``if_gt(a, b, c, d)``.
 CHOICES: Mapping[str, str] = {"if_lt": "<", "if_le": "<=", "if_gt": ">", "if_ge": ">="}
 # Words that are younger than files which use them as names: a declared name wins.
@@ -73,3 +74,4 @@ ROUGH = ("sgn", "abs", "min", "max", "floor", "round", *CHOICES)
 ELEMENTARY: Mapping[str, Callable[..., float]] = {
     name: each for name, each in NAMESPACE.items() if each.__module__ == elementary.__name__
 }
+ARGUMENTS: Mapping[str, int] = {name: 2 if name in ("pow", "noise") else 1 for name in ELEMENTARY}

@@ -21,7 +21,7 @@ import numpy as np
 
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.parser import PARSER
-from gms_fsm.language import ELEMENTARY, NAMESPACE
+from gms_fsm.language import ARGUMENTS, ELEMENTARY, NAMESPACE
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 from integrators import elementary
 from integrators.runners import quick
@@ -63,7 +63,7 @@ def quickened(namespace: dict[str, Any]) -> dict[str, Any]:
         return call
 
     for name in ELEMENTARY:
-        namespace[name] = counted(name, NAMESPACE[name], 2 if name == "pow" else 1)
+        namespace[name] = counted(name, NAMESPACE[name], ARGUMENTS[name])
     return namespace
 
 

@@ -27,7 +27,7 @@ from gms_fsm.language import (
 from gms_fsm.language.functions import ROUGH
 
 # Functions that round the same everywhere.
-EXACT = (*ROUGH, "sqrt", "tooth")
+EXACT = (*ROUGH, "sqrt", "tooth", "noise")
 Stored = dict[str, Value]  # by name, such as "#0"
 
 

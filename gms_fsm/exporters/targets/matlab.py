@@ -90,6 +90,27 @@ m = mod(u, 2);
 d = min(m, max(1 - m, m - 2));
 end
 """,
+    "noise": """\
+function value = @_noise(n, seed)
+% The n-th of a series of numbers that look like chance, on 32 bits.
+x = mod(floor(n), 2^32);
+key = mod(@_times(mod(floor(seed), 2^32), 2654435769) + 1640531527, 2^32);
+for part = 1:4
+    x = mod(x + key, 2^32);
+    x = @_times(x, mod(2 * x + 1, 2^32));
+    high = floor(x / 65536);
+    x = 65536 * (x - 65536 * high) + high;
+    key = mod(key + 2654435769, 2^32);
+end
+value = x / 2^31 - 1;
+end
+""",
+    "times": """\
+function value = @_times(a, b)
+high = floor(a / 65536);
+value = mod(65536 * mod(high * b, 65536) + (a - 65536 * high) * b, 2^32);
+end
+""",
     "choose": """\
 function value = @_choose(yes, a, b)
 if yes
@@ -100,7 +121,7 @@ end
 end
 """,
 }
-CALLED = {name: f"@_{name}({{0}})" for name in ("floor", "round", "tooth")} | {
+CALLED = {name: f"@_{name}({{all}})" for name in ("floor", "round", "tooth", "noise")} | {
     name: f"@_choose({{0}} {op} {{1}}, {{2}}, {{3}})" for name, op in CHOICES.items()
 }
 
@@ -207,7 +228,8 @@ class FunctionFile:
             self.begin(),
         ]
         text = "\n".join(parts)
-        text += "".join(f"\n{each}" for name, each in DEFINED.items() if f"@_{name}(" in text)
+        for name, each in DEFINED.items():  # earlier ones call later ones
+            text += f"\n{each}" if f"@_{name}(" in text else ""
         suffix = max(re.findall(r"@(_\w+)", text), key=len)
         if len(self.name + suffix) > LONGEST:
             raise ParameterError(

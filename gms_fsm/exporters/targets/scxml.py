@@ -14,10 +14,18 @@ from xml.etree import ElementTree as ET
 
 from gms_fsm._version import __version__
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
+from gms_fsm.charts.files.scxml import (
+    OURS,
+    SCXML,
+    STEP,
+    VALUES,
+    assignments,
+    conditions,
+    written_out,
+)
 from gms_fsm.charts.reader import AGE
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._names import identifier
+from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.alone import (
     check_moved_from_outside,
@@ -26,6 +34,7 @@ from gms_fsm.exporters.alone import (
     one_line,
 )
 from gms_fsm.formats import Format, register
+from gms_fsm.language import ECMASCRIPT, names_in
 from gms_fsm.systems.system import LEAST_LOAD, Contact, loaded
 
 __all__: list[str] = []
@@ -48,6 +57,11 @@ def _write(subject: Subject) -> dict[str, str]:
     for each in _names(chart):
         identifier(each, WORDS, f"chart {chart.name!r}, name {each!r}")
     _check_characters(chart)
+    assigned = [tree for each in chart.assignments.values() for tree in each.values()]
+    read = {name for tree in (*assigned, *chart.guards.values()) for name in names_in(tree)}
+    lets = [tree for name, tree in written_out(chart.lets).items() if name in read]
+    trees = (*chart.guards.values(), *assigned, *lets)
+    check_functions(trees, ECMASCRIPT, f"chart {chart.name!r}", "ECMAScript")
     contact = subject.numbers
     numbers = [{}] if contact is None else element_numbers(contact)
     files = {

@@ -16,7 +16,7 @@ function product(u, whole) {
 }
 const divided = (a, b) => { if (b === 0) throw UNDEFINED; return a / b; };
 
-const { exp, log, sin, cos, tanh, atan, asinh, pow, floor, round, tooth } = ELEMENTARY; // the bits of Python, in every browser
+const { exp, log, sin, cos, tanh, atan, asinh, pow, floor, round, tooth, noise } = ELEMENTARY; // the bits of Python, in every browser
 const FUNCTIONS = {
   "+": (a, b) => a + b, "*": (a, b) => a * b, "/": divided,
   "-": (a, b) => (b === undefined ? -a : a - b),
@@ -25,7 +25,7 @@ const FUNCTIONS = {
   abs: Math.abs, sgn: (u) => (u > 0 ? 1 : u < 0 ? -1 : 0),
   sqrt: (u) => { if (u < 0) throw UNDEFINED; return Math.sqrt(u); },
   exp: (u) => finite(exp(u), u), log: (u) => { if (u <= 0) throw UNDEFINED; return log(u); },
-  sin: (u) => finite(sin(u)), cos: (u) => finite(cos(u)), tanh, atan, asinh, floor, round, tooth,
+  sin: (u) => finite(sin(u)), cos: (u) => finite(cos(u)), tanh, atan, asinh, floor, round, tooth, noise,
   min: (...all) => all.reduce((a, b) => (b < a ? b : a)), max: (...all) => all.reduce((a, b) => (b > a ? b : a)),
   product,
 };

@@ -77,6 +77,7 @@ function parse(text, { levels, negation, sign, functions, constants, units }, na
     const [a, b, c] = parts;
     if (name === "mod") return { at, tree: ["-", a, ["*", b, ["floor", ["/", a, b]]]] };
     if (name === "quantise") return { at, tree: ["*", b, ["round", ["/", a, b]]] };
+    if (name === "noise") return { at, tree: ["noise", ["floor", a], ["floor", b]] };
     if (name === "saturate") return { at, tree: ["min", ["max", a, b], c] };
     return { at, tree: [name, ...parts] };
   }
