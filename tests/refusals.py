@@ -1683,6 +1683,12 @@ class Equal(Element):
     hits: int = 0
 
 
+TWO_LETS = System(
+    "lets",
+    bodies=(Body("mass", inertia="m"),),
+    contacts=(Contact("pad", stick_slip("signed")),),
+    numbers={"m": 1.0},
+)
 KICKED = Chart("kick", states=(State("on", entry={"v": "1"}, outputs={"F": "0"}),))
 rows = {
     "text for a model": ("model", "GMS", lambda: simulate("GMS", Prescribed("0"), 1.0)),
@@ -1690,6 +1696,16 @@ rows = {
     "class for a rig": ("rig", Slider, lambda: simulate(GIVEN, Slider, 1.0)),
     "class for a model of a contact": ("contact 'pad': chart", GMS, lambda: Contact("pad", GMS)),
     "end under another name": ("", ..., lambda: simulate(GIVEN, Prescribed("0"), tend=1.0)),  # type: ignore[call-arg]
+    "let that reads a later one": (
+        "let 'a', column 1",
+        ...,
+        lambda: dataclasses.replace(TWO_LETS, let={"a": "b", "b": "1"}),
+    ),
+    "let of a name that is taken": (
+        "let",
+        ...,
+        lambda: dataclasses.replace(TWO_LETS, let={"m": "1"}),
+    ),
     "too many jumps": (
         "floor(t / 1e-07)",
         ...,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.errors import SignalError
-from gms_fsm.language import Owner, evaluate
+from gms_fsm.language import Name, Owner, evaluate, names_in, values_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program
@@ -150,6 +150,10 @@ class SystemScope:
             return self.system.numbers[name]
         if name in self.given:
             return self.given[name]
+        if name in self.system.let:
+            tree = self.system.assembly.expanded(Name(name))
+            found = values_of(tree, {each: self.value(each) for each in ("t", *names_in(tree))})
+            return found if found.ndim else float(found)
         return self.y[self.layout.y.index(name)]
 
     def watches(self) -> dict[str, Any]:

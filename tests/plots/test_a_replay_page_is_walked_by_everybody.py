@@ -13,7 +13,15 @@ import numpy as np
 import pytest
 
 from gms_fsm.errors import ExpressionError
-from gms_fsm.language import ARGUMENTS, CONSTANTS, ELEMENTARY, FUNCTIONS, SEVERAL, evaluate, parse_condition
+from gms_fsm.language import (
+    ARGUMENTS,
+    CONSTANTS,
+    ELEMENTARY,
+    FUNCTIONS,
+    SEVERAL,
+    evaluate,
+    parse_condition,
+)
 from gms_fsm.session.session import Session
 from plots.page.replay import replay
 from tests.plots.browser import (

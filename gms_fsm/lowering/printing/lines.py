@@ -302,7 +302,7 @@ class ProgramWriter(ABC):
         needed = self.closure(reads | reads_of(followed or ())) - self.late
         values: list[CodeLine] = []
         for name in self.read.defined:
-            if followed and "." in name:  # the first one of a contact
+            if followed and ("." in name or name in self.read.system.let):  # may read a velocity
                 values, followed = values + followed, None
             if name in needed and name not in self.read.owner:
                 values += self.defined(name, signs)

@@ -292,6 +292,12 @@ class SystemReader:
             elif not (body.velocity == body.v and body.v in system.signals):
                 tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
                 self.definitions.append(Definition(body.v, tree))
+        lets = dict.fromkeys(system.let)
+        for name, text in system.let.items():
+            known = [each for each in system.names if each not in lets]
+            tree = self.value(text, known, self.here.of(f"let {name!r}", "let", name))
+            self.definitions.append(Definition(name, tree))
+            del lets[name]
         for name, sign, term in spring_forces(system):
             if name in forces:
                 forces[name] = added(forces[name], sign, term)
