@@ -40,6 +40,7 @@ from gms_fsm.language.tree import (
     Number,
     Relation,
     Value,
+    is_whole,
     walk,
 )
 
@@ -426,7 +427,7 @@ class _Reader:
         """Read a function that stands for others."""
         a, b, *more = (self.value(each, depth + 2) for each in given)
         if function == "noise":
-            return Call("noise", tuple(u if _whole(u) else Call("floor", (u,)) for u in (a, b)))
+            return Call("noise", tuple(u if is_whole(u) else Call("floor", (u,)) for u in (a, b)))
         if function == "saturate":
             return Call("min", (Call("max", (a, b)), *more))
         whole = Call("floor" if function == "mod" else "round", (Binary("/", a, b),))
@@ -507,7 +508,7 @@ class _Reader:
                     a, b = self.value(sides[i], depth), self.value(sides[i + 1], depth)
                     if type(op) in _COMPARISONS:
                         parts.append(Relation(_COMPARISONS[type(op)], a, b))
-                    elif isinstance(op, ast.Eq | ast.NotEq) and _whole(a) and _whole(b):
+                    elif isinstance(op, ast.Eq | ast.NotEq) and is_whole(a) and is_whole(b):
                         equal = Both((Relation("<=", a, b), Relation(">=", a, b)))
                         parts.append(equal if isinstance(op, ast.Eq) else Not(equal))
                     else:
@@ -561,20 +562,6 @@ class _Reader:
             raise self.refuse("states are compared by == or !=", name, self.compared())
         found = InState(element, name.id)
         return found if isinstance(op, ast.Eq) else Not(found)
-
-
-def _whole(value: Value) -> bool:
-    """Tell whether a value is a whole number, whatever its names stand for."""
-    match value:
-        case Number(number):
-            return number.is_integer()
-        case Call("floor" | "round" | "sgn"):
-            return True
-        case Call(function, arguments) if function in CHOICES:
-            return all(map(_whole, arguments[2:]))
-        case Negative() | Binary("+" | "-" | "*") | Call("abs" | "min" | "max"):
-            return all(map(_whole, value.parts))
-    return False
 
 
 def _plain(node: ast.expr) -> str:

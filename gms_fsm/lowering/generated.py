@@ -11,6 +11,7 @@ import builtins
 import functools
 import hashlib
 import inspect
+import itertools
 import linecache
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -24,6 +25,7 @@ from gms_fsm.foundation.parser import PARSER
 from gms_fsm.language import ARGUMENTS, ELEMENTARY, NAMESPACE
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 from integrators import elementary
+from integrators.machine_code import whole_numbers
 from integrators.runners import quick
 
 # What generated text calls besides the functions of the expression language.
@@ -142,7 +144,8 @@ def elementary_text(names: Iterable[str]) -> str:
 def _elementary_parts() -> list[tuple[list[str], list[str], str]]:
     """Return the names that each part of the module defines, those that it uses, and its text."""
     parts = []
-    for part in _tree(inspect.getsource(elementary)).body:
+    sources = (_tree(inspect.getsource(each)).body for each in (elementary, whole_numbers))
+    for part in itertools.chain(*sources):
         match part:
             case ast.FunctionDef(name=name):
                 given, space = [name], "\n\n"
