@@ -273,9 +273,12 @@ MATHEMATICS = Dialect(
         ">=": _between("≥"),
         "**": Form(_written_raised, LEVELS["**"]),
     },
-    MATLAB_LIKE.functions
-    | _choices("if({0} {op} {1}, {2}, {3})", {"<=": "≤", ">=": "≥"})
-    | {"sqrt": "√({0})", "floor": "⌊{0}⌋"},
+    {
+        **MATLAB_LIKE.functions,
+        **_choices("if({0} {op} {1}, {2}, {3})", {"<=": "≤", ">=": "≥"}),
+        "sqrt": "√({0})",
+        "floor": "⌊{0}⌋",
+    },
     _typeset,
     true="⊤",
 )

@@ -95,7 +95,7 @@ def step_times(
                     place=f"floor({spell(u, MATLAB_LIKE)})",
                     advice=f"at most {MOST_STEPS} jumps; a shorter run, or a longer period",
                 )
-            times = (np.arange(first, last) - start) / rate
+            times = (np.arange(first, last, dtype=np.float64) - start) / rate
             found.update(as_floats(times[(times > t_start) & (times < t_end)]))
     return found
 

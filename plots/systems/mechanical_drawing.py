@@ -318,7 +318,7 @@ def _sources(system: System) -> list[str]:
     flows = {name: text for name, text in system.flow.items() if name in used}
     for text in flows.values():
         used |= names_in(parse_value(text, system.names))
-    for name, text in reversed(system.let.items()):  # earlier ones are used by later ones
+    for name, text in reversed([*system.let.items()]):  # earlier ones are used by later ones
         used |= names_in(parse_value(text, system.names)) if name in used else set()
     for name, signal in system.signals.items():
         if name in used:
