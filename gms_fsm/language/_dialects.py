@@ -257,8 +257,10 @@ PYTHON = Dialect(
 MATLAB_LIKE = Dialect(
     _ARITHMETIC
     | _logic(" && ", " || ", Form("!{0}", LEVELS["not"], (ATOM,)))
-    | {"**": Form("{0}^{1}", LEVELS["**"], (ATOM, ATOM))},
-    _calls(_ALL) | _choices("if({0} {op} {1}, {2}, {3})") | {"abs": "|{0}|", "after": "after({0})"},
+    | {"**": Form("{0}^{1}", LEVELS["**"], (ATOM, ATOM)), "==": _between("==")},
+    _calls(f"{_ALL} mod quantise")
+    | _choices("if({0} {op} {1}, {2}, {3})")
+    | {"abs": "|{0}|", "after": "after({0})"},
     _short,
 )
 # Formulas of Unicode, for charts.
@@ -271,6 +273,7 @@ MATHEMATICS = Dialect(
         "*": _infix("·", LEVELS["*"]),
         "<=": _between("≤"),
         ">=": _between("≥"),
+        "==": _between("="),
         "**": Form(_written_raised, LEVELS["**"]),
     },
     {

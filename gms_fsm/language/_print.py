@@ -46,6 +46,19 @@ def spell(node: Node, dialect: Dialect = PYTHON, rename: Mapping[str, str] | Non
     return fold(node, _Printer(dialect, rename or {})).text
 
 
+def _short(node: Binary) -> Call | None:
+    """Return the call that was read as this, see `gms_fsm.language.functions.SHORT`."""
+    match node:
+        case Binary("-", a, Binary("*", b, Call("floor", (Binary("/", c, d),)))) if (a, b) == (
+            c,
+            d,
+        ):
+            return Call("mod", (a, b))
+        case Binary("*", q, Call("round", (Binary("/", u, p),))) if p == q:
+            return Call("quantise", (u, q))
+    return None
+
+
 class _Printer:
     """The algebra of printed text."""
 
@@ -77,6 +90,9 @@ class _Printer:
         return self.operator("neg", *parts)
 
     def binary(self, node: Binary, parts: Iterator[Printed]) -> Printed:
+        short = _short(node)
+        if short is not None and short.function in self.dialect.functions:
+            return self.function(short.function, (fold(each, self) for each in short.arguments))
         return self.operator(node.op, *parts)
 
     def power(self, node: Binary, parts: Iterator[Printed]) -> Printed:
@@ -113,6 +129,12 @@ class _Printer:
         return self.operator("not", *parts)
 
     def both(self, node: Both, parts: Iterator[Printed]) -> Printed:
+        match node.operands:
+            case (Relation("<=", a, b), Relation(">=", c, d)) if (a, b) == (
+                c,
+                d,
+            ) and "==" in self.dialect.operators:
+                return self.operator("==", fold(a, self), fold(b, self))
         return self.joined("and", parts) if node.operands else self.printed(self.dialect.true)
 
     def either(self, _: Either, parts: Iterator[Printed]) -> Printed:

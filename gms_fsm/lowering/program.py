@@ -355,16 +355,22 @@ def _relation_names(plan: ProgramPlan) -> list[str]:
 
 
 def _in_words(relation: Comparison, plan: ProgramPlan) -> str:
-    match relation.left:
-        case Call("tooth", inside):
-            return spell(Call("floor", inside), rename=plan.names.plain)
+    if isinstance(relation.left, Call) and relation.left.function == "tooth":
+        return f"{_zero_in_words(relation.left, plan)} = 0"
     return spell(Requirement(relation, True).relation, rename=plan.names.plain)
+
+
+def _zero_in_words(u: Value, plan: ProgramPlan) -> str:
+    match u:
+        case Call("tooth", (inside,)):  # not a word of the language
+            return f"mod({spell(inside, rename=plan.names.plain)}, 1)"
+    return spell(u, rename=plan.names.plain)
 
 
 def _surface_names(plan: ProgramPlan) -> list[str]:
     """Return the value that is zero on each surface, in words."""
     return [
-        spell(u, rename=plan.names.plain) + _of_element(plan, u, i)
+        _zero_in_words(u, plan) + _of_element(plan, u, i)
         if not isinstance(u, Pair)
         else f"{spell(u.value, rename=plan.names.plain)} ({u.lower}, {u.upper})"
         + _of_contact(plan, u.bank, i)

@@ -65,6 +65,15 @@ def test_a_body_stops_where_a_choice_of_the_velocity_holds_it() -> None:
     assert trace.x[-1] == pytest.approx(1.0, rel=1e-12)
 
 
+def test_a_body_is_held_where_a_rounded_force_jumps() -> None:
+    """F is 0 below v = 1/2 and 1 above: pushed by 3/4, v reaches 1/2 and stays there."""
+    chart = Chart("steps", inputs=("v",), states=(State("on"),), outputs={"F": "round(v)"})
+    trace = simulate(ChartModel(chart, {}), Slider(1.0, "0.75"), 2.0, engine=FASTEST)
+    assert trace.v[-1] == pytest.approx(0.5, rel=1e-12)
+    assert trace.x[-1] == pytest.approx(0.75 / 2 * (2 / 3) ** 2 + 0.5 * (2 - 2 / 3), rel=1e-9)
+    assert [str(each.surface) for each in trace.sliding] == ["mod(v + 0.5, 1)"]
+
+
 def test_a_motion_over_the_steps_of_a_force_keeps_its_energy() -> None:
     """A mass of 1 kg in a potential of straight pieces."""
     stairs = Chart(
