@@ -259,8 +259,7 @@ MATLAB_LIKE = Dialect(
     | _logic(" && ", " || ", Form("!{0}", LEVELS["not"], (ATOM,)))
     | {"**": Form("{0}^{1}", LEVELS["**"], (ATOM, ATOM)), "==": _between("==")},
     _calls(f"{_ALL} mod quantise")
-    | _choices("if({0} {op} {1}, {2}, {3})")
-    | {"abs": "|{0}|", "after": "after({0})"},
+    | {"abs": "|{0}|", "after": "after({0})", "if": "if({0}, {1}, {2})"},
     _short,
 )
 # Formulas of Unicode, for charts.
@@ -278,7 +277,6 @@ MATHEMATICS = Dialect(
     },
     {
         **MATLAB_LIKE.functions,
-        **_choices("if({0} {op} {1}, {2}, {3})", {"<=": "≤", ">=": "≥"}),
         "sqrt": "√({0})",
         "floor": "⌊{0}⌋",
     },

@@ -7,7 +7,20 @@ from collections.abc import Iterator, Mapping
 from gms_fsm.language._dialects import ATOM, LEVELS, PYTHON, Dialect, Printed
 from gms_fsm.language._fold import fold
 from gms_fsm.language._powers import product_power
-from gms_fsm.language.tree import Binary, Both, Call, Either, Name, Negative, Node, Not, Relation
+from gms_fsm.language.functions import CHOICES
+from gms_fsm.language.tree import (
+    Binary,
+    Both,
+    Call,
+    Condition,
+    Either,
+    Name,
+    Negative,
+    Node,
+    Not,
+    Relation,
+    Value,
+)
 
 
 def spell(node: Node, dialect: Dialect = PYTHON, rename: Mapping[str, str] | None = None) -> str:
@@ -57,6 +70,27 @@ def _short(node: Binary) -> Call | None:
         case Binary("*", q, Call("round", (Binary("/", u, p),))) if p == q:
             return Call("quantise", (u, q))
     return None
+
+
+def _chosen(node: Call) -> tuple[Condition, Value, Value]:
+    """Return the condition of a choice that was read one comparison at a time, and both values."""
+
+    def relation(node: Call) -> Relation:
+        return Relation(CHOICES[node.function], *node.arguments[:2])
+
+    *_, yes, no = node.arguments
+    both, either = [relation(node)], [relation(node)]
+    while isinstance(yes, Call) and yes.function in CHOICES and yes.arguments[3] == no:
+        both.append(relation(yes))
+        yes = yes.arguments[2]
+    while len(both) == 1 and isinstance(no, Call) and no.function in CHOICES:
+        if no.arguments[2] != yes:
+            break
+        either.append(relation(no))
+        no = no.arguments[3]
+    if len(either) > 1:
+        return Either(tuple(either)), yes, no
+    return Both(tuple(both)) if len(both) > 1 else both[0], yes, no
 
 
 class _Printer:
@@ -113,6 +147,8 @@ class _Printer:
         return self.printed(product, LEVELS["*"])
 
     def call(self, node: Call, parts: Iterator[Printed]) -> Printed:
+        if node.function in CHOICES and "if" in self.dialect.functions:
+            return self.function("if", (fold(each, self) for each in _chosen(node)))
         return self.function(node.function, parts)
 
     def relation(self, node: Relation, parts: Iterator[Printed]) -> Printed:

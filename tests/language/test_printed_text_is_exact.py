@@ -200,5 +200,8 @@ def test_short_forms_are_shown_as_they_were_given() -> None:
     tree = parse_condition(asked, ["t", "v", "n"])
     assert spell(tree, MATLAB_LIKE) == text
     assert spell(tree, MATHEMATICS).startswith("mod(t + 1, 2) > if(v ≥ 0, 0.5, 0.8)")
+    for text in ("if(v < 0 && t >= 1, 1, 2)", "if(v < 0 || t >= 1 || n > 2, if(t < 1, 1, v), 2)"):
+        asked = text.replace("&&", "and").replace("||", "or")
+        assert spell(parse_value(asked, ["t", "v", "n"]), MATLAB_LIKE) == text
     other = parse_value("t - 2 * floor(t / 3)", ["t"])
     assert spell(other, MATLAB_LIKE) == "t - 2 * floor(t / 3)"
