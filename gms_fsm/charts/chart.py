@@ -65,7 +65,8 @@ class Chart:
     transitions : sequence of Transition
         Among the edges that leave one state, earlier ones have priority. Guards may read ``F``, the
         force of the contact, ``a``, its acceleration, ``age``, the time in the present state [s],
-        and ``after(T)``, short for ``age >= T``.
+        and ``after(T)``, short for ``age >= T``; on an edge from a state to itself ``every(T)`` may
+        be written, which means the same: the age begins anew each time.
     outputs : mapping of str to str
         ``F``, the element's force [N], in all states that give none of their own; may use
         ``d<variable>`` for a derivative.

@@ -525,9 +525,9 @@ class _Reader:
                 return Not(self.condition(operand, depth))
             case ast.Constant(value=True):
                 return Both(())
-            case ast.Call(func=ast.Name(id="after"), args=[time], keywords=[]) if (
-                "age" in self.names
-            ):
+            case ast.Call(
+                func=ast.Name(id="after" | "every" as word), args=[time], keywords=[]
+            ) if "age" in self.names and word not in self.names:
                 return Relation(">=", Name("age"), self.value(time, depth))
             case ast.Name(id="state") | ast.Call(func=ast.Name(id="state")) if self.own.states:
                 raise self.refuse("a state is compared with a name", node, self.compared())
