@@ -1683,12 +1683,6 @@ class Equal(Element):
     hits: int = 0
 
 
-TWO_LETS = System(
-    "lets",
-    bodies=(Body("mass", inertia="m"),),
-    contacts=(Contact("pad", stick_slip("signed")),),
-    numbers={"m": 1.0},
-)
 KICKED = Chart("kick", states=(State("on", entry={"v": "1"}, outputs={"F": "0"}),))
 rows = {
     "text for a model": ("model", "GMS", lambda: simulate("GMS", Prescribed("0"), 1.0)),
@@ -1696,16 +1690,6 @@ rows = {
     "class for a rig": ("rig", Slider, lambda: simulate(GIVEN, Slider, 1.0)),
     "class for a model of a contact": ("contact 'pad': chart", GMS, lambda: Contact("pad", GMS)),
     "end under another name": ("", ..., lambda: simulate(GIVEN, Prescribed("0"), tend=1.0)),  # type: ignore[call-arg]
-    "let that reads a later one": (
-        "let 'a', column 1",
-        ...,
-        lambda: dataclasses.replace(TWO_LETS, let={"a": "b", "b": "1"}),
-    ),
-    "let of a name that is taken": (
-        "let",
-        ...,
-        lambda: dataclasses.replace(TWO_LETS, let={"m": "1"}),
-    ),
     "too many jumps": (
         "floor(t / 1e-07)",
         ...,
@@ -2597,6 +2581,7 @@ rows = {
     "locks that repeat": ("system 'one'", ..., {"contacts": TWICE}),
     "load without a curve": ("system 'one', contact 'p'", ..., {"contacts": (DAHL,)}),
     "period": ("system 'one'", ..., {"sampled": pid(u="period"), "numbers": {"period": 2.0}}),
+    "let of a name that is taken": ("", ..., {"let": {"t": "1"}}),
     "driven body alone": ("contact 'pad'", ..., {"body": {"inertia": None, "velocity": "1"}}),
     "samplers without number": (
         "",
@@ -2623,6 +2608,7 @@ group("signal", SignalError, Prescribed, rows)
 rows = {
     "force of a contact": ("body 'mass', force, column 1", ..., {"body": {"force": "F"}}),
     "force in an update": ("sampled 'pid', 'u', column 5", ..., {"sampled": pid(u="2 * F")}),
+    "let that reads a later one": ("let 'a', column 1", ..., {"let": {"a": "b", "b": "1"}}),
 }
 group("system", ExpressionError, lambda given: made(**given), rows)
 rows = {
