@@ -10,7 +10,8 @@
 #   make bench   speed and error compared with C, numba, SciPy, CVODE and PathSim
 #   make regressions  speed compared with an older commit, in interleaved rounds; OLD=main
 #   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
-#                reference, 500 systems in all engines; SOAK_MINUTES=10 for each fuzzer
+#                reference, 500 systems in all engines, verdicts about 400; SOAK_MINUTES=10 for each
+#                fuzzer
 #   make foreign the widget, driven in JupyterLab and marimo by their own user interfaces, in Chromium,
 #                whole runs of friction in other simulators, the exports in the tools they are for, and
 #                the tests marked matrix: further sizes, themes and charts

@@ -25,7 +25,10 @@ def main() -> None:
     ]
     text = "\n".join(lines) + "\n"
     write_whole(TABLE, lambda file: file.write(text.encode()))
-    figures.save(figures.phenomena_matrix(table), HERE / "images" / "phenomena_matrix.png")
+    figures.save(
+        figures.phenomena_matrix(table, title="Which model shows what"),
+        HERE / "images" / "phenomena_matrix.png",
+    )
     for name in SHOWN:
         figure = figures.phenomenon_figure(table, name)
         if figure is not None:

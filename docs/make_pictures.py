@@ -40,7 +40,7 @@ from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.foundation.files import write_whole
 from plots import figures, panels
-from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY, ramp
+from plots.style import INK, LINE_GREY, RC, TEXT_GREY, ramp
 from plots.systems.mechanism import schematic_figure
 
 FOLDER = Path(__file__).parent / "images"
@@ -116,12 +116,16 @@ def draw_figures(signed: Trace) -> None:
     landscape = plots.landscape(pulled, 1, t=0.4, title="Pulled mass")
     figures.save(landscape, FOLDER / "figure_landscape.png")
     figures.save(plots.unfold(signed, 32.6, 32.7), FOLDER / "figure_unfold.png")
-    phase = plots.phase(pulled, window=(0.22, 0.345), title="Pulled mass")
+    # From stick to slip: all four elements break away.
+    second = pulled.transitions.t[9]
+    row = int(np.flatnonzero(pulled.t == second)[-1])
+    phase = plots.phase(pulled, window=(0.262, 0.304), row=row, title="Pulled mass")
     figures.save(phase, FOLDER / "figure_phase.png")
     with rc_context(RC):
         figure = Figure(figsize=(5.4, 3.6), layout="constrained")
         ax = figure.subplots()
-        panels.stribeck(ax, run("stribeck_sweep"))
+        panels.stribeck(ax, run("stribeck_sweep"), log=True)
+        ax.set_title("Stribeck curve, and friction in a slow sweep of the velocity")
         ax.legend()
     figures.save(figure, FOLDER / "figure_stribeck.png")
 
@@ -153,6 +157,7 @@ def element_figure() -> Figure:
         panels.ratio(ratio, trace)
         panels.force(force, trace)
         panels.ribbons(states, trace)
+        states.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
         named = (
             (velocity, "the slider moves back and forth"),
             (ratio, "deflection over threshold"),
@@ -173,7 +178,7 @@ def microstep_figure(trace: Trace) -> Figure:
     rows = np.flatnonzero(trace.t == log.t[0])
     with rc_context(RC):
         figure = Figure(figsize=(7.6, 3.2), layout="constrained")
-        over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5))
+        over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5), sharey=True)
         t = float(log.t[0])
         panels.force(over_time, trace, window=(t - 1.5, t + 1.5))
         panels.lettered(over_time, "a", "over time: one jump of $F$")
@@ -198,7 +203,7 @@ def microstep_figure(trace: Trace) -> Figure:
             fontsize=8,
         )
         by_step.set(xlabel="micro-step", ylabel="$F$ [N]", xticks=range(5), xlim=(-0.5, 5.3))
-        by_step.margins(y=0.25)
+        by_step.set_ylim(top=1.08 * trace.F[rows].max())  # room for the names
     return figure
 
 
@@ -216,8 +221,8 @@ def crossing_figure() -> Figure:
         figure = Figure(figsize=(7.2, 3.6), layout="constrained")
         ax = figure.subplots()
         looks = (
-            (once, TEXT_GREY, "s--", "guards checked once per step"),
             (located, INK, "o-", "located"),
+            (once, TEXT_GREY, "s--", "guards checked once per step"),
         )
         for trace, colour, look, name in looks:
             keep = (trace.t > true - 1.9 * step) & (trace.t < true + 2.9 * step)
@@ -227,8 +232,8 @@ def crossing_figure() -> Figure:
                 look,
                 color=colour,
                 label=name,
-                markersize=7,
-                markerfacecolor=PAPER if trace is once else colour,
+                markersize=10 if trace is once else 5,
+                markerfacecolor="none" if trace is once else colour,
             )
         ax.axhline(0, color=LINE_GREY, linewidth=0.9, zorder=0)
         for time, text, colour, height in (
@@ -247,7 +252,7 @@ def crossing_figure() -> Figure:
                 color=colour,
             )
         ax.set(xlabel="$t$ [s]", ylabel="$z - s$ of element 1 [mm]")
-        ax.set_title(f"{model.title}: guards in fixed steps of {step:g} s")
+        ax.set_title(f"Break-away seen at the end of a step of {step:g} s, and located")
         ax.legend(loc="lower right")
     return figure
 
@@ -286,7 +291,7 @@ def draw_howto() -> None:
     plots.render(plots.statechart(AGEING), FOLDER / "howto_own_chart.png")
     report = prove(BROKEN["memoryless"].chart)
     (finding,) = report.refuted
-    note = [*wrap(f"{finding.check}: {finding.text}", 50), *wrap(finding.example, 50)]
+    note = [*wrap(f"{finding.check}: {finding.text}", 38), *wrap(finding.example, 38)]
     marked = [part for part in finding.where if part in report.chart.guards]
     graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
     plots.render(graph, FOLDER / "howto_refuted.png")
@@ -334,30 +339,33 @@ def mujoco_figure() -> Figure:
         left, right = figure.subplots(1, 2)
         looks = (":", "--", "-")
         for (amplitude, (M, q)), look in zip(names["loops"].items(), looks, strict=True):
-            left.plot(1e3 * q, M, look, color=INK, label=f"{amplitude} N m")
+            left.plot(1e3 * q, M, look, color=INK, label=f"{amplitude} N·m")
         left.set(
-            xlabel="angle [mrad]", ylabel="torque [N m]", title="Loops below break-away, 1.5 N m"
+            xlabel="angle [mrad]", ylabel="torque [N·m]", title="Loops below break-away, 1.5 N·m"
         )
         left.legend(loc="upper left")
         t = 1e-3 * np.arange(1, len(names["held"]) + 1)
         right.plot(t, 1e3 * names["native"], "--", color=TEXT_GREY, label="frictionloss of MuJoCo")
         right.plot(t, 1e3 * names["held"], color=INK, label="four elements")
-        right.set(xlabel="$t$ [s]", ylabel="angle [mrad]", title="Angle under a constant 1 N m")
+        right.set(xlabel="$t$ [s]", ylabel="angle [mrad]", title="Angle under a constant 1 N·m")
         right.legend(loc="upper left")
     return figure
 
 
 def loops_figure(bilinear: Chart) -> Figure:
-    """Draw the loops of bilinear hysteresis, with and without hardening."""
+    """Draw one cycle of bilinear hysteresis, with and without hardening."""
     rig = Prescribed("2*pi*4e-5*cos(2*pi*t)")
     with rc_context(RC):
         figure = Figure(figsize=(5.4, 3.6), layout="constrained")
         ax = figure.subplots()
         for H, colour, look in ((1e4, INK, "-"), (0.0, TEXT_GREY, "--")):
             model = ChartModel(bilinear, {"k": 1e5, "H": H, "F_y": 1.0})
-            trace = simulate(model, rig, 1.75)
-            ax.plot(1e6 * trace.x, trace.F, look, color=colour, label=f"$H$ = {1e-3 * H:g} kN/m")
-        ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]", title="Bilinear hysteresis, strokes of ±40 µm")
+            trace = simulate(model, rig, 1.25)
+            cycle = trace.t >= 0.25  # from one end of the stroke to the same
+            label = f"$H$ = {1e-3 * H:g} kN/m"
+            ax.plot(1e6 * trace.x[cycle], trace.F[cycle], look, color=colour, label=label)
+        ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]")
+        ax.set_title("Bilinear hysteresis, a cycle of ±40 µm: hardening tilts the loop")
         ax.legend(loc="upper left")
     return figure
 
@@ -388,7 +396,7 @@ def sweep_figure() -> Figure:
             1e3 * speed, 1e3 * v_s, counts, cmap=ListedColormap(ramp("heat", 256)), rasterized=True
         )
         ax.set(yscale="log", xlabel="pulling speed [mm/s]", ylabel="$v_s$ [mm/s]")
-        ax.set_title(f"arrests in 0.6 s, {len(result):,} runs; signed law")
+        ax.set_title(f"Pulled mass, signed law: arrests in 0.6 s, in each of {len(result):,} runs")
         figure.colorbar(image, label="arrests")
     return figure
 

@@ -24,7 +24,7 @@ def main() -> None:
     """Write every picture."""
     fig_4 = "paper_fig4_stick_slip"
     screen("debugger_why", fig_4, (124, 38), "goto 25", "why 1")
-    screen("debugger_small", fig_4, (80, 24), "next", "why 1")
+    screen("debugger_small", fig_4, (80, 24), "goto 87.4", "next", "why 1")
     screen(
         "debugger_branches",
         fig_4,
@@ -62,7 +62,7 @@ def screen(
 def live(name: str, scenario: str, t: float) -> None:
     """Write the live view of a run at a time."""
     loaded = load_scenario(SCENARIOS / f"{scenario}.toml")
-    console = Console(record=True, file=io.StringIO(), width=96, force_terminal=True)
+    console = Console(record=True, file=io.StringIO(), width=80, force_terminal=True)
     moments: list[Moment] = []
     loaded.simulate(progress=moments.append)
     view = LiveView(console, 0.0, loaded.arguments["t_end"], detail=True, pace=1.0)

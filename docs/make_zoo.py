@@ -12,13 +12,14 @@ import inspect
 import re
 import tempfile
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -29,10 +30,12 @@ from gms_fsm.charts.parameters import ANY, Parameter, with_shared
 from gms_fsm.charts.registry import Demonstration, Entry, registered_modules
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.foundation.files import write_whole
+from gms_fsm.foundation.quantities import scale_of
+from gms_fsm.language import latex_name
 from gms_fsm.traces.failures import StepLimitError
 from gms_fsm.verification.findings import Report, Status
 from plots import figures, panels
-from plots.style import INK, LINE_GREY, RC
+from plots.style import INK, LINE_GREY, RC, compared_look
 
 DOCS = Path(__file__).parent
 PAGES = DOCS / "zoo"
@@ -359,7 +362,7 @@ def simulated(text: str) -> Trace:
 
 
 def run_figure(item: Item) -> Figure:
-    """Draw friction force, velocity and states of the run; of loops the force over x instead."""
+    """Draw forces, velocities and states of the run; of loops the force over x instead."""
     trace = run_of(item).trace
     window, _ = WINDOWS.get(item.name, ((0.0, T_END), ""))
     sampled = trace.sample(np.linspace(*window, 2001))
@@ -368,16 +371,34 @@ def run_figure(item: Item) -> Figure:
         if item.name in LOOPS:
             return loops_figure(pad, sampled.body("mass").x)
         tall = 0.5 + 0.2 * item.entry.demonstration.n  # inches, of the states
-        figure = Figure(figsize=(6.4, 3.2 + tall), layout="constrained")
-        force, velocity, states = figure.subplots(3, 1, sharex=True, height_ratios=(1.6, 1.6, tall))
-        force.plot(pad.t, pad.F, color=INK)
-        force.set(ylabel="$F$ [N]", xlim=window)
-        velocity.plot(pad.t, pad.v, color=INK)
-        velocity.set(ylabel="$v$ [m/s]")
-        panels.ribbons(states, trace, window=window)
-        for ax in (force, velocity):
-            ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
+        heights = [1.6, 1.6, *([tall] if item.chart.transitions else [])]
+        figure = Figure(figsize=(6.4, sum(heights)), layout="constrained")
+        force, velocity, *states = figure.subplots(
+            len(heights), 1, sharex=True, height_ratios=heights
+        )
+        over_time(force, pad, item.chart.force_names, "N")
+        over_time(velocity, pad, item.chart.velocities, "m/s")
+        velocity.set(xlim=window, xlabel="$t$ [s]")
+        if item.chart.sets_velocity:
+            force.set_title("between impacts; an impact takes no time, and $F$ has no value in it")
+        for ax in states:
+            panels.ribbons(ax, trace, window=window)
+            velocity.set_xlabel("")
+            ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=6, columnspacing=1.2)
     return figure
+
+
+def over_time(ax: Axes, pad: Trace, names: Sequence[str], unit: str) -> None:
+    """Draw quantities of a contact in one unit."""
+    values = [np.asarray(pad.value(name)) for name in names]
+    scale = scale_of(np.concatenate(values).tolist(), unit)
+    for number, (name, each) in enumerate(zip(names, values, strict=True)):
+        ax.plot(pad.t, scale.factor * each, label=f"${latex_name(name)}$", **compared_look(number))
+    ax.set_ylabel(f"{', '.join(f'${latex_name(name)}$' for name in names)} [{scale.unit}]")
+    if len(names) > 1:
+        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=len(names))
+    if min(each.min() for each in values) < 0.5 * max(each.max() for each in values):
+        ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
 
 
 def loops_figure(pad: Trace, x: NDArray[np.float64]) -> Figure:

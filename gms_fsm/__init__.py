@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from gms_fsm.systems.system import Contact as Contact
     from gms_fsm.systems.system import Sampled as Sampled
     from gms_fsm.systems.system import Spring as Spring
+    from gms_fsm.systems.system import Supervisor as Supervisor
     from gms_fsm.systems.system import System as System
     from gms_fsm.traces.failures import CallbackError as CallbackError
     from gms_fsm.traces.failures import LivelockError as LivelockError
@@ -115,7 +116,7 @@ _HOMES = {
     "systems.models": "ChartModel GMS LuGre Model",
     "systems.rigs": "Prescribed PulledSlider Rig Slider",
     "systems.signals": "Signal",
-    "systems.system": "Body Contact Sampled Spring System",
+    "systems.system": "Body Contact Sampled Spring Supervisor System",
     "traces.failures": "CallbackError LivelockError LockError NotFiniteError NotUniqueError "
     "SignalEndError SimulationError StepLimitError StepSizeError",
     "traces.trace": "Trace",

@@ -78,6 +78,7 @@ class RunPlan(NamedTuple):
     max_steps: int  # attempted steps in the whole run
     impulses: list[int]  # for each edge: 1 if it is an impulse, 2 if it changes forces at once
     leaps: bool  # whether velocities that are given may jump at a crossing
+    events: int  # the bit with which events are forgotten once all machines were asked; or 0
 
 
 @dataclass(slots=True, eq=False)

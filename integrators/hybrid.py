@@ -135,6 +135,8 @@ class Equations:
         Number of values that `Switch.jolts` compares; 0 if nothing can be jolted.
     leaps : bool
         Whether these may jump at a crossing, without an edge.
+    events : int
+        The bit with which a tick forgets events, once all machines were asked; 0 if there are none.
     """
 
     flow: Flow
@@ -156,6 +158,7 @@ class Equations:
     impulses: list[int] = field(default_factory=list)
     velocities: int = 0
     leaps: bool = False
+    events: int = 0
 
     def functions(self, located: bool) -> Functions:
         """Return the functions for a run with or without located crossings."""
@@ -494,6 +497,7 @@ def plan_of(
         ticks=bits,
         impulses=equations.impulses,
         leaps=equations.leaps,
+        events=equations.events,
         discrete=equations.discrete or [0] * machines,
         knots=equations.knots if options.located else [],
         relaxing=relaxation_times(options),

@@ -135,6 +135,8 @@ def run_to_event(
                 leave(on, now, relations, left)
                 return SLID
             _only_due(plan, memory)
+            if plan.events > 0:
+                switch.tick(plan.events, now.t, now.y, now.mode, p)
             memory.machine = -1
             memory.fired_one = False
             memory.phase = PICK

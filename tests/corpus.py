@@ -51,7 +51,7 @@ from gms_fsm.traces.failures import (
     StepLimitError,
     StepSizeError,
 )
-from tests import systems_cases
+from tests import supervisor_cases, systems_cases
 from tests.helpers import (
     CURVE,
     FASTEST,
@@ -574,6 +574,10 @@ def _random(index: int) -> Maker:
 
 
 SYSTEM_RUNS: dict[str, Maker] = {
+    **{
+        f"supervisor {make.__name__.replace('_', ' ')}": _case(make)
+        for make in supervisor_cases.CASES
+    },
     **{
         f"system {name.replace('_', ' ')}": _case(make)
         for name, make in systems_cases.CASES.items()

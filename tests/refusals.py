@@ -25,6 +25,9 @@ from unittest import mock
 import numpy as np
 import scipy.integrate
 from scipy.integrate import RK45
+from transitions import Machine
+from transitions.extensions.asyncio import AsyncMachine
+from transitions.extensions.nesting import HierarchicalMachine
 
 from gms_fsm import (
     GMS,
@@ -79,10 +82,10 @@ from gms_fsm.errors import (
     TraceFileError,
     UnitError,
 )
+from gms_fsm.foundation.quantities import factor
 from gms_fsm.identification.certainty.intervals import Bootstrap
 from gms_fsm.phenomena.results import PhenomenaTable, PhenomenonResult
 from gms_fsm.records import _table, damper, tribometer
-from gms_fsm.records.units import factor
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.signals import as_signal
 from gms_fsm.systems.system import with_model
@@ -850,10 +853,11 @@ rows = {
 group("motion", RecordError, moving, rows)
 
 
-def fit_command(override: str) -> None:
-    """Fit the good table."""
+def fit_command(override: str, head: str = "") -> None:
+    """Fit the good table, without the head of one of its tables."""
     Path("own.csv").write_text(GOOD)
-    Path("a.toml").write_text(f'{MEASURED}\n[fit]\nfree = ["k"]\nsearch = "local"\n')
+    text = f'{MEASURED}\n[fit]\nfree = ["k"]\nsearch = "local"\n'
+    Path("a.toml").write_text(text.replace(head, ""))
     verb("fit", "a.toml", "-o", "out", "--set", override)
 
 
@@ -867,6 +871,12 @@ rows = {
     "bounds and not free": ("[fit]: bounds", ..., "fit.bounds.C=[1.0, 2.0]"),
     "search": ("a.toml", ..., "fit.search=genetic"),
     "rows in a text": ("a.toml", ..., "fit.train=4-16"),
+    "rows with dots": ("a.toml", ..., "fit.train=4..16"),
+    "one time": ("a.toml", ..., "fit.train=4"),
+    "one time in a list": ("a.toml", ..., "fit.test=[4.0]"),
+    "one bound": ("a.toml", ..., "fit.bounds.k=1e3"),
+    "no head of the fit": ("a.toml", ..., "run.rtol=1e-5", "[fit]\n"),
+    "no head of the record": ("a.toml", ..., "run.rtol=1e-5", "[record]\n"),
     "names in a text": ("a.toml", ..., "fit.free=k, C"),
     "text for a column": ("a.toml", ..., "record.time=t"),
     "measured": ("[fit]: measured", ..., "fit.measured=G"),
@@ -1190,8 +1200,66 @@ def document(text: str) -> None:
 rows = {
     "type definition": ('<!DOCTYPE scxml><scxml xmlns="http://www.w3.org/2005/07/scxml"/>',),
     "larger than a chart": (" " * 11_000_000,),
+    "20,000 states": (
+        '<scxml xmlns="http://www.w3.org/2005/07/scxml">'
+        + "".join(f'<state id="s{i}"><transition target="s0"/></state>' for i in range(20_000))
+        + "</scxml>",
+    ),
 }
 group("document", ChartError, document, rows, "own.toml")
+SCXML = '<scxml xmlns="http://www.w3.org/2005/07/scxml">{}</scxml>'
+
+
+def inside(text: str) -> None:
+    """Read a chart with the state a, and what is given inside of it."""
+    document(SCXML.format(f'<state id="a">{text}</state>'))
+
+
+TWICE = '<assign location="n" expr="1"/>' * 2
+rows = {
+    "parallel states": ("state 'a'", ..., "<parallel/>"),
+    "message": ("state 'a', onentry", ..., '<onentry><send event="b" delay="1s"/></onentry>'),
+    "no end": ("done.state.a", ..., '<transition event="done.state.a" target="a"/>'),
+    "any event": ("transition *", ..., '<transition event="*" target="a"/>'),
+    "two targets": ("transition 1", ..., '<transition target="a b"/>'),
+    "no target, with exit": ("1", ..., f"<onexit>{TWICE[:31]}</onexit><transition/>"),
+    "assigned twice": ("onentry", ..., f"<onentry>{TWICE}</onentry>"),
+    "data without a value": ("<data id='n'>", ..., '<datamodel><data id="n"/></datamodel>'),
+}
+group("state of a document", ChartError, inside, rows)
+rows = {"words": ("", ..., "<datamodel><data id='n' expr='\"red\"'/></datamodel>")}
+group("data of a document", ExpressionError, inside, rows)
+
+
+def machine(kind: Callable[..., Any], second: Any, callbacks: Any, more: Mapping[str, Any]) -> None:
+    """Read a chart from a machine with one edge."""
+    made = kind(states=["a", second], initial="a", auto_transitions=False)
+    made.add_transition("go", "a", "b", **more)
+    Chart.from_transitions(made, outputs={"F": "0"}, callbacks=callbacks)
+
+
+rows = {
+    "awaited": ("machine", ..., AsyncMachine, "b", {}, {}),
+    "parallel": (
+        "state 'b'",
+        ...,
+        HierarchicalMachine,
+        {"name": "b", "parallel": ["c", "d"]},
+        {},
+        {},
+    ),
+    "no guard": ("trigger 'go'", ..., Machine, "b", {}, {}),
+}
+group("machine", ChartError, machine, rows)
+rows = {
+    "condition": ("trigger 'go'", ..., {}, {"conditions": "is_hot"}),
+    "action": ("trigger 'go'", ..., {}, {"after": "count"}),
+    "before the condition": ("trigger 'go'", ..., {"look": {"n": "1"}}, {"prepare": "look"}),
+    "no such function": ("callbacks", ..., {"is_hot": "v > 1"}, {}),
+    "no table": ("callbacks", 3, 3, {}),
+    "mapping for a condition": ("'go'", ..., {"is_hot": {"n": "1"}}, {"conditions": "is_hot"}),
+}
+group("function of a machine", ChartError, partial(machine, Machine, "b"), rows)
 STICK = State("stick", flow={"z": "v"})
 SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})
 GO = Transition("go", "stick", "slip", guard="z >= s and v > v_c")
@@ -1237,6 +1305,7 @@ rows = {
     "unknown output": ("chart 'rubber', outputs", ..., {"outputs": {"G": "k"}}),
     "unknown output of a state": ("state 'slip', outputs", ..., state(outputs={"G": "k"})),
     "force of a locked state": ("state 'slip'", ..., state(locked=True, outputs={"F": "k"})),
+    "F in a let": ("chart 'rubber', let 'pull'", ..., {"let": {"pull": "abs(F)"}}),
     "F in a flow": ("chart 'rubber', state 'slip', flow of 'z'", ..., state(flow={"z": "F"})),
     "a in a force": ("chart 'rubber', state 'slip', output 'F'", ..., state(outputs={"F": "a"})),
     "layout of no state": (
@@ -1251,6 +1320,13 @@ rows = {
         {"layout": {"stick": (0, 0), "slip": (9, "right")}},
     ),
     "layout that is no mapping": ("chart 'rubber': layout", "right", {"layout": "right"}),
+    "start of no variable": ("chart 'rubber': initial", ..., {"initial": {"y": 1.0}}),
+    "start that is no number": (
+        "chart 'rubber': initial, 'z'",
+        "far",
+        {"initial": {"z": "far"}},
+    ),
+    "start that is no mapping": ("chart 'rubber': initial", 1.0, {"initial": 1.0}),
     "let of a parameter": (
         "contact_outputs 'F'",
         ...,
@@ -1260,7 +1336,6 @@ rows = {
 group("chart", ChartError, chart, rows)
 rows = {
     "no states": ({"states": (), "transitions": ()},),
-    "no velocity": ({"velocities": ()},),
     "outputs by state": ({"outputs": {"F": {"stick": "k * z"}}},),
     "let and parameter": ({"let": {"k": "1"}},),
     "force and parameter": ({"velocities": ("v", "w"), "parameters": (*K, "F_w")},),
@@ -1297,6 +1372,11 @@ rows = {
         ...,
         {"parameters": (*K, "mod"), **edge(guard="mod(z, 1) > s")},
     ),
+    "time with a unit": ("column 10", ..., edge(guard="after(2, sec)")),
+    "time with a unit after a blank": ("column 10", ..., edge(guard="after(20 ms)")),
+    "after without a time": ("column 1", ..., edge(guard="after()")),
+    "after of two": ("column 11", ..., edge(guard="z >= s or after(2, s_0)")),
+    "after as a number": ("column 5", ..., edge(guard="1 < after(2)")),
     "guard of equality": ("chart 'rubber', edge 'go', guard, column 6", ..., edge(guard="z == s")),
     "decimal comma in a guard": ("guard, column 7", ..., edge(guard="z >= 0,8 * s")),
     "capitals in a guard": ("guard, column 8", ..., edge(guard="z >= s AND v > v_c")),
@@ -1330,11 +1410,48 @@ rows = {
         ...,
         lambda: State("stick", flow={"z": "v"}, during="z = 0"),
     ),
+    "argument of transitions": (
+        "Transition",
+        ...,
+        lambda: call(Transition, trigger="go", source="stick", dest="slip"),
+    ),
+    "second argument of transitions": (
+        "transition 'go'",
+        ...,
+        lambda: call(Transition, "go", "stick", dest="slip"),
+    ),
+    "edge without a guard": (
+        "edge 'go'",
+        ...,
+        lambda: call(Transition, "go", "stick", "slip"),
+    ),
     "locked by a number": ("state 'slip': locked", 1, lambda: State("slip", locked=1)),
     "edge from nowhere": ("edge 'go'", ..., lambda: Transition("go", (), "slip", guard="v > 0")),
     "name that is none": ("chart 5: name", 5, lambda: Chart(5, states=(), outputs={})),
 }
 group("part of a chart", ChartError, called, rows)
+
+
+def call(kind: Any, *args: object, **given: object) -> object:
+    """Make an object with arguments that it does not take."""
+    return kind(*args, **given)
+
+
+rows = {
+    "no law": ("GMS", (GMS, GMSParameters.paper("stick-slip")), {}),
+    "law without its name": ("GMS", (GMS, GMSParameters.paper("stick-slip"), "signed"), {}),
+    "no law of a chart": ("gms_element", (gms_element,), {}),
+    "number with another name": ("Stribeck", (Stribeck, 1.0, 1.5), {"vs": 1e-3}),
+    "number too few": ("PulledSlider", (PulledSlider, 1.0, 2.0), {}),
+    "stiffness of a spring": ("spring 'shaft'", (Spring, "shaft", "motor"), {"stiffness": 2.0}),
+    "sample time": ("sampled 'pid'", (Sampled, "pid"), {"sample_time": 1e-3, "updates": {}}),
+}
+group(
+    "argument",
+    ParameterError,
+    lambda args, given: call(*args, **given),
+    {name: (place, ..., args, given) for name, (place, args, given) in rows.items()},
+)
 
 
 # --------------------------------------------------------------------------- parameters
@@ -1544,6 +1661,11 @@ rows = {
     "equality": ("invariant, column 6", ..., lambda: "z == s"),
 }
 group("monitors", ExpressionError, monitored, rows)
+rows = {
+    f"unit {text!r}": (f"invariant {text!r}", ..., lambda text=text: text)
+    for text in ("z < 3 mm/s", "F < 2 furlong")
+}
+group("monitors", UnitError, monitored, rows)
 
 
 # --------------------------------------------------------------------------- branches
@@ -2112,9 +2234,17 @@ group("exported session", SessionError, lambda call: call(), rows, "")
 
 
 # --------------------------------------------------------------------------- proofs
+TWO_PADS = System(
+    "pads",
+    bodies=(Body("body", inertia=1.0),),
+    contacts=(Contact("pad", FIG4[0]), Contact("other", FIG4[0])),
+)
 rows = {
     "quotient in its domain": ("", ..., lambda: prove(gms_element("signed"), ["z / s > 1"])),
-    "model": ("chart", FIG4[0], lambda: prove(FIG4[0])),
+    "no chart": ("chart", 3, lambda: prove(3)),  # type: ignore[arg-type]
+    "contact of a chart": ("contact", "pad", lambda: prove(gms_element("signed"), contact="pad")),
+    "which contact": ("contact", ..., lambda: prove(TWO_PADS)),
+    "unknown contact": ("", ..., lambda: prove(TWO_PADS, contact="pat")),
 }
 group("prove", ParameterError, lambda call: call(), rows)
 
@@ -2524,8 +2654,12 @@ rows = {
     "an unknown key": ("inertia = 2", "inertia = 2\nmass = 1"),
     "an unknown motion": ("inertia = 2", 'inertia = 2\nmotion = "rotary"'),
     "an unknown table": ("[[sampled]]", "[[sample]]"),
+    "a scenario of a system": ('name = "pair"', 'name = "pair"\nrun.t_end = 1.0'),
+    "a model on a rig": ('name = "pair"', 'rig.kind = "prescribed"\nname = "pair"'),
 }
 group("system file", ScenarioError, system_file, rows, "own.toml")
+rows = {"scenario of the package": ("servo",)}
+group("system file", ScenarioError, System.load, rows, "servo")
 FUNCTION = '{ kind = "function" }'
 rows = {
     "a chart elsewhere": ("contact.0.chart: chart", "../a.toml", '"lugre"', '"../a.toml"'),
@@ -2603,6 +2737,11 @@ rows = {
     },
 }  # fmt: skip
 group("part of a system", ParameterError, lambda call: call(), rows)
+rows = {
+    key: ("", ..., lambda key=key: simulate(load_system("servo"), 0.1, initial={key: 1.0}))
+    for key in ("load.y", "w", "bearing.state")
+}
+group("initial value of a system", ParameterError, called, rows)
 rows = {"pairs in a pair": ("signal", ..., ((0.0, 0.0), (1.0, 2.0)))}
 group("signal", SignalError, Prescribed, rows)
 rows = {

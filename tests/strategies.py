@@ -111,6 +111,7 @@ def charts(
         reference=draw(texts),
         let=draw(st.sampled_from([{}, {"S": "k * v", "T": "S + 1"}])),
         contact_outputs=draw(st.sampled_from([{}, {"F": "F + v"}])),
+        initial=draw(st.sampled_from([{}, {"z": -0.25}])),
     )
 
 

@@ -13,6 +13,7 @@ from gms_fsm.adapters._scipy_parts import Caller, Carried, ContactSwitch, Soluti
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
+from gms_fsm.run.problem import IMPLICIT
 from integrators import Arc, Firing, Held, HybridError, Livelock, NotFinite, hybrid, look
 
 NUDGE = 1e-6  # of a component of y, to see how the velocities depend on it
@@ -147,7 +148,7 @@ class Located:
                     place, edge = self.driven.place(event.machine), self.driven.edge(event.edge)
                     switches.append(ContactSwitch(event.t, *place, edge))
         except HybridError as error:
-            message = f"it stopped at t = {error.t!r} s: {error}; {_advice(error)}"
+            message = f"it stopped at t = {error.t!r} s: {error}; {_advice(error, options.method)}"
         nfev = self.caller.nfev
         forces = [self._observed(whole, *row) for row in zip(t, rows, modes, strict=True)]
         table = np.array(forces).reshape(-1, len(self.driven.forces)).T
@@ -186,10 +187,12 @@ class Located:
         return [out[k] for k in self.driven.forces]
 
 
-def _advice(error: HybridError) -> str:
+def _advice(error: HybridError, method: Any) -> str:
     """Say what to do where the solver gives up."""
     if isinstance(error, NotFinite):
         return "fun, velocity or the friction gives NaN or infinity there"
     if isinstance(error, Livelock):
         return "states keep switching without progress: prove() finds such guards"
+    if getattr(method, "__name__", "") in IMPLICIT:
+        return "try a larger rtol and atol"
     return "try a stiff method ('Radau'), or a larger rtol and atol"

@@ -18,6 +18,7 @@ from gms_fsm.foundation.toml import parsed
 from gms_fsm.scenarios import scenario_path
 from gms_fsm.systems.models import ChartModel, Model
 from gms_fsm.systems.system import System, system_of
+from gms_fsm.verification.facts import ContactFacts, facts_of
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,10 @@ class OwnFile:
 
     def charts(self, contact: str = "") -> dict[str, Chart]:
         """Return its charts."""
+        return {names: each.chart for names, each in self.facts(contact).items()}
+
+    def facts(self, contact: str = "") -> dict[str, ContactFacts]:
+        """Return its charts, with what a run makes of them; contacts alike stand together."""
         if self.chart is not None:
             if contact:
                 raise ParameterError(
@@ -56,17 +61,18 @@ class OwnFile:
                     place=f"--contact {contact}: {self.path}",
                     advice="leave --contact out",
                 )
-            return {self.path.stem: self.chart}
+            return {self.path.stem: facts_of(self.chart)}
         assert self.system is not None
-        chosen = [self.system.contact(contact)] if contact else self.system.contacts
-        found: list[tuple[list[str], Chart]] = []
+        chosen = [self.system.contact(contact)] if contact else self.system.machines
+        found: list[tuple[list[str], ContactFacts]] = []
         for each in chosen:
-            names = next((names for names, chart in found if chart == each.chart), None)
+            facts = facts_of(self.system, each.name)
+            names = next((names for names, other in found if other == facts), None)
             if names is None:
-                found.append(([each.name], each.chart))
+                found.append(([each.name], facts))
             else:
                 names.append(each.name)
-        return {", ".join(names): chart for names, chart in found}
+        return {", ".join(names): facts for names, facts in found}
 
     def only_model(self, contact: str = "") -> Model:
         """Return the model of its contact."""
@@ -76,7 +82,7 @@ class OwnFile:
                 place=str(self.path),
                 advice="give a scenario file",
             )
-        several = self.system.contacts
+        several = self.system.machines
         if len(several) > 1 and not contact:
             raise contacts_error(self.path, [each.name for each in several], "give")
         chosen: Any = self.system.contact(contact) if contact else several[0]
@@ -85,12 +91,12 @@ class OwnFile:
 
     def only_chart(self, contact: str = "") -> Chart:
         """Return its chart."""
-        found = self.charts(contact)
-        if len(found) > 1:
+        first, *others = self.charts(contact).values()
+        if any(each != first for each in others):
             assert self.system is not None
-            names = [each.name for each in self.system.contacts]
+            names = [each.name for each in self.system.machines]
             raise contacts_error(self.path, names, "give", ", with different charts")
-        return next(iter(found.values()))
+        return first
 
 
 def contacts_error(path: Path, names: Sequence[str], advice: str, more: str = "") -> ParameterError:

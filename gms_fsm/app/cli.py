@@ -27,7 +27,7 @@ from gms_fsm.app.verbs.charts import (
     code_command,
     handout_command,
 )
-from gms_fsm.app.verbs.console import error_line, note
+from gms_fsm.app.verbs.console import error_line, note, put
 from gms_fsm.app.verbs.export import export_command
 from gms_fsm.app.verbs.fit import fit_command
 from gms_fsm.app.verbs.runs import (
@@ -163,7 +163,7 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"gms-fsm {gms_fsm.__version__}")
+        put(f"gms-fsm {gms_fsm.__version__}")
         raise typer.Exit
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gms_fsm.errors import MissingExtraError, OutputError
 from gms_fsm.foundation.arguments import checked_kind, checked_path
 from gms_fsm.foundation.files import csv_text, output_folder, refuse_input, write_text
-from gms_fsm.foundation.markdown import plain, table_lines
+from gms_fsm.foundation.text import plain, table_lines
 from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
 

@@ -178,7 +178,7 @@ class LiveView:
         self._read(moment)
         curves = self.curves(moment)  # first: they choose units that suit what they show
         slow = "; computing is slower than that" * self.behind
-        pace = "" if self.pace is None else f"{self.pace:g} simulated seconds per second{slow}"
+        pace = "" if self.pace is None else f"simulated seconds per second: {self.pace:g}{slow}"
         return [
             *self.tables(moment),
             *curves,
@@ -233,11 +233,12 @@ class LiveView:
         }
         v, F = (scales[name].text(values[name]) for name in ("v", "F"))
         title = f"{lead.removesuffix('.')}   ".lstrip()
-        title += f"t = {self.time.text(t, 5):<9}   v = {v:>11}   F = {F:>9}"
+        title += f"t = {self.time.text(t, 5):<9}   v = {v:<11}   F = {F}"
         bare = all(map(math.isnan, values["s"]))  # no threshold without a Stribeck curve
         still = all(map(math.isnan, values["z"]))  # a chart without variables
         table = Table("element", "state", title=title, title_justify="left", min_width=len(title))
-        for head in (*(() if bare else ("|z|/s", "")), *(() if still else ("z",))):
+        scale = f"0{1:>{BAR - 1}}"  # of the bar
+        for head in (*(() if bare else ("|z|/s", scale)), *(() if still else ("z",))):
             table.add_column(head)
         rows = zip(states, values["z"], values["s"], strict=True)
         for i, ((state, place), z, s) in enumerate(rows):

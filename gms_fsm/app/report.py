@@ -15,8 +15,8 @@ from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
 from gms_fsm.foundation.files import output_folder, refuse_input, write_text
-from gms_fsm.foundation.markdown import plain, table_lines
 from gms_fsm.foundation.quantities import named_numbers
+from gms_fsm.foundation.text import plain, table_lines
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
@@ -26,6 +26,7 @@ from gms_fsm.systems.system import Contact, System, loaded
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace, dwell_times
 from gms_fsm.traces.verdicts import Trust
+from gms_fsm.traces.views import range_of_force
 
 __all__ = [
     "ForceComparison",
@@ -259,7 +260,7 @@ def summary_text(loaded: Loaded, trace: Trace, trust: Trust) -> str:
             f"- rig: {plain(trace.rig.title)}",
             f"- parameters: {_parameters(trace)}",
             f"- run: {settings}",
-            f"{result}, F from {trace.F.min():.4g} to {trace.F.max():.4g} N",
+            f"{result}, {_range(trace)} N",
             "",
             *_element_table(trace),
         ]
@@ -314,11 +315,15 @@ def _contact_lines(trace: Trace) -> list[str]:
         "",
         f"- on: {', '.join(map(plain, velocities))}",
         f"- parameters: {_parameters(trace)}",
-        f"- result: {len(trace.transitions)} transitions, F from {trace.F.min():.4g} to "
-        f"{trace.F.max():.4g}",
+        f"- result: {len(trace.transitions)} transitions, {_range(trace)}",
         "",
         *_element_table(trace),
     ]
+
+
+def _range(trace: Trace) -> str:
+    least, most = range_of_force(trace)
+    return f"F from {least:.4g} to {most:.4g}"
 
 
 def _setting(value: Setting) -> str:

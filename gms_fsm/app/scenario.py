@@ -218,7 +218,7 @@ def kind_of(data: Mapping[str, Any]) -> str:
 
 
 _TABLES = {
-    "system": {"body", "bodies", "contact", "contacts"},
+    "system": {"body", "bodies", "contact", "contacts", "supervisor", "supervisors"},
     "rig": {"model", "rig"},
     "chart": {"state", "states", "edge", "transitions"},
 }

@@ -16,8 +16,8 @@ from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import ParameterError, cut
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.files import csv_text, output_folder, refuse_input, write_text
-from gms_fsm.foundation.markdown import plain, table_lines
 from gms_fsm.foundation.quantities import in_si
+from gms_fsm.foundation.text import plain, table_lines
 from gms_fsm.run.sweep import Sweep, sweep
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in

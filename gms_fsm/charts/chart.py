@@ -14,19 +14,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from gms_fsm.charts.parameters import QUANTITIES, Parameter
+from gms_fsm.charts.parameters import QUANTITIES, Parameter, check_rules
 from gms_fsm.charts.parts import (
     State,
     Transition,
+    check_size,
+    event_name,
     parameter_of,
     places_of,
     texts_of,
     tuple_of,
+    values_of,
 )
 from gms_fsm.charts.reader import ChartReader
 from gms_fsm.errors import ChartError, cut, shown
-from gms_fsm.foundation.arguments import checked_kind, checked_path
+from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing
 from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, YIELDING, Condition, Value, spell
 
 if TYPE_CHECKING:
@@ -43,8 +47,10 @@ RESERVED = frozenset(
 )
 
 
+@refusing(ChartError, instead={"edges": "transitions"})
 @displayed("svg", "html")
-@dataclass(frozen=True, init=False)
+@by_value()
+@dataclass(frozen=True, init=False, eq=False)
 class Chart:
     """The state chart of one friction element, checked at construction.
 
@@ -76,10 +82,13 @@ class Chart:
         Named expressions that all other texts can use; later ones can use earlier ones.
     velocities : sequence of str
         What the contact moves by. With several (a planar contact) the forces are ``F``,
-        ``F_<second>`` and so on, the accelerations ``a``, ``a_<second>``.
+        ``F_<second>`` and so on, the accelerations ``a``, ``a_<second>``. With none it is the chart
+        of a `Supervisor`, whose outputs have any names.
     contact_outputs : mapping of str to str, optional
         The force of a contact, where it is not just the sum of its elements' forces, which is
         called ``F`` here: ``{"F": "F + sigma_2 * v"}``.
+    initial : mapping of str to float, optional
+        Values with which variables start, where a run gives none; 0 for the others.
     layout : mapping of str to (float, float), optional
         Where pictures show the centre of each state: points to the right and down. Charts that
         differ in nothing else are equal.
@@ -111,6 +120,7 @@ class Chart:
     let: Mapping[str, str] = field(default_factory=dict)
     velocities: tuple[str, ...] = ("v",)
     contact_outputs: Mapping[str, str] = field(default_factory=dict)
+    initial: Mapping[str, float] = field(default_factory=dict)
     layout: Mapping[str, tuple[float, float]] = field(default_factory=dict, compare=False)
     guards: Mapping[str, Condition] = field(init=False, repr=False, compare=False)
     flows: Mapping[tuple[str, str], Value] = field(init=False, repr=False, compare=False)
@@ -136,6 +146,7 @@ class Chart:
         let: Mapping[str, str] | None = None,
         velocities: Iterable[str] = ("v",),
         contact_outputs: Mapping[str, str] | None = None,
+        initial: Mapping[str, float] | None = None,
         layout: Mapping[str, Sequence[float]] | None = None,
     ) -> None:
         here = f"chart {name!r}"
@@ -159,7 +170,8 @@ class Chart:
         for each, value in given.items():  # copies: nobody else can change a frozen chart
             object.__setattr__(self, each, value)
         self._check_names()
-        self._check_rules()
+        check_rules(self.parameters, here)
+        object.__setattr__(self, "initial", values_of(initial or {}, self.variables, here))
         object.__setattr__(self, "layout", places_of(layout or {}, self.states, here))
         expanded = tuple(each for edge in self.transitions for each in edge.each())
         for each, value in {**ChartReader(self).trees(), "transitions": expanded}.items():
@@ -167,12 +179,9 @@ class Chart:
 
     def __repr__(self) -> str:
         states, edges = len(self.states), len(self.transitions)
-        return (
-            f"<Chart {cut(self.name)!r}: {states} state{'s' * (states != 1)}, "
-            f"{edges} edge{'s' * (edges != 1)}>"
-        )
+        counts = f"{states} state{'s' * (states != 1)}, {edges} edge{'s' * (edges != 1)}"
+        return f"<Chart {cut(self.name)!r}: {counts}>"
 
-    # ------------------------------------------------------------------ checks
     def _check_names(self) -> None:
         here = f"chart {self.name!r}"
         for text in ("name", "reference"):
@@ -189,20 +198,11 @@ class Chart:
                     raise ChartError(
                         f"{each} has {shown(given)}", place=here, advice=f"write it as {example}"
                     )
-        if not self.states:
-            raise ChartError("it has no states", place=here, advice="give at least one")
-        if not self.velocities:
-            raise ChartError(
-                "it has no velocity",
-                place=here,
-                advice="give at least one, for example ('v',)",
-                key=("velocities",),
-            )
-        derivatives = ["d" + variable for variable in self.variables]
+        check_size(len(self.states), sum(len(each.sources) for each in self.transitions), here)
         groups = (
             ("input", "inputs", dict.fromkeys([*self.inputs, *self.velocities])),
             ("variable", "variables", self.variables),
-            ("derivative", "variables", derivatives),
+            ("derivative", "variables", ["d" + variable for variable in self.variables]),
             ("parameter", "parameters", self.parameter_names),
             ("let", "let", self.let),
             ("state", "states", [s.name for s in self.states]),
@@ -252,27 +252,24 @@ class Chart:
                     key=("transitions", i, "impulse"),
                 )
 
-    def _check_rules(self) -> None:
-        for i, each in enumerate(self.parameters):
-            known = {*self.parameter_names} - {each.name}
-            for name in sorted(each.others - known):
-                raise ChartError(
-                    f"chart {self.name!r}, parameter {each.name!r}: its rule names {name!r}, "
-                    "which is not another parameter",
-                    advice=f"there are {_listed(sorted(known))}",
-                    key=("parameters", i, "rule"),
-                )
-
-    # ------------------------------------------------------------------ forces
     @property
     def force_names(self) -> tuple[str, ...]:
-        """Name of the force along each velocity: ``F``, then ``F_<velocity>``."""
+        """What it gives out: ``F``, then ``F_<velocity>``; without velocity its outputs."""
+        if not self.velocities:
+            own = [name for state in self.states for name in state.outputs]
+            return tuple(dict.fromkeys([*self.outputs, *own]))
         return ("F", *(f"F_{each}" for each in self.velocities[1:]))
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """The events that edges wait for or emit, as trees call them."""
+        used = (name for edge in self.transitions for name in (edge.event, *edge.emit))
+        return tuple(dict.fromkeys(event_name(name) for name in used if name))
 
     @property
     def rate_names(self) -> tuple[str, ...]:
         """Name of the acceleration along each velocity: ``a``, then ``a_<velocity>``."""
-        return ("a", *(f"a_{each}" for each in self.velocities[1:]))
+        return ("a", *(f"a_{each}" for each in self.velocities[1:]))[: len(self.velocities)]
 
     @property
     def locks(self) -> bool:
@@ -294,7 +291,6 @@ class Chart:
         """Whether an assignment sets a velocity of the contact."""
         return any({*self.velocities} & {*steps} for steps in self.assignments.values())
 
-    # ------------------------------------------------------------------ files
     @classmethod
     def load(cls, path: str | Path) -> Chart:
         """Read a chart from a TOML file.
@@ -304,9 +300,9 @@ class Chart:
         path : str or Path
             With the keys ``name``, ``reference``, ``inputs``, ``velocities``, ``variables``,
             ``parameters`` (a list of names) or ``[[parameter]]`` (name, unit, rule, per_element,
-            meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[[state]]`` (name,
-            flow, entry, exit, outputs, locked) and ``[[edge]]`` (name, from, to, guard, do,
-            impulse).
+            meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[initial]``,
+            ``[[state]]`` (name, flow, entry, exit, outputs, locked) and ``[[edge]]`` (name, from,
+            to, guard, do, impulse).
 
         Returns
         -------
@@ -330,26 +326,28 @@ class Chart:
 
         return load(checked_path("path", path), cls)
 
-    # ------------------------------------------------------------------ from other programs
     @classmethod
     def from_transitions(cls, machine: Any, **texts: Unpack[GivenTexts]) -> Chart:
         """Build a chart from a machine of the package transitions, and texts given beside it.
 
-        The machine gives the states, the edges (one for each trigger, of its name) and their
-        priority (the order of the triggers). Functions cannot be read: a text of `guards` stands
-        for the conditions of its trigger.
+        The machine gives states, edges and their priority: the order of the triggers and of their
+        transitions, those of inner states first. States in states become ``outer__inner``. An edge
+        has the name of its trigger, or ``source_target`` if the trigger has edges that differ.
 
         Parameters
         ----------
         machine : transitions.Machine
-            Plain, without callbacks.
+            Of any class but the asynchronous ones.
         **texts
             ``inputs``, ``variables``, ``parameters``, ``outputs``, ``name``, ``reference``,
-            ``let``, ``velocities`` and ``contact_outputs`` as for `Chart`; a parameter may be a
-            mapping of the fields of `Parameter`. By the name of an edge: ``guards``, all of them,
-            and ``actions``. By the name of a state: ``flows``, ``entry``, ``exit`` and
-            ``state_outputs``. ``locked`` names the states that lock the contact, ``impulses`` the
-            edges that take an impulse to do so.
+            ``let``, ``velocities``, ``contact_outputs`` and ``initial`` as for `Chart`; a parameter
+            may be a mapping of the fields of `Parameter`. ``callbacks`` says what the functions of
+            the machine do, by their names: a condition as a text, what others assign as a mapping,
+            empty for those that only look on. By the name of an edge or of a trigger: ``guards``,
+            which stand for conditions without a text, and ``actions``. By the name of a state, with
+            or without states inside: ``flows``, ``entry``, ``exit`` and ``state_outputs``.
+            ``locked`` names the states that lock the contact, ``impulses`` the edges that take an
+            impulse to do so.
 
         Returns
         -------
@@ -360,7 +358,7 @@ class Chart:
         ------
         ChartError, ExpressionError
             If the machine has something without counterpart in a chart, which is named, such as a
-            callback, ``unless``, a nested state or an internal transition; or if a text is wrong.
+            function without a text, or parallel states; or if a text is wrong.
 
         Examples
         --------
@@ -376,24 +374,27 @@ class Chart:
         from gms_fsm.charts.files import from_transitions, imported
 
         given = imported.Texts.of(texts, from_transitions.HERE)
-        states, edges = from_transitions.read(machine)
-        return imported.built(cls, states, edges, given, from_transitions.HERE)
+        read = from_transitions.read(machine, given.callbacks)
+        return imported.built(cls, *read, given, from_transitions.HERE)[0]
 
     @classmethod
     def from_scxml(cls, path: str | Path, **texts: Unpack[GivenTexts]) -> Chart:
         """Build a chart from an SCXML document, and texts given beside it.
 
-        The document gives the states, the transitions in their order, and what is assigned. What
-        the export ``scxml`` keeps there in a namespace of its own need not be given.
+        The document gives the states, the transitions in their order, what is assigned, and data:
+        a variable with its value at the start, or a named expression if nothing assigns it. What
+        the export ``scxml`` keeps there in a namespace of its own need not be given. ``<log>`` is
+        left out, with a warning.
 
         Parameters
         ----------
         path : str or Path
-            The document. The name of an edge is the event of the transition, if no other has the
-            same, or else ``source_target``.
+            The document. Names are as for `from_transitions`, from the events of the transitions;
+            a dot in a name becomes ``__``, a hyphen ``_``.
         **texts
             As for `from_transitions`; they replace what the document says. Guards that are not
-            given are read from ``cond``, if that is written as in Python or ECMAScript.
+            given are read from ``cond``, if that is written as in Python or ECMAScript. A guard
+            that is given for an event with several edges is joined to their own.
 
         Returns
         -------
@@ -404,8 +405,7 @@ class Chart:
         ------
         ChartError, ExpressionError
             If the document cannot be read, or has something without counterpart in a chart, which
-            is named, such as a parallel or nested state, a history, a script; or if a text is
-            wrong.
+            is named, such as a parallel state, a history, a script; or if a text is wrong.
 
         Examples
         --------
@@ -421,7 +421,6 @@ class Chart:
 
         return from_scxml.load(cls, checked_path("path", path), texts)
 
-    # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
         """Write the chart to a TOML file, from which `load` returns an equal one.
 

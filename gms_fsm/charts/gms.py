@@ -29,7 +29,7 @@ from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import either
+from gms_fsm.foundation.arguments import either, refusing
 
 __all__ = [
     "CHARTS",
@@ -51,6 +51,7 @@ WHICH_LAW = (
     "'signed' (Al-Bender et al. 2005) is for simulations; 'published', eq. (1) as printed, repeats "
     "the paper, and makes energy for v < 0"
 )
+GIVE_LAW = f"law={either(LAWS)}: {WHICH_LAW}"
 WHICH_C = (
     "while an element slips, its force follows s(v) in the time F_c / C: for 50 ms at F_c = 1 N "
     "give C = 20 N/s with shares, or C_i = share * C / k_i in m/s, a list"
@@ -86,6 +87,7 @@ def check_law(law: object) -> None:
         raise ParameterError(f"it must be {either(LAWS)}", place="law", value=law, advice=WHICH_LAW)
 
 
+@refusing(law=GIVE_LAW)
 def gms_element(law: Law) -> Chart:
     """Return the chart of one GMS element under a slip law.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import ChartError, GMSError, ParameterError, shown
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.arguments import refusing, unknown
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -88,6 +88,7 @@ def _bound(text: str, rule: str) -> Bound:
     return Bound(op, number, f"{op} {limit}")
 
 
+@refusing(ChartError)
 @dataclass(frozen=True)
 class Parameter:
     """A number that a chart or a model takes: its name, unit and rule.
@@ -181,6 +182,7 @@ QUANTITIES: Mapping[str, Parameter] = {
         Parameter("s", "m", "> 0", meaning="threshold: weight times Stribeck curve"),
         Parameter("z", "m", meaning="deflection"),
         Parameter("F", "N", meaning="friction force"),
+        Parameter("N", "N", meaning="normal force"),
     )
 }
 # What a model takes in addition to its chart's parameters.
@@ -227,6 +229,20 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
         if not isinstance(bound.limit, str) and not bound.holds(number, bound.limit):
             raise ParameterError(f"it must be {bound.text}", place=name, value=number)
     return number
+
+
+def check_rules(parameters: Sequence[Parameter], here: str) -> None:
+    """Refuse rules that name what is not another parameter."""
+    names = [each.name for each in parameters]
+    for i, each in enumerate(parameters):
+        known = sorted({*names} - {each.name})
+        for name in sorted(each.others - {*known}):
+            raise ChartError(
+                f"{here}, parameter {each.name!r}: its rule names {name!r}, "
+                "which is not another parameter",
+                advice=f"there are {', '.join(map(repr, known)) or 'none'}",
+                key=("parameters", i, "rule"),
+            )
 
 
 def check_names(

@@ -3,16 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from math import isfinite, nan
 from typing import Any
 
-from gms_fsm.charts.parameters import Parameter
-from gms_fsm.errors import ChartError, shown
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.charts.parameters import Parameter, checked_scalar
+from gms_fsm.errors import ChartError, ParameterError, shown
+from gms_fsm.foundation.arguments import refusing, unknown
+from gms_fsm.foundation.equality import by_value
+from gms_fsm.language import EVENT
+
+MOST_PARTS = 5_000  # states and edges of a chart; more would take minutes to read and to compile
+NO_GUARD = "an event alone"  # what stands for a guard that is left out
 
 
-@dataclass(frozen=True)
+def check_size(states: int, edges: int, place: str) -> None:
+    """Refuse a chart without states, and one that is too large, before anything else of it."""
+    if not states:
+        raise ChartError("it has no states", place=place, advice="give at least one")
+    if states + edges > MOST_PARTS:
+        raise ChartError(
+            f"it has {states:,} states and {edges:,} edges",
+            place=place,
+            advice=f"a chart can have {MOST_PARTS:,} of both together",
+        )
+
+
+@refusing(
+    ChartError,
+    "states do not nest, so write one state for each combination",
+    instead={"during": "flow", "on_enter": "entry", "on_exit": "exit"},
+)
+@by_value()
+@dataclass(frozen=True, eq=False)
 class State:
     """One state of a machine: how its variables evolve, and what force it gives, while active.
 
@@ -47,17 +70,6 @@ class State:
     outputs: Mapping[str, str] = field(default_factory=dict)
     locked: bool = False
 
-    def __new__(cls, *parts: Any, **given: Any) -> State:
-        """Refuse unknown arguments with an error of this package."""
-        known = [each.name for each in fields(cls)]
-        for name in sorted(given.keys() - set(known)):
-            raise ChartError(
-                f"a State takes {', '.join(known[:-1])} and {known[-1]}, not {name!r}",
-                place=f"state {shown(given.get('name', parts[0] if parts else '?'))}",
-                advice="states do not nest, so write one state for each combination",
-            )
-        return object.__new__(cls)
-
     def __post_init__(self) -> None:
         here = f"state {shown(self.name)}"
         for each in ("flow", "entry", "exit", "outputs"):
@@ -67,7 +79,13 @@ class State:
             raise ChartError("it must be True or False", place=f"{here}: locked", value=self.locked)
 
 
-@dataclass(frozen=True, init=False)
+@refusing(
+    ChartError,
+    instead={"trigger": "name", "dest": "target", "conditions": "guard", "condition": "guard"},
+    guard="guard='True' for always",
+)
+@by_value()
+@dataclass(frozen=True, init=False, eq=False)
 class Transition:
     """One guarded edge between two states.
 
@@ -84,6 +102,11 @@ class Transition:
     actions : mapping of str to str, optional
         Assignments ``variable: expression`` performed when it is taken. An assignment to a velocity
         is an impulse that keeps the momentum of the bodies.
+    event : str
+        The event that the edge waits for; its guard then has to hold at that instant, and may be
+        left out.
+    emit : sequence of str
+        Events for the machines of the system; they are asked for them next, at the same instant.
     impulse : bool
         Whether an edge into a locked state takes the velocity that is left as an impulse, on
         purpose: an engaging clutch, a rest speed. Other edges lock the contact where its velocity
@@ -101,6 +124,8 @@ class Transition:
     guard: str
     actions: Mapping[str, str]
     impulse: bool = field(repr=False)
+    event: str = field(repr=False)
+    emit: tuple[str, ...] = field(repr=False)
     sources: tuple[str, ...] = field(init=False, repr=False)
 
     def __init__(
@@ -108,11 +133,21 @@ class Transition:
         name: str,
         source: str | Sequence[str],
         target: str,
-        guard: str,
+        guard: str = NO_GUARD,
         actions: Mapping[str, str] | None = None,
         *,
+        event: str = "",
+        emit: str | Sequence[str] = (),
         impulse: bool = False,
     ) -> None:
+        here = f"edge {shown(name)}"
+        emitted = (emit,) if isinstance(emit, str) else tuple_of(emit, f"{here}: emit")
+        for each in (*emitted, *[event][: bool(event)]):
+            if not isinstance(each, str) or not each.isidentifier():
+                raise ChartError("it is not a name", place=f"{here}: event", value=each)
+        if guard == NO_GUARD and not event:
+            raise ChartError("it has no guard", place=here, advice="give one; 'True' is always")
+        guard = "True" if guard == NO_GUARD else guard
         if not isinstance(source, str) and not isinstance(source, Sequence):
             raise ChartError(
                 "it must be the name of a state, or several",
@@ -134,6 +169,8 @@ class Transition:
             ("guard", guard),
             ("actions", given),
             ("impulse", impulse),
+            ("event", event),
+            ("emit", emitted),
             ("sources", sources),
         ):
             object.__setattr__(self, each, value)
@@ -144,6 +181,11 @@ class Transition:
         for part in parts:
             object.__setattr__(part, "sources", self.sources)
         return parts
+
+
+def event_name(event: str) -> str:
+    """Return what an event is called in trees, where it is 1 while machines are asked for it."""
+    return EVENT + event
 
 
 def texts_of(given: object, owner: str) -> dict[str, str]:
@@ -178,6 +220,25 @@ def parameter_of(given: object, here: str) -> Parameter:
         place=here,
         advice="write it as 'k', or as Parameter('k', 'N/m', '> 0') with its unit and rule",
     )
+
+
+def values_of(given: object, variables: Sequence[str], here: str) -> dict[str, float]:
+    """Return the values with which variables start."""
+    owner = f"{here}: initial"
+    if not isinstance(given, Mapping):
+        raise ChartError(
+            "it gives a value for a variable, like {'z': 1.0}", place=owner, value=given
+        )
+    for name in given:
+        if name not in variables:
+            raise unknown("variable", name, variables, ChartError, place=owner)
+    try:
+        return {
+            name: checked_scalar(f"{owner}, {name!r}", value, "finite")
+            for name, value in given.items()
+        }
+    except ParameterError as error:
+        raise ChartError(error.reason, place=error.place, value=error.value) from None
 
 
 def places_of(given: object, parts: Sequence[State], here: str) -> dict[str, tuple[float, float]]:

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from gms_fsm.charts.parts import event_name
 from gms_fsm.errors import ChartError, ExpressionError, Part
-from gms_fsm.language import Condition, Number, Value, names_in, parse_condition, parse_value
+from gms_fsm.language import (
+    Both,
+    Condition,
+    Name,
+    Number,
+    Relation,
+    Value,
+    names_in,
+    parse_condition,
+    parse_value,
+)
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
@@ -55,7 +67,7 @@ class ChartReader:
             for variable in chart.variables:
                 flows[state.name, variable] = self.value(
                     state.flow.get(variable, "0"),
-                    self.known_now,
+                    [*self.known_now, *self.forces_for(variable)],
                     owner.of(f"flow of {variable!r}", "flow", variable),
                 )
             for kind, texts in (("entry", state.entry), ("exit", state.exit)):
@@ -65,10 +77,12 @@ class ChartReader:
         guards: dict[str, Condition] = {}
         for i, edge in enumerate(chart.transitions):
             owner = here.of(f"edge {edge.name!r}", "transitions", i)
-            guards[edge.name] = self.guard(edge.guard, owner.of("guard", "guard"))
-            assignments["action", edge.name] = self.assignments(
-                edge.actions, owner.of("action", "actions")
-            )
+            guard = self.guard(edge.guard, owner.of("guard", "guard"))
+            guards[edge.name] = _awaiting(edge.event, guard) if edge.event else guard
+            assignments["action", edge.name] = {
+                **self.assignments(edge.actions, owner.of("action", "actions")),
+                **{event_name(each): Number(1.0) for each in edge.emit},
+            }
         totals = {
             force: self.total(chart.contact_outputs[force], force)
             for force in chart.force_names
@@ -89,6 +103,18 @@ class ChartReader:
             "guards": guards,
             "totals": totals,
         }
+
+    def forces_for(self, variable: str) -> list[str]:
+        """Return the forces that the flow of a variable can read: wear and heat need them.
+
+        They must not follow from that rate, and no state may be locked, which would hold any force.
+        """
+        chart, rate = self.chart, f"d{variable}"
+        texts = [*chart.outputs.values(), *chart.contact_outputs.values()]
+        texts += [text for state in chart.states for text in state.outputs.values()]
+        if chart.locks or any(re.search(rf"\b{rate}\b", str(text)) for text in texts):
+            return []
+        return [name for name in chart.force_names if name in self.late]
 
     @property
     def known_now(self) -> list[str]:
@@ -180,13 +206,14 @@ class ChartReader:
         except ExpressionError:
             return
         for name in sorted(names_in(tree) & {*self.late}):
-            raise ChartError(
-                f"it reads {name!r}, which follows from it (an algebraic loop)",
-                place=owner.words,
-                advice=f"guards and actions can read {', '.join(self.late)}; a flow or a force "
-                "that needs them needs a variable in between",
-                key=owner.key,
-            )
+            late = f"guards and actions can read {', '.join(self.late)}"
+            if owner.key[:1] == ("let",):
+                reason = f"it reads {name!r}, and flows and forces, which could read it, cannot"
+                advice = f"write it out where it is needed: {late}"
+            else:
+                reason = f"it reads {name!r}, which follows from it (an algebraic loop)"
+                advice = f"{late}; a flow or a force that needs them needs a variable in between"
+            raise ChartError(reason, place=owner.words, advice=advice, key=owner.key)
 
     def only(self, texts: Mapping[str, str], allowed: tuple[str, ...], owner: Part) -> None:
         """Refuse texts for anything but the allowed variables."""
@@ -216,6 +243,15 @@ class ChartReader:
                     advice="it is one text for all states; where the force differs by state, give "
                     "it there: State('forward', outputs={'F': 'F_c'})",
                 )
+
+
+def _awaiting(event: str, guard: Condition) -> Condition:
+    """Return a guard that holds only at its event."""
+    arrived = Relation(">", Name(event_name(event)), Number(0.5))
+    match guard:
+        case Both(parts):
+            return Both((arrived, *parts)) if parts else arrived
+    return Both((arrived, guard))
 
 
 def _age(text: object) -> list[str]:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import STRIBECK, FloatArray, checked_values
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.language import Value, parse_value, values_of
 from integrators import elementary
 
@@ -69,6 +70,7 @@ def _part(text: str) -> str:
 _TEXTS = stribeck_text(delta="delta"), stribeck_text(delta=GAUSSIAN)
 
 
+@refusing()
 @dataclass(frozen=True)
 class Stribeck:
     """The Stribeck curve ``s(v) = F_c + (F_s - F_c) * exp(-abs(v / v_s)**delta)``, eq. (2).

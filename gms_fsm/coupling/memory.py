@@ -109,7 +109,7 @@ def prepared(start: Problem) -> tuple[Buffers, Sample]:
     lines = [each for each in start.system.signals.values() if isinstance(each, Corners)]
     sample = Sample(
         end=start.t_start,
-        wanted=layout.observed.index(layout.banks[0].of("F")),
+        wanted=layout.recorded[1][0][2],  # its force
         mean=False,
         resumed=False,
         switches=0,

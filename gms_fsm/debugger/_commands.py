@@ -17,10 +17,10 @@ from gms_fsm.debugger._view import branches, chart_states, ending, view
 from gms_fsm.errors import ExpressionError, GMSError, SessionError
 from gms_fsm.foundation.arguments import meant, there_are
 from gms_fsm.foundation.quantities import WIDTH, in_words
-from gms_fsm.language import evaluate
+from gms_fsm.language import EVENT, evaluate
 from gms_fsm.session.explain import holds
 from gms_fsm.session.session import KINDS, Breakpoint, Session
-from gms_fsm.session.units import in_si, units_of
+from gms_fsm.traces.system_scope import asked_unit, in_si, units_of
 
 
 class Commands:
@@ -58,6 +58,7 @@ class Commands:
         self.session, self.marks, self.width, self.element = session, marks, width, 0
         self.last_move = ""  # the line that moved last, which an empty line repeats
         self.left = False  # whether the last line was `quit`
+        self.refused = 0  # lines that were answered by an error
 
     def reply(self, line: str) -> Iterator[str]:
         """Execute a line as a person types it; a mistake is answered and changes nothing."""
@@ -73,10 +74,12 @@ class Commands:
             yield "stopped"
             yield from self.here()
         except GMSError as error:
+            self.refused += 1
             yield f"error: {error}"
         except BrokenPipeError:
             raise
         except Exception as error:  # losing the session would be worse than an unclear message
+            self.refused += 1
             yield f"error: {type(error).__name__}: {error}"
         else:
             self.left = name == "quit"
@@ -136,12 +139,12 @@ class Commands:
     @property
     def states(self) -> list[str]:
         """Names of the states of all charts."""
-        charts = (contact.chart for contact in self.session.system.contacts)
+        charts = (contact.chart for contact in self.session.system.machines)
         return list(dict.fromkeys(state.name for chart in charts for state in chart.states))
 
     @property
     def _edges(self) -> list[str]:
-        charts = (contact.chart for contact in self.session.system.contacts)
+        charts = (contact.chart for contact in self.session.system.machines)
         return list(dict.fromkeys(edge.name for chart in charts for edge in chart.transitions))
 
     def _usage(self, name: str) -> str:
@@ -211,7 +214,7 @@ class Commands:
     def do_goto(self, arg: str) -> Iterator[str]:
         """Go to a time."""
         try:
-            t = self.session.watch(in_si(self.session.start, arg, "t"))
+            t = self.session.watch(in_si(self.session.start.what, arg, "t"))
         except ExpressionError:
             advice = f"{self._usage('goto')}; the run ends at {self.session.t_end:g} s"
             raise SessionError(f"{arg!r} is not a time", advice=advice) from None
@@ -243,7 +246,7 @@ class Commands:
 
     def _unit(self, name: str) -> str:
         """Return the unit of a name, empty if it is not known."""
-        return units_of(self.session.start).get(name, "")
+        return units_of(self.session.start.what).get(name, "")
 
     def _units_in(self, text: str) -> str:
         """Return the units in which a text's numbers are read."""
@@ -337,7 +340,9 @@ class Commands:
     def _value(self, text: str) -> str:
         if re.search(r"[<>]|==|\b(and|or|not|state)\b", text):
             return "true" if self._truth(text) else "false"
-        return in_words(self.session.watch(text), self._unit(text.strip()), 9)
+        asked, unit, size = asked_unit(self.session.start.what, text)
+        value = self.session.watch(asked)
+        return f"{value / size:.9g} {unit}" if unit else in_words(value, self._unit(asked), 9)
 
     def _truth(self, text: str) -> bool:
         tree = self.session.parse(self._with_states(text))
@@ -439,6 +444,16 @@ class Commands:
         number = self.session.poke(edits.variables, edits.v, edits.state)
         yield f"branch {number}, from branch {parent}: {self.session.branch.edits}"
         yield from self.here()
+
+    def do_send(self, arg: str) -> Iterator[str]:
+        """Send an event in a new branch."""
+        events = [name.removeprefix(EVENT) for name in self.session.system.events]
+        if not events:
+            yield "no machine here waits for events"
+        elif arg not in events:
+            raise SessionError(f"there is no event {arg!r}", advice=there_are(arg, events))
+        else:
+            yield from self.do_poke(f"{arg}=1")
 
     def do_branches(self, arg: str) -> Iterator[str]:
         """Show branches."""

@@ -15,8 +15,8 @@ from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.session.elements import chart_of, element_name
 from gms_fsm.session.session import Session
 from gms_fsm.session.tree.poking import Edits, pokeable
-from gms_fsm.session.units import in_si
 from gms_fsm.systems.models import parameter_names
+from gms_fsm.traces.system_scope import in_si
 
 
 @dataclass(frozen=True)
@@ -130,12 +130,14 @@ def read_edits(session: Session, arg: str, usage: str, states: Iterable[str]) ->
         if state:
             named[_whose(elements, name, state[1], state[2])] = spelled(value, states)
         elif elements.named:
-            variables[name] = session.watch(in_si(session.start, value, name))
+            variables[name] = session.watch(in_si(session.start.what, value, name))
         elif name == "v":
-            v = session.watch(in_si(session.start, value, name))
+            v = session.watch(in_si(session.start.what, value, name))
         else:
             variable, i = _variable(session, name, usage)
-            variables.setdefault(variable, {})[i] = session.watch(in_si(session.start, value, name))
+            variables.setdefault(variable, {})[i] = session.watch(
+                in_si(session.start.what, value, name)
+            )
     return Edits(variables, v, named)
 
 

@@ -56,8 +56,9 @@ COMMANDS = {
     "print": Command(
         "look",
         "print EXPRESSION",
-        "Print the value of an expression or the truth of a condition. Names: {names}.",
-        ("print {z}1 / {s}1", "print {lead}F1", "p {lead}state({n}) == {state}"),
+        "Print the value of an expression, in SI units or the unit given, or the truth of a "
+        "condition. Names: {names}.",
+        ("print {z}1 / {s}1", "print {lead}F in mN", "p {lead}state({n}) == {state}"),
         "p",
     ),
     "watch": Command(
@@ -132,6 +133,12 @@ COMMANDS = {
             "poke {lead}state{n}={state}",
         ),
     ),
+    "send": Command(
+        "change",
+        "send EVENT",
+        "Send an event to the machines here and continue in a new branch.",
+        ("send overheat",),
+    ),
     "run": Command("change", "run", "Compute this branch to its end, without moving.", ("run",)),
     "branches": Command("change", "branches", "Show all branches.", ("branches",)),
     "branch": Command("change", "branch N", "Switch to another branch.", ("branch 0",)),
@@ -175,8 +182,8 @@ Ctrl-C interrupts a long move."""
 def names_for(session: Session) -> dict[str, str]:
     """Return the replacements for the names in braces, as far as the chart has them."""
     start, system = session.start, session.system
-    given, several = start.what.named, len(system.contacts) > 1
-    contact = system.contacts[0]
+    given, several = start.what.named, len(system.machines) > 1
+    contact = system.machines[0]
     chart, n = contact.chart, min(2, contact.n)
     lead = f"{contact.name}." if several else ""
     begin = session.branch.raw(0).t
@@ -190,7 +197,7 @@ def names_for(session: Session) -> dict[str, str]:
         "t": f"{begin + 0.25 * (session.t_end - begin):.9g}",
         "n": str(n),
         "lead": lead,
-        "v": chart.velocities[0],
+        "v": (*chart.velocities, "t")[0],
         "bodies": "bodies, sampled values and signals, then the contacts: " if given else "",
         "ELEMENT": "CONTACT [N]" if several else "ELEMENT",
         "NUMBER": "CONTACT [N]" if several else "N",
@@ -218,7 +225,7 @@ def names_for(session: Session) -> dict[str, str]:
 
 def _names(session: Session) -> str:
     """Return in words which names expressions can use."""
-    system, first = session.system, session.system.contacts[0]
+    system, first = session.system, session.system.machines[0]
     own = [*first.chart.variables, *(["s"] if first.stribeck is not None else []), "F", "state"]
     numbered = [f"{name}1" if name != "state" else "state(1)" for name in own]
     if not session.start.what.named:

@@ -19,6 +19,7 @@ from typing import TextIO
 from gms_fsm.debugger._commands import Commands
 from gms_fsm.debugger._text import DRAWN, PLAIN
 from gms_fsm.foundation.quantities import WIDTH, wrapped
+from gms_fsm.foundation.text import visible, visible_lines
 from gms_fsm.session.session import Session
 from plots.style import ansi
 
@@ -99,10 +100,10 @@ class Debugger(cmd.Cmd):
         Returns
         -------
         int
-            The exit code, 0.
+            The exit code: 1 if commands that were not typed were refused, else 0.
         """
         if self.title:
-            self.say(self.title)
+            self.say(visible(self.title))
         self.say(self.session.title)
         self.say("help lists the commands, where shows everything, quit exits.")
         while True:
@@ -111,12 +112,12 @@ class Debugger(cmd.Cmd):
             except KeyboardInterrupt:  # at the prompt
                 self.say("\nquit exits")
             else:
-                return 0
+                return int(self.commands.refused > 0 and not self.typed)
 
     def precmd(self, line: str) -> str:
         """Echo a command that was not typed."""
         if not self.typed:
-            self.stdout.write("\n" if line == "EOF" else f"{line}\n")
+            self.stdout.write("\n" if line == "EOF" else f"{visible(line)}\n")
         return line
 
     def postcmd(self, stop: bool, line: str) -> bool:  # noqa: ARG002 (signature of the base class)
@@ -176,7 +177,7 @@ class Debugger(cmd.Cmd):
     def say(self, text: str) -> None:
         """Print lines, wrapped to the screen width."""
         width = self.width
-        for line in text.replace("µ", self.commands.marks.micro).split("\n"):
+        for line in visible_lines(text).replace("µ", self.commands.marks.micro).split("\n"):
             for part in wrapped(line, width):
                 part = part.encode(self.encoding, "replace").decode(self.encoding)
                 self.stdout.write(f"{self._painted(part)}\n")

@@ -47,9 +47,8 @@ def _body_lines(view: Screen) -> Iterator[str]:
     """Yield the bodies and the further values of a system."""
     wide = max((len(body.name) for body in view.bodies), default=0)
     for body in view.bodies:
-        (x, position), (v, velocity) = body.x, body.v
         given = "  (given)" if body.driven else ""
-        yield f"{body.name:<{wide}}  {x} = {position:.6g}, {v} = {velocity:.6g}{given}"
+        yield f"{body.name:<{wide}}  {body.text()}{given}"
     for each in view.values:
         tick = "" if each.tick is None else f"; next tick at t = {each.tick:.9g} s"
         yield f"{each.title}: {named_numbers(each.values)}{tick}"
@@ -64,7 +63,7 @@ def _contact_lines(
     shared = "  (shared with other locks)" if contact.here.shared else ""
     if contact.name:
         yield contact.title
-        yield f"  {contact.here.written('v', 'F', *contact.here.more)}{shared}"
+        yield f"  {contact.here.said}{shared}".rstrip()
     else:
         yield contact.here.written("v", "x", "F")
         yield from ending_lines(view.ending)
@@ -82,7 +81,7 @@ def _contact_lines(
             cells += [f"{scales['s'].number(each.s):>9}", f"{shown:>7}"]
             if len(each.variables) == 1:  # further variables take the place of the bar
                 cells.append(_bar(each.ratio, marks, bar))
-        cells.append(f"{scales['F'].number(each.F):>10}")
+        cells += [f"{scales['F'].number(each.F):>10}"][: len(chart.velocities)]
         line = lead + " ".join([f"{short(each.state, wide):<{wide}}", *cells])
         edges = " ".join(
             f"{edge.priority}:"
@@ -111,7 +110,7 @@ def _heads(contact: ContactView, bar: int) -> list[str]:
         heads += [f"{heading['s']:>9}", f"{short(f'|{chart.variables[0]}|/s', 7):>7}"]
         if len(names) == 1:
             heads.append(" " * (bar + 2))
-    return [*heads, f"{heading['F']:>10}"]
+    return [*heads, *[f"{heading['F']:>10}"][: len(chart.velocities)]]
 
 
 def _bar(ratio: float, marks: Marks, wide: int) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.foundation.quantities import Scale, scale_of
+from gms_fsm.foundation.quantities import Scale, quantity, scale_of
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.session.elements import chart_of
 from gms_fsm.session.here import why_at
@@ -121,12 +121,21 @@ class BodyView:
         Name and value of its position and of its velocity.
     driven : bool
         Whether its velocity is given.
+    unit : str
+        Of its position.
     """
 
     name: str
     x: tuple[str, float]
     v: tuple[str, float]
     driven: bool
+    unit: str
+
+    def text(self) -> str:
+        """Return name and value of position and velocity, with units."""
+        (x, position), (v, velocity) = self.x, self.v
+        speed = quantity(velocity, f"{self.unit}/s")
+        return f"{x} = {quantity(position, self.unit)}, {v} = {speed}"
 
 
 @dataclass(frozen=True)
@@ -281,6 +290,7 @@ def view(session: Session) -> Screen:
                 (body.x, here.bodies[body.name].x),
                 (body.v, here.bodies[body.name].v),
                 body.driven,
+                body.unit,
             )
             for body in start.system.bodies
         )

@@ -87,7 +87,7 @@ def adapting_of(start: Problem) -> Adapting:
 def check_first_call(subject: Subject, words: Collection[str]) -> None:
     """Refuse inputs that the language cannot name, and initial values that depend on them."""
     start = subject.start
-    for contact in start.system.contacts:
+    for contact in start.system.machines:
         chart = contact.chart
         given = {*chart.inputs, *chart.velocities, *chart.declared} - {*chart.variables}
         given -= {*chart.parameter_names}

@@ -20,6 +20,7 @@ from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import C_WORDS
+from gms_fsm.foundation.text import visible
 from gms_fsm.run.problem import LATEST, Problem
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.front_end.translate import Translator
@@ -262,7 +263,7 @@ def _comment(each: Quantity) -> str:
 
 def safe(text: str) -> str:
     """Return a text that does not end a comment."""
-    return text.replace("*/", "* /").replace("/*", "/ *").replace("\n", " ")
+    return visible(text).replace("*/", "* /").replace("/*", "/ *")
 
 
 def _closed(lines: Sequence[str]) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from gms_fsm.charts.parameters import QUANTITIES, SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
+from gms_fsm.foundation.text import visible
 from gms_fsm.run.problem import Problem
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.system import Contact, System
@@ -52,12 +53,14 @@ class Quantity:
     @property
     def about(self) -> str:
         """Unit and meaning, for a comment."""
-        return ", ".join(part for part in (self.unit, self.meaning) if part)
+        return visible(", ".join(part for part in (self.unit, self.meaning) if part))
 
     @property
     def shown(self) -> str:
         """A line of a README."""
-        return f"- `{self.name}` = {', '.join(map(repr, self.values))} {self.unit}".rstrip()
+        return (
+            f"- `{self.name}` = {', '.join(map(repr, self.values))} {visible(self.unit)}".rstrip()
+        )
 
 
 def outputs_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
@@ -125,7 +128,7 @@ def _parameter(
 def _declared(system: System, label: str) -> Parameter:
     """Return unit and meaning of a name in the trees."""
     owner, _, name = label.rpartition(".")
-    contact = next((each for each in system.contacts if each.name == owner), None)
+    contact = next((each for each in system.machines if each.name == owner), None)
     known: dict[str, Parameter] = {}
     if contact is not None:
         known = dict(_of_contact(contact))

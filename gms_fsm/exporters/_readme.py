@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gms_fsm.exporters.plain.element import NamedFriction
 from gms_fsm.exporters.plain.parts import Constant
+from gms_fsm.foundation.text import visible
 
 
 def about_friction(element: NamedFriction) -> str:
@@ -19,8 +20,8 @@ def about_friction(element: NamedFriction) -> str:
     GMS element, signed law, 4 elements (arXiv 2512.03049 (2025)).
     """
     count = f"{element.n} element{'s' if element.n > 1 else ''}"
-    source = f" ({element.reference})" if element.reference else ""
-    lines = [f"{element.title}, {count}{source}."]
+    source = f" ({visible(element.reference)})" if element.reference else ""
+    lines = [f"{visible(element.title)}, {count}{source}."]
     lines += ["", "Inputs:", ""]
     lines += [f"- {name}{_described(about)}" for name, about in element.inputs]
     lines += ["", "Numbers:", ""]
@@ -38,4 +39,4 @@ def _shown(constant: Constant) -> str:
 
 
 def _described(about: str) -> str:
-    return f" ({about})" if about else ""
+    return f" ({visible(about)})" if about else ""

@@ -15,6 +15,7 @@ from gms_fsm.formats import Format, of
 from gms_fsm.foundation.arguments import checked_path, either, unknown
 from gms_fsm.foundation.display import asked
 from gms_fsm.foundation.files import output_folder, write_together
+from gms_fsm.foundation.text import encoded
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact, System
@@ -132,5 +133,5 @@ def export(
 
 
 def _writer(content: str | bytes) -> Callable[[IO[bytes]], object]:
-    data = content.encode() if isinstance(content, str) else content
+    data = encoded(content) if isinstance(content, str) else content
     return lambda file: file.write(data)

@@ -69,11 +69,6 @@ def check_moved_from_outside(chart: Chart, known: Iterable[str], title: str) -> 
             )
 
 
-def one_line(text: str) -> str:
-    """Return a text without line breaks and control characters."""
-    return "".join(c if c.isprintable() else " " for c in text)
-
-
 def fields_of(parameter: Parameter) -> dict[str, Any]:
     """Return the fields of a parameter that differ from their defaults, besides its name."""
     plain = vars(Parameter(parameter.name))

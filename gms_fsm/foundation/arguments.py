@@ -7,14 +7,18 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import functools
+import inspect
 import operator
 import os
-from collections.abc import Iterable
+import textwrap
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from gms_fsm.errors import GMSError, ParameterError, shown
 
+Called = TypeVar("Called", bound=Callable[..., Any])
 MOST_NAMED = 12  # of all names: more are a wall that nobody reads
 
 
@@ -85,6 +89,99 @@ def listed(name: str, value: Any, wanted: str) -> list[Any]:
     return list(checked_kind(name, value, Iterable, wanted))
 
 
+# --------------------------------------------------------------------------- of a call
+def refusing(
+    error: type[GMSError] = ParameterError,
+    *advice: str,
+    instead: Mapping[str, str] | None = None,
+    **needed: str,
+) -> Callable[[Called], Called]:
+    """Return a decorator: a class or function refuses arguments that it does not take, or lacks.
+
+    `instead` has names of other programs, with ours; `needed` says what to give for one that is
+    missing, `advice` what else holds where there is no such argument.
+
+    Examples
+    --------
+    >>> @refusing(speed="a number [m/s]")
+    ... def belt(speed, load=1.0): ...
+    >>> belt(spede=0.1)
+    Traceback (most recent call last):
+    gms_fsm.errors.ParameterError: belt: it has no argument 'spede'; did you mean 'speed'? \
+it takes speed, load
+    >>> belt()
+    Traceback (most recent call last):
+    gms_fsm.errors.ParameterError: belt: speed is missing; give a number [m/s]
+    """
+
+    def add(kind: Called) -> Called:
+        call: Any = kind.__init__ if isinstance(kind, type) else kind  # type: ignore[misc]
+
+        @functools.wraps(call)
+        def checked(*args: Any, **given: Any) -> Any:
+            try:
+                return call(*args, **given)
+            except TypeError:
+                misfit = _misfit(kind, call, args, given, instead or {}, needed, advice)
+                if misfit is None:  # raised within
+                    raise
+                place, reason, *rest = misfit
+            raise error(reason, place=place, advice="; ".join(rest))
+
+        if not isinstance(kind, type):
+            return cast("Called", checked)
+        kind.__init__ = checked  # type: ignore[misc]
+        return kind
+
+    return add
+
+
+def _misfit(
+    kind: Any,
+    call: Callable[..., Any],
+    args: tuple[Any, ...],
+    given: Mapping[str, Any],
+    instead: Mapping[str, str],
+    needed: Mapping[str, str],
+    advice: tuple[str, ...],
+) -> tuple[str, ...] | None:
+    """Return place, reason and advice if a call does not fit; None if it does."""
+    signature = inspect.signature(call)
+    try:
+        signature.bind(*args, **given)
+    except TypeError as error:
+        said = str(error)
+    else:
+        return None
+    takes = {name: each for name, each in signature.parameters.items() if name != "self"}
+    args = args[len(signature.parameters) - len(takes) :]
+    named = given.get("name", args[0] if args else None) if "name" in takes else None
+    place = kind.__name__ if named is None else f"{kind.__name__.lower()} {shown(named)}"
+    for name in given:
+        if name not in takes:
+            near = instead.get(name) or nearest(name, takes)
+            hint = f"did you mean {near!r}? " if near else ""
+            return (
+                place,
+                f"it has no argument {name!r}",
+                f"{hint}it takes {', '.join(takes)}",
+                *advice,
+            )
+    ordered = [name for name, each in takes.items() if each.kind is not each.KEYWORD_ONLY]
+    if len(args) > len(ordered):
+        rest = [name for name in takes if name not in ordered]
+        form = f": {', '.join(f'{name}=...' for name in rest)}" if rest else ""
+        return (
+            place,
+            f"{len(args)} arguments without a name are too many",
+            f"give at most {len(ordered)}{', the others by name' * bool(rest)}{form}",
+        )
+    for name, each in takes.items():
+        if each.default is each.empty and name not in given and name not in ordered[: len(args)]:
+            return place, f"{name} is missing", f"give {needed.get(name, f'{name}=...')}"
+    return place, said
+
+
 # --------------------------------------------------------------------------- names
 def nearest(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
     """Return the known name most like a wrong one, whatever its case; empty if none is.
@@ -150,8 +247,8 @@ def unknown(
     return kind(f"there is no {noun} {shown(name)}", advice=there_are(name, known), **at)
 
 
-def there_are(name: object, known: Iterable[str]) -> str:
-    """Return the advice on a name that is not known.
+def there_are(name: object, known: Iterable[str], *, every: bool = False) -> str:
+    """Return the advice on a name that is not known: with names, or every name there is.
 
     Examples
     --------
@@ -160,6 +257,8 @@ def there_are(name: object, known: Iterable[str]) -> str:
     """
     names = [*dict.fromkeys(known)]
     hint = meant(name, names)
+    if every and len(names) > MOST_NAMED:
+        return "\n".join([f"{hint}there are", *textwrap.wrap(", ".join(names), 76)])
     if hint and len(names) > MOST_NAMED + 1:  # a wall of names would hide the one that is meant
         return f"{hint}there are {len(names)} in all"
     return f"{hint}there {'is only' if len(names) == 1 else 'are'} {some_of(names)}"

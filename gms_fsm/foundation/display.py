@@ -16,12 +16,15 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
+import numpy as np
+
 from gms_fsm.errors import cut
 
 Form: TypeAlias = str  # as in the names of the methods that IPython asks: html, png or svg
 Shown = TypeVar("Shown", bound=type)
 
 GROUP = "gms_fsm.display"  # of entry points
+ALWAYS = {"trust": "gms_fsm.session.trust:trust_of"}  # this package's, installed or not
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"  # in a checkout
 MOST_NUMBERS = 8  # of an array in a short repr
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
@@ -94,7 +97,8 @@ def asked(name: str) -> Callable[..., Any] | None:
 
 
 def _declared() -> Iterator[EntryPoint]:
-    """Yield the entry points of the checkout, which need not be installed, then the others."""
+    """Yield what is always there, the entry points of the checkout, and those installed."""
+    yield from (EntryPoint(name, value, GROUP) for name, value in ALWAYS.items())
     if PROJECT.is_file():
         project = tomllib.loads(PROJECT.read_text(encoding="utf-8")).get("project", {})
         for name, value in project.get("entry-points", {}).get(GROUP, {}).items():
@@ -152,3 +156,27 @@ def full_text(value: Any) -> str:
     """
     parts = ", ".join(repr(getattr(value, each.name)) for each in fields(value) if each.repr)
     return f"{type(value).__name__}({parts})"
+
+
+# --------------------------------------------------------------------------- tables
+@displayed("html")
+class Log(np.recarray[Any, Any]):
+    """A record array that notebooks show as a table of its first rows.
+
+    In every other respect it is a `numpy.recarray`.
+
+    Examples
+    --------
+    >>> records = np.array([(0.5, "slip"), (0.7, "stick")], dtype=[("t", "f8"), ("to", "U5")])
+    >>> log = records.view(Log)
+    >>> log
+    <2 records of t, to>
+    >>> log.to.tolist(), log[log.t > 0.6]
+    (['slip', 'stick'], <1 record of t, to>)
+    """
+
+    def __repr__(self) -> str:
+        names = self.dtype.names
+        if names is None or self.ndim != 1:
+            return repr(self.view(np.ndarray))
+        return f"<{len(self)} record{'s' * (len(self) != 1)} of {', '.join(names)}>"

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import IO
 
 from gms_fsm.errors import OutputError
+from gms_fsm.foundation.text import encoded
 
 if sys.platform != "win32":  # on Windows nothing is locked, and no leftovers are removed
     import fcntl
@@ -127,7 +128,7 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
 
 def write_text(path: Path, text: str) -> Path:
     """Write a text as `write_whole` does."""
-    return write_whole(path, lambda file: file.write(text.encode()))
+    return write_whole(path, lambda file: file.write(encoded(text)))
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
@@ -286,8 +287,8 @@ def _add_to_list(folder: Path, parts: Mapping[Path, Path]) -> None:
 
 
 def _as_json(listed: Mapping[str, list[str]]) -> Callable[[IO[bytes]], object]:
-    text = json.dumps(listed, indent=1, sort_keys=True).encode()
-    return lambda file: file.write(text + b"\n")
+    text = json.dumps(listed, indent=1, sort_keys=True)
+    return lambda file: file.write(encoded(f"{text}\n"))
 
 
 def _checksum(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""Values in engineering units, with one unit for each quantity and place: ``-776.2 mm``."""
+"""Values in engineering units, one unit for each quantity and place (``-776.2 mm``); factors."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from gms_fsm.errors import UnitError, shown
+
 WIDTH = 80  # columns, where there is no terminal
 JOINED = "\N{NO-BREAK SPACE}"
 NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=[pnuµmkMGT]?(?:m/s|m|N|s)\b)")
@@ -16,11 +18,19 @@ PREFIXES = {3 * i - 12: prefix for i, prefix in enumerate([*"pnµm", "", *"kMGT"
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
 TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns)(?=$|[/*·])")
 LONGEST_NUMBER = 60  # characters, with its unit: the search takes quadratic time
-FACTORS = {"g": 1e-3, "min": 60.0, "h": 3600.0, "%": 0.01}  # of units that are not of SI
+NOT_OF_SI = {"g": 1e-3, "min": 60.0, "h": 3600.0, "%": 0.01}  # factors to SI
 _ONE_UNIT = re.compile(r"([pnuµmckMGT]?)(Nm|Ns|Pa|Hz|rad|m|s|N|J|W|V|A|g)\^?(-?\d)?")
 _POWER_OF_TEN = re.compile(r"(?:([\d.,]+)\s*[*x×·]\s*)?\b10\s*(?:\^|\*\*)\s*\(?([+-]?\d+)\)?")
 _WITH_UNIT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 _THOUSANDS = re.compile(r"(?<!\d)[1-9]\d{0,2}(?:,\d{3})+(?!\d)")
+# quantity -> unit -> factor to SI
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+    "position": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254},
+    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "nm/s": 1e-9},
+    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "lbf": 4.4482216152605},
+}
+UNITS["normal"] = UNITS["force"]
 BLOCKS = "▁▂▃▄▅▆▇█"
 DIGITS = 4
 SMALLEST = -4  # power of ten of a value in the unit of its place, below which it has an exponent
@@ -137,14 +147,121 @@ def in_si(text: str) -> str:
 
 def _factor(unit: str) -> float | None:
     """Return the factor to SI of one unit, with its prefix and power."""
-    if unit in FACTORS:
-        return FACTORS[unit]
+    if unit in NOT_OF_SI:
+        return NOT_OF_SI[unit]
     found = _ONE_UNIT.fullmatch(unit)
     if found is None:
         return None
     prefixes = {prefix: power for power, prefix in PREFIXES.items()} | {"u": -6, "c": -2}
-    factor = 10.0 ** prefixes[found[1]] * FACTORS.get(found[2], 1.0)
+    factor = 10.0 ** prefixes[found[1]] * NOT_OF_SI.get(found[2], 1.0)
     return float(factor ** int(found[3] or 1))
+
+
+def plain(unit: str) -> str:
+    """Return a unit as the table of factors writes it.
+
+    Parameters
+    ----------
+    unit : str
+        Unit, for example ``" µm"``.
+
+    Returns
+    -------
+    str
+        Without spaces around it, and with ``u`` for micro.
+
+    Examples
+    --------
+    >>> plain(" µm")
+    'um'
+    """
+    return unit.strip().replace("µ", "u").replace("μ", "u")
+
+
+def factor(quantity: str, unit: str) -> float:
+    """Return the factor from a unit to SI.
+
+    Parameters
+    ----------
+    quantity : {"time", "position", "velocity", "force", "normal"}
+        The quantity.
+    unit : str
+        Unit, for example ``"mm"``; ``µ`` and ``μ`` are read as ``u``.
+
+    Returns
+    -------
+    float
+        Value in SI = factor * value in the unit.
+
+    Raises
+    ------
+    UnitError
+        If the unit is unknown or belongs to another quantity.
+
+    Examples
+    --------
+    >>> factor("position", "µm")
+    1e-06
+    """
+    name, known = plain(unit), UNITS[quantity]
+    if name in known:
+        return known[name]
+    for other, units in UNITS.items():
+        if name in units:
+            raise UnitError(
+                f"unit {shown(unit)} measures {other}, not {quantity}",
+                advice=f"use one of {', '.join(known)}",
+            )
+    raise UnitError(
+        f"unknown unit {shown(unit)}", advice=f"for {quantity} use one of {', '.join(known)}"
+    )
+
+
+def convert_numbers(text: str, quantities: Mapping[str, str] | None = None) -> str:
+    """Replace each ``number unit`` in a condition by the number in SI.
+
+    Parameters
+    ----------
+    text : str
+        Condition, for example ``"normal > 4.5 N"``.
+    quantities : mapping of str to str, optional
+        The quantity that each name measures; by default names are those of quantities.
+
+    Returns
+    -------
+    str
+        The condition with SI numbers, for example ``"normal > 4.5"``.
+
+    Raises
+    ------
+    UnitError
+        If a word after a number is not a unit, or not one of the quantity that it is compared with.
+
+    Examples
+    --------
+    >>> convert_numbers("normal > 4500 mN and time < 3 min")
+    'normal > 4.5     and time < 180.0'
+    >>> convert_numbers("abs(v) > 300 mm/s", {"v": "velocity"})
+    'abs(v) > 0.3     '
+    """
+    known = {each: each for each in UNITS} if quantities is None else quantities
+    # Possessive (++): 2e3 is not 2 with the unit e3, and long digit strings do not backtrack.
+    number = r"(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?\d++)?+"
+    number_unit = rf"(?<![\w.])({number})\s*+([^\W\d]\w*+(?:/s)?)"
+
+    def converted(clause: str) -> str:
+        measured = [known[name] for name in re.findall(r"[^\W\d][\w.]*", clause) if name in known]
+
+        def in_si(found: re.Match[str]) -> str:
+            value, unit = float(found.group(1)), found.group(2)
+            fitting = measured or [q for q, units in UNITS.items() if plain(unit) in units]
+            # Padded to the length of the original if possible, so columns in messages are correct.
+            return repr(value * factor((fitting or ["force"])[0], unit)).ljust(len(found.group(0)))
+
+        return re.sub(number_unit, in_si, clause)
+
+    parts = re.split(r"(\band\b|\bor\b|\bnot\b|&&|\|\|)", text)
+    return "".join(p if k % 2 else converted(p) for k, p in enumerate(parts))
 
 
 def _power(value: float) -> int:

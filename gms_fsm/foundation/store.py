@@ -3,20 +3,23 @@
 A faulty disk or cable, or a user, may alter a file, and machine code with one wrong bit crashes the
 process that runs it. So each content is preceded by a checksum over name and content, which is
 verified before use; a file that fails is removed, and the caller recreates it. The kind of content
-does not matter here. A checksum detects damage, not malice: the folder must be as trusted as the
-program.
+does not matter here. What has not been used for longest makes room for what is new. A checksum
+detects damage, not malice: the folder must be as trusted as the program.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 from gms_fsm.errors import OutputError
 from gms_fsm.foundation.files import remove_leftovers, write_whole
+
+MOST_BYTES = 256_000_000  # of all files; the code of one run has some 100,000
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,8 @@ class CodeFolder:
     ----------
     folder : Path
         The location of the files.
+    most : int
+        Bytes of all files together.
 
     Examples
     --------
@@ -38,6 +43,7 @@ class CodeFolder:
     """
 
     folder: Path
+    most: int = MOST_BYTES
 
     @classmethod
     def at(cls, folder: Path) -> CodeFolder | None:
@@ -62,6 +68,8 @@ class CodeFolder:
             found = b""
         size = hashlib.sha256().digest_size
         if found[:size] == _checksum(name, found[size:]):
+            with contextlib.suppress(OSError):  # removed meanwhile, or not ours to change
+                os.utime(path)  # the time of the last use
             return found[size:]
         with contextlib.suppress(OSError):  # another process may have removed it first
             path.unlink()
@@ -73,6 +81,25 @@ class CodeFolder:
             write_whole(
                 self.folder / name, lambda file: file.write(_checksum(name, content) + content)
             )
+            self._make_room(name)
+
+    def _make_room(self, kept: str) -> None:
+        """Remove the files that have not been used for longest, if all are too large together."""
+        with contextlib.suppress(OSError), os.scandir(self.folder) as entries:
+            found = [each for each in entries if not each.name.startswith(".")]
+            files = sorted(
+                (each.stat().st_mtime_ns, each.stat().st_size, each.path, each.name)
+                for each in found
+                if each.is_file()
+            )
+            left = sum(size for _, size, _, _ in files) - self.most
+            for _, size, path, name in files:
+                if left <= 0:
+                    return
+                if name != kept:
+                    left -= size
+                    with contextlib.suppress(OSError):  # by another process, or open in it
+                        os.unlink(path)
 
 
 def _checksum(name: str, content: bytes) -> bytes:

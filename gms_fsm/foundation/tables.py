@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
 from pydantic.fields import FieldInfo
@@ -17,6 +17,7 @@ from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, shown
 from gms_fsm.foundation.arguments import either, meant, nearest, some_of
 from gms_fsm.foundation.files import output_folder, write_whole
 from gms_fsm.foundation.quantities import in_si
+from gms_fsm.foundation.text import encoded
 from gms_fsm.foundation.toml import LARGEST_FILE, Key, data_of, line_of, override, text_of, written
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
@@ -43,6 +44,8 @@ Numbers = Annotated[
 ]
 Texts = Annotated[Annotated[str, Tag(ONE)] | Annotated[list[str], Tag(LIST)], Discriminator(_form)]
 Value = Annotated[Annotated[str, Tag(TEXT)] | Annotated[float, Tag(ONE)], Discriminator(_kind)]
+
+NUMBER = r"(?:(?<![\d.])[+-])?(?:\d+(?:\.(?!\.)\d*)?|(?<!\.)\.\d+)(?:[eE][+-]?\d+)?"
 
 Kind = TypeVar("Kind", bound=BaseModel)
 Made = TypeVar("Made")
@@ -88,7 +91,7 @@ def write_file(path: Path, table: Table) -> Path:
         raise OutputError(f"its name must end in .toml, not {path.suffix!r}", place=str(path))
     text = written(table.model_dump(by_alias=True, exclude_defaults=True))
     try:
-        raw = text.encode()
+        raw = encoded(text)
     except UnicodeEncodeError as error:
         found = shown(error.object[error.start : error.end])
         raise OutputError(
@@ -141,17 +144,33 @@ def explained(
     # An unknown key is often the cause of a missing one, so report it first.
     first = min(findings, key=lambda f: f["type"] != "extra_forbidden")
     places = _written_key(first["loc"], data)
-    for each in findings:  # a table without its head gives its keys to none
-        name = str(each["loc"][0]) if each["type"] == "missing" and len(each["loc"]) == 1 else ""
-        unknown = first["type"] == "extra_forbidden" and len(places) == 1
-        if unknown and name and places[0] in _fields_at((name,), {name: data}, root):
-            return places, f"{places[0]} is in no table; write its head, [{name}], above it"
+    unknown = [each["loc"] for each in findings if each["type"] == "extra_forbidden"]
+    if unknown and (head := _head_missing([_written_key(u, data) for u in unknown], data, root)):
+        where = f"no key of [{places[0]}]" if len(places) > 1 else "in no table"
+        return places, f"{places[-1]} is {where}; write the head of its table, {head}, above it"
     rest = len(findings) - 1
     sentence = _sentence(first, places, data, root) + (f" (and {rest} more)" if rest else "")
     tag = first.get("ctx", {}).get("discriminator", "").strip("'")
     part = tag or getattr(first.get("ctx", {}).get("error"), "place", "").partition("[")[0]
     value = first.get("input")
     return (*places, part) if isinstance(value, dict) and part in value else places, sentence
+
+
+def _head_missing(unknown: list[Key], data: dict[str, Any], root: type[BaseModel]) -> str:
+    """Return the head of the table to which unknown keys belong, if it is not there.
+
+    Without its head, a table gives its keys to the table before it, or to none. One key alone tells
+    that only of a table that must be there.
+    """
+    table = unknown[0][:-1]
+    keys = [each[-1] for each in unknown if each[:-1] == table]
+    for name, field in root.model_fields.items():
+        shown = field.alias or name
+        there = {} if shown in data else _fields_at((shown,), {shown: {}}, root)
+        least = 1 if field.is_required() else 2
+        if len(table) < 2 and keys[0] in there and sum(key in there for key in keys) >= least:
+            return f"[[{shown}]]" if get_origin(field.annotation) is list else f"[{shown}]"
+    return ""
 
 
 def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseModel]) -> str:
@@ -184,6 +203,10 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
             return f"[{key}]: there may be several of it; write [[{key}]]"
         return f"[{key}] {text}" if key else text
     field = _fields_at(places[:-1], data, root).get(str(places[-1]))
+    outer = _fields_at(places[:-2], data, root).get(str(places[-2])) if len(places) > 1 else None
+    pair = isinstance(places[-1], str) and (_pair_in(field) or _pair_in(outer))
+    if pair and kind in ("list_type", "too_short", "too_long"):
+        return f"{key} = {shown(value)}: {_as_pair(value, field)}"
     per_element = field is not None and "element" in (field.description or "")
     elements = _beside(places, data) if per_element else 0
     return f"{key} = {shown(value)}: {_other_form(kind, value, elements) or text}"
@@ -204,15 +227,35 @@ def _other_form(kind: str, value: object, elements: int) -> str:
     return ""
 
 
+def _as_pair(value: object, field: FieldInfo | None) -> str:
+    """Return how two numbers are written: with those that are given, if there are one or two."""
+    numbers = re.findall(NUMBER, value if isinstance(value, str) else repr(value))
+    span = field is not None and "from and to" in (field.description or "")
+    form = "from and to" if span else "lowest and highest"
+    if span and len(numbers) == 1:
+        numbers = ["0", *numbers]
+    return f"it must be a list of two numbers, {form}" + (
+        f": [{', '.join(numbers)}]" if len(numbers) == 2 else ""
+    )
+
+
+def _pair_in(field: Any) -> bool:
+    """Return whether a key, or a part of its annotation, takes a list of two."""
+    annotation = field.annotation if isinstance(field, FieldInfo) else field
+    limits = [getattr(each, "metadata", ()) for each in getattr(annotation, "__metadata__", ())]
+    if any(getattr(each, "max_length", 0) == 2 for several in limits for each in several):
+        return True
+    return any(map(_pair_in, get_args(annotation)))
+
+
 def _as_list(text: str) -> str:
     """Return a text as the list that it stands for.
 
     >>> _as_list("4-16"), _as_list("100, 50"), _as_list("k, weights"), _as_list("coverage")
     ('[4, 16]', '[100, 50]', '["k", "weights"]', '["coverage"]')
     """
-    number = r"(?:(?<![\d.])[+-])?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-    if re.fullmatch(rf"\W*{number}(?:(?:[\s,;:\-]|\.\.|to)+{number})*\W*s?", text):
-        return f"[{', '.join(re.findall(number, text))}]"
+    if re.fullmatch(rf"\W*{NUMBER}(?:(?:[\s,;:\-]|\.\.|to)+{NUMBER})*\W*s?", text):
+        return f"[{', '.join(re.findall(NUMBER, text))}]"
     words = filter(None, (each.strip() for each in re.split(r"[,;]", text.strip("[]"))))
     return f"[{', '.join(f'{chr(34)}{cut(each, 40)}{chr(34)}' for each in words)}]"
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from gms_fsm.foundation.files import output_folder, write_whole
 from gms_fsm.foundation.tables import Table
+from gms_fsm.foundation.text import encoded
 from gms_fsm.systems.files.tables import SignalField, signal_table
 from gms_fsm.systems.files.toml import FileTable, SystemFile, save_as
 from gms_fsm.systems.signals import Corners, Signal
@@ -61,7 +62,7 @@ def _signal(signal: Signal | str, name: str, path: Path) -> FileTable | SignalFi
         return signal_table(signal)
     table = path.with_suffix(".csv")
     rows = (f"{t!r},{u!r}" for t, u in np.stack([signal.times, signal.values], axis=1).tolist())
-    text = "\n".join([f"t_s,{name}", *rows, ""]).encode()
+    text = encoded("\n".join([f"t_s,{name}", *rows, ""]))
     output_folder(table.parent, [table.name])
     write_whole(table, lambda file: file.write(text))
     return FileTable(file=table.name, value=name)

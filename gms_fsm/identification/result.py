@@ -23,6 +23,7 @@ from gms_fsm.foundation.arguments import (
 )
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import missing
+from gms_fsm.foundation.text import visible
 from gms_fsm.identification.certainty.assess import Assessed, Estimate
 from gms_fsm.identification.certainty.compared import Choice, ChoiceRow, FitComparison, score_of
 from gms_fsm.identification.certainty.intervals import Bootstrap, bootstrapped, profiled
@@ -559,7 +560,7 @@ class Fit:
     def __repr__(self) -> str:
         opened = f"; {len(self.open)} cannot be told" if self.open else ""
         return (
-            f"<Fit: {self.title}, {len(self.table)} parameters, training RMSE "
+            f"<Fit: {visible(self.title)}, {len(self.table)} parameters, training RMSE "
             f"{self.training['rmse']:.4g} {self.task.measured.unit}{opened}>"
         )
 

@@ -22,6 +22,8 @@ from gms_fsm.language.tree import (
     Value,
 )
 
+EVENT = "event__"  # the name of an event begins like this; it is 1 where the event has come
+
 
 def spell(node: Node, dialect: Dialect = PYTHON, rename: Mapping[str, str] | None = None) -> str:
     """Write a tree as text.
@@ -155,6 +157,9 @@ class _Printer:
         if node.left == Name("age") and node.op == ">=" and "after" in self.dialect.functions:
             next(parts)
             return self.function("after", parts)
+        event = node.left.id if isinstance(node.left, Name) else ""
+        if event.startswith(EVENT) and "after" in self.dialect.functions:  # a chart shows it
+            return self.name(event.removeprefix(EVENT))
         return self.operator(node.op, *parts)
 
     def in_state(self, element: int, state: str) -> Printed:

@@ -18,8 +18,8 @@ from typing import NamedTuple
 from gms_fsm.errors import ExpressionError, shown
 from gms_fsm.foundation.arguments import nearest, some_of
 from gms_fsm.foundation.parser import PARSER
+from gms_fsm.foundation.quantities import in_si
 from gms_fsm.language.functions import (
-    CHOICES,
     CONSTANTS,
     FUNCTIONS,
     NAMESPACE,
@@ -27,6 +27,7 @@ from gms_fsm.language.functions import (
     SHORT,
     YIELDING,
 )
+from gms_fsm.language.normal import chosen, written_out
 from gms_fsm.language.tree import (
     Binary,
     Both,
@@ -90,6 +91,9 @@ _STATE = re.compile(r"\bstate\d*\s*(\(\s*\d+\s*\)\s*)?$")
 _WORDS = re.compile(r"\b(AND|OR|NOT)\b")
 _DECIMAL_COMMA = re.compile(r"(?<![\w.])(\d+),(\d+)")
 _NO_SIGN_BETWEEN = re.compile(r"[\w.)]\s+[\w(]|\)[\w(]|\d[^\W\d_eE]")  # 2 pi, 2pi, (a)(b)
+_AFTER = re.compile(  # as in Stateflow: after(2, sec)
+    r"\bafter\(\s*([\d.]+(?:[eE][+-]?\d+)?)\s*,?\s*([mnuµ]?s(?=ec|\W)|min)(?:ec)?\s*\)"
+)
 _QUANTITIES = {"time": "t", "position": "x", "velocity": "v", "force": "F"}  # of records, of runs
 _ALIASES: Mapping[str, str] = {
     "quantize": "quantise",
@@ -246,6 +250,11 @@ def _parsed(text: str) -> ast.expr:
             foreign.start() + 1,
             f"{'==' if state else _INSTEAD[mark]} instead",
         )
+    if timed := _AFTER.search(text):
+        seconds = in_si(f"{timed[1]} {timed[2]}")
+        raise ExpressionError(
+            "after takes one time, in seconds", text, timed.start(2) + 1, f"after({seconds})"
+        )
     flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay correct
     # Python has a word if, but no function: these letters are the same name to it, and no word.
     flat = _IF.sub(r"\1𝑖𝑓", flat)
@@ -340,6 +349,14 @@ class _Reader:
                 return Binary(
                     _OPERATORS[type(op)], self.value(left, depth), self.value(right, depth)
                 )
+            case ast.Call(func=ast.Name(id="is_in" | "count" as f), args=[ast.Attribute() as of]):
+                return self.name(node, f"{f}({ast.unparse(of)})")
+            case ast.Call(func=ast.Name(id="after")) if "age" in self.names:
+                raise self.refuse(
+                    "found a comparison where a number is needed",
+                    node,
+                    "age, the time in the present state",
+                )
             case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
                 self.known(node, function)
                 return self.call(node, function, arguments, depth)
@@ -374,7 +391,14 @@ class _Reader:
         raise self.refuse(
             f"unknown name {shown(name)}{_suggestion(name, [*self.names, *CONSTANTS])}",
             node,
-            f"the names {some_of(self.names)}, and pi",
+            f"the names {some_of(self.listed)}, and pi",
+        )
+
+    @property
+    def listed(self) -> list[str]:
+        """The names that messages list: those of others after one's own, without states."""
+        return sorted(
+            (name for name in self.names if "(" not in name), key=lambda name: "." in name
         )
 
     @functools.cached_property
@@ -403,7 +427,8 @@ class _Reader:
                 raise self.refuse(f"{function} got {len(arguments)} arguments", node, wanted)
             if function == "if":
                 return self.choice(node, arguments, depth)
-            return self.short(node, function, arguments, depth)
+            parts = [self.value(each, depth + 2) for each in arguments]
+            return self.within(node, written_out(function, *parts))
         several = function in SEVERAL
         if (len(arguments) < 2) if several else (len(arguments) != 1):
             wanted = "two or more arguments" if several else "one argument"
@@ -423,41 +448,15 @@ class _Reader:
             result = Call(function, (result, value))
         return result
 
-    def short(self, node: ast.expr, function: str, given: list[ast.expr], depth: int) -> Value:
-        """Read a function that stands for others."""
-        a, b, *more = (self.value(each, depth + 2) for each in given)
-        if function == "noise":
-            return Call("noise", tuple(u if is_whole(u) else Call("floor", (u,)) for u in (a, b)))
-        if function == "saturate":
-            return Call("min", (Call("max", (a, b)), *more))
-        whole = Call("floor" if function == "mod" else "round", (Binary("/", a, b),))
-        parts = Binary("*", b, whole)
-        return self.within(node, parts if function == "quantise" else Binary("-", a, parts))
-
     def choice(self, node: ast.expr, given: list[ast.expr], depth: int) -> Value:
         """Read a choice between two values, one comparison at a time."""
         test, *values = given
         levels = sum(isinstance(each, ast.cmpop) for each in ast.walk(test))
-        condition = self.condition(test, depth)
         yes, no = (self.value(each, depth + levels) for each in values)
-        return self.within(node, self.chosen(test, condition, yes, no))
-
-    def chosen(self, node: ast.expr, condition: Condition, yes: Value, no: Value) -> Value:
-        match condition:
-            case Relation(op, left, right):
-                name = next(each for each, known in CHOICES.items() if known == op)
-                return Call(name, (left, right, yes, no))
-            case Not(operand):
-                return self.chosen(node, operand, no, yes)
-            case Both(operands):
-                for each in reversed(operands):
-                    yes = self.chosen(node, each, yes, no)
-                return yes
-            case Either(operands):
-                for each in reversed(operands):
-                    no = self.chosen(node, each, yes, no)
-                return no
-        raise self.refuse("a value depends on numbers, not on states", node)
+        try:
+            return self.within(node, chosen(self.condition(test, depth), yes, no))
+        except TypeError as error:
+            raise self.refuse(str(error), test) from None
 
     def within(self, node: ast.expr, value: Value) -> Value:
         """Refuse a value whose repeated parts make it too large."""
@@ -529,6 +528,9 @@ class _Reader:
                 func=ast.Name(id="after" | "every" as word), args=[time], keywords=[]
             ) if "age" in self.names and word not in self.names:
                 return Relation(">=", Name("age"), self.value(time, depth))
+            case ast.Call(func=ast.Name(id="after"), args=given) if "age" in self.names:
+                wanted = "one time in seconds, for example after(0.2)"
+                raise self.refuse(f"after got {len(given)} arguments", node, wanted)
             case ast.Name(id="state") | ast.Call(func=ast.Name(id="state")) if self.own.states:
                 raise self.refuse("a state is compared with a name", node, self.compared())
             case ast.Constant() | ast.Name() | ast.BinOp() | ast.UnaryOp() | ast.Call():

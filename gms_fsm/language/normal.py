@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from gms_fsm.language._powers import integer_power
-from gms_fsm.language.functions import ROUGH
+from gms_fsm.language.functions import CHOICES, ROUGH
 from gms_fsm.language.tree import (
     Binary,
     Both,
@@ -21,6 +21,7 @@ from gms_fsm.language.tree import (
     Number,
     Relation,
     Value,
+    is_whole,
     rebuilt,
     walk,
 )
@@ -354,3 +355,35 @@ def renamed_in(condition: Condition, new: Mapping[str, Value]) -> Condition:
         case Either(operands):
             return Either(tuple(renamed_in(each, new) for each in operands))
     return condition
+
+
+# --------------------------------------------------------------------------- short forms
+def written_out(function: str, a: Value, b: Value, *more: Value) -> Value:
+    """Return what a function of `gms_fsm.language.functions.SHORT` other than if stands for."""
+    match function:
+        case "saturate":
+            return Call("min", (Call("max", (a, b)), *more))
+        case "noise":
+            return Call("noise", tuple(u if is_whole(u) else Call("floor", (u,)) for u in (a, b)))
+    whole = Call("floor" if function == "mod" else "round", (Binary("/", a, b),))
+    parts = Binary("*", b, whole)
+    return parts if function == "quantise" else Binary("-", a, parts)
+
+
+def chosen(condition: Condition, yes: Value, no: Value) -> Value:
+    """Return a choice between two values, one comparison at a time."""
+    match condition:
+        case Relation(op, left, right):
+            name = next(each for each, known in CHOICES.items() if known == op)
+            return Call(name, (left, right, yes, no))
+        case Not(operand):
+            return chosen(operand, no, yes)
+        case Both(operands):
+            for each in reversed(operands):
+                yes = chosen(each, yes, no)
+            return yes
+        case Either(operands):
+            for each in reversed(operands):
+                no = chosen(each, yes, no)
+            return no
+    raise TypeError("a value depends on numbers, not on states")

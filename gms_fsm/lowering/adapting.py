@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import Number, Value, names_in, renamed, spell
 from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful
-from gms_fsm.lowering.printing.lines import CodeLine, indented, one_line
+from gms_fsm.lowering.printing.lines import CodeLine, indented
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
 from gms_fsm.lowering.printing.locks import ENDLESS
 from gms_fsm.lowering.printing.names import computed_names
@@ -39,7 +40,7 @@ LIMIT = math.sqrt(ENDLESS)  # where locks contradict each other a force has no l
 # --------------------------------------------------------------------------- the text
 def _text(plan: ProgramPlan) -> str:
     printer = _AdaptingPrinter(plan)
-    lines = [f"# What follows from the numbers of {one_line(plan.title)}"]
+    lines = [f"# What follows from the numbers of {visible(plan.title)}"]
     for k, bank in enumerate(plan.read.banks):
         own = frozenset(n for n in bank.chart.parameter_names if of(bank.name, n) in plan.read.own)
         made = scale_text(bank.chart, f"scale_{k}", own, curved=printer.is_curved(bank))
@@ -189,7 +190,7 @@ class _AdaptingPrinter(LockFunctions):
             yield f"dy[{self.layout.y.index(body.v)}]"
             inertia = self.read.inertias[body.name]
             for bank in self.read.banks:
-                for force, row in zip(bank.forces, bank.jacobian, strict=True):
+                for force, row in zip(bank.forces, bank.jacobian, strict=False):
                     if body.name in row:
                         place = self.layout.observed.index(force)
                         ratio, mass = (

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.extras import missing
 from gms_fsm.foundation.store import CodeFolder
+from gms_fsm.foundation.text import visible
 from gms_fsm.language.functions import sgn
 from gms_fsm.lowering.generated import SIGNALS, load
 from gms_fsm.lowering.observing import on_surfaces
@@ -109,7 +110,7 @@ def store() -> CodeFolder | None:
 def notify(text: str) -> None:
     """Print a message about a slow step to stderr, if somebody waits there."""
     if sys.stderr.isatty():
-        print(f"gms-fsm: {text}", file=sys.stderr)
+        print(visible(f"gms-fsm: {text}"), file=sys.stderr)
 
 
 def observe_rows(

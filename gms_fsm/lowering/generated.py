@@ -22,6 +22,7 @@ import numpy as np
 
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.parser import PARSER
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import ARGUMENTS, ELEMENTARY, NAMESPACE
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 from integrators import elementary
@@ -193,8 +194,7 @@ def _unannotated(tree: ast.AST) -> str:
 @functools.lru_cache(maxsize=256)
 def _compiled(title: str, source: str, careful: bool = False) -> CodeType:
     digest = hashlib.sha256(source.encode()).hexdigest()[:8]
-    shown = "".join(c if c.isprintable() else "?" for c in title)  # not all are valid in file names
-    filename = f"<{shown} {digest}>"
+    filename = f"<{visible(title)} {digest}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     if not careful:
         return compile(source, filename, "exec")

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import some_of, unknown
-from gms_fsm.language import names_in
+from gms_fsm.language import EVENT, names_in
 from gms_fsm.lowering.log_columns import LOG_TEXTS
 from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.systems.reading.assembly import Assembly, Bank, of
@@ -127,7 +127,7 @@ class SystemLayout:
         system, banks, first, edges = read.system, [], 0, 0
         for bank in read.banks:
             variables = bank.chart.variables
-            velocity = bank.chart.velocities[0]
+            velocity = (*bank.chart.velocities, "")[0]
             position = bank.position
             banks.append(BankPlaces(bank.name, bank.n, first, variables, velocity, edges, position))
             first += bank.n
@@ -156,8 +156,9 @@ class SystemLayout:
             for bank, size in zip(read.banks, sizes, strict=True)
         )
         held = [bank.held(force) for bank in read.banks if bank.periodic for force in bank.forces]
-        y = Places((*moved, *system.flow, *updated, *held), blocks)
-        keys = {name: name for name, _ in y}
+        y = Places((*moved, *system.flow, *updated, *system.events, *held), blocks)
+        keys = {name.removeprefix(EVENT): name for name in system.events}
+        keys |= {name: name for name, _ in y}
         for body in system.bodies:
             keys |= {f"{body.name}.x": body.x, f"{body.name}.v": body.v}
         if len(banks) == 1:
@@ -175,6 +176,11 @@ class SystemLayout:
     def label(self, name: str) -> str:
         """Return what a component of the state vector is called for the user."""
         return name.split(".", 1)[-1] if len(self.banks) == 1 else name
+
+    @cached_property
+    def events(self) -> tuple[str, ...]:
+        """The events, as components of the state vector."""
+        return tuple(name for name in self.y.shared if name.startswith(EVENT))
 
     @cached_property
     def n(self) -> int:
@@ -238,8 +244,13 @@ class SystemLayout:
         own: list[int] = []
         seen: list[list[int]] = []
         for bank in self.banks:
-            v, F = (self.observed.shared.index(bank.of(name)) for name in (bank.velocity, "F"))
             for i in range(bank.n):
+                none = self.observed.index(bank.of("s"), i)  # NaN where there is no curve
+                shared = self.observed.shared
+                v, F = (
+                    shared.index(name) if name in shared else none
+                    for name in (bank.of(bank.velocity), bank.of("F"))
+                )
                 first = bank.variables[:1]
                 own += [self.y.index(bank.of(name), i) for name in first] or [-1]
                 seen.append([v, self.observed.index(bank.of("s"), i), F])
@@ -296,7 +307,7 @@ def shown_of(read: Assembly) -> Places[str]:
     for bank, size in zip(read.banks, sizes_of(read.banks), strict=True):
         guards = frozenset[str]().union(*(names_in(edge.guard) for edge in bank.edges))
         late = [name for name in (*bank.forces, *bank.rates) if name in guards]
-        names = ["x", *bank.chart.velocities, *bank.chart.inputs]
+        names = [*["x"][: len(bank.velocities)], *bank.chart.velocities, *bank.chart.inputs]
         lets = [of(bank.name, name) for name in bank.chart.let]
         shared += [of(bank.name, name) for name in dict.fromkeys(names) if name not in ("t", "s")]
         shared += [*late, *(name for name in lets if name not in read.owner)]

@@ -35,6 +35,7 @@ from typing import Any
 import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError, shown
+from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.language import Binary, Call, Comparison, Requirement, Value, rough_points, spell
 from gms_fsm.lowering.adapting import Adaptive, adaptive
 from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful, quickened
@@ -43,7 +44,6 @@ from gms_fsm.lowering.printing.plan import Pair, ProgramPlan, both_sides, plan_o
 from gms_fsm.lowering.printing.python import FUNCTIONS, python
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import mounted
-from gms_fsm.systems.reading.texts import ByIdentity
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (
@@ -97,6 +97,8 @@ class Program:
         For each machine the bit of its contact if this has a period, else 0.
     impulses : list of int
         For each edge 1 if it is an impulse, 2 if it lets go of a lock, else 0; empty if all are 0.
+    events : int
+        The bit of a tick that forgets events; 0 if there are none.
     velocities : int
         Number of velocities that locks may hold or impulses set; 0 if nothing locks.
     leaps : bool
@@ -121,6 +123,7 @@ class Program:
     impulses: list[int]
     velocities: int
     leaps: bool
+    events: int = 0
     ticks: integrators.Ticks = field(default_factory=integrators.Ticks.none)
 
     @property
@@ -185,7 +188,7 @@ def _key(system: System) -> tuple[Any, ...]:
     spelled = tuple(map(_spelling, system.signals.values()))
     # A ratio that is 1 or 0 is left out of no text; an inertia that is not positive is refused.
     zeros = tuple(name for name, value in system.numbers.items() if value == 0.0)
-    sizes = tuple(contact.n for contact in system.contacts)
+    sizes = tuple(contact.n for contact in system.machines)
     return id(system.shape), sizes, spelled, zeros
 
 
@@ -240,6 +243,7 @@ def _lowered(shape: _ProgramShape) -> Program:
         surface_names=_surface_names(plan),
         knots=[],
         jumps=[],
+        events=plan.read.events_bit,
         discrete=[bit for bank in plan.read.banks for bit in [plan.read.bit(bank)] * bank.n],
         **_jolts(plan),
     )
@@ -313,6 +317,7 @@ def equations(program: Program) -> integrators.Equations:
         impulses=program.impulses,
         velocities=program.velocities,
         leaps=program.leaps,
+        events=program.events,
     )
 
 

@@ -19,12 +19,12 @@ from numpy.typing import ArrayLike
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.charts.stribeck import Stribeck
+from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.lowering.adapting import SHARE
 from gms_fsm.lowering.generated import ieee, load, load_careful
 from gms_fsm.lowering.printing.scale_text import HELPERS, scale_text
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.reading.texts import ByIdentity
 from gms_fsm.systems.system import Contact
 
 __all__ = ["Scales", "Setting", "SystemScales", "Tolerance", "scales_of", "scales_of_system"]

@@ -11,7 +11,7 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.phenomena._bench import BenchMotion
-from gms_fsm.phenomena.limits import LIMITS
+from gms_fsm.phenomena.limits import LIMITS, percent
 from gms_fsm.phenomena.results import Curve, MeasuredNumber, Phenomenon, PhenomenonResult, Verdict
 
 if TYPE_CHECKING:
@@ -126,6 +126,7 @@ PHENOMENA = (
         ("force rate [N/s]", "break-away force [N]"),
         _break_away,
         log=True,
+        shows_if=f"> {percent('break-away.fall')}",
     ),
     Phenomenon(
         "vibration",
@@ -137,5 +138,6 @@ PHENOMENA = (
         ("amplitude of the vibration / break-away force [–]", "$x$ [µm]"),
         _vibration,
         decimals=2,
+        shows_if=f"≥ {LIMITS['vibration.early'].value:g}",
     ),
 )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.phenomena._bench import Bench, BenchMotion
-from gms_fsm.phenomena.limits import LIMITS
+from gms_fsm.phenomena.limits import LIMITS, percent
 from gms_fsm.phenomena.results import Curve, MeasuredNumber, Phenomenon, PhenomenonResult, Verdict
 
 if TYPE_CHECKING:
@@ -104,12 +104,12 @@ def _stick_slip(specimen: Specimen) -> PhenomenonResult:
     still = np.abs(trace.v) <= STUCK * bench.speed
     stuck = _share(t[last], still[last])
     period = cycle[1] - cycle[0] if cycle else 0.0
-    limit = LIMITS["stick-slip.amplitude"].value * bench.F_s
+    limit, instead = LIMITS["stick-slip.amplitude"].value * bench.F_s, ""
     if amplitude <= limit:
         verdict: Verdict = "does not show"
         said = "it slides steadily"
     elif stuck <= LIMITS["stick-slip.stuck"].value:
-        verdict, said = "does not show", "it oscillates and never sticks"
+        verdict, said, instead = "does not show", "it oscillates and never sticks", "never sticks"
     else:
         verdict, said = "shows", "it sticks and slips in a limit cycle"
     numbers = (
@@ -117,7 +117,7 @@ def _stick_slip(specimen: Specimen) -> PhenomenonResult:
         MeasuredNumber("period", period, "s"),
         MeasuredNumber("share of the period in stick", stuck, "1"),
     )
-    return PhenomenonResult(verdict, numbers, said, (Curve("", t, pull),))
+    return PhenomenonResult(verdict, numbers, said, (Curve("", t, pull),), instead)
 
 
 def _last_cycle(t: FloatArray, v: FloatArray, speed: float) -> tuple[float, float] | None:
@@ -171,6 +171,7 @@ PHENOMENA = (
         ("$v$ [mm/s]", "friction [N]"),
         _lag,
         decimals=1,
+        shows_if=f"> {percent('lag.width')} of $F_s$ at 25 rad/s",
     ),
     Phenomenon(
         "stribeck",
@@ -181,6 +182,7 @@ PHENOMENA = (
         ("$v$ [mm/s]", "friction [N]"),
         _stribeck,
         log=True,
+        shows_if=f"> {percent('stribeck.fall')}",
     ),
     Phenomenon(
         "stick-slip",
@@ -191,6 +193,7 @@ PHENOMENA = (
         "the share of the period in stick.",
         ("$t$ [s]", "spring force [N]"),
         _stick_slip,
+        shows_if=f"> {percent('stick-slip.amplitude')} of $F_s$, and sticks",
     ),
     Phenomenon(
         "passivity",
@@ -202,5 +205,6 @@ PHENOMENA = (
         ("$t$ [ms]", "energy taken [mJ]"),
         _passivity,
         decimals=2,
+        shows_if=f"≤ {percent('passivity.made')} of what is exchanged",
     ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["LIMITS", "Limit"]
+__all__ = ["LIMITS", "Limit", "percent"]
 
 
 @dataclass(frozen=True)
@@ -108,3 +108,12 @@ LIMITS = {
         "the energy is summed over the rows of the run; the error of this sum is below 1e-4",
     ),
 }
+
+
+def percent(name: str) -> str:
+    """Return a limit in percent.
+
+    >>> percent("memory.gap"), percent("drift.rate")
+    ('1 %', '0.1 %')
+    """
+    return f"{100 * LIMITS[name].value:g} %"

@@ -9,7 +9,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.phenomena._bench import BenchMotion, ForcePath, path
-from gms_fsm.phenomena.limits import LIMITS
+from gms_fsm.phenomena.limits import LIMITS, percent
 from gms_fsm.phenomena.results import Curve, MeasuredNumber, Phenomenon, PhenomenonResult, Verdict
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ OUTER = (0.95, -0.95, 0.95)
 HOLD = 5.0  # s
 NESTED = (0.95, -0.8, 0.8, -0.8, 0.95)
 SLIDING = 20.0  # in F_s / sigma_0: a longer stroke is not pre-sliding
-AWAY = "slides away"
+AWAY, NO_LOOP = "slides away", "no loop"
 BIAS_RAMP = ((0.0, 0.0), (2.0, 0.6), (4.0, 0.3), (5.0, 0.3))
 RIPPLE, FREQUENCY = 0.1, 2.0  # Hz
 PER_PERIOD = 50  # samples
@@ -92,12 +92,12 @@ def _memory(specimen: Specimen) -> PhenomenonResult:
     rising, falling = (way.force(branch) for branch in way.branches[2:4])
     width = _at(0.0, falling, down) - _at(0.0, rising, up)
     open_by, wide = (abs(u / stroke) if stroke else 0.0 for u in (gap, width))
-    slides = abs(stroke) > SLIDING * specimen.bench.bristle
-    if slides:
+    instead = ""
+    if abs(stroke) > SLIDING * specimen.bench.bristle:
         verdict: Verdict = "does not show"
-        said = "it slides away although the break-away force is not reached"
+        instead, said = AWAY, "it slides away although the break-away force is not reached"
     elif wide <= LIMITS["memory.width"].value and open_by <= LIMITS["memory.gap"].value:
-        verdict = "does not show"
+        verdict, instead = "does not show", NO_LOOP
         said = "there is no inner loop" if stroke > 0.0 else "it does not move"
     elif open_by > LIMITS["memory.gap"].value:
         verdict, said = "does not show", "the inner loop does not close: it forgets where it turned"
@@ -110,7 +110,7 @@ def _memory(specimen: Specimen) -> PhenomenonResult:
         MeasuredNumber("width of the inner loop at F = 0", 1e6 * width, "µm"),
     )
     curves = (Curve("", 1e6 * trace.x, way.force(trace.t)),)
-    return PhenomenonResult(verdict, numbers, said, curves, AWAY if slides else "")
+    return PhenomenonResult(verdict, numbers, said, curves, instead)
 
 
 def _drift(specimen: Specimen) -> PhenomenonResult:
@@ -153,6 +153,7 @@ PHENOMENA = (
         ("$x$ [µm]", "applied force [N]"),
         _hysteresis,
         decimals=1,
+        shows_if=f"> {percent('hysteresis.width')} of the stroke",
     ),
     Phenomenon(
         "memory",
@@ -164,6 +165,7 @@ PHENOMENA = (
         ("$x$ [µm]", "applied force [N]"),
         _memory,
         decimals=1,
+        shows_if=f"≤ {percent('memory.gap')}, of a loop",
     ),
     Phenomenon(
         "drift",
@@ -174,5 +176,6 @@ PHENOMENA = (
         "period.",
         ("$t$ [s]", "$x$ [µm]"),
         _drift,
+        shows_if=rf"≤ {percent('drift.rate')} of $F_s/\sigma_0$",
     ),
 )

@@ -88,7 +88,7 @@ class PhenomenonResult:
     curves : tuple of Curve
         For the picture.
     instead : str
-        What the table says where the first number would tell nothing, such as "slides away".
+        What the table says where the first number would tell nothing: "slides away", "no loop".
     """
 
     verdict: Verdict
@@ -143,6 +143,8 @@ class Phenomenon:
         Whether the horizontal axis is logarithmic.
     decimals : int
         Of the first number in a table.
+    shows_if : str
+        What the first number of a model that shows it is, in a few words; symbols in ``$``.
     """
 
     name: str
@@ -153,6 +155,7 @@ class Phenomenon:
     measure: Callable[..., PhenomenonResult] = field(repr=False)
     log: bool = False
     decimals: int = 3
+    shows_if: str = ""
 
     def brief(self, found: PhenomenonResult) -> str:
         """Return what a table says of a result; empty if nothing was measured.

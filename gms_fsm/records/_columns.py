@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.records.units import FACTORS, factor, plain
+from gms_fsm.foundation.quantities import UNITS, factor, plain
 
 if TYPE_CHECKING:
     from gms_fsm.charts.parameters import FloatArray
@@ -97,7 +97,7 @@ def _check_named_unit(quantity: str, name: str) -> None:
     """Refuse a name that ends in another unit than that in which the column would be read."""
     before, *parts = re.split(r"[\s_(\[]+", name.rstrip(" )]"))
     unit = plain(parts[-1]) if before and parts else ""
-    if FACTORS[quantity].get(unit, 1.0) != 1.0:
+    if UNITS[quantity].get(unit, 1.0) != 1.0:
         raise ParameterError(
             f"its values would be read in {_si(quantity)}",
             place=quantity,
@@ -107,4 +107,4 @@ def _check_named_unit(quantity: str, name: str) -> None:
 
 
 def _si(quantity: str) -> str:
-    return next(unit for unit, value in FACTORS[quantity].items() if value == 1.0)
+    return next(unit for unit, value in UNITS[quantity].items() if value == 1.0)

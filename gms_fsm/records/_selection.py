@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, ParameterError, RecordError, UnitError, shown
 from gms_fsm.foundation.arguments import one_of
+from gms_fsm.foundation.quantities import convert_numbers
 from gms_fsm.language import evaluate, names_in, parse_condition
 from gms_fsm.records._columns import LOADS, QUANTITIES
 from gms_fsm.records._table import Words
-from gms_fsm.records.units import convert_numbers
 
 FEWEST = 5  # rows of a record
 GAP = 5.0  # time steps longer than this many median steps are reported

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError, cut, shown
 from gms_fsm.foundation.arguments import meant, no_file
+from gms_fsm.foundation.quantities import UNITS, plain
 from gms_fsm.records._columns import Column
-from gms_fsm.records.units import FACTORS, plain
 
 LONGEST_LINE = 100_000  # characters
 LONGEST_FILE = 5_000_000  # rows
@@ -381,7 +381,7 @@ def _units(
     cells = {
         quantity: row[place].strip().strip("[]()").strip() for quantity, place in places.items()
     }
-    known = {unit for units in FACTORS.values() for unit in units}
+    known = {unit for units in UNITS.values() for unit in units}
     if not any(plain(cell) in known for cell in cells.values()) or any(
         map(_is_number, cells.values())
     ):

@@ -98,8 +98,9 @@ class Checkpointer:
 
     def save(self) -> None:
         """Write a checkpoint atomically."""
-        state = {f"loop_{name}": u for name, u in states.state_of(self.run.buffers).items()}
+        # First the rows, which come back into the columns that the state counts.
         kept = {f"kept_{name}": u for name, u in self.run.kept().items()}
+        state = {f"loop_{name}": u for name, u in states.state_of(self.run.buffers).items()}
         head: dict[str, Any] = {"format": _FORMAT, "program": _program(), "identity": self.identity}
         write_whole(self.path, lambda file: np.savez(file, **head, **state, **kept))
 
@@ -201,7 +202,7 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
     }
     groups = [[name for name in kept if name.startswith(kind)] for kind in ("rows_", "stops_")]
     if "log" in kept:  # from a run in Python
-        contacts = {each.name: each for each in start.system.contacts}
+        contacts = {each.name: each for each in start.system.machines}
         _check_log(kept["log"], contacts, named=start.what.named)
     else:  # from a compiled run
         groups.append(["t", "machine", "edge", "numbers"])

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
 from gms_fsm.foundation.arguments import checked_path, no_file, unknown
+from gms_fsm.foundation.display import Log
 from gms_fsm.foundation.extras import require
 from gms_fsm.foundation.files import write_whole
-from gms_fsm.foundation.logs import Log
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.systems.numbers import column_name
 from gms_fsm.traces.files.archives import member, write_arrays

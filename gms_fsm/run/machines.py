@@ -7,8 +7,9 @@ that callbacks registered by a user (``on_enter_slip``, ``after`` ...) run once 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from transitions import Machine, MachineError
 
@@ -31,8 +32,9 @@ class Element:
     Callbacks can read: ``t`` [s], ``x`` [m], ``v`` [m/s], the threshold ``s``, each variable
     (``z`` [m]) and each parameter (``k``, ``sigma``, ``C``, ``v_c``) of the chart, the current
     ``state`` and the element's ``index`` counted from 0. Parameters are read-only: the run is
-    integrated with those of the model. Derive from it to give elements methods that `transitions`
-    calls by name, for example ``on_enter_slip(self, event)``.
+    integrated with those of the model. Values of the run cannot be set while it goes on; before it
+    they can, for ``element.may_break_away_forward()``. Derive from it to give elements methods that
+    `transitions` calls by name, for example ``on_enter_slip(self, event)``.
     """
 
     # No __slots__ and no generated __eq__: transitions fails with the former, and registers models
@@ -43,9 +45,17 @@ class Element:
     x: float
     v: float
     s: float
-    _fixed: frozenset[str] = frozenset()
+    _fixed: frozenset[str] = frozenset()  # parameters
+    _live: frozenset[str] = frozenset()  # what a run shows
+    _firing: Sequence[bool] = (False,)  # whether a machine of the run fires
 
     def __setattr__(self, name: str, value: Any) -> None:
+        if self._firing[0] and name in self._live:
+            raise Interference(
+                f"a callback set {name} of element {self.index + 1} to {shown(value)}; {ONLY_LOOK}",
+                advice="write the assignment into the chart: actions of the edge, or entry or exit "
+                "of a state",
+            )
         if name in self._fixed:
             raise ParameterError(
                 f"{name} is set to {shown(value)}, but parameters of an element are "
@@ -56,20 +66,42 @@ class Element:
             )
         object.__setattr__(self, name, value)
 
+    if not TYPE_CHECKING:  # which knows all attributes there are
+
+        def __getattr__(self, name):
+            """Say what to do where a value is read before a run shows it."""
+            if name not in self._live:
+                raise AttributeError(
+                    f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self
+                )
+            raise AttributeError(
+                f"element {self.index + 1} has no {name!r} before a run: run first, with "
+                "simulate(..., engine=machines), or set what guards and callbacks read: "
+                f"element.{name} = ...",
+                name=name,
+                obj=self,
+            )
+
 
 class Guard:
     """A guard as a condition of `transitions`: called with an event, or evaluated directly."""
 
     def __init__(self, edge: str, condition: Condition) -> None:
+        self.edge, self.condition = edge, condition
         names = {name: f"element.{name}" for name in names_in(condition)}
-        self.text = spell(condition, PYTHON)
+        self.text = self.__name__ = spell(condition, PYTHON)  # transitions draws the name
+        self.held = False  # at the last call
         source = f"def holds(element):\n    return {spell(condition, PYTHON, names)}\n"
         self.holds: Callable[[Element], bool] = ieee(
             load(f"guard {edge}", source)["holds"], load_careful(f"guard {edge}", source)["holds"]
         )
 
+    def __reduce__(self) -> tuple[type[Guard], tuple[str, Condition]]:
+        return Guard, (self.edge, self.condition)  # its function is generated
+
     def __call__(self, event: Any) -> bool:
-        return self.holds(event.model)
+        self.held = self.holds(event.model)
+        return self.held
 
     def __repr__(self) -> str:
         return f"<guard {self.text}>"
@@ -84,6 +116,10 @@ class ElementMachines:
         The model, or the contact of a system, whose elements are created.
     element : type, optional
         Class of the element objects: `Element` or a class derived from it.
+    machine : callable, optional
+        Makes the machine: a class such as `transitions.extensions.GraphMachine`, or one with
+        arguments of its own, ``functools.partial(GraphMachine, graph_engine="mermaid")``. Not an
+        asynchronous one.
 
     Attributes
     ----------
@@ -105,7 +141,12 @@ class ElementMachines:
     ([0, 1, 2, 3], 'slip')
     """
 
-    def __init__(self, model: Model, element: type[Element] = Element) -> None:
+    def __init__(
+        self,
+        model: Model,
+        element: type[Element] = Element,
+        machine: Callable[..., Machine] = Machine,
+    ) -> None:
         if not hasattr(model, "chart"):
             raise ParameterError(
                 "it must be a model, for example GMS(parameters, law='signed')",
@@ -116,7 +157,8 @@ class ElementMachines:
         self.model = model
         self.guards = {edge: Guard(edge, guard) for edge, guard in chart.guards.items()}
         self.elements = [_new_element(element, model, i) for i in range(model.n)]
-        self.machine = Machine(
+        self.machine = _new_machine(
+            machine,
             model=self.elements,
             states=[state.name for state in chart.states],
             transitions=[
@@ -192,6 +234,38 @@ class ElementMachines:
         return table
 
 
+def _new_machine(kind: Callable[..., Machine], **given: Any) -> Machine:
+    known = issubclass(kind, Machine) if isinstance(kind, type) else callable(kind)
+    made = kind(**given) if known and _takes(kind, given) else None
+    if not isinstance(made, Machine):
+        raise ParameterError(
+            "it must be a class of the package transitions, or make a machine of one",
+            place="machine",
+            value=kind,
+        )
+    if inspect.iscoroutinefunction(type(made).dispatch):
+        raise ParameterError(
+            f"the triggers of an {type(made).__name__} are awaited, and a run cannot wait",
+            place="machine",
+            advice="take the class without Async",
+        )
+    if made.model_attribute != "state":
+        raise ParameterError(
+            f"it keeps the state of an element in {made.model_attribute!r}",
+            place="machine",
+            advice="leave model_attribute out",
+        )
+    return made
+
+
+def _takes(function: Callable[..., Any], given: Mapping[str, Any]) -> bool:
+    try:
+        inspect.signature(function).bind(**given)
+    except (TypeError, ValueError):  # a ValueError for what has no signature
+        return False
+    return True
+
+
 def _new_element(kind: type[Element], model: Model, index: int) -> Element:
     if not (isinstance(kind, type) and issubclass(kind, Element)):
         raise ParameterError("it must be a class derived from Element", place="element", value=kind)
@@ -206,6 +280,10 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
     values["index"] = index
     values |= parameter_values(model, index)
     values["_fixed"] = frozenset(model.values) | {"index"}
+    chart = model.chart
+    read = frozenset().union(*map(names_in, chart.guards.values()))
+    live = read.union(["t", "x"], chart.inputs, chart.velocities, chart.variables)
+    values["_live"] = live - {*values["_fixed"]}
     return element
 
 
@@ -213,10 +291,15 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
 class Interference(Exception):
     """A callback changed something it may only read; the run turns this into a user's error."""
 
-    def __init__(self, reason: str, place: str, t: float) -> None:
+    def __init__(
+        self,
+        reason: str,
+        place: str = "",
+        t: float = 0.0,
+        advice: str = "write the switch into the chart, as an edge with a guard",
+    ) -> None:
         super().__init__(reason)
-        self.reason, self.place, self.t = reason, place, t
-        self.advice = "write the switch into the chart, as an edge with a guard"
+        self.reason, self.place, self.t, self.advice = reason, place, t, advice
 
 
 class MachineEngine:
@@ -247,6 +330,9 @@ class MachineEngine:
         # Bypasses __setattr__ of the elements, which would cost time.
         self.seen_by = [vars(element) for element in self.elements]
         self.states = [""] * len(self.elements)
+        self.firing = [False]
+        for values in self.seen_by:
+            values["_firing"] = self.firing
         self.tick, self.jolts = program.ieee["tick"], program.ieee["jolts"]
         self.arrests = {
             bank.first_edge + number
@@ -268,8 +354,12 @@ class MachineEngine:
 
     def set_state(self, machine: int, state: str) -> None:
         """Put one element into a state, without callbacks."""
-        self.parts[machine].machine.set_state(state, self.elements[machine])
+        element = self.elements[machine]
+        self.parts[machine].machine.set_state(state, element)
         self.states[machine] = state
+        graphs = getattr(self.parts[machine].machine, "model_graphs", {})
+        if id(element) in graphs:  # the state that it shows as active changes only with a firing
+            vars(element)["get_graph"](force_new=True)
 
     def show(self, t: float, y: list[float], mode: list[int], jolt: list[int]) -> None:
         """Show the present values to every element."""
@@ -314,15 +404,22 @@ class MachineEngine:
         bank = self.program.layout.bank(machine)
         row = self.parts[machine].model.chart.transitions[edge - bank.first_edge]
         place = f"{self.called(machine)}, edge {row.name!r}"
+        guard = self.parts[machine].guards[row.name]
+        guard.held = False  # not what the trigger returns: with a queue that is always True
         # The trigger evaluates the guard once more; assignments follow, as in Stateflow, where the
         # whole set is selected before any of them.
+        self.firing[0] = True
         try:
-            fired = getattr(self.elements[machine], row.name)()
+            getattr(self.elements[machine], row.name)()
+        except Interference as error:
+            raise Interference(error.reason, place, t, error.advice) from None
         except MachineError as error:
             raise Interference(
                 f"a callback changed a state ({error.value}); {ONLY_LOOK}", place, t
             ) from error
-        if not fired:
+        finally:
+            self.firing[0] = False
+        if not guard.held:
             raise Interference(
                 "the edge was enabled, but a callback changed the element's values before "
                 f"it fired; {ONLY_LOOK}",

@@ -26,7 +26,7 @@ def last_edges(start: Problem) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _charts(start: Problem) -> list[Any]:
-    contacts = {each.name: each for each in start.system.contacts}
+    contacts = {each.name: each for each in start.system.machines}
     return [contacts[b.name].chart for b in start.program.layout.banks for _ in range(b.n)]
 
 

@@ -15,6 +15,7 @@ from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.foundation.arguments import there_are, unknown
+from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.lowering.floor import floor_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.log_columns import LogRecord
@@ -34,6 +35,7 @@ from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import LoopOptions
 
+IMPLICIT = ("Radau", "BDF", "LSODA")  # methods of SciPy for stiff runs
 STEPS_A_TICK = 4  # after each tick the steps begin anew
 LATEST = 1e9  # s; one tick of a double is then 1e-7 s
 
@@ -94,7 +96,7 @@ class Problem:
     def before_entry(self) -> tuple[list[float], list[int]]:
         """Return the state vector before any entry, and 1 for what the initial values give."""
         layout = self.program.layout
-        y, _, given = _given(self.system, layout, self.initial)
+        y, _, given = _given(self.what, layout, self.initial)
         return y, [int(name in given) for name, _ in layout.y]
 
     def chosen_tolerances(self) -> list[float]:
@@ -129,7 +131,9 @@ class Problem:
 
     @property
     def implicit(self) -> str:
-        """An implicit method and the tolerances that it needs, as one writes them."""
+        """An implicit method and the tolerances it needs, as one writes them; "" if one is used."""
+        if self.chosen.method_name in IMPLICIT:
+            return ""
         missing = _without_scale(self.program.layout, self.options.atol)
         return f"method=scipy.integrate.Radau{f', atol={missing}' if missing else ''}"
 
@@ -195,7 +199,7 @@ class Problem:
             most = chosen.max_steps + STEPS_A_TICK * len(program.ticks)
             options = replace(options, max_steps=most)
         initial = {} if initial is None else initial
-        y, mode = _initial(system, program, t_start, initial)
+        y, mode = _initial(what, program, t_start, initial)
         floor = floor_of(program, tolerances, (t_start, last), y, mode)
         options = replace(options, floor=floor)
         return cls(
@@ -218,7 +222,7 @@ class Problem:
         scales = scales_of_system(program)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
-        y, _ = _initial(what.system, program, self.t_start, self.initial)
+        y, _ = _initial(what, program, self.t_start, self.initial)
         span = self.t_start, self.last
         floor = floor_of(program, tolerances, span, y, self.mode)
         return replace(
@@ -367,22 +371,23 @@ def _covered(system: System, t_start: float, t_end: float) -> float:
 
 
 def _initial(
-    system: System, program: Program, t_start: float, initial: Mapping[str, Any]
+    what: Mounted, program: Program, t_start: float, initial: Mapping[str, Any]
 ) -> tuple[list[float], list[int]]:
     """Build the state vector and the modes."""
-    layout = program.layout
-    if initial == {} and _is_plain(system.shape):
+    system, layout = what.system, program.layout
+    if initial == {} and _is_plain(ByIdentity(system.shape)):
         return [0.0] * layout.y.size, [0] * layout.n
-    y, mode, given = _given(system, layout, initial)
+    y, mode, given = _given(what, layout, initial)
     y = _entered(system, program, t_start, y, mode, given)
     _check_locks(system, program, t_start, y, mode)
     return y, mode
 
 
 def _given(
-    system: System, layout: SystemLayout, initial: Mapping[str, Any]
+    what: Mounted, layout: SystemLayout, initial: Mapping[str, Any]
 ) -> tuple[list[float], list[int], set[str]]:
     """Return the state vector and the modes before any entry, and what has been given."""
+    system = what.system
     if not isinstance(initial, Mapping):
         raise ParameterError(
             "it must be a mapping, for example {'x': 0}", place="initial", value=initial
@@ -398,7 +403,7 @@ def _given(
         elif key in layout.keys:
             given[layout.keys[key]] = value
         else:
-            reason, advice = _unknown_initial(system, layout, key, value)
+            reason, advice = _unknown_initial(what, layout, key, value)
             raise ParameterError(reason, advice=advice)
     y: dict[str, Any] = dict.fromkeys(layout.y.shared, 0.0)
     for each in system.sampled:
@@ -406,11 +411,12 @@ def _given(
     for name in layout.y.shared:
         if name in given:
             y[name] = checked_scalar(f"initial[{name!r}]", given[name], "finite")
-    for bank in layout.banks:
+    for bank, part in zip(layout.banks, system.machines, strict=True):
         for variable in bank.variables:
+            start = part.chart.initial.get(variable, 0.0)
             name, label = bank.of(variable), layout.label(bank.of(variable))
             values = checked_array(
-                f"initial[{label!r}]", given.get(name, [0.0] * bank.n), None, "finite"
+                f"initial[{label!r}]", given.get(name, [start] * bank.n), None, "finite"
             )
             if values.size != bank.n:
                 raise ParameterError(
@@ -424,7 +430,7 @@ def _given(
             if name not in y and name.startswith(bank.of(""))
         }
     state, mode = layout.y.joined(y), list[int]()
-    for bank, part in zip(layout.banks, system.contacts, strict=True):
+    for bank, part in zip(layout.banks, system.machines, strict=True):
         chart = part.chart
         default = [chart.default_state.name] * bank.n
         wanted = names.get(bank.name, default)
@@ -438,10 +444,11 @@ def _given(
 
 
 @functools.lru_cache(maxsize=64)
-def _is_plain(shape: System) -> bool:
+def _is_plain(key: ByIdentity[System]) -> bool:
     """Return whether systems of a shape start with 0 everywhere unless something else is given."""
-    locked = any(contact.chart.default_state.locked for contact in shape.contacts)
-    return not (shape.sampled or locked or _enters(shape))
+    charts = [contact.chart for contact in key.it.machines]
+    special = any(chart.default_state.locked or chart.initial for chart in charts)
+    return not (key.it.sampled or special or _enters(key.it))
 
 
 def _check_locks(
@@ -451,7 +458,7 @@ def _check_locks(
     layout, out = program.layout, [0.0] * program.layout.shown.size
     locked = [
         (bank, contact.chart, state)
-        for bank, contact in zip(layout.banks, system.contacts, strict=True)
+        for bank, contact in zip(layout.banks, system.machines, strict=True)
         for state in [contact.chart.states[i] for i in mode[bank.elements]]
         if state.locked
     ]
@@ -481,7 +488,7 @@ def _not_locked(chart: Chart) -> str:
 
 def _enters(system: System) -> bool:
     """Return whether the default state of some chart has an entry."""
-    charts = (contact.chart for contact in system.contacts)
+    charts = (contact.chart for contact in system.machines)
     return any(chart.assignments["entry", chart.default_state.name] for chart in charts)
 
 
@@ -500,7 +507,7 @@ def _entered(
     if not _enters(system):
         return y
     layout = program.layout
-    for bank, contact in zip(layout.banks, system.contacts, strict=True):
+    for bank, contact in zip(layout.banks, system.machines, strict=True):
         chart = contact.chart
         for name in chart.assignments["entry", chart.default_state.name]:
             if name in chart.velocities and 0 in mode[bank.elements]:
@@ -516,10 +523,10 @@ def _entered(
 
 
 def _unknown_initial(
-    system: System, layout: SystemLayout, key: object, value: object
+    what: Mounted, layout: SystemLayout, key: object, value: object
 ) -> tuple[str, str]:
     """Say what is wrong with a key of the initial values, and what to do."""
-    for body in system.bodies:
+    for body in what.system.bodies:
         if body.driven and key in (body.v, f"{body.name}.v"):
             whose = (
                 "the rig prescribes the velocity"
@@ -528,8 +535,7 @@ def _unknown_initial(
             )
             return f"initial has {key!r} = {shown(value)}, but {whose}", "leave it out"
     known = [layout.label(name) for name in (*layout.y.shared, *layout.y.own)]
-    states = ["states"] if len(layout.banks) == 1 else [f"{b.name}.states" for b in layout.banks]
-    return (
-        f"initial has the key {shown(key)}",
-        there_are(key, [*known, *states]),
-    )
+    known += ["states"] * (len(layout.banks) == 1)
+    if what.named:
+        known += [*layout.keys, *(f"{bank.name}.states" for bank in layout.banks)]
+    return f"initial has the key {shown(key)}", there_are(key, known, every=True)

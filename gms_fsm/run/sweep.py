@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.foundation.arguments import checked_kind, meant, unknown
-from gms_fsm.foundation.logs import Log
+from gms_fsm.foundation.display import Log
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.lowering.observing import observe
@@ -386,7 +386,7 @@ class _Collected:
 
     def __init__(self, what: Mounted, runs: int, t_eval: ArrayLike | None) -> None:
         self.what = what
-        n, several = sum(each.n for each in what.system.contacts), len(what.system.contacts)
+        n, several = sum(each.n for each in what.system.machines), len(what.system.machines)
         columns = (several,) if several > 1 else ()
         self.times = np.array([] if t_eval is None else t_eval, dtype=np.float64)
         self.outcome, self.message = ["lost"] * runs, [""] * runs
@@ -420,7 +420,7 @@ class _Collected:
 
     def sweep(self, parameters: Mapping[str, FloatArray]) -> Sweep:
         """Return the sweep with all results."""
-        contacts, states, edges, owners = self.what.system.contacts, [], list[str](), list[str]()
+        contacts, states, edges, owners = self.what.system.machines, [], list[str](), list[str]()
         borders = np.cumsum([each.n for each in contacts])[:-1]
         for each, modes in zip(contacts, np.split(self.mode, borders, axis=1), strict=True):
             names = np.array([*(state.name for state in each.chart.states), ""])

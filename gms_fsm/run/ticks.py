@@ -53,7 +53,7 @@ def clocks_of(system: System) -> tuple[Clock, ...]:
     found = [Clock(each.name, each.period, each.offset, True) for each in system.sampled]
     found += [
         Clock(each.name, each.period, 0.0, False)
-        for each in system.contacts
+        for each in system.machines
         if each.period is not None
     ]
     return tuple(found)

@@ -13,20 +13,21 @@ from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
 from gms_fsm.run.problem import Problem
 from gms_fsm.session.explain import holds
 from gms_fsm.session.tree.branch import Branch, BranchRow
-from gms_fsm.session.units import in_si, names_of
-from gms_fsm.traces.system_scope import owners_of
+from gms_fsm.traces.system_scope import in_si, names_of, owners_of
 
 
 def read(start: Problem, text: str) -> Condition:
     """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``."""
     states, n, owners = [], 0, {}
-    if len(start.system.contacts) == 1:
+    if len(start.system.machines) == 1:
         states, n = [state.name for state in start.model.chart.states], start.model.n
     if start.what.named:
         owners = owners_of(start.system)
     with _explained(start):
-        text = in_si(start, text)
-        return parse_condition(text, names_of(start), states, n, own_state=n == 1, owners=owners)
+        text = in_si(start.what, text)
+        return parse_condition(
+            text, names_of(start.what), states, n, own_state=n == 1, owners=owners
+        )
 
 
 def holds_at(condition: Condition, branch: Branch, row: BranchRow) -> bool:
@@ -37,7 +38,7 @@ def holds_at(condition: Condition, branch: Branch, row: BranchRow) -> bool:
 def value_of(start: Problem, text: str, values: Mapping[str, Any]) -> float:
     """Return the value of a watch expression, given the values of its names."""
     with _explained(start):
-        tree = parse_value(in_si(start, text), names_of(start))
+        tree = parse_value(in_si(start.what, text), names_of(start.what))
     try:
         return float(evaluate(tree, values))
     except (ArithmeticError, ValueError) as error:
@@ -59,8 +60,8 @@ def _explained(start: Problem) -> Iterator[None]:
 
 def _complete(start: Problem) -> dict[str, str]:
     """Return how to complete names that are incomplete."""
-    known, found = names_of(start), dict[str, str]()
-    for contact in start.system.contacts:
+    known, found = names_of(start.what), dict[str, str]()
+    for contact in start.system.machines:
         lead = start.what.of(contact.name, "")
         for name in contact.chart.variables:
             for each in (name, f"{lead}{name}"):

@@ -13,6 +13,7 @@ import numpy as np
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.text import visible
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.run.problem import Problem
 
@@ -89,8 +90,10 @@ def element_name(start: Problem, machine: int) -> str:
 def title_of(start: Problem) -> str:
     """Return what runs: titles of model and rig, or of a system and its contacts."""
     if start.what.named:
-        return f"{start.system.name}; {'; '.join(each.title for each in start.system.contacts)}"
-    return f"{start.model.title}; {start.rig.title}"
+        titles = [start.system.name, *(each.title for each in start.system.machines)]
+    else:
+        titles = [start.model.title, start.rig.title]
+    return visible("; ".join(titles))
 
 
 def chart_of(start: Problem, bank: BankPlaces) -> Chart:

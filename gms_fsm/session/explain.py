@@ -24,7 +24,7 @@ from gms_fsm.language import (
     names_in,
     spell,
 )
-from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.scope import Scope, unit_of
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 
@@ -182,7 +182,7 @@ class Why:
     sigma: Mapping[str, float] = field(default_factory=dict)
     contact: str = ""
     tick: float | None = None
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = field(default=(), compare=False)
 
     def __iter__(self) -> Iterator[Explanation]:
         return iter(self.edges)
@@ -379,7 +379,7 @@ def clause_unit(chart: Chart, part: Condition, text: str) -> str:
     str
         Empty if the names do not determine it.
     """
-    units = {chart.unit(name) for name in names_in(part)} - {""}
+    units = {unit_of(chart, name) for name in names_in(part)} - {""}
     plain = not set(text) & set("*/^()")
     return units.pop() if plain and len(units) == 1 else ""
 

@@ -38,7 +38,9 @@ def here_at(branch: Branch, row: int) -> Here:
 
 def _contact(scope: Scope, scales: Mapping[str, Scale]) -> ContactHere:
     chart = scope.model.chart
-    more = (*chart.velocities[1:], *chart.force_names[1:])
+    more = chart.force_names  # the outputs of a supervisor
+    if chart.velocities:
+        more = (*chart.velocities[1:], *chart.force_names[1:])
     return ContactHere(
         scope.x,
         scope.v,

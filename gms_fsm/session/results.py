@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import zip_longest
@@ -104,11 +105,18 @@ class ContactHere:
             for name in names
         )
 
+    @property
+    def said(self) -> str:
+        """What it gives out, and the velocity, as text; a supervisor has outputs only."""
+        if math.isnan(self.v):
+            return ", ".join(f"{name} = {value:.6g}" for name, value in self.more.items())
+        return self.written("v", "F", *self.more)
+
     def __str__(self) -> str:
         share = " (shared with other locks)" if self.shared else ""
-        text = f"{self.written('v', 'F', *self.more)}{share}"
+        text = f"{self.said}{share}"
         if len(self.states) == 1:
-            return f"{text}, {self.states[0]}"
+            return ", ".join(filter(None, [text, self.states[0]]))
         counts = [(self.states.count(name), name) for name in dict.fromkeys(self.states)]
         return f"{text}, {', '.join(f'{count} {name}' for count, name in counts)}"
 

@@ -27,11 +27,11 @@ from gms_fsm.session.results import BranchComparison, Fired, Here
 from gms_fsm.session.tree import walker
 from gms_fsm.session.tree.branch import Branch
 from gms_fsm.session.tree.branches import Tree
-from gms_fsm.session.units import names_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import arguments_of, mounted
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
+from gms_fsm.traces.system_scope import names_of
 
 __all__ = ["KINDS", "Branch", "BranchComparison", "Breakpoint", "Fired", "Here", "Session"]
 
@@ -231,7 +231,7 @@ class Session:
 
         Variables of a single element need no number. In a system: its names, and ``gear.F``.
         """
-        return names_of(self.start)
+        return names_of(self.start.what)
 
     def parse(self, text: str) -> Condition:
         """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``.
@@ -439,7 +439,7 @@ class Session:
         variables : mapping of str to float, or to mapping of int to float, optional
             New values of the variables of the chart, by element index, from 0:
             ``{"z": {0: 0.1}, "w": {1: 2.0}}``. In a system by the names of ``initial``:
-            ``{"load.x": 0.1, "gear.z": {0: 0.1}, "gear.z2": 0.2, "u": 0.0}``.
+            ``{"load.x": 0.1, "gear.z": {0: 0.1}, "u": 0.0}``; ``{"overheat": 1}`` sends an event.
         v : float, optional
             New velocity, m/s; not allowed if the velocity is prescribed.
         state : mapping of int or str to str, optional

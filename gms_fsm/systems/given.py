@@ -7,6 +7,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, check_names, checked_values
 from gms_fsm.errors import ParameterError, shown
@@ -126,3 +128,13 @@ def derivative_free(rest: Value) -> bool:
         case Binary("/", a, _):
             return derivative_free(a)
     return False
+
+
+def rank_of(banks: Iterable[Any], free: list[str], numbers: Mapping[str, float]) -> int:
+    """Return how many velocities of contacts are independent of each other."""
+    rows = [
+        [float(evaluate(row.get(body, Number(0.0)), numbers)) for body in free]
+        for bank in banks
+        for row in bank.jacobian
+    ]
+    return int(np.linalg.matrix_rank(np.array(rows)))

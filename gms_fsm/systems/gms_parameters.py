@@ -20,15 +20,18 @@ from gms_fsm.charts.parameters import (
 )
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import nearest, unknown
+from gms_fsm.foundation.arguments import nearest, refusing, unknown
 from gms_fsm.foundation.display import displayed, short_repr
+from gms_fsm.foundation.equality import by_value
 
 RULES = {each.name: each.rule for each in PARAMETERS}
 EVERY = {each.name: each for each in (*PARAMETERS, SIGMA_2, WEIGHTS)}  # in the order of checks
 
 
+@refusing()
 @displayed("html")
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class GMSParameters:
     """Parameters of a bank of n GMS elements.

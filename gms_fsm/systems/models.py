@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.chart import SUPPLIED, Chart
-from gms_fsm.charts.gms import GMS_ELEMENT, Law, check_law
+from gms_fsm.charts.gms import GIVE_LAW, GMS_ELEMENT, Law, check_law
 from gms_fsm.charts.parameters import (
     SIGMA_2,
     STRIBECK,
@@ -31,7 +31,9 @@ from gms_fsm.charts.registry import Entry
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.charts.zoo.bristles.lugre import LUGRE
 from gms_fsm.errors import ParameterError, shown
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.display import displayed, short_repr
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.given import Text, texts_of
 from gms_fsm.systems.gms_parameters import GMSParameters
 
@@ -74,8 +76,10 @@ def is_model(given: object) -> bool:
     return marked and not isinstance(given, type)
 
 
+@refusing(law=GIVE_LAW)
 @displayed("svg", "html")
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class GMS:
     """A bank of Generalized Maxwell Slip elements in parallel.
@@ -121,7 +125,7 @@ class GMS:
                 f"published law with F_s = F_c = {self.stribeck.F_c!r} N: a slipping element stays "
                 "exactly on |z| = s, where the law is at rest, and never arrests; use law='signed' "
                 "or F_s > F_c",
-                stacklevel=3,
+                stacklevel=4,
             )
 
     @property
@@ -162,8 +166,10 @@ class GMS:
         return self.parameters.sigma_2
 
 
+@refusing()
 @displayed("svg", "html")
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LuGre:
     """The LuGre model: one bristle, one state, no edges.
@@ -214,8 +220,10 @@ class LuGre:
         return np.ones(1)
 
 
+@refusing()
 @displayed("svg", "html")
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class ChartModel:
     """Any chart run as a bank of n elements, for example with your own guards or states.

@@ -13,6 +13,8 @@ from typing import Any
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import spell
 from gms_fsm.systems.models import Model, is_model
+from gms_fsm.systems.parts import Contact
+from gms_fsm.systems.reading.assembly import Assembly
 from gms_fsm.systems.rigs import Prescribed, Rig
 from gms_fsm.systems.signals import Signal
 from gms_fsm.systems.system import System, system_of
@@ -68,15 +70,15 @@ class Several:
         self._system = system
 
     def __repr__(self) -> str:
-        return f"<{len(self._system.contacts)} contacts of {self._system!r}>"
+        return f"<{len(self._system.machines)} contacts of {self._system!r}>"
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
-        known = ", ".join(repr(each.name) for each in self._system.contacts)
+        known = ", ".join(repr(each.name) for each in self._system.machines)
         raise ParameterError(
             f"system {self._system.name!r} has the contacts {known}",
-            advice=f"say which one: trace.contact({self._system.contacts[0].name!r})",
+            advice=f"say which one: trace.contact({self._system.machines[0].name!r})",
         )
 
 
@@ -109,7 +111,7 @@ class Mounted:
     @property
     def several(self) -> bool:
         """Whether there are several contacts, of which a model must be named."""
-        return self.named and len(self.system.contacts) > 1
+        return self.named and len(self.system.machines) > 1
 
     @property
     def made_of(self) -> Model | System:
@@ -124,7 +126,7 @@ class Mounted:
     @property
     def contacts(self) -> tuple[str, ...]:
         """The names of contacts that the user can say."""
-        return tuple(each.name for each in self.system.contacts) if self.named else ()
+        return tuple(each.name for each in self.system.machines) if self.named else ()
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -170,11 +172,11 @@ def mounted(model: Model | System, rig: Rig | None = None, period: float | None 
     >>> from gms_fsm import GMS, GMSParameters, PulledSlider
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> what = mounted(model, PulledSlider(1.0, 2.0, 0.1))
-    >>> what.system.contacts[0].name, what.whose("friction")
+    >>> what.system.machines[0].name, what.whose("friction")
     ('friction', '')
     """
     if isinstance(model, System):
-        single: Any = model.contacts[0] if len(model.contacts) == 1 else Several(model)
+        single: Any = model.machines[0] if len(model.machines) == 1 else Several(model)
         return Mounted(model, single, Mounting(model), named=True)
     for what, given, mark, example in (
         ("model", model, "chart", "GMS(parameters, law='signed')"),
@@ -199,6 +201,31 @@ def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
             value=model,
         )
     return mounted(model, Prescribed("0"))
+
+
+def contact_of(what: object, name: str) -> tuple[Contact, Assembly | None]:
+    """Return a contact of a system, with the system read; or a model as a contact of its own."""
+    if isinstance(what, System):
+        known = [each.name for each in what.contacts]
+        if not name and len(known) > 1:
+            raise ParameterError(
+                f"system {what.name!r} has the contacts {', '.join(map(repr, known))}",
+                place="contact",
+                advice=f"say which one: contact={known[0]!r}",
+            )
+        return what.contact(name or known[0]), what.assembly
+    if name:
+        raise ParameterError(
+            "only a system has contacts", place="contact", value=name, advice="leave it out"
+        )
+    if isinstance(what, Contact):
+        return what, None
+    if not is_model(what):
+        raise ParameterError(
+            "it must be a chart, a model, a contact or a system", place="chart", value=what
+        )
+    model: Any = what
+    return Contact("friction", model), None
 
 
 def shifted(call: str, model: Model | System, rig: Any, *rest: Any) -> tuple[Any, ...]:

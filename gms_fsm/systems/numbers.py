@@ -74,7 +74,7 @@ def known_in(what: Mounted) -> dict[str, tuple[Parameter, int]]:
         what.of(NUMBERS, name): (units.get(name, Parameter(name)), 0) for name in what.rig.numbers
     }
     found = dict(rest) if what.named else {}
-    for contact in what.system.contacts:
+    for contact in what.system.machines:
         for name, each in _known(contact).items():
             found.setdefault(what.of(contact.name, name), each)
     return found | rest
@@ -106,7 +106,7 @@ def varied(what: Mounted, values: Mapping[str, ArrayLike]) -> Mounted:
         groups.setdefault(owner, {})[own] = given
     contacts = tuple(
         each.with_values(groups[each.name]) if each.name in groups else each
-        for each in what.system.contacts
+        for each in what.system.machines
     )
     return _remade(what, contacts, groups.get(NUMBERS, {}))
 
@@ -128,7 +128,7 @@ def _owner(what: Mounted, name: str) -> tuple[str, str]:
     if what.named:
         owner, _, own = name.partition(".")
         return owner, own
-    return NUMBERS if name in what.rig.numbers else what.system.contacts[0].name, name
+    return NUMBERS if name in what.rig.numbers else what.system.machines[0].name, name
 
 
 def _known(contact: Contact) -> dict[str, tuple[Parameter, int]]:
@@ -215,7 +215,7 @@ def joined(what: Mounted, parts: Iterable[tuple[str, int | None, float]]) -> dic
 # --------------------------------------------------------------------------- the slip law
 def law_of(what: Mounted) -> str | None:
     """Return the slip law of the first GMS model; None without."""
-    laws = (_law_of(each.model) for each in what.system.contacts)
+    laws = (_law_of(each.model) for each in what.system.machines)
     return next((each for each in laws if each is not None), None)
 
 
@@ -226,7 +226,7 @@ def with_law(what: Mounted, law: str) -> Mounted:
         raise ParameterError("only a GMS model has a slip law", place="law", value=law)
     contacts = tuple(
         each if each.model is None else each.with_model(_lawful(each.model, law))
-        for each in what.system.contacts
+        for each in what.system.machines
     )
     return _remade(what, contacts, {})
 

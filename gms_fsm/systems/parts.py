@@ -13,8 +13,9 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, cut, shown
-from gms_fsm.foundation.arguments import one_of
+from gms_fsm.foundation.arguments import one_of, refusing
 from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.given import (
     Text,
     check_name,
@@ -28,9 +29,11 @@ from gms_fsm.systems.models import Model, check_bank, is_model, with_values
 
 Motion = Literal["along", "normal", "turning"]  # the first is the default
 LOAD = "N"  # the input of a contact that multiplies its Stribeck curve
+COUNTS = ("is_in", "count")  # of the elements in a state; the first where there is one element
 LEAST_LOAD = 1e-9  # N; charts divide by thresholds
 
 
+@refusing()
 @dataclass(frozen=True)
 class Body:
     """A body with one degree of freedom: free, or moved with a given velocity.
@@ -97,7 +100,9 @@ class Body:
         return "rad" if self.motion == "turning" else "m"
 
 
+@refusing()
 @displayed("svg", "html")
+@by_value()
 @dataclass(frozen=True, init=False, eq=False)
 class Contact:
     """Machines of one chart on one relative velocity.
@@ -174,6 +179,12 @@ class Contact:
                 place=f"{here}: chart",
                 value=chart,
             )
+        if not chart.velocities and not isinstance(self, Supervisor):
+            raise ParameterError(
+                f"chart {chart.name!r} has no velocity",
+                place=here,
+                advice="it is the chart of a Supervisor: supervisors=(Supervisor(...),)",
+            )
         check_bank(chart, n, here)
         velocities = several(v, str, f"{here}: v")
         if len(velocities) != len(chart.velocities):
@@ -225,7 +236,7 @@ class Contact:
 
     def replaced(self, **fields: Any) -> Contact:
         """Return the same contact with other fields, which fit together."""
-        new = object.__new__(Contact)
+        new = object.__new__(type(self))
         vars(new).update(vars(self) | fields)
         return new
 
@@ -258,12 +269,71 @@ class Contact:
         return 0.0 if self.model is None else self.model.sigma_2
 
 
+class Supervisor(Contact):
+    """A machine that is no contact: its chart has no velocity, and its outputs are signals.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its system; its outputs are called ``name.output`` in all texts of the system.
+    chart : Chart
+        With ``velocities=()``.
+    values : mapping, optional
+        For each parameter of the chart a number.
+    inputs : mapping of str to str or float
+        For an input of the chart what it is, over the names of the system, the outputs of other
+        supervisors, and ``is_in(pad.stuck)`` or ``count(pad.slip)``.
+    period : float, optional
+        s: as for a `Contact`.
+
+    Raises
+    ------
+    ParameterError
+        If its chart has a velocity, or an input is not bound.
+
+    Examples
+    --------
+    >>> from gms_fsm import Chart, State, System, Transition, simulate
+    >>> heater = Chart("thermostat", inputs=("T",), velocities=(),
+    ...     states=(State("off", outputs={"u": "0"}), State("on", outputs={"u": "1"})),
+    ...     transitions=(Transition("switch_on", "off", "on", guard="T < 19"),
+    ...                  Transition("switch_off", "on", "off", guard="T > 21")))
+    >>> room = System("room", supervisors=(Supervisor("heater", heater),),
+    ...               flow={"T": "30 * heater.u - T"})
+    >>> [str(edge) for edge in simulate(room, 3.0).transitions.edge[:3]]
+    ['switch_on', 'switch_off', 'switch_on']
+    """
+
+    def __init__(
+        self,
+        name: str,
+        chart: Chart,
+        values: Mapping[str, Any] | None = None,
+        *,
+        inputs: Mapping[str, Text] | None = None,
+        period: float | None = None,
+    ) -> None:
+        if not isinstance(chart, Chart) or chart.velocities:
+            raise ParameterError(
+                "it must be a Chart with velocities=()",
+                place=f"supervisor {shown(name)}: chart",
+                value=chart,
+                advice="a chart that moves is that of a Contact",
+            )
+        super().__init__(name, chart, values, v=(), inputs=inputs, period=period)
+
+    def __repr__(self) -> str:
+        return f"<Supervisor {cut(self.name)!r}: {cut(self.chart.name)}>"
+
+
 def loaded(model: Model | Contact) -> bool:
     """Return whether thresholds follow a load besides the velocity."""
     return isinstance(model, Contact) and model.load is not None
 
 
-@dataclass(frozen=True)
+@refusing(instead={"sample_time": "period"})
+@by_value("updates")
+@dataclass(frozen=True, eq=False)
 class Sampled:
     """A sampled controller: values that change at exact ticks only.
 

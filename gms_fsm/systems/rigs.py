@@ -13,7 +13,9 @@ from typing import Any, ClassVar, Protocol
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import Parameter, checked_scalar
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.display import short_repr
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring
 
@@ -40,7 +42,9 @@ class Rig(Protocol):
         """Text of dv/dt in t, x, v, F, the signals and the numbers; None if v is prescribed."""
 
 
+@refusing()
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class Prescribed:
     """Open loop: the velocity is prescribed.
@@ -56,7 +60,7 @@ class Prescribed:
     'prescribed velocity'
     """
 
-    velocity: SignalLike
+    velocity: SignalLike = field(compare=False)
     signals: Mapping[str, Signal] = field(init=False, repr=False)
 
     title = "prescribed velocity"
@@ -72,7 +76,9 @@ class Prescribed:
         return {}
 
 
+@refusing()
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class Slider:
     """Closed loop: a mass pushed by a force, ``m dv/dt = F_a(t) - F``.
@@ -91,7 +97,7 @@ class Slider:
     """
 
     mass: float
-    force: SignalLike
+    force: SignalLike = field(compare=False)
     signals: Mapping[str, Signal] = field(init=False, repr=False)
 
     title = "slider pushed by a force"
@@ -108,6 +114,8 @@ class Slider:
         return {each.name: getattr(self, each.name) for each in self.parameters}
 
 
+@refusing()
+@by_value()
 @dataclass(frozen=True, eq=False)
 class PulledSlider:
     """Closed loop: a mass pulled through a spring whose end moves at constant speed.
@@ -158,6 +166,7 @@ class PulledSlider:
 
 
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class TextRig:
     """Any rig as its texts, numbers and signals: what a file keeps of a rig of your own.

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, SignalError, shown
 from gms_fsm.foundation.display import short_repr
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import Value, parse_value
 
 __all__ = ["Corners", "Formula", "Function", "Signal", "SignalLike", "as_signal", "piecewise_slope"]
@@ -49,6 +50,7 @@ class Formula:
 
 
 @short_repr
+@by_value()
 @dataclass(frozen=True, eq=False)
 class Corners:
     """Straight lines between corners; two corners at the same time make a jump.
@@ -129,7 +131,7 @@ class Corners:
 
 
 @short_repr
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Function:
     """A Python callable of t [s] that returns a number.
 

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.arguments import refusing, unknown
 from gms_fsm.language import Binary, Name, Negative, Number, Value, parse_value
 from gms_fsm.systems.given import Text, check_name, check_text, constant
 from gms_fsm.systems.parts import Body
@@ -22,6 +22,7 @@ ZERO, ONE = Number(0.0), Number(1.0)
 Terms = tuple[tuple[int, Value], ...]  # each with its sign
 
 
+@refusing(instead={"stiffness": "k", "damping": "d"})
 @dataclass(frozen=True)
 class Spring:
     """A spring, a damper, or both in parallel, between two bodies or a body and the ground.

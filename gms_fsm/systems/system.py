@@ -18,8 +18,9 @@ import numpy as np
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, cut, shown
-from gms_fsm.foundation.arguments import checked_path, unknown
+from gms_fsm.foundation.arguments import checked_path, refusing, unknown
 from gms_fsm.foundation.display import displayed
+from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import (
     Binary,
     Name,
@@ -39,7 +40,16 @@ from gms_fsm.systems.given import (
     texts_of,
 )
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.parts import LEAST_LOAD, LOAD, Body, Contact, Sampled, loaded
+from gms_fsm.systems.parts import (
+    COUNTS,
+    LEAST_LOAD,
+    LOAD,
+    Body,
+    Contact,
+    Sampled,
+    Supervisor,
+    loaded,
+)
 from gms_fsm.systems.reading.texts import texts_of_system
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
@@ -55,6 +65,7 @@ __all__ = [
     "Contact",
     "Sampled",
     "Spring",
+    "Supervisor",
     "System",
     "loaded",
     "system_of",
@@ -64,7 +75,9 @@ __all__ = [
 Key = tuple[str | int, ...]
 
 
+@refusing(instead={"parameters": "numbers"})
 @displayed("svg", "html")
+@by_value()
 @dataclass(frozen=True, eq=False)
 class System:
     """Bodies, the contacts between them, and what drives both.
@@ -73,10 +86,12 @@ class System:
     ----------
     name : str
         What it is called in pictures and messages.
-    bodies : sequence of Body
-        At least one.
-    contacts : sequence of Contact
-        Whatever switches.
+    bodies : sequence of Body, optional
+        What moves.
+    contacts : sequence of Contact, optional
+        Whatever switches between bodies.
+    supervisors : sequence of Supervisor, optional
+        Machines that are no contacts; bodies, contacts and supervisors may not all be missing.
     springs : sequence of Spring, optional
         Springs and dampers; their forces are added to those of the bodies, in this order.
     signals : mapping of str to signal, optional
@@ -102,6 +117,9 @@ class System:
     Locked contacts may hold the same motion. The earlier ones, as listed, then carry the force, and
     those that would repeat them carry none; `Trace.shared` marks these.
 
+    Systems are equal if all their parts are: bodies, contacts with their charts and numbers,
+    springs, signals. So are models, rigs and signals; functions only if they are the same.
+
     Examples
     --------
     >>> from gms_fsm.charts.gms import gms_element
@@ -115,8 +133,9 @@ class System:
     """
 
     name: str
-    bodies: tuple[Body, ...] = field(kw_only=True)
-    contacts: tuple[Contact, ...] = field(kw_only=True)
+    bodies: tuple[Body, ...] = field(default=(), kw_only=True)
+    contacts: tuple[Contact, ...] = field(default=(), kw_only=True)
+    supervisors: tuple[Supervisor, ...] = field(default=(), kw_only=True)
     springs: tuple[Spring, ...] = field(default=(), kw_only=True)
     signals: Mapping[str, Signal | str] = field(default_factory=dict, kw_only=True)
     numbers: Mapping[str, float] = field(default_factory=dict, kw_only=True)
@@ -128,13 +147,21 @@ class System:
         if not isinstance(self.name, str):
             raise ParameterError("it must be a text", place="name", value=self.name)
         put, here = object.__setattr__, f"system {shown(self.name)}"
-        kinds = {"bodies": Body, "springs": Spring, "contacts": Contact, "sampled": Sampled}
+        kinds = {
+            "bodies": Body,
+            "springs": Spring,
+            "contacts": Contact,
+            "supervisors": Supervisor,
+            "sampled": Sampled,
+        }
         for each, kind in kinds.items():
             put(self, each, several(getattr(self, each), kind, f"{here}: {each}"))
-        if not self.bodies:
-            raise ParameterError("it has no bodies", place=here, advice="give at least one")
-        if not self.contacts:
-            raise ParameterError("it has no contacts", place=here, advice="give at least one")
+        if self.contacts and not self.bodies:
+            raise ParameterError("it has contacts, but no bodies", place=here)
+        if not self.machines:
+            raise ParameterError(
+                "it has no contacts and no supervisors", place=here, advice="give at least one"
+            )
         numbers = {
             name: checked_scalar(f"{here}: {name}", value, "finite")
             for name, value in mapping_of(self.numbers, f"{here}: numbers").items()
@@ -197,7 +224,7 @@ class System:
                     )
                 owner[name] = kind
         seen: set[str] = set()
-        for attribute in ("bodies", "springs", "contacts", "sampled"):
+        for attribute in ("bodies", "springs", "contacts", "supervisors", "sampled"):
             for i, part in enumerate(getattr(self, attribute)):
                 key = (attribute, i, "name")
                 check_name(part.name, f"{here}, {type(part).__name__.lower()}", key)
@@ -271,9 +298,10 @@ class System:
         return load(checked_path("path", path), cls)
 
     def save(self, path: str | Path) -> Path:
-        """Write the system to a TOML file, from which `load` returns an equivalent one.
+        """Write the system to a TOML file, from which `load` returns an equal one.
 
-        Charts that are included are written by name, others in full.
+        Charts that are included are written by name, others in full. A model of a class of one's
+        own is read back as an equivalent `ChartModel`.
 
         Parameters
         ----------
@@ -301,8 +329,36 @@ class System:
         """All names that its texts can use."""
         moved = (name for body in self.bodies for name in (body.x, body.v))
         updated = (name for each in self.sampled for name in each.updates)
-        every = ("t", *moved, *self.flow, *updated, *self.signals, *self.numbers, *self.let)
+        given = (
+            f"{each.name}.{name}" for each in self.supervisors for name in each.chart.force_names
+        )
+        every = ("t", *moved, *self.flow, *updated, *self.signals, *self.numbers, *self.let, *given)
         return tuple(dict.fromkeys(every))
+
+    @property
+    def readable(self) -> tuple[str, ...]:
+        """All names that its texts can read: its own, and what they see of machines.
+
+        That is ``is_in(pad.stuck)`` and ``count(pad.slip)``, and by ``pad.z`` the variables of
+        single elements, the velocities and the forces.
+        """
+        found = [*self.names]
+        for each in self.machines:
+            chart, one = each.chart, each.n == 1
+            found += [f"{w}({each.name}.{s.name})" for w in COUNTS[not one :] for s in chart.states]
+            own = (*chart.variables[: len(chart.variables) * one], *chart.velocities)
+            found += [f"{each.name}.{name}" for name in (*own, *chart.force_names)]
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """The events that machines wait for or emit, as components of the state vector."""
+        return tuple(dict.fromkeys(name for each in self.machines for name in each.chart.events))
+
+    @property
+    def machines(self) -> tuple[Contact, ...]:
+        """Whatever switches: the contacts, then the supervisors."""
+        return (*self.contacts, *self.supervisors)
 
     def body(self, name: str) -> Body:
         """Return a body by name.
@@ -325,12 +381,12 @@ class System:
         return _found(self.bodies, name, "body")
 
     def contact(self, name: str) -> Contact:
-        """Return a contact by name.
+        """Return a contact, or a supervisor, by name.
 
         Parameters
         ----------
         name : str
-            One of its contacts' names.
+            One of its contacts' or supervisors' names.
 
         Returns
         -------
@@ -342,7 +398,7 @@ class System:
         ParameterError
             If there is none.
         """
-        return _found(self.contacts, name, "contact")
+        return _found(self.machines, name, "contact")
 
 
 MOST_READ = 64

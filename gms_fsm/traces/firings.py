@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
-from gms_fsm.foundation.logs import Log
+from gms_fsm.foundation.display import Log
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRecord
 

@@ -16,6 +16,8 @@ from gms_fsm.traces.rows import Rows
 from integrators.runners.observing import is_turn, observe_beside, observe_row
 
 FEW = 8  # rows that are observed without machine code
+BESIDE = 2  # rows on either side that a row beside a slide depends on
+AT_ONCE = 1_000_000  # numbers in rows that are whole at the same time
 
 
 class Observed(Mapping[str, FloatArray]):
@@ -68,10 +70,24 @@ def _observed_rows(program: Program, rows: Rows, kept: range, *, compiled: bool)
     """Return the observed quantities at some places at all rows, shape (rows, kept)."""
     if compiled:
         try:
-            return observe_rows(program, rows.t, rows.y, rows.mode, kept)
+            return _in_blocks(program, rows, kept)
         except SignalError:  # a Python function failed at some row
             pass
     return _one_by_one(program, rows, kept)
+
+
+def _in_blocks(program: Program, rows: Rows, kept: range) -> FloatArray:
+    """Return the same by machine code, which needs whole rows: of some at a time."""
+    count = max(FEW, AT_ONCE // (program.layout.y.size + program.layout.modes))
+    if len(rows) <= count:
+        return observe_rows(program, rows.t, rows.y, rows.mode, kept)
+    table = np.empty((len(rows), len(kept)))
+    for row in range(0, len(rows), count):
+        start = max(0, row - BESIDE)
+        part = rows.at(slice(start, row + count + BESIDE))
+        own = observe_rows(program, part.t, part.y, part.mode, kept)[row - start :][:count]
+        table[row:][:count] = own
+    return table
 
 
 def _one_by_one(program: Program, rows: Rows, kept: range) -> FloatArray:

@@ -176,6 +176,8 @@ class Scope:
     def x(self) -> Any:
         """Position, m."""
         position = self.places.position
+        if not position:
+            return math.nan
         if position in self.layout.y.shared:
             return self.y[self.layout.y.index(position)]
         return self.seen["x"]
@@ -183,12 +185,12 @@ class Scope:
     @property
     def v(self) -> Any:
         """Velocity, m/s."""
-        return self.seen[self.places.velocity]
+        return self.seen.get(self.places.velocity, math.nan)
 
     @property
     def F(self) -> Any:
         """Friction force, N."""
-        return self.seen["F"]
+        return self.seen.get("F", math.nan)
 
     @property
     def z(self) -> Any:
@@ -220,7 +222,7 @@ class Scope:
         bank = self.places
         if name in bank.variables:
             return self.y[self.layout.y.block(bank.of(name))]
-        return self.seen[name]
+        return self.seen.get(name, [math.nan] * bank.n)  # a supervisor has no force
 
     # ------------------------------------------------------------------ by name
     def guards(self, element: int) -> dict[str, Any]:
@@ -230,6 +232,8 @@ class Scope:
             values[name] = value[element] if isinstance(value, list) else value
         for name in self.places.variables:
             values[name] = self.each(name)[element]
+        for name in self.layout.events:
+            values[name] = self.y[self.layout.y.index(name)]
         return values | parameter_values(self.model, element)
 
     def watches(self) -> dict[str, Any]:
@@ -284,6 +288,8 @@ def _read(
 def guard_columns(trace: Trace, names: Iterable[str]) -> dict[str, Any]:
     """Return the values of names in guards at all rows."""
     wanted, columns = set(names), Scope.over(trace).invariants()
+    events = {*trace.program.layout.events} & wanted
+    columns |= {name: trace.rows.y[:, trace.program.layout.y.index(name)] for name in events}
     found = {name: columns[name] for name in wanted & columns.keys()}
     program, rows, places = trace.program, trace.rows, trace.places
     if missing := sorted(wanted - columns.keys()):
@@ -322,9 +328,8 @@ class GuardValues:
                 self._places.append(
                     [(name.removeprefix(start), shown.index(name, i)) for name in names]
                 )
-                self._variables.append(
-                    [(name, y.index(bank.of(name), i)) for name in bank.variables]
-                )
+                own = [(name, y.index(bank.of(name), i)) for name in bank.variables]
+                self._variables.append(own + [(name, y.index(name)) for name in layout.events])
 
     def put(
         self, t: float, y: Sequence[float], shown: Sequence[float], into: Sequence[dict[str, Any]]

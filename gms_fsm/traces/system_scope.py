@@ -9,21 +9,34 @@ be written without it, unless the system itself uses them. A model on a rig has 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gms_fsm.errors import SignalError
+from gms_fsm.errors import SignalError, UnitError, shown
+from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.quantities import UNITS, convert_numbers, factor
+from gms_fsm.foundation.quantities import in_si as number_in_si
 from gms_fsm.language import Name, Owner, evaluate, names_in, values_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program
+from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.signals import Corners, Function, piecewise_linear
 from gms_fsm.systems.system import Contact, System
-from gms_fsm.traces.scope import Scope, watch_names
+from gms_fsm.traces.scope import Scope, unit_of, watch_names
 from gms_fsm.traces.trace import Trace
+
+# What the units of SI measure; a force is a force, also where it is a normal force.
+MEASURED = {
+    unit: quantity
+    for quantity, units in reversed(UNITS.items())
+    for unit, factor in units.items()
+    if factor == 1.0
+}
 
 
 def system_names(system: System) -> list[str]:
@@ -38,7 +51,7 @@ def system_names(system: System) -> list[str]:
     ['t', 'x', 'v', 'pad.x', 'pad.v', 'pad.F', 'pad.F1', 'F', 'F1']
     """
     names = [*system.names]
-    for contact in system.contacts:
+    for contact in system.machines:
         names += [f"{contact.name}.{name}" for name in _names_of(contact)]
     if len(system.contacts) == 1:
         names += _names_of(system.contacts[0])
@@ -49,13 +62,14 @@ def _names_of(contact: Contact) -> list[str]:
     """Return the names that belong to a contact, without its own."""
     chart = contact.chart
     own = [name for name in watch_names(contact) if name not in ("t", "x", "v", "F")]
-    return ["x", *chart.velocities, *chart.force_names, *own]
+    own = own if chart.velocities else [name for name in own if not name.startswith("F")]
+    return [*["x"][: len(chart.velocities)], *chart.velocities, *chart.force_names, *own]
 
 
 def owners_of(system: System) -> dict[str, Owner]:
     """Return whose states conditions may name: those of each contact's elements."""
     found, first = {}, 0
-    for contact in system.contacts:
+    for contact in system.machines:
         states = tuple(state.name for state in contact.chart.states)
         found[contact.name] = Owner(first, contact.n, states)
         first += contact.n
@@ -129,7 +143,7 @@ class SystemScope:
         observed = program.layout.observed.named(observe(program, t, y, mode))
         contacts = {
             each.name: Scope.of(each, program, t, y, mode, each.name, observed)
-            for each in system.contacts
+            for each in system.machines
         }
         return cls(system, program.layout, t, y, given_values(system, t), contacts)
 
@@ -139,7 +153,8 @@ class SystemScope:
         system, rows = trace.what.system, trace.rows
         at_rows = [given_values(system, t) for t in rows.t.tolist()]
         given = {name: np.array([at[name] for at in at_rows]) for name in (at_rows or [{}])[0]}
-        contacts = {name: Scope.over(trace.contact(name)) for name in trace.contacts}
+        every = (bank.name for bank in trace.program.layout.banks)
+        contacts = {name: Scope.over(trace.contact(name)) for name in every}
         return cls(system, trace.program.layout, rows.t, rows.y.T, given, contacts)
 
     def value(self, name: str) -> Any:
@@ -154,6 +169,9 @@ class SystemScope:
             tree = self.system.assembly.expanded(Name(name))
             found = values_of(tree, {each: self.value(each) for each in ("t", *names_in(tree))})
             return found if found.ndim else float(found)
+        if name not in self.layout.y.shared:  # an output of a supervisor
+            owner, _, output = name.partition(".")
+            return self.contacts[owner].seen[output]
         return self.y[self.layout.y.index(name)]
 
     def watches(self) -> dict[str, Any]:
@@ -175,3 +193,58 @@ class SystemScope:
         chart, watched = scope.model.chart, scope.watches()
         watched |= {name: scope.seen[name] for name in (*chart.velocities, *chart.force_names)}
         return {name: watched[name] for name in _names_of(self.system.contact(bank.name))}
+
+
+# --------------------------------------------------------------------------- units
+def names_of(what: Mounted) -> list[str]:
+    """Return the names allowed in conditions and watches."""
+    return system_names(what.system) if what.named else watch_names(what.model)
+
+
+def units_of(what: Mounted, names: Iterable[str] = ()) -> dict[str, str]:
+    """Return the units of names, as far as they are known: those of bodies are not declared.
+
+    Without names, of those in conditions and watches.
+    """
+    every = [*names] or names_of(what)
+    found: dict[str, str] = {}
+    for contact in what.system.machines:
+        chart = contact.chart
+        for name in every:
+            owner, _, last = name.rpartition(".")
+            if what.named and (owner != contact.name or name in what.system.names):
+                continue
+            bare = re.sub(r"\d+$", "", last)
+            if unit := unit_of(chart, last) or unit_of(chart, bare):
+                found[name] = unit
+    return found | {"t": "s"}
+
+
+def in_si(what: Mounted, text: str, name: str = "", names: Iterable[str] = ()) -> str:
+    """Return a text with numbers in SI for those with units, such as ``"v > 300 mm/s"``.
+
+    With a name, the text is an expression for that name.
+    """
+    checked_kind("text", text, str, "a text")
+    known = {each: MEASURED[u] for each, u in units_of(what, names).items() if u in MEASURED}
+    return (
+        convert_numbers(f"{name}=={text}", known).partition("==")[2]
+        if name
+        else convert_numbers(text, known)
+    )
+
+
+def asked_unit(what: Mounted, text: str) -> tuple[str, str, float]:
+    """Return an expression without the unit that is asked for, such as ``F in mN``; unit, factor.
+
+    The unit is empty if none is asked for.
+    """
+    found = re.fullmatch(r"(.+?)\s+in\s+(\S+)", text.strip())
+    if found is None:
+        return text, "", 1.0
+    asked, unit = found.groups()
+    known = MEASURED.get(units_of(what).get(asked, ""))
+    size = factor(known, unit) if known else float(number_in_si(f"1 {unit}") or "nan")
+    if math.isnan(size):
+        raise UnitError(f"{shown(unit)} is not a unit", advice="for example mN, mm or mm/s")
+    return asked, unit, size

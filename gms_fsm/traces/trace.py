@@ -22,6 +22,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import require
+from gms_fsm.foundation.text import visible
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
@@ -50,16 +51,7 @@ from gms_fsm.traces.views import (
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["BodyTrace", "Trace", "check_trace", "dwell_times"]
-
-
-def check_trace(trace: object) -> None:
-    """Raise `ParameterError` unless an object to be drawn is a trace of one contact."""
-    if not isinstance(trace, Trace):
-        raise ParameterError(
-            "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
-        )
-    _ = trace.model.chart  # a system with several contacts refuses, and says to choose one
+__all__ = ["BodyTrace", "Trace", "dwell_times"]
 
 
 @displayed("png", "html")
@@ -114,14 +106,14 @@ class Trace:
     initial: Mapping[str, Any] | None = field(default=None, repr=False)  # as given; not in files
 
     def __repr__(self) -> str:
-        return f"<Trace: {self.title}; {len(self)} rows, {len(self.firings)} transitions>"
+        return f"<Trace: {visible(self.title)}; {len(self)} rows, {len(self.firings)} transitions>"
 
     @property
     def title(self) -> str:
         """What ran: model and rig, or a system and its contacts."""
         if not self.subject.named:
             return f"{self.model.title}; {self.rig.title}"
-        return f"{self.what.title}; contacts {', '.join(self.contacts)}"
+        return f"{self.what.title}; {', '.join(self.what.contacts)}"
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -184,7 +176,7 @@ class Trace:
     @property
     def contacts(self) -> tuple[str, ...]:
         """Names of the contacts."""
-        return tuple(bank.name for bank in self.program.layout.banks)
+        return tuple(bank.name for bank in self.program.layout.banks if bank.velocity)
 
     def contact(self, name: str) -> Trace:
         """Return the run as one contact sees it: its v, F, z, s, states and transitions.
@@ -212,6 +204,8 @@ class Trace:
         chosen = replace(self, firings=mine, which=bank.name, every=every)
         vars(chosen).update({k: u for k, u in vars(self).items() if k in ("program", "seen")})
         return chosen
+
+    supervisor = contact
 
     def body(self, name: str) -> BodyTrace:
         """Return the motion of a body.
@@ -259,6 +253,8 @@ class Trace:
         layout = self.program.layout
         if name in layout.y.shared:
             return self._named(name)
+        if name in self.what.system.names and name in self.seen:
+            return self.seen[name]  # an output of a supervisor
         bank = self.places if self.which or len(layout.banks) == 1 else None
         names = {} if bank is None else bank.plain({each: each for each in layout.observed.shared})
         if isinstance(name, str) and name in names:
@@ -272,7 +268,7 @@ class Trace:
         position = self.places.position
         if position in self.program.layout.y.shared:
             return self._named(position)
-        return self.seen[position]
+        return self._seen(position)
 
     @property
     def n(self) -> int:
@@ -313,6 +309,10 @@ class Trace:
             )
         return self._named(self.places.of(name))
 
+    def _seen(self, name: str) -> FloatArray:
+        """Return what was observed with one value; NaN where a supervisor does not have it."""
+        return self.seen[name] if name in self.seen else np.full(len(self.rows), np.nan)
+
     def _named(self, name: str) -> FloatArray:
         column: FloatArray = self.rows.y[:, self.program.layout.y.where(name)]
         return column
@@ -330,7 +330,7 @@ class Trace:
     @property
     def v(self) -> FloatArray:
         """Velocity, shape (rows,), m/s."""
-        return self.seen[self.places.of(self.places.velocity)]
+        return self._seen(self.places.of(self.places.velocity))
 
     @property
     def s(self) -> FloatArray:
@@ -340,7 +340,7 @@ class Trace:
     @property
     def F(self) -> FloatArray:
         """Friction force, shape (rows,), N."""
-        return self.seen[self.places.of("F")]
+        return self._seen(self.places.of("F"))
 
     @property
     def shared(self) -> NDArray[np.bool_]:
@@ -355,7 +355,8 @@ class Trace:
     @property
     def F_elements(self) -> FloatArray:
         """Force of each element, shape (rows, n), N."""
-        return self.seen[self.places.of("F_elements")]
+        force = self.places.of("F_elements")
+        return self.seen[force] if force in self.seen else np.full((len(self.rows), self.n), np.nan)
 
     @property
     def dz(self) -> FloatArray:
@@ -464,9 +465,8 @@ class Trace:
             This trace if it already has them.
         """
         table = merged(self.rows, self.stops)
-        if len(table) == len(self.rows):
-            return self
-        return replace(self, rows=table, stops=table, stored={})
+        same = len(table) == len(self.rows)
+        return self if same else replace(self, rows=table, stops=table, stored={})
 
     def with_monitors(self, found: Mapping[str, Verdict]) -> Trace:
         """Return the same run with the verdicts of its monitors, and all that was computed."""

@@ -174,7 +174,8 @@ class ClauseSeen:
     Parameters
     ----------
     edge, text : str
-        Name of the edge, and the clause as shown in the chart.
+        Name of the edge, with its source (``"lift from slip"``) if it leaves several states, and
+        the clause as shown in the chart.
     true, false : tuple of bool
         One entry per element.
     """
@@ -200,7 +201,8 @@ class CoverageVerdict:
     states : dict of str to tuple of bool
         Whether each element was ever in the state.
     edges : dict of str to tuple of int
-        Number of times each element took the edge.
+        Number of times each element took the edge; one that leaves several states is counted once
+        for each of them, as ``"lift from slip"``.
     clauses : tuple of ClauseSeen
         One entry per clause of each guard.
     never : tuple of str

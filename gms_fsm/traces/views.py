@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError, shown, why
 from gms_fsm.foundation.arguments import no_file, some_of
-from gms_fsm.foundation.display import short_repr
-from gms_fsm.foundation.logs import Log
+from gms_fsm.foundation.display import Log, short_repr
 from gms_fsm.lowering.observing import armed, rate, sigmas
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.system import Body
@@ -41,6 +40,12 @@ class BodyTrace:
     name: str
     x: FloatArray
     v: FloatArray
+
+
+def range_of_force(trace: Trace) -> tuple[float, float]:
+    """Return the least and the largest friction force over what lasts."""
+    lasting = trace.F[trace.rows.lasting]
+    return float(lasting.min()), float(lasting.max())
 
 
 def driven_velocity(trace: Trace, body: Body) -> FloatArray:

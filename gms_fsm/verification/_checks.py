@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations, islice, product
-from typing import Any, TypeAlias
+from collections.abc import Iterator, Sequence
+from itertools import combinations, islice
+from typing import Any
 
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.language import (
-    Condition,
-    Not,
-    Requirement,
-    Split,
     Value,
-    evaluate,
     names_in,
     parse_value,
-    split,
 )
 from gms_fsm.verification._prover import (
     Answer,
@@ -33,11 +26,24 @@ from gms_fsm.verification._prover import (
     refuted,
     shown,
 )
-from gms_fsm.verification._subject import ChartSubject
+from gms_fsm.verification._switching import (
+    after,
+    by_turns,
+    changed,
+    earlier,
+    endless,
+    follow_impulses,
+    interrupted,
+    is_hidden,
+    may_change,
+    others,
+    others_switch,
+    read_by,
+    untaken,
+)
 from gms_fsm.verification.findings import Finding
 
 MOST_CYCLES = 200  # cycles; a friction chart has a handful
-MOST_WAYS = 64  # alternatives per guard
 
 
 # --------------------------------------------------------------------------- determinism
@@ -58,10 +64,10 @@ def _at_once(prover: Prover, pair: Sequence[Transition]) -> Answer:
     guards = [prover.subject.guard(edge) for edge in pair]
     formulas = [reading.truth(guard, prover.still) for guard in guards]
     prover.defined(reading)
-    point = prover.example(names_of(*guards), *formulas, *prover.at_rest(pair[0].source))
+    point = prover.example(names_of(*guards), *formulas, *prover.within(pair[0].source))
     if point is None:
         return Answer("proved", "never enabled at the same time")
-    if _arrests(prover, pair[0]) and _is_hidden(prover, pair[1], pair[:1]):
+    if prover.subject.arrests(pair[0]) and is_hidden(prover, pair[1], pair[:1]):
         return Answer("proved", f"{pair[1].name} is taken only where the velocity jumps")
     text = f"both are enabled at the same time; the machine takes the earlier, {first}"
     return by_example("settled by order", text, point, enabled(guards, point))
@@ -70,15 +76,49 @@ def _at_once(prover: Prover, pair: Sequence[Transition]) -> Answer:
 # --------------------------------------------------------------------------- livelock
 def livelock(prover: Prover) -> Iterator[Finding]:
     """Check that no cycle of edges is enabled at one point."""
+    if prover.subject.facts.period is not None:
+        yield Finding("livelock", "proved", (), "a machine takes at most one edge at each tick")
+        return
     cycles = list(islice(_cycles(prover.chart), MOST_CYCLES + 1))
     if not cycles:
         yield Finding("livelock", "proved", (), "the edges form no cycle")
-    for cycle in cycles[:MOST_CYCLES]:
+        return
+    passable: list[tuple[Transition, ...]] = []
+    found = []
+    # Elements that share a force switch together, so that no one of them can be followed alone.
+    shared = prover.subject.rest and prover.subject.shared
+    for cycle in cycles[:MOST_CYCLES] if not shared else ():
         where = tuple(name for edge in cycle for name in (edge.source, edge.name))
-        yield prover.settle("livelock", where, _all_around, cycle)
+        found.append(prover.settle("livelock", where, _all_around, cycle, passable))
+    yield from found
     if len(cycles) > MOST_CYCLES:
         text = f"more than {MOST_CYCLES} cycles; the others were not checked"
         yield Finding("livelock", "undecided", (), text)
+    elif not any(each.status == "refuted" for each in found) and (
+        may_change(prover) or _crossed(passable, cycles)
+    ):
+        yield prover.settle("livelock", (), _at_one_instant, cycles)
+
+
+def _crossed(
+    passable: Sequence[tuple[Transition, ...]], cycles: Sequence[tuple[Transition, ...]]
+) -> bool:
+    """Return whether a cycle that can be passed shares a state with another one."""
+    states = [{edge.source for edge in cycle} for cycle in cycles]
+    return any(
+        sum(bool({edge.source for edge in cycle} & other) for other in states) > 1
+        for cycle in passable
+    )
+
+
+def _at_one_instant(prover: Prover, cycles: Sequence[tuple[Transition, ...]]) -> Answer:
+    """Follow what cycles do by turns, several elements together, or beside other contacts."""
+    facts, several = prover.subject.facts, may_change(prover)
+    if several and (answer := interrupted(prover, cycles)) is not None:
+        return answer
+    if several and others_switch(prover):
+        return Answer("undecided", f"{others(prover)} at the same instant are not followed")
+    return by_turns(prover, facts.n if several else 1)
 
 
 def _cycles(chart: Chart) -> Iterator[tuple[Transition, ...]]:
@@ -97,63 +137,46 @@ def _cycles(chart: Chart) -> Iterator[tuple[Transition, ...]]:
         yield from extend((), first)
 
 
-def _all_around(prover: Prover, cycle: tuple[Transition, ...]) -> Answer:
-    subject = prover.subject
-    assigned = frozenset(
-        name
-        for edge in cycle
-        for name in (*(name for name, _ in subject.assigned(edge)), *subject.landed(edge))
-    )
+def _all_around(
+    prover: Prover, cycle: tuple[Transition, ...], passable: list[tuple[Transition, ...]]
+) -> Answer:
+    """Search for a point at which a cycle is taken, again and again; others stay as they are.
 
-    def around(passes: int) -> tuple[list[Any], Duals]:
+    A cycle that can be passed at least once is added to `passable`.
+    """
+    subject = prover.subject
+    assigned = changed(subject, cycle)
+
+    def around(passes: int, certain: bool | None) -> tuple[list[Any], Duals]:
         reading, here = Reading(), dict(prover.still)
-        formulas = prover.at_rest(cycle[0].source)
+        formulas = prover.within(cycle[0].source)
         for edge in cycle * passes:
             formulas.append(reading.truth(subject.guard(edge), here))
+            if certain is not None:
+                formulas += untaken(prover, edge, here, certain)
             here = after(prover, reading, edge, here)
         prover.defined(reading)
         return formulas, here
 
-    once, end = around(1)
-    if prover.find(*once) is None:
+    if prover.find(*around(1, certain=None)[0]) is None:
         return Answer("proved", "never all enabled at one point")
+    if prover.find(*around(1, certain=True)[0]) is None:
+        text = "never all taken at one point: an earlier edge takes precedence"
+        return Answer("proved", text)
+    passable.append(cycle)
+    once, end = around(1, certain=False)
     closed = [end[name].value == prover.symbols[name] for name in sorted(assigned)]
-    names = names_of(*(tree for edge in cycle for tree in subject.trees(edge))) | assigned
+    names = read_by(subject, cycle) | assigned
     point = prover.example(names, *once, *closed)
     if point is not None:
+        follow_impulses(subject, cycle)
         text = "all are enabled at one point: endless switching"
-        return refuted(text, point, _comes_back(subject, cycle, point))
-    if prover.find(*around(2)[0]) is None:
+        return refuted(text, point, endless(subject, [cycle[0].source], [point]))
+    if prover.find(*around(2, certain=True)[0]) is None:
         return Answer("proved", "the assignments end it before a second pass")
+    if prover.find(*once) is None:
+        raise Undecided("an earlier arrest ends it, except where the velocity jumps")
     return Answer("undecided", "each pass assigns different values; only two passes were followed")
-
-
-def after(prover: Prover, reading: Reading, edge: Transition, here: Duals) -> dict[str, Dual]:
-    """Return the values after an edge; F and a are those before it."""
-    subject = prover.subject
-    before = subject.before[edge.source, edge.name].items()
-    held = {name: reading.value(tree, here) for name, tree in before}
-    there = dict(here)
-    for name, tree in subject.assigned(edge):
-        there[name] = reading.value(tree, {**there, **held})
-    zero = prover.z3.RealVal(0)
-    return there | dict.fromkeys(subject.landed(edge), Dual(zero, zero))
-
-
-def _comes_back(
-    subject: ChartSubject, cycle: Sequence[Transition], point: Mapping[str, float]
-) -> bool:
-    """Return whether the cycle also returns to the same point in floats."""
-    here = dict(point)
-    for edge in cycle:
-        if not enabled([subject.guard(edge)], here):
-            return False
-        before = subject.before[edge.source, edge.name].items()
-        held = {name: evaluate(tree, here) for name, tree in before}
-        for name, tree in subject.assigned(edge):
-            here[name] = evaluate(tree, {**here, **held})
-        here |= dict.fromkeys(subject.landed(edge), 0.0)
-    return here == point
 
 
 # --------------------------------------------------------------------------- reachability
@@ -183,39 +206,26 @@ def reachability(prover: Prover) -> Iterator[Finding]:
 
 def _can_hold(prover: Prover, edge: Transition) -> Answer:
     subject, reading = prover.subject, Reading()
-    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.at_rest(edge.source)]
+    formulas = [
+        reading.truth(subject.guard(edge), prover.still),
+        *prover.within(edge.source, waits=False),
+    ]
     prover.defined(reading)
     if prover.find(*formulas) is None:
         return Answer("refuted", f"its guard can never hold: {shown(subject.guard(edge))}")
+    formulas += prover.within(edge.source)
+    if prover.find(*formulas) is None:
+        waits = [each.name for each, _ in subject.waits(edge.source) if each.name != edge.name]
+        first = ", ".join(dict.fromkeys(waits))
+        return Answer("refuted", f"never taken: {first} ends each stay in {edge.source} before")
+    prover.apart(names_of(subject.guard(edge)))
     # Where the velocity has jumped, arrests are not taken.
-    earlier = [each for each in _earlier(prover, edge) if not _arrests(prover, each)]
-    if _is_hidden(prover, edge, earlier):
-        names = ", ".join(each.name for each in earlier)
+    before = [each for each in earlier(subject, edge) if not subject.arrests(each)]
+    if is_hidden(prover, edge, before):
+        names = ", ".join(each.name for each in before)
         text = f"never taken: wherever its guard holds, an earlier edge takes precedence ({names})"
         return Answer("refuted", text)
     return Answer("proved", "its guard can hold")
-
-
-def _arrests(prover: Prover, edge: Transition) -> bool:
-    """Return whether an edge locks the contact where its velocity passes 0."""
-    return any(
-        prover.chart.transitions[number].name == edge.name for number in prover.chart.arrests
-    )
-
-
-def _earlier(prover: Prover, edge: Transition) -> list[Transition]:
-    """Return the edges that leave the same state with precedence."""
-    leaving = [each for _, each in prover.chart.leaving(edge.source)]
-    return leaving[: [each.name for each in leaving].index(edge.name)]
-
-
-def _is_hidden(prover: Prover, edge: Transition, earlier: Sequence[Transition]) -> bool:
-    """Return whether one of these edges is enabled wherever another one is."""
-    subject, reading = prover.subject, Reading()
-    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.at_rest(edge.source)]
-    formulas += [reading.truth(Not(subject.guard(each)), prover.still) for each in earlier]
-    prover.defined(reading)
-    return prover.find(*formulas) is None
 
 
 def _entered(chart: Chart, edges: Sequence[Transition]) -> set[str]:
@@ -232,149 +242,6 @@ def _in_graph(state: str, certain: set[str], possible: set[str], yes: str, no: s
         text = f"perhaps {no}: a guard is undecided"
         return Finding("reachability", "undecided", (state,), text)
     return Finding("reachability", "refuted", (state,), no)
-
-
-# --------------------------------------------------------------------------- chattering
-def chattering(prover: Prover) -> Iterator[Finding]:
-    """Check that no two flows push toward each other across a guard surface."""
-    pairs = [
-        (there, back)
-        for there, back in combinations(prover.chart.transitions, 2)
-        if there.source == back.target != there.target == back.source
-    ]
-    if not pairs:
-        yield Finding("chattering", "proved", (), "no two states have edges in both directions")
-    for there, back in pairs:
-        where = (there.source, there.name, back.source, back.name)
-        yield prover.settle("chattering", where, _pushed, there, back)
-
-
-def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
-    """Search for a point at which each flow pushes into the guard that leaves its state.
-
-    A comparison is on its surface where its margin is zero. Each guard needs one such comparison,
-    whose margin grows under its own flow and falls under the other; its other margins must be
-    positive, or zero and growing. A margin at rest at zero, or a point where a flow jumps, is not
-    decided to first order.
-    """
-    subject, z3 = prover.subject, prover.z3
-    for edge in (there, back):
-        arrests = [each for each in _earlier(prover, edge) if _arrests(prover, each)]
-        if arrests and _is_hidden(prover, edge, arrests):
-            text = f"{edge.name} is taken only where the velocity jumps: {arrests[0].name} has "
-            return Answer("proved", f"{text}precedence")
-    jumps = subject.assigned(there) or subject.assigned(back)
-    guards = [subject.guard(edge) for edge in (there, back)]
-    resting = prover.at_rest(there.source, back.source)
-    of_flows, of_guards = Reading(), Reading()
-    moved = [moving(prover, of_flows, edge.source, prover.still) for edge in (there, back)]
-    at_break = z3.Or([u == 0 for u in of_flows.breaks])
-    strict, loose = [], []
-    for pair in product(*(ways(split(guard)) for guard in guards)):
-        if not _at_one_time(prover, [*pair[0], *pair[1]]):
-            continue
-        if jumps:
-            raise Undecided("an edge assigns variables; the flow after a jump is not followed")
-        crossed, touched, growing, not_falling, reached = [], [], [], [], []
-        for way, own, other in zip(pair, moved, reversed(moved), strict=True):
-            here = [of_guards.margin(part, own) for part in way]
-            across = [of_guards.margin(part, other).slope for part in way]
-            turning = zip(here, across, strict=True)
-            crossed.append(z3.Or([z3.And(m.value == 0, m.slope > 0, n < 0) for m, n in turning]))
-            touched.append(z3.Or([m.value == 0 for m in here]))
-            growing += [z3.Or(m.value > 0, z3.And(m.value == 0, m.slope > 0)) for m in here]
-            not_falling += [z3.Or(m.value > 0, z3.And(m.value == 0, m.slope >= 0)) for m in here]
-            reached += [m.value >= 0 for m in here]
-        strict.append(z3.And(*crossed, *growing))
-        loose += [z3.And(*crossed, *not_falling), z3.And(at_break, *touched, *reached)]
-    if not strict:
-        return Answer("proved", "their guards never become true at the same place and time")
-    breaks = [*of_flows.breaks, *of_guards.breaks]
-    prover.defined(of_flows)
-    prover.defined(of_guards)
-    names = moving_names(prover, guards, (there.source, back.source))
-    point = prover.example(names, z3.Or(strict), *resting, *(u != 0 for u in breaks))
-    if point is not None:
-        place = _surface(guards[0], point)
-        text = f"on {place} each flow pushes into the other's guard: endless switching"
-        return refuted(text, point)
-    if of_guards.breaks:
-        raise Undecided("a value jumps in a guard")
-    if prover.find(z3.Or(loose), *resting) is not None:
-        raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
-    return Answer("proved", "there is no surface on which both flows push into the other's guard")
-
-
-Ways: TypeAlias = list[tuple[Requirement, ...]]
-
-
-def ways(parts: Split) -> Ways:
-    """Return the alternatives under which a split condition holds."""
-    if isinstance(parts, Requirement):
-        return [(parts,)]
-    word, inner = parts
-    found = [ways(part) for part in inner]
-    if word == "either":
-        return [way for some in found for way in some]
-    if math.prod(map(len, found)) > MOST_WAYS:
-        raise Undecided(f"a guard has more than {MOST_WAYS} alternatives")
-    return [tuple(part for way in some for part in way) for some in product(*found)]
-
-
-def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
-    """Return whether the comparisons of inputs alone allow both guards.
-
-    Inputs are the same in both states, so both guards must allow them at one time: ``v > v_c`` in
-    one and ``abs(v) <= v_c`` in the other is not chattering, though both are about to change at
-    v_c.
-    """
-    variables = {*prover.subject.variables}
-    alike = [part.relation for part in parts if not names_in(part.relation) & variables]
-    reading = Reading()
-    formulas = [reading.truth(relation, prover.still) for relation in alike]
-    prover.defined(reading)
-    return prover.find(*formulas) is not None
-
-
-def moving(prover: Prover, reading: Reading, state: str, here: Duals) -> Duals:
-    """Return every name with its rate of change in a state, at some values of the names."""
-    subject = prover.subject
-    rates = {name: prover.rates[f"d{name}/dt"] for name in subject.inputs}
-    if "t" in rates:
-        rates["t"] = prover.z3.RealVal(1)
-    if subject.mobility:
-        rates[subject.mobility] = prover.z3.RealVal(0)
-    if "x" in rates and (velocity := _velocity(subject)):
-        rates["x"] = here[velocity].value
-    for name in subject.variables:
-        rates[name] = reading.value(subject.flows[state, name], here).value
-    return {**here, **{name: Dual(here[name].value, rate) for name, rate in rates.items()}}
-
-
-def _velocity(subject: ChartSubject) -> str:
-    """Return the name of the rate of x; empty if the chart has none."""
-    v = subject.chart.velocities[0]
-    return v if v in (*subject.inputs, *subject.variables) else ""
-
-
-def moving_names(
-    prover: Prover, guards: Sequence[Condition], states: Sequence[str]
-) -> frozenset[str]:
-    """Return what decides how guards change in states: their names, rates, and the flows."""
-    subject = prover.subject
-    flows = [subject.flows[state, name] for state in states for name in subject.variables]
-    names = names_of(*guards, *flows)
-    steady = {"t", "x", subject.mobility}
-    names |= {f"d{name}/dt" for name in names_of(*guards) & {*subject.inputs} - steady}
-    return names | (names & {"x"} and frozenset({_velocity(subject)}))
-
-
-def _surface(guard: Condition, point: Mapping[str, float]) -> str:
-    """Describe the surface of a guard on which a point lies."""
-    for part in (part.comparison for way in ways(split(guard)) for part in way):
-        if evaluate(part.left, point) == evaluate(part.right, point):
-            return f"{shown(part.left)} = {shown(part.right)}"
-    return f"the surface of {shown(guard)}"
 
 
 # --------------------------------------------------------------------------- stability

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, TypeAlias
 
-from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.foundation.extras import require
 from gms_fsm.language import (
@@ -36,10 +35,11 @@ from gms_fsm.language import (
     parse_condition,
     spell,
 )
-from gms_fsm.verification._subject import subject_of
+from gms_fsm.verification._subject import AGE, ChartSubject
 from gms_fsm.verification.findings import Check, Finding, Status, listed
 
 PATIENCE = 5.0  # s, per query to z3
+MOST_OTHERS = 3  # elements whose forces are followed beside that of the element in question
 HIGHEST_DEGREE = 16  # of a text as a polynomial; above it z3 runs out of memory before time
 # Preferred numbers in an example, so that it is easy to follow.
 NICE = tuple(Fraction(number) for number in (1, -1, 2, -2, 0, 0.5, -0.5, 3, -3, 0.25, -0.25, 4, -4))
@@ -253,20 +253,21 @@ class Answer:
     status: Status
     text: str
     counterexample: Mapping[str, float] = field(default_factory=dict)
+    where: tuple[str, ...] = ()  # in place of what was asked about
 
 
 class Prover:
     """The names of a chart, as its subject has them, as real symbols within the domain."""
 
-    def __init__(self, chart: Chart, domain: Sequence[str]) -> None:
-        self.chart, self.subject, self.z3 = chart, subject_of(chart), solver()
+    def __init__(self, subject: ChartSubject, domain: Sequence[str]) -> None:
+        self.chart, self.subject, self.z3 = subject.chart, subject, solver()
         real, zero = self.z3.Real, self.z3.RealVal(0)
         # In the order in which an example fixes them: constants, inputs, variables.
-        names = (*chart.parameter_names, *self.subject.inputs, *self.subject.variables)
+        names = (*self.chart.parameter_names, *self.subject.inputs, *self.subject.variables)
         self.symbols = {name: real(name) for name in names}
         self.rates = {f"d{name}/dt": real(f"d{name}/dt") for name in self.subject.inputs}
         self.still = {name: Dual(symbol, zero) for name, symbol in self.symbols.items()}
-        self.domain = [self._assumed(text) for text in domain]
+        self.domain = [self._assumed(text, self.still) for text in domain]
         try:
             empty = self.find() is None
         except GaveUp:
@@ -276,10 +277,43 @@ class Prover:
                 f"the domain {', '.join(domain)} is empty", advice="loosen its conditions"
             )
 
-    def _assumed(self, text: str) -> Any:
+        self.others: list[dict[str, Dual]] = []
+        self.unfollowed = ""  # why the force of the other elements is free
+        if subject.rest:
+            try:
+                self.domain += self._rest(domain)
+            except Undecided as reason:
+                self.unfollowed = f"the force of the other elements is not followed: {reason}"
+
+    def _rest(self, domain: Sequence[str]) -> list[Any]:
+        """Return what the states and values of the other elements make of their force."""
+        subject, real, z3 = self.subject, self.z3.Real, self.z3
+        if not subject.shared:
+            raise Undecided("here it only accelerates the bodies")
+        if subject.facts.n - 1 > MOST_OTHERS:
+            raise Undecided(f"there are {subject.facts.n - 1}")
+        own, formulas = {*subject.elements}, []
+        sums = {force: z3.RealVal(0) for force in subject.rest}
+        for number in range(2, subject.facts.n + 1):
+            mine = {name: Dual(real(f"{name}#{number}"), z3.RealVal(0)) for name in own}
+            here, some = {**self.still, **mine}, []
+            parts = {force: real(f"{force}#{number}") for force in sums}
+            for forces in subject.own.values():
+                reading = Reading()
+                equal = [parts[f] == reading.value(tree, here).value for f, tree in forces.items()]
+                some.append(z3.And(*equal, *(below != 0 for below, _ in reading.denominators)))
+            formulas.append(z3.Or(some))
+            for text in domain:
+                if names_in(parse_condition(text, self.symbols)) & own:
+                    formulas.append(self._assumed(text, here))
+            sums = {force: total + parts[force] for force, total in sums.items()}
+            self.others.append(here)
+        return [*formulas, *(self.symbols[subject.rest[f]] == total for f, total in sums.items())]
+
+    def _assumed(self, text: str, names: Duals) -> Any:
         reading = Reading()
         try:
-            formula = reading.truth(parse_condition(text, self.symbols), self.still)
+            formula = reading.truth(parse_condition(text, self.symbols), names)
         except ExpressionError as error:
             raise error.at("domain") from None
         except Undecided as reason:
@@ -293,11 +327,34 @@ class Prover:
             )
         return formula
 
-    def at_rest(self, *states: str) -> list[Any]:
-        """Return the formulas that hold in locked states: the velocities are 0."""
-        if not any(map(self.subject.locked, states)):
-            return []
-        return [self.symbols[name] == 0 for name in self.chart.velocities]
+    def within(self, *states: str, waits: bool = True) -> list[Any]:
+        """Return what holds in states: a lock holds the velocities at 0, and no stay is too long.
+
+        An edge that is taken after a time ends a stay there; at ticks, at the next of them.
+        """
+        z3, subject, reading = self.z3, self.subject, Reading()
+        found: list[Any] = []
+        if any(map(subject.locked, states)):
+            found += [self.symbols[name] == 0 for name in self.chart.velocities]
+        late = z3.RealVal(str(Fraction(subject.facts.period or 0.0)))
+        for state in states:
+            for _, length in subject.waits(state) if waits else ():
+                try:
+                    end = reading.value(length, self.still).value
+                except Undecided:
+                    continue
+                if not reading.denominators:
+                    age = self.symbols[AGE]
+                    found.append(z3.Or(age <= end + late, age <= late))
+        return found
+
+    def apart(self, point_of: frozenset[str]) -> None:
+        """Raise `Undecided` if it is not known that a point with these names can be."""
+        rest = {*self.subject.rest.values()}
+        if point_of & rest and self.unfollowed:
+            raise Undecided(self.unfollowed)
+        if point_of & {f"d{name}/dt" for name in rest}:
+            raise Undecided("how fast the force of the other elements changes is not followed")
 
     def find(self, *formulas: Any) -> Any:
         """Return a model of the formulas within the domain, or None."""
@@ -309,15 +366,22 @@ class Prover:
             raise GaveUp(f"z3 gave up after {PATIENCE:g} s")
         return solver.model() if answer == self.z3.sat else None
 
-    def example(self, names: frozenset[str], *formulas: Any) -> dict[str, float] | None:
-        """Return a point that satisfies the formulas, of simple numbers exact in floats."""
+    def example(
+        self, names: frozenset[str], *formulas: Any, more: Mapping[str, Any] | None = None
+    ) -> dict[str, float] | None:
+        """Return a point that satisfies the formulas, of simple numbers exact in floats.
+
+        `more` are symbols beside those of the names.
+        """
         model = self.find(*formulas)
         if model is None:
             return None
+        self.apart(names)
         constants = len(self.chart.parameters)
         order = list(self.symbols.items())
         order[constants:constants] = self.rates.items()
         wanted = {name: symbol for name, symbol in order if name in names}
+        wanted |= more or {}
         held, found = list(formulas), {}
         deadline = time.monotonic() + PATIENCE
         for name, symbol in wanted.items():
@@ -367,6 +431,7 @@ class Prover:
             answer = question(self, *about)
         except Undecided as reason:
             answer = Answer("undecided", str(reason))
+        where = answer.where or where
         return Finding(check, answer.status, where, answer.text, answer.counterexample, case)
 
 

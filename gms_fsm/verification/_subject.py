@@ -4,7 +4,8 @@ The checks see a chart alone, without bodies. For a chart that reads F or a, loc
 sets its velocity, two free quantities stand for the rest of the system: H, the force that would
 hold v where it is, and W > 0, the inverse of the inertia that the contact feels. Then
 ``a = (H - F) W`` while the contact moves, and ``F = H``, ``a = 0``, ``v = 0`` while it is locked;
-v is a variable whose rate is a.
+v is a variable whose rate is a. With several elements, F is the sum over them: R, the force of
+the others, is one that their states give. A model's viscous force is part of F.
 """
 
 from __future__ import annotations
@@ -12,9 +13,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from gms_fsm.charts.chart import Chart, Transition
-from gms_fsm.language import Binary, Condition, Name, Number, Value, names_in, renamed
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.language import (
+    Binary,
+    Condition,
+    Either,
+    Name,
+    Number,
+    Relation,
+    Value,
+    names_in,
+    renamed,
+)
 from gms_fsm.language.normal import renamed_in
+from gms_fsm.verification.facts import ContactFacts
 
 ZERO = Number(0.0)
 AGE = "age"
@@ -42,8 +54,17 @@ class ChartSubject:
         By state and variable.
     load, mobility : str
         What H and W are called here; empty if it does not move.
+    rest : mapping of str to str
+        By force, what the force of the other elements is called; empty if there are none, or if it
+        does not move.
+    shared : bool
+        Whether edges depend on the force at the same instant, beside its effect on the motion.
+    own : mapping of str to mapping of str to Value
+        By state and force, that of one element.
     assumed : tuple of str
         Conditions that hold by construction.
+    facts : ContactFacts
+        What was read.
     """
 
     chart: Chart
@@ -56,7 +77,11 @@ class ChartSubject:
     flows: Mapping[tuple[str, str], Value]
     load: str
     mobility: str
+    rest: Mapping[str, str]
+    shared: bool
+    own: Mapping[str, Mapping[str, Value]]
     assumed: tuple[str, ...]
+    facts: ContactFacts
 
     def guard(self, edge: Transition) -> Condition:
         """Return the guard of an edge."""
@@ -79,6 +104,52 @@ class ChartSubject:
         """Return whether a state locks the contact."""
         return self.chart.states[self.chart.state_index(state)].locked
 
+    def waits(self, state: str) -> list[tuple[Transition, Value]]:
+        """Return the edges that end a stay in a state by its length alone, and that length."""
+        found = []
+        for _, edge in self.chart.leaving(state):
+            guard = self.guard(edge)
+            for part in guard.operands if isinstance(guard, Either) else (guard,):
+                match part:
+                    case Relation(">=" | ">", Name(name), length) if name == AGE:
+                        constant = names_in(length) <= {*self.chart.parameter_names}
+                        if constant and not self.arrests(edge):
+                            found.append((edge, length))
+        return found
+
+    def arrests(self, edge: Transition) -> bool:
+        """Return whether an edge locks the contact where its velocity passes 0."""
+        chart = self.chart
+        return any(chart.transitions[number].name == edge.name for number in chart.arrests)
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """The names of which every element has its own: variables, parameters, the threshold."""
+        own = [each.name for each in self.chart.parameters if each.per_element]
+        curved = ["s"] if self.facts.curved and "s" in self.inputs else []
+        return (*own, *curved, *self.chart.variables)
+
+    @property
+    def about(self) -> tuple[str, ...]:
+        """What the statements are about, line by line."""
+        facts, v, H, W = self.facts, self.chart.velocities[0], self.load, self.mobility
+        lines = [
+            "over the reals, not floats; over points, not trajectories",
+            "inputs and their rates (ds/dt, dv/dt) are free, but equal in both states of a switch",
+        ]
+        if self.moves:
+            held = f", F = {H} and a = {v} = 0 while it is locked" * self.chart.locks
+            lines.append(f"{H}, the force that would hold {v}, is free")
+            lines.append(f"a = ({H} - F) {W} while the contact moves{held}")
+        if self.rest:
+            others = "the other element" if facts.n == 2 else f"the other {facts.n - 1} elements"
+            own = [f"; {name}2 is the {name} of element 2" for name in self.elements[-1:]]
+            lines.append(f"F is the sum over {facts.n} elements, {self.rest['F']} that of {others}")
+            lines[-1] += "".join(own)
+        if facts.period is not None:
+            lines.append(f"machines are asked once at each tick, every {facts.period:g} s")
+        return tuple(lines)
+
     @property
     def used(self) -> frozenset[str]:
         """The names that its guards, flows and assignments read."""
@@ -86,55 +157,61 @@ class ChartSubject:
         return frozenset[str]().union(*map(names_in, [*edges, *self.flows.values()]))
 
 
-def subject_of(chart: Chart) -> ChartSubject:
+def subject_of(facts: ContactFacts) -> ChartSubject:
     """Return a chart as the checks read it.
 
     Examples
     --------
     >>> from gms_fsm.charts import CHARTS
     >>> from gms_fsm.language import spell
-    >>> read = subject_of(CHARTS["stiction"])
+    >>> read = subject_of(ContactFacts(CHARTS["stiction"]))
     >>> spell(read.guards["stuck", "release_forward"]), spell(read.flows["forward", "v"])
     ('H > F_s', '(H - (F_c + b * v)) * W')
     """
+    chart = facts.chart
     lets: dict[str, Value] = {}
     for name, tree in chart.lets.items():
         lets[name] = renamed(tree, lets)
     declared = {*chart.inputs, *chart.velocities, *chart.variables, *chart.parameter_names, *lets}
     late = [name for name in (*chart.force_names, *chart.rate_names) if name not in declared]
-    steps = {
-        (edge.source, edge.name): tuple(
-            (name, renamed(tree, lets))
-            for place in (("exit", edge.source), ("action", edge.name), ("entry", edge.target))
-            for name, tree in chart.assignments[place].items()
-        )
-        for edge in chart.transitions
-    }
+    steps = _steps(chart, lets)
     guards = {name: renamed_in(tree, lets) for name, tree in chart.guards.items()}
     read = _names(guards.values()) | _names(tree for row in steps.values() for _, tree in row)
-    moves = bool(read & {*late}) or chart.locks or chart.sets_velocity
+    driven = bool(read & {*late}) or chart.locks or chart.sets_velocity
+    moves = driven or (facts.free and bool(read & {"x", *chart.velocities}))
+    moves = moves and bool(chart.velocities)  # a supervisor does not
     load, mobility = _fresh("H", declared), _fresh("W", declared)
     flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
-    values = {
-        state.name: _late(chart, state.name, late, lets | _rates(chart, flows, state.name), load)
-        for state in chart.states
+    rest = {
+        force: _fresh(_called("R", chart, force), declared)
+        for force in chart.force_names
+        if moves and facts.n > 1
     }
-    if moves and len(chart.velocities) == 1:
-        for state in chart.states:
-            force = values[state.name]["F"]
-            net = Binary("*", Binary("-", Name(load), force), Name(mobility))
-            rate = ZERO if state.locked else net
-            flows[state.name, chart.velocities[0]] = rate
-            if chart.rate_names[0] in late:
-                values[state.name][chart.rate_names[0]] = rate
-    elif moves:  # the accelerations are coupled, which is not encoded: their names stay
-        for state in chart.states:
-            for velocity, name in zip(chart.velocities, chart.rate_names, strict=True):
-                flows[state.name, velocity] = ZERO if state.locked else Name(name)
+    viscous = _fresh("sigma_2", declared) if moves and facts.viscous else ""
+    own: dict[str, dict[str, Value]] = {}
+    values: dict[str, dict[str, Value]] = {}
+    for state in chart.states:
+        inside = lets | _rates(chart, flows, state.name)
+        own[state.name] = {
+            name: renamed(given, inside)
+            for name in chart.force_names
+            if (given := chart.forces[state.name, name]) is not None
+        }
+        found = values[state.name] = {
+            force: _total(chart, force, own[state.name].get(force), inside, (load, rest, viscous))
+            for force in chart.force_names
+        }
+        if state.locked:
+            found |= {name: ZERO for name in chart.rate_names if name in late}
+    for state in chart.states if moves else ():
+        rates = _accelerations(chart, state, values[state.name]["F"], load, mobility)
+        flows |= {(state.name, velocity): rate for velocity, rate in rates.items()}
+        if len(rates) == 1 and chart.rate_names[0] in late:
+            values[state.name] |= dict.fromkeys(chart.rate_names, *rates.values())
     inputs = [name for name in chart.inputs if not (moves and name in chart.velocities)]
     if moves:
-        loads = [_load(load, chart, force) for force in chart.force_names]
-        inputs += [*loads, mobility]
+        loads = [_called(load, chart, force) for force in chart.force_names]
+        inputs += [*loads, mobility, *rest.values(), *([viscous] if viscous else [])]
     else:
         named = read | _names(flows.values())
         inputs += [name for name in chart.velocities if name in named and name not in inputs]
@@ -159,11 +236,63 @@ def subject_of(chart: Chart) -> ChartSubject:
         flows=flows,
         load=load if moves else "",
         mobility=mobility if moves else "",
+        rest=rest,
+        shared=driven,
+        own=own,
         assumed=(
             *([f"{mobility} > 0"] if moves else []),
+            *([f"{viscous} >= 0"] if viscous else []),
             *([f"{AGE} >= 0"] if AGE in chart.variables else []),
         ),
+        facts=facts,
     )
+
+
+def _steps(
+    chart: Chart, lets: Mapping[str, Value]
+) -> dict[tuple[str, str], tuple[tuple[str, Value], ...]]:
+    return {
+        (edge.source, edge.name): tuple(
+            (name, renamed(tree, lets))
+            for place in (("exit", edge.source), ("action", edge.name), ("entry", edge.target))
+            for name, tree in chart.assignments[place].items()
+        )
+        for edge in chart.transitions
+    }
+
+
+def _total(
+    chart: Chart,
+    force: str,
+    own: Value | None,
+    inside: Mapping[str, Value],
+    called: tuple[str, Mapping[str, str], str],
+) -> Value:
+    """Return the force of a contact, given that of one element; None stands for a lock.
+
+    `called` are the names of the load, of the forces of the others, and of viscous friction.
+    """
+    load, rest, viscous = called
+    if own is None:
+        return Name(_called(load, chart, force))
+    total = Binary("+", own, Name(rest[force])) if rest else own
+    if force in chart.totals:
+        total = renamed(chart.totals[force], {**inside, force: total})
+    if viscous and force == chart.force_names[0]:
+        total = Binary("+", total, Binary("*", Name(viscous), Name(chart.velocities[0])))
+    return total
+
+
+def _accelerations(
+    chart: Chart, state: State, force: Value, load: str, mobility: str
+) -> dict[str, Value]:
+    """Return the rate of each velocity; several are coupled, which is not encoded."""
+    if state.locked:
+        return dict.fromkeys(chart.velocities, ZERO)
+    if len(chart.velocities) > 1:
+        return {v: Name(rate) for v, rate in zip(chart.velocities, chart.rate_names, strict=True)}
+    net = Binary("-", Name(load), force)
+    return {chart.velocities[0]: Binary("*", net, Name(mobility))}
 
 
 def _names(trees: Iterable[Value | Condition]) -> frozenset[str]:
@@ -176,28 +305,10 @@ def _fresh(name: str, taken: set[str]) -> str:
     return name
 
 
-def _load(load: str, chart: Chart, force: str) -> str:
-    return load + force.removeprefix(chart.force_names[0])
+def _called(name: str, chart: Chart, force: str) -> str:
+    """Return a name for a force as F is named for it: H_w, as F_w is."""
+    return name + force.removeprefix(chart.force_names[0])
 
 
 def _rates(chart: Chart, flows: Mapping[tuple[str, str], Value], state: str) -> dict[str, Value]:
     return {f"d{name}": flows[state, name] for name in chart.variables}
-
-
-def _late(
-    chart: Chart, state: str, late: Iterable[str], inside: Mapping[str, Value], load: str
-) -> dict[str, Value]:
-    """Return the forces of a contact of one element in a state, and its rates while locked."""
-    locked = chart.states[chart.state_index(state)].locked
-    found: dict[str, Value] = {}
-    for force in chart.force_names:
-        tree = chart.forces[state, force]
-        if tree is None:
-            found[force] = Name(_load(load, chart, force))
-        else:
-            found[force] = renamed(tree, inside)
-            if force in chart.totals:
-                found[force] = renamed(chart.totals[force], {**inside, force: found[force]})
-    if locked:
-        found |= {name: ZERO for name in chart.rate_names if name in late}
-    return found

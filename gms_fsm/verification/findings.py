@@ -8,10 +8,9 @@ from typing import Literal, TypeAlias, get_args
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.display import displayed, short_repr
-from gms_fsm.verification._subject import subject_of
 
 Check: TypeAlias = Literal[
-    "determinism", "livelock", "reachability", "chattering", "stability", "release"
+    "determinism", "livelock", "reachability", "chattering", "stability", "release", "zeno"
 ]
 Status: TypeAlias = Literal["proved", "settled by order", "refuted", "undecided"]
 CHECKS: tuple[Check, ...] = get_args(Check)
@@ -25,8 +24,8 @@ class Finding:
 
     Parameters
     ----------
-    check : {"determinism", "livelock", "reachability", "chattering", "stability", "release"}
-        The check.
+    check : str
+        The check, one of `CHECKS`.
     status : {"proved", "settled by order", "refuted", "undecided"}
         The result.
     where : tuple of str
@@ -75,11 +74,14 @@ class Report:
         The conditions assumed.
     findings : tuple of Finding
         All findings, check by check.
+    about : tuple of str
+        What they are about, line by line.
     """
 
     chart: Chart
     domain: tuple[str, ...]
     findings: tuple[Finding, ...]
+    about: tuple[str, ...] = ()
 
     @property
     def refuted(self) -> tuple[Finding, ...]:
@@ -96,13 +98,14 @@ class Report:
 
         Parameters
         ----------
-        check : {"determinism", "livelock", "reachability", "chattering", "stability", "release"}
-            The check.
+        check : str
+            The check, one of `CHECKS`.
 
         Returns
         -------
         tuple of Finding
-            At least one finding; of release none, if the chart neither locks, nor reads F or a.
+            At least one finding; of release none, if the chart neither locks, nor reads F or a, and
+            of zeno none, if no edge from a state to itself sets a velocity.
         """
         return tuple(f for f in self.findings if f.check == check)
 
@@ -111,15 +114,8 @@ class Report:
         lines = [
             self.chart.name,
             f"assumed: {', '.join(self.domain) or 'nothing'}",
-            "over the reals, not floats; over points, not trajectories",
-            "inputs and their rates (ds/dt, dv/dt) are free, but equal in both states of a switch",
+            *self.about,
         ]
-        subject = subject_of(self.chart)
-        if subject.moves:
-            v, H, W = self.chart.velocities[0], subject.load, subject.mobility
-            held = f", F = {H} and a = {v} = 0 while it is locked" * self.chart.locks
-            lines.append(f"{H}, the force that would hold {v}, is free")
-            lines.append(f"a = ({H} - F) {W} while the contact moves{held}")
         for check in (check for check in CHECKS if self.of(check)):
             lines += ["", check]
             lines += [f"  {line}" for f in self.of(check) for line in str(f).splitlines()]

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from math import ceil
 
-from plots.charts.labels import Piece, Row, escape, printable
+from gms_fsm.foundation.text import visible
+from plots.charts.labels import Piece, Row, escape
 from plots.style import MONO, SANS, ChartTheme
 from plots.style.fonts import width
 
@@ -164,7 +165,7 @@ class CellWriter:
         if piece.role == "pad":
             return SIDE - 1
         _, face, bold, _ = _FACES.get(piece.role, _FORMULA)
-        return width(printable(piece.text), self._points(piece), mono=face == MONO, bold=bold)
+        return width(visible(piece.text), self._points(piece), mono=face == MONO, bold=bold)
 
     def _points(self, piece: Piece) -> int:
         """Return the size of a text; Graphviz takes whole points only."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.language import Value
+from gms_fsm.language import Value, parse_value
 from plots.charts.notation import ChartWriter
 
 SAID_ONCE = 3  # states: what so many have alike, forces and flows, is said once for all of them
@@ -40,7 +40,7 @@ def state_texts(write: ChartWriter, state: State) -> Texts:
     return [
         ("entry", actions["entry"]),
         ("during", [write.flow(name, chart.flows[state.name, name]) for name in flows]),
-        ("force", _equations(write, forces)),
+        (_given(chart), _equations(write, forces)),
         ("locked", [write.held()] if state.locked else []),
         ("exit", actions["exit"]),
     ]
@@ -51,17 +51,29 @@ def chart_texts(write: ChartWriter) -> Texts:
     chart = write.chart
     shared = _forces(chart, chart.default_state) if _force_below(chart) else {}
     return [
+        ("at the start", [write.assignment(*each) for each in _starts(chart)]),
         ("let", _equations(write, chart.lets)),
         (
             "during in all states",
             [write.flow(name, tree) for name, tree in _flows_below(chart).items()],
         ),
-        ("force in all states", _equations(write, shared)),
+        (f"{_given(chart)} in all states", _equations(write, shared)),
         (
             "force of the contact",
             [write.total(name, tree) for name, tree in chart.totals.items()],
         ),
     ]
+
+
+def _given(chart: Chart) -> str:
+    """Return what a state gives out: the force of a contact, or an output of a supervisor."""
+    return "force" if chart.velocities else "output"
+
+
+def _starts(chart: Chart) -> Iterator[tuple[str, Value]]:
+    """Yield the variables that start with a value of their chart."""
+    for name, value in chart.initial.items():
+        yield name, parse_value(repr(value), [])
 
 
 def _equations(write: ChartWriter, trees: Mapping[str, Value]) -> list[str]:

@@ -9,6 +9,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 
 from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.foundation.text import visible
 from gms_fsm.traces.trace import Trace, dwell_times
 from plots.charts.contents import chart_texts, state_texts
 from plots.charts.notation import ChartWriter
@@ -152,16 +153,11 @@ def _best_break(text: str, limit: int) -> int:
 def escape(text: str) -> str:
     """Escape a text for an HTML label; indentation is kept."""
     core = text.strip(" ")
-    words = html.escape(printable(core))
+    words = html.escape(visible(core))
     # Graphviz 2.43 refuses a bare ] in a label; one backslash would begin an escape sequence.
     words = words.replace("[", "&#91;").replace("]", "&#93;").replace("\\", "&#92;" * 2)
     start = len(text) - len(text.lstrip(" ")) if core else len(text)
     return "&#160;" * start + words + "&#160;" * (len(text) - start - len(core))
-
-
-def printable(text: str) -> str:
-    """Return a text without control characters."""
-    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def warn_of_missing_glyphs(write: ChartWriter, note: str = "") -> None:
@@ -179,7 +175,7 @@ def warn_of_missing_glyphs(write: ChartWriter, note: str = "") -> None:
     )
     found: dict[str, str] = {}
     for place, text in places.items():
-        for character in missing_glyphs(printable(text)):
+        for character in missing_glyphs(visible(text)):
             found.setdefault(character, place)
     if found:
         listed = ", ".join(

@@ -5,7 +5,7 @@ and texts of known parts of that SVG, so hundreds of frames take seconds.
 
 The active state has a thick border and a dot. Only the edges that leave it have marks: their
 clauses carry ✓ or ✗. The edge that the element has just taken is thick and orange; on the row of
-that firing it carries the marks with which it was taken. Everything else is pale.
+that firing it carries the marks with which it was taken. Everything else is grey.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ from gms_fsm.foundation.quantities import Scale, scale_of, trimmed
 from gms_fsm.language import Condition, clauses, evaluate, names_in
 from gms_fsm.session.explain import values_at
 from gms_fsm.traces.scope import guard_columns, unit_of
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from plots.charts.labels import FALSE, TRUE, UNKNOWN, Piece, Row, edge_id, element_id, part_id
 from plots.charts.statechart import ChartSheet, chosen
 from plots.output.drawings import Svg, image
 from plots.output.graphviz import picture
+from plots.views.traces import check_trace
 
 SVG = "http://www.w3.org/2000/svg"
 THIN, THICK, BORDER = "1.1", "2.6", "3"
@@ -471,7 +472,7 @@ class ElementParts:
     ) -> None:
         """Paint an edge, given its name and source."""
         guard, texts, line = self.edges[key]
-        colour = fired or (self.colours.ink if leaving else self.colours.pale)
+        colour = fired or (self.colours.ink if leaving else self.colours.line)
         classes = ["leaving" if leaving else "pale"] + ["fired"] * bool(fired)
         _classify(line, "edge", classes)
         for shape in _shapes(line):
@@ -480,9 +481,9 @@ class ElementParts:
             if shape.get("fill") != "none":
                 shape.set("fill", colour)
         _classify(guard, "node guard", classes)
-        plain = self.colours.pale if classes == ["pale"] else self.colours.ink
+        plain = self.colours.soft if classes == ["pale"] else self.colours.ink
         for piece, node in texts:
-            self._paint_text(piece, node, marks, plain, colour)
+            self._paint_text(piece, node, marks, plain, fired or plain)
 
     def write_count(self, state: str, count: str) -> None:
         """Write how many elements are in a state (`ChartSheet.among`)."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.language import (
+    EVENT,
     MATHEMATICS,
     MATLAB_LIKE,
     Both,
@@ -112,7 +113,12 @@ class ChartWriter:
         """Write the assignments of an edge on one line; empty if there are none."""
         if not trees:
             return ""
-        texts = [self.assignment(name, tree) for name, tree in trees.items()]
+        texts = [
+            f"send({name.removeprefix(EVENT)})" + ";" * (not self.math)
+            if name.startswith(EVENT)
+            else self.assignment(name, tree)
+            for name, tree in trees.items()
+        ]
         return "/ " + ", ".join(texts) if self.math else "{" + " ".join(texts) + "}"
 
 

@@ -18,6 +18,7 @@ import graphviz
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, listed, one_of
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
 from plots.charts.arrange import arrange
@@ -37,7 +38,6 @@ from plots.charts.labels import (
     Piece,
     Row,
     Tally,
-    printable,
     warn_of_missing_glyphs,
     with_indices,
     wrapped,
@@ -358,7 +358,7 @@ class ChartSheet:
         """Draw elements (see `arrange`)."""
         sheet = self.fitted()
         graph = ChartGraph(
-            name=graphviz.escape(printable(self.chart.name)),
+            name=graphviz.escape(visible(self.chart.name)),
             engine="neato",
             graph_attr={
                 "fontname": SANS,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,11 +12,12 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.quantities import Scale, scale_of
 from gms_fsm.language import latex_name
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import last_cycles, letter_panels
 from plots.panels.parts.axes import VECTOR_ROWS, draw_curve, time_axis
-from plots.panels.parts.selection import is_number, is_whole, scaled
+from plots.panels.parts.selection import dotted, is_number, is_whole, scaled
 from plots.style import INK, LINE_GREY, PALE_GREY, REPORTED, TEXT_GREY, colour
 from plots.style.matplotlib import Axes, Figure, rc_context
 from plots.style.presets import font, pt, settings, to_scale
@@ -32,11 +34,21 @@ LANE = 0.22  # inches: the row of a parameter
 WIDEST = 100.0  # %: a longer interval ends in arrows
 BINS, FEWEST = 40, 5  # of a mean residual over x, and rows in a bin
 DOT = 1.6  # points, of a residual among thousands
+NEAR = 0.01  # of the largest measured value: a smaller residual has a unit of its own
+SYMBOLS = {"weights": "w", "shares": "alpha", "sigma": "sigma_1"}  # of elements
 MOVING = 0.05  # of the largest speed; slower rows have no direction
 DIRECTIONS: tuple[tuple[int, str, dict[str, Any]], ...] = (
-    (1, "forward (v > 0)", {"color": INK, "linestyle": "-", "linewidth": 1.6}),
-    (-1, "backward (v < 0)", {"color": LINE_GREY, "linestyle": (0, (4.0, 1.5)), "linewidth": 2.2}),
+    (1, "forward ($v > 0$)", {"color": INK, "linestyle": "-", "linewidth": 1.6}),
+    (
+        -1,
+        "backward ($v < 0$)",
+        {"color": LINE_GREY, "linestyle": (0, (4.0, 1.5)), "linewidth": 2.2},
+    ),
 )
+
+
+def _largest(values: Floats) -> float:
+    return float(np.nanmax(np.abs(values), initial=0.0))
 
 
 @dataclass(frozen=True)
@@ -44,7 +56,7 @@ class _Compared:
     """One record of a fit: what was measured, what the model gives, in units for the figure."""
 
     name: str
-    unit: str  # of measurement and residual: the prefix suits the measurement
+    scale: Scale  # of the measurement
     small: str  # unit of the residual
     place: str  # unit of x
     t: Floats
@@ -61,22 +73,30 @@ class _Compared:
         kept = residuals.rows | residuals.held
         measured = np.where(kept, residuals.measured, np.nan)
         difference = measured - residuals.modelled
-        large, long = scaled(measured, unit)
+        scale = scale_of(_largest(measured), unit)
         small, short = scaled(difference, unit)
+        if _largest(difference) > NEAR * _largest(measured):
+            small, short = scale.factor, scale.unit
         far, place = scaled(residuals.x - residuals.x[0], "m")
         return cls(
             quantity,
-            long,
+            scale,
             short,
             place,
             residuals.t,
             far * (residuals.x - residuals.x[0]),
             residuals.v,
-            large * measured,
-            large * np.where(kept, residuals.modelled, np.nan),
+            scale.factor * measured,
+            scale.factor * np.where(kept, residuals.modelled, np.nan),
             small * difference,
             small,
         )
+
+    @property
+    def ends(self) -> Window:
+        """The first and the last time that is compared, s."""
+        compared = self.t[np.isfinite(self.measured)]
+        return float(compared[0]), float(compared[-1])
 
 
 def fit_figure(
@@ -114,7 +134,7 @@ def fit_figure(
     number = _worst(every) if which is None else _checked_which(which, len(every))
     chosen = every[number]
     part = _Compared.of(chosen, fit.measured, fit.task.measured.unit)
-    shown = _checked_window(chosen, window)
+    shown = _checked_window(chosen, part.ends, window)
     listed = fit.table if not low() and len(fit.table) <= MOST_PARAMETERS else ()
     with rc_context(settings()):
         figure, (over_time, residual, loop, over_x), bars = _sheet(len(listed))
@@ -123,7 +143,7 @@ def fit_figure(
         _loop(loop, part)
         _residual_over_x(over_x, part)
         begin, end = shown
-        whole = begin <= part.t[0] and end >= part.t[-1]
+        whole = begin <= part.ends[0] and end >= part.ends[1]
         names = [
             "measurement and model" + ("" if whole else f", {begin:.4g} to {end:.4g} s"),
             _score_name(chosen, part),
@@ -132,7 +152,7 @@ def fit_figure(
         ]
         axes = [over_time, residual, loop, over_x]
         if bars is not None:
-            _parameters(bars, listed)
+            _parameters(bars, listed, (fit.task.measured.unit, part.scale))
             axes.append(bars)
             names.append("parameters with 95 % intervals")
         letter_panels(axes, names)
@@ -157,9 +177,10 @@ def _checked_which(which: Any, count: int) -> int:
     return int(which)
 
 
-def _checked_window(shown: Residuals, window: Any) -> Window:
+def _checked_window(shown: Residuals, compared: Window, window: Any) -> Window:
     if window is None:
-        return last_cycles(shown)
+        begin, end = last_cycles(shown)
+        return max(begin, compared[0]), min(end, compared[1])
     first, last = float(shown.t[0]), float(shown.t[-1])
     pair = isinstance(window, (tuple, list)) and len(window) == 2 and all(map(is_number, window))
     if not pair or not (window[0] < window[1] and window[0] < last and window[1] > first):
@@ -180,9 +201,11 @@ def _score_name(chosen: Residuals, part: _Compared) -> str:
     """Name the panel of the residual, with its size in the rows of this record."""
     parts = [("RMSE", chosen.rows), ("held out", chosen.held)]
     sizes = [
-        f"{name} {part.factor * _size(chosen, rows):.3g}" for name, rows in parts if rows.any()
+        f"{name} {part.factor * _size(chosen, rows):#.3g} {part.small}"
+        for name, rows in parts
+        if rows.any()
     ]
-    return f"residual; {', '.join(sizes)} {part.small}"
+    return f"residual; {', '.join(sizes)}"
 
 
 def _size(each: Residuals, rows: NDArray[np.bool_]) -> float:
@@ -214,20 +237,19 @@ def _over_time(ax: Axes, part: _Compared, shown: Window, test: Window | None) ->
     measured: dict[str, Any] = {"color": LINE_GREY, "linewidth": pt(2.4), "label": "measured"}
     draw_curve(ax, t, part.measured[inside], **measured)
     draw_curve(ax, t, part.modelled[inside], color=INK, label="model")
-    ax.set_ylabel(f"${latex_name(part.name)}$ [{part.unit}]")
+    ax.set_ylabel(f"${latex_name(part.name)}$ [{part.scale.unit}]")
     time_axis(ax, *shown)
     legend_above(ax)
 
 
 def _residual_over_time(ax: Axes, part: _Compared, fit: Fit) -> None:
-    whole = float(part.t[0]), float(part.t[-1])
-    _shaded(ax, part, fit.test, whole, label="held out")
+    _shaded(ax, part, fit.test, part.ends, label="held out")
     draw_curve(ax, part.t, part.residual, color=INK, linewidth=pt(0.6))
     if fit.floor is not None:
         for sign, label in ((1, "± repeatability"), (-1, None)):
             ax.axhline(sign * part.factor * fit.floor, label=label, **to_scale(REPORTED))
     ax.set_ylabel(f"measured − model [{part.small}]")
-    time_axis(ax, *whole)
+    time_axis(ax, *part.ends)
     if ax.get_legend_handles_labels()[1]:
         legend_above(ax)
 
@@ -246,7 +268,7 @@ def _shaded(ax: Axes, part: _Compared, test: Window | None, shown: Window, label
 def _loop(ax: Axes, part: _Compared) -> None:
     draw_curve(ax, part.x, part.measured, color=LINE_GREY, linewidth=pt(2.0), label="measured")
     draw_curve(ax, part.x, part.modelled, color=INK, linewidth=pt(0.7), label="model")
-    ax.set(xlabel=f"$x$ [{part.place}]", ylabel=f"${latex_name(part.name)}$ [{part.unit}]")
+    ax.set(xlabel=f"$x$ [{part.place}]", ylabel=f"${latex_name(part.name)}$ [{part.scale.unit}]")
 
 
 def _residual_over_x(ax: Axes, part: _Compared) -> None:
@@ -266,8 +288,9 @@ def _residual_over_x(ax: Axes, part: _Compared) -> None:
             **dots,
         )
         means.append((_binned(part.x[chosen], part.residual[chosen]), name, look))
-    for (x, mean), name, look in means:
+    for (x, mean), _, look in means:
         ax.plot(x, mean, color=colour("paper"), linewidth=pt(look["linewidth"] + 2.0))
+    for (x, mean), name, look in means:
         ax.plot(x, mean, label=name, **to_scale(look))
     ax.set(xlabel=f"$x$ [{part.place}]", ylabel=f"measured − model [{part.small}]")
     legend_above(ax)
@@ -285,7 +308,7 @@ def _binned(x: Floats, values: Floats) -> tuple[Floats, Floats]:
     return 0.5 * (edges[1:] + edges[:-1]), mean
 
 
-def _parameters(ax: Axes, table: Sequence[Estimate]) -> None:
+def _parameters(ax: Axes, table: Sequence[Estimate], measured: tuple[str, Scale]) -> None:
     """Draw a row for each parameter: a dot with its interval, or that it cannot be told."""
     spans = [_relative(each) for each in table]
     told = [max(map(abs, span)) for span in spans if span is not None]
@@ -305,12 +328,13 @@ def _parameters(ax: Axes, table: Sequence[Estimate]) -> None:
     ax.axvline(0.0, color=PALE_GREY, linewidth=pt(0.8), zorder=0)
     rows = range(len(table))
     ax.set(xlim=(-1.04 * limit, 1.04 * limit), ylim=(len(table) - 0.5, -0.5))
-    ax.set_yticks(rows, [each.name for each in table])
+    ax.set_yticks(rows, [_symbol(each.name) for each in table])
     ax.set_xlabel("interval relative to the value [%]")
     ax.tick_params(axis="y", length=0, labelsize=font(8.5))
     if not narrow():
+        scales = _scales(table, measured)
         values = ax.secondary_yaxis("right")
-        values.set_yticks(rows, [_value(each) for each in table])
+        values.set_yticks(rows, [_value(each, scales[each.unit]) for each in table])
         values.tick_params(axis="y", length=0, labelsize=font(8.5))
         values.spines["right"].set_visible(False)
 
@@ -323,6 +347,24 @@ def _relative(each: Estimate) -> tuple[float, float] | None:
     return 100 * (each.low - each.value) / size, 100 * (each.high - each.value) / size
 
 
-def _value(each: Estimate) -> str:
+def _symbol(name: str) -> str:
+    """Return a parameter as in formulas; words stay words."""
+    part = re.fullmatch(r"(\w*[a-zA-Z])(\d+)", name)  # of an element, with its number
+    whole = f"{SYMBOLS.get(part[1], part[1])}_{part[2]}" if part else SYMBOLS.get(name, name)
+    symbol = latex_name(whole)
+    return name if symbol.startswith(r"\mathrm") else f"${symbol}$"
+
+
+def _scales(table: Sequence[Estimate], measured: tuple[str, Scale]) -> dict[str, Scale]:
+    """Return one scale for all parameters of a unit: of the measured quantity, its own."""
+    values: dict[str, list[float]] = {}
+    for each in table:
+        values.setdefault(each.unit, []).append(each.value)
+    return {unit: scale_of(every, unit) for unit, every in values.items()} | dict([measured])
+
+
+def _value(each: Estimate, scale: Scale) -> str:
     note = f", {each.note}" if each.note and each.told else ""
-    return f"{each.shown[0]} {each.unit}".rstrip().replace("-", "−") + note
+    mantissa = each.shown[0].partition("e")[0]
+    digits = len(re.sub(r"\D", "", mantissa).lstrip("0")) or 1
+    return dotted(scale.text(each.value, digits)).replace("-", "−") + note

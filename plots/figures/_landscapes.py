@@ -6,26 +6,37 @@ from textwrap import wrap
 from typing import Any
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.foundation.quantities import Scale
+from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.findings import Report
 from plots import panels
 from plots.figures._layout import fitted, low, sheet
 from plots.figures._parts import head
-from plots.panels.guards.landscapes import DASHED, acceleration, pinned, with_unit
+from plots.panels.guards.landscapes import (
+    AFTER,
+    BORDER,
+    acceleration,
+    path_colour,
+    pinned,
+    view_of,
+    with_unit,
+)
 from plots.panels.guards.racing import rows_of
 from plots.panels.parts.selection import checked_row, one_element
 from plots.style import INK, LINE_GREY
 from plots.style.matplotlib import Axes, Figure, Line2D, rc_context
 from plots.style.presets import current, font, inches, pt, room, settings
 from plots.views.plane import Plane
+from plots.views.traces import check_trace
 from plots.views.window import Window
 
 # Inches: figure, panels, above them, a line of text.
-WIDTH, PLOT, TOP, LINE = 11.6, 5.2, 0.95, 0.165
+WIDTH, PLOT, TOP, LINE = 10.0, 4.8, 0.95, 0.165
 LEFT, RIGHT, BETWEEN = 0.72, 0.15, 0.43  # inches: beside the panels
-RACE = 3.6  # inches: width of the race, if the panels are next to each other
+RACE = 3.5  # inches: width of the race, if the panels are next to each other
 OVER = 1.0  # inches: between the panels, if they are below each other
-LANE, LOWEST = 0.56, 0.36  # inches: a row of the race, if there is room; below the landscape
+UNDER, BELOW = 0.85, 0.45  # inches: for the axes of the race and of the landscape
+LANE, LOWEST = 0.5, 0.36  # inches: a row of the race, if there is room; below the landscape
 LETTERS = 14.2  # of the caption, per inch
 
 
@@ -91,16 +102,20 @@ def landscape(
         raise ParameterError(f"row is {row} and t is {t}", advice="give one of them")
     row = checked_row(trace, row, t)
     plane = Plane.of(trace, row, element)
-    lines = _caption(trace, plane)
+    said = _caption(trace, plane, view_of(trace, element, plane).speeds)
     if checks is not None:
-        lines += _pins_listed(plane, checks)
+        said += _pins_listed(plane, checks)
     if low():  # no room for more
-        lines = lines[:1]
-    letters = int(LETTERS * (room(WIDTH) - 0.3))
-    lines = [part for line in lines for part in wrap(line, letters, subsequent_indent="      ")]
+        said = said[:1]
+    rows = rows_of(plane.why)
+    lines, x = _folded(said, RACE), 1 - (RACE + RIGHT) / room(WIDTH)
+    under = _free(rows) > LINE * len(lines)  # the race, next to the landscape
+    if not under:
+        lines, x = _folded(said, room(WIDTH) - 0.3), 0.02
     with rc_context(settings()):
-        figure, left, right = _axes(rows_of(plane.why), len(lines))
+        figure, left, right = _axes(rows, 0 if under else len(lines))
         height = figure.get_figheight() / inches(1)
+        bottom = left.get_position().y0 * height - BELOW if under else 0.06
         panels.landscape(left, trace, element, row=row, window=window)
         if checks is not None:
             panels.pins(left, trace, element, checks, row=row)
@@ -108,15 +123,20 @@ def landscape(
         shown = "guards that leave" if plane.edges else "flow of"
         panels.lettered(left, "a", f"{shown} {plane.state}")
         panels.lettered(right, "b", "race to fire")
-        looks = [("path before", INK, "-"), ("after", INK, DASHED)]
+        path = path_colour(plane, element, trace.n)
+        looks = [
+            ("border", INK, BORDER),
+            ("path before", path, "-"),
+            ("after", path, AFTER),
+        ]
         handles = [Line2D([], [], color=c, linestyle=dash, label=n) for n, c, dash in looks]
         if plane.threshold is not None:
             handles.append(
                 Line2D([], [], color=LINE_GREY, linewidth=pt(5), alpha=0.45, label="$±s(v)$")
             )
-        close: Any = {"handlelength": 1.4, "columnspacing": 1.0} if low() else {}
+        close: Any = {"handlelength": 1.4 if low() else 1.8, "columnspacing": 1.0}
         legend = left.legend(
-            handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=3, **close
+            handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=4, **close
         )
         if room(WIDTH) < WIDTH:  # it may be wider than the panel
             legend.set_loc("lower left")
@@ -125,16 +145,32 @@ def landscape(
             _title(trace, plane, title), x=0.02, y=1 - 0.12 / height, ha="left", va="top"
         )
         for number, line in enumerate(lines):
-            place = (LINE * (len(lines) - number) + 0.06) / height
-            figure.text(0.02, place, line, fontsize=font(8), va="top", color=INK)
+            place = (LINE * (len(lines) - number) + bottom) / height
+            figure.text(x, place, line, fontsize=font(8), va="top", color=INK)
     return fitted(figure)
+
+
+def _folded(lines: list[str], width: float) -> list[str]:
+    """Return a caption in lines that are at most so many inches wide."""
+    letters = int(LETTERS * width)
+    return [part for line in lines for part in wrap(line, letters, subsequent_indent="   ")]
+
+
+def _beside() -> bool:
+    """Return whether the landscape and the race are next to each other."""
+    return current().height is not None or room(WIDTH) - LEFT - BETWEEN - RACE - RIGHT > RACE
+
+
+def _free(rows: float) -> float:
+    """Return how many inches are free below a race of so many rows, beside the landscape."""
+    return PLOT + BELOW - UNDER - LANE * rows if _beside() and current().height is None else 0.0
 
 
 def _axes(rows: float, lines: int) -> tuple[Figure, Axes, Axes]:
     """Return an empty figure, and the axes of the landscape and of the race beside or below it."""
     wide, below = room(WIDTH), 0.82 + LINE * lines
     given = current().height
-    if given is not None or wide - LEFT - BETWEEN - RACE - RIGHT > RACE:
+    if _beside():
         tall = PLOT if given is None else given / inches(1) - TOP - below
         race = min(RACE, 0.46 * wide)
         plot, lanes = wide - LEFT - BETWEEN - race - RIGHT, min(tall, LANE * rows)
@@ -161,7 +197,7 @@ def _title(trace: Trace, plane: Plane, title: str) -> str:
     return f"{head(trace, title)}\n{who} in {plane.state} at {place}"
 
 
-def _caption(trace: Trace, plane: Plane) -> list[str]:
+def _caption(trace: Trace, plane: Plane, speeds: Scale) -> list[str]:
     """Return what is held, what the arrows are, and which row is shown, as lines."""
     chart, lines = plane.chart, []
     if plane.why.left:
@@ -185,9 +221,12 @@ def _caption(trace: Trace, plane: Plane) -> list[str]:
     elif dv is None:
         lines.append("No arrows: the arc of this row has no second time.")
     else:
+        rate = float(f"{dv * speeds.factor:.4g}")
         lines.append(
             f"Arrows: direction of the flow; d{second}/dt is that of {plane.state}, "
-            f"d{plane.names[0]}/dt = {with_unit(chart, 'a', dv)} as at this row everywhere."
+            f"d{plane.names[0]}/dt = {rate:.6g} {speeds.unit}² as at this row everywhere.".replace(
+                "-", "−"
+            )
         )
     return lines
 

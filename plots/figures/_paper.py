@@ -23,9 +23,10 @@ from plots.views.window import Window
 
 Floats = NDArray[np.float64]
 REACHED = "$±s(v)$ away from reversals"
-INSET = (0.56, 0.81, 0.42, 0.18)  # of a panel: left, bottom, width, height
+INSET = (0.48, 0.81, 0.51, 0.18)  # of a panel: left, bottom, width, height
+ALIKE = 0.01  # of the largest deflection: curves that are closer look like one
 ZOOM = 0.012  # half of the time of an inset, of the whole time
-FIG3_PHASES = (("rising", 2.0), ("falling", 4.0), ("oscillating", np.inf))
+FIG3_PHASES = (("$F_a$ rises", 2.0), ("$F_a$ falls", 4.0), ("$F_a$ oscillates", np.inf))
 
 
 def figure_3(
@@ -37,6 +38,7 @@ def figure_3(
     title: str,
     phases: Sequence[tuple[str, float]] = FIG3_PHASES,
     limit: float | None = None,
+    reason: str = "",
     window: Window | None = None,
 ) -> Figure:
     """Draw Fig. 3: the applied force, and F against x for chart, if-else and LuGre.
@@ -53,6 +55,8 @@ def figure_3(
         Names and end times [s] of the parts of the experiment.
     limit : float, optional
         Upper end of the F axis [N]; a higher peak is given as text.
+    reason : str
+        Why there is such a peak, added to this text.
     window : (float, float), optional
         Time interval to show, s.
 
@@ -87,10 +91,10 @@ def figure_3(
             x_peak = scale[0] * (trace.x[peak] - trace.x[0])
             if limit is not None and trace.F[peak] > limit:
                 ax.set_ylim(min(0.0, trace.F.min()) - 0.03 * limit, limit)
-                said = f"peak {trace.F[peak]:.2f} N\nat t = {trace.t[peak]:.3f} s"
+                said = f"peak {trace.F[peak]:.2f} N at $t$ = {trace.t[peak]:.3f} s\n{reason}"
                 beside(ax, said, (x_peak, limit), (-8, -4), ha="right", va="top", color=TEXT_GREY)
         names = ["applied force (chosen by us)", f"{chart.model.title}; chart"]
-        letter_panels(axes, [*names, "the same; if-else", "LuGre"])
+        letter_panels(axes, [*names, "the same from if-else code", "LuGre"])
         if len(phases) > 1:
             legend_below(figure, *axes[1].get_legend_handles_labels())
         figure.suptitle(title, x=0.01, ha="left")
@@ -178,7 +182,7 @@ def _zoom(ax: Axes, trace: Trace) -> None:
     inset.locator_params(axis="y", nbins=ticks, min_n_ticks=ticks)
     at = (0.02, INSET[1] + INSET[3] / 2)
     look: dict[str, Any] = {"va": "center", "fontsize": font(7), "color": TEXT_GREY}
-    ax.text(*at, "first peak", transform=ax.transAxes, **look)
+    ax.text(*at, "first peak,\n$F$ [N] over $t$ [s]", transform=ax.transAxes, **look)
     inset.spines[:].set(visible=True, color=LINE_GREY)
     bounds = (t0, bottom - edge, t1 - t0, high - bottom + 2 * edge)
     frame = ax.indicate_inset(bounds, inset, edgecolor=LINE_GREY, alpha=1.0)
@@ -237,6 +241,8 @@ def compare_laws(
                 column[0].axhline(
                     level, color=LINE_GREY, linewidth=pt(0.9), zorder=0, label=REACHED
                 )
+            if not many:
+                _coinciding(column[0], trace, elements)
             for ax in column[:2]:
                 ax.set_xlabel("")
         letter_panels(grid[0], list(runs))
@@ -246,6 +252,18 @@ def compare_laws(
             entries |= dict(zip(labels, handles, strict=True))
         legend_below(figure, list(entries.values()), list(entries))
     return fitted(figure)
+
+
+def _coinciding(ax: Axes, trace: Trace, elements: Sequence[int] | None) -> None:
+    """Say so, if the deflections of all elements cannot be told apart."""
+    chosen = checked_elements(trace, elements)
+    if len(chosen) < 2 or not trace.model.chart.variables:
+        return
+    z = trace.z[:, chosen]
+    if np.nanmax(np.ptp(z, axis=1)) < ALIKE * np.nanmax(np.abs(z)):
+        said = f"$z_{{{chosen[0] + 1}}}$ to $z_{{{chosen[-1] + 1}}}$ coincide"
+        look: dict[str, Any] = {"ha": "right", "va": "bottom", "color": TEXT_GREY}
+        ax.text(0.98, 0.04, said, transform=ax.transAxes, **look)
 
 
 def residuals(
@@ -322,7 +340,7 @@ def held_residuals(
         force, place, between, period = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
         lines = panels.lag_over_time(force, lags, papers[0], window=(0.0, until))
         panels.lag_over_time(place, lags, papers[1], window=(0.0, until), place=True)
-        panels.lag_between_ticks(between, lags, window=(zoom, zoom + 2 * lags[0].period))
+        panels.lag_between_ticks(between, lags, papers[0], window=(zoom, zoom + 2 * lags[0].period))
         panels.lag_over_period(period, lags, papers, phases=phases)
         letter_panels(
             [force, place, between, period],

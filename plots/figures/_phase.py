@@ -9,7 +9,7 @@ import numpy as np
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import fitted, narrow, sheet
 from plots.figures._parts import head, letter_panels
@@ -24,6 +24,7 @@ from plots.panels.parts.selection import (
 from plots.style import PAPER, VERMILION
 from plots.style.matplotlib import Axes, Figure, LineCollection, rc_context
 from plots.style.presets import pt, settings
+from plots.views.traces import check_trace
 from plots.views.window import Window
 
 
@@ -94,12 +95,20 @@ def phase(
             portrait.set_ylabel("")
         portrait.tick_params(labelleft=True)
         letter_panels([loop, portrait], ["friction over position", "friction over velocity"])
-        note = f"from {limits[0]:.6g} to {limits[1]:.6g} s, dot at t = {trace.t[row]:.9g} s"
+        note = f"from {limits[0]:.6g} to {limits[1]:.6g} s, dot at {_place(trace, row)}"
         figure.suptitle(f"{head(trace, title)}\n{note}", x=0.01, ha="left")
         figure.draw_without_rendering()  # arrows are evenly spaced in the laid out picture
         _arrows(loop, over_x)
         _arrows(portrait, over_v)
     return fitted(figure)
+
+
+def _place(trace: Trace, row: int) -> str:
+    """Return the time of a row, and what fires there, if one edge does."""
+    log = trace.transitions
+    fired = log[log.t == trace.t[row]]
+    what = f": E{fired.element[0] + 1} {fired.edge[0]}" if fired.size == 1 else ""
+    return f"t = {trace.t[row]:.6g} s{what}"
 
 
 def _dot(ax: Axes, here: float, values: np.ndarray, unit: str, F: float) -> None:

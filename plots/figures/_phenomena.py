@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,9 @@ from plots.style import (
 from plots.style.matplotlib import Axes, Figure, Rectangle, rc_context
 from plots.style.presets import font, inches, pt, room, settings, to_scale
 
-COLUMNS, PANEL, NARROWEST = 4, (2.7, 2.15), 1.9  # in
+COLUMNS, PANEL, NARROWEST = 3, (2.7, 2.15), 1.9  # in
+LETTERS = 12.5  # per inch, of the text under the panels
+CELL, NAME = 1.06, 0.087  # in: width of a cell, of a letter of a model's name
 TOO_LARGE = 4.0  # times the median range: such a panel has its own axis
 # Verdicts differ by shape; the grounds only help to find them.
 TINTS = {"shows": "chosen", "shows wrongly": "pale"}
@@ -59,13 +62,24 @@ def phenomenon_figure(table: PhenomenaTable, name: str) -> Figure | None:
             _panel(ax, model, found, phenomenon, limits)
         for ax in grid.flat[len(shown) :]:
             ax.set_axis_off()
-        figure.supxlabel(phenomenon.axes[0], fontsize=font(9.5))
+        below = "\n".join(wrap(_told(shown, phenomenon), int(LETTERS * room(size[0]))))
+        look: Any = {"family": "DejaVu Sans", "fontsize": font(9.5)}
+        figure.supxlabel(f"{phenomenon.axes[0]}\n\n{below}", **look)
         figure.supylabel(phenomenon.axes[1], fontsize=font(9.5))
         figure.suptitle(phenomenon.title, x=0.01, ha="left", fontsize=font(12))
         handles, labels = grid.flat[0].get_legend_handles_labels()
         if labels:
             figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
     return fitted(figure)
+
+
+def _told(shown: Sequence[tuple[str, PhenomenonResult]], phenomenon: Phenomenon) -> str:
+    """Return what mark and number of a panel mean."""
+    seen = {found.verdict for _, found in shown}
+    marks = ", ".join(f"{mark} {verdict}" for verdict, mark in MARKS.items() if verdict in seen)
+    number = shown[0][1].numbers[0].name
+    rule = f" (shows it if {phenomenon.shows_if})" if phenomenon.shows_if else ""
+    return f"Below each name: {marks}; {number}{rule}."
 
 
 def _panel(
@@ -83,17 +97,21 @@ def _panel(
             marker=marker,
             markersize=pt(3),
             label=curve.label,
+            zorder=3 - 0.1 * number,  # a thin line is seen on a broad one
             **to_scale(compared_look(number)),
         )
     if phenomenon.log:
         ax.set_xscale("log")
     own = False
     for axis, limit in zip(("x", "y"), limits, strict=True):
+        if limit is None:
+            continue
         low, high = _range([found], axis)
-        if limit is None or low < limit[0] or high > limit[1]:
-            own = own or limit is not None
-        else:
+        # What slides away leaves the panel; its scale would hide all else that it does.
+        if found.instead or (limit[0] <= low and high <= limit[1]):
             ax.set(**{f"{axis}lim": limit})
+        else:
+            own = True
     if not phenomenon.log:
         ax.locator_params(axis="x", nbins=4)
     ax.locator_params(axis="y", nbins=4)
@@ -137,7 +155,8 @@ def phenomena_matrix(
     title : str
         Above the matrix.
     notes : sequence of str
-        Short texts under the columns, such as thresholds; the first is under the models' names.
+        Short texts under the columns, the first under the models' names; by default, what the
+        numbers of models are that show it.
     below : float
         Height of the empty space under the matrix for panels of your own, in.
 
@@ -148,10 +167,12 @@ def phenomena_matrix(
         are too narrow for numbers and notes.
     """
     models = [model for model in table.models if model not in table.left_out()]
-    left = 0.11 * max([8, *map(len, models)])
-    size = room(left + 1.28 * len(table.phenomena) + 0.2)
+    left = 0.15 + NAME * max([8, *map(len, models)])
+    size = room(left + CELL * len(table.phenomena) + 0.2)
     wide, high = (size - left - 0.2) / len(table.phenomena), 0.46  # in, of a cell
-    brief = wide < 1.0
+    brief = wide < 0.95 * CELL
+    under_heads = [*notes] or ["shows it if", *(each.shows_if for each in table.phenomena)]
+    under_heads = [] if brief else [_folded(note) for note in under_heads]
     heads = [each.short if brief else _folded(each.short) for each in table.phenomena]
     above = 0.25 + 0.14 * max(head.count("\n") + 1 for head in heads)
     if brief:
@@ -160,7 +181,8 @@ def phenomena_matrix(
     found_any = {table.cell(model, one.name).verdict for model in models for one in table.phenomena}
     key = [each for each in VERDICTS if each in found_any]
     lines = _lines(key, size)
-    under = 0.35 + 0.2 * len(lines) + (0.15 if notes and not brief else 0.0)
+    noted = 0.13 * max([0, *(note.count("\n") + 1 for note in under_heads)])
+    under = 0.35 + 0.2 * len(lines) + noted
     tall = above + under + high * max(1, len(models))
     with rc_context(settings()):
         figure = sheet(size, tall + below, layout=None, grows=True)
@@ -187,15 +209,16 @@ def phenomena_matrix(
                 )
                 _symbol(ax, corner[0] + (0.5 * wide if brief else 0.2), y, found.verdict)
                 if not brief:
+                    look: Any = {"va": "center", "fontsize": font(9.5), "linespacing": 0.95}
                     text = phenomenon.brief(found)
-                    ax.text(corner[0] + 0.36, y, text, va="center", fontsize=font(8.5))
-        for column, note in enumerate(() if brief else notes):
+                    if found.instead:
+                        text, look["fontsize"] = text.replace(" ", "\n", 1), font(8.5)
+                    ax.text(corner[0] + 0.33, y, text, **look)
+        for column, note in enumerate(under_heads):
             x, side = (
                 (left - 0.1, "right") if column == 0 else (left + (column - 0.5) * wide, "center")
             )
-            ax.text(
-                x, under - 0.14, note, ha=side, va="center", fontsize=font(7.5), color=TEXT_GREY
-            )
+            ax.text(x, under - 0.07, note, ha=side, va="top", fontsize=font(7.5), color=TEXT_GREY)
         for place, line in enumerate(reversed(lines)):
             for x, verdict in line:
                 y = 0.15 + 0.2 * place
@@ -234,10 +257,10 @@ def _symbol(ax: Axes, x: float, y: float, verdict: str) -> None:
 
 
 def _folded(text: str) -> str:
-    """Break a heading into lines of at most 16 characters."""
+    """Break a heading into lines of at most 14 characters, if its words are not longer."""
     lines = [""]
     for word in text.split():
-        if lines[-1] and len(lines[-1]) + len(word) >= 16:
+        if lines[-1] and len(lines[-1]) + len(word) >= 14:
             lines.append("")
         lines[-1] = f"{lines[-1]} {word}".strip()
     return "\n".join(lines)

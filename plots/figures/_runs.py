@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import (
@@ -27,6 +27,7 @@ from plots.panels.parts.selection import checked_elements, checked_window, scale
 from plots.style import LINE_GREY, PALE_GREY
 from plots.style.matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
 from plots.style.presets import pt, settings
+from plots.views.traces import check_trace
 from plots.views.window import Window
 
 LOW = 2  # panels below each other, on a slide
@@ -103,8 +104,11 @@ def overview(
         if count > MANY:
             panels.slipping(time[2], part, window=window, elements=elements)
         panels.ribbons(time[-1], part, window=window, elements=elements)
-        panels.hysteresis(loop, trace, window=window)
-        panels.portrait(portrait, part, elements=elements)
+        alone = measured is None  # else ink is the model, grey the measurement
+        panels.hysteresis(loop, trace, window=window, elements=elements, slipping=alone)
+        (lines,) = panels.portrait(portrait, part, elements=elements, bar=False)
+        assert isinstance(lines, LineCollection)
+        panels.slip_bar(lines, trace, [loop, portrait] if alone else portrait)
         if measured is not None:
             _add_measured(time[1], loop, measured, trace, window)
         if trace.model.chart.transitions:
@@ -262,7 +266,7 @@ def _ribbon_axes(
         )
         pair = list(figure.add_subfigure(halves[1, 0]).subplots(1, 2))
         return figure, axes[:rows], axes[rows:], pair
-    figure = sheet(13.2 if zoom else 9.6, sum(tall) + 2.2)
+    figure = sheet(11.6 if zoom else 9.6, sum(tall) + 2.2)
     beside = not (zoom and low())
     widths = (2.1 if zoom else 1.3, 1)[: 1 + beside]
     halves = figure.add_gridspec(1, len(widths), width_ratios=widths)
@@ -353,8 +357,8 @@ def _zoom_names(zoom: Window, margin: str) -> list[str]:
     middle, width = (zoom[0] + zoom[1]) / 2, zoom[1] - zoom[0]
     factor, unit = scaled(np.array([width]), "s")
     return [
-        f"velocity, {factor * width:.3g} {unit} at t = {middle:.5g} s",
+        f"velocity, {factor * width:.3g} {unit} at $t$ = {middle:.5g} s",
         margin,
-        "jumps of F (open: before, filled: after)",
+        "jumps of $F$ (open before, filled after)",
         "order of slipping",
     ]

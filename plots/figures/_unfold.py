@@ -16,6 +16,7 @@ from plots.panels.micro_steps.unfolding import (
     LINE,
     column_width,
     edge_texts,
+    fired_look,
     time_texts,
 )
 from plots.panels.parts.selection import scaled
@@ -26,6 +27,7 @@ from plots.style.presets import inches, room, settings, to_scale
 COLUMN, NARROWEST, WIDEST, SIDES = 1.15, 6.4, 11.6, 1.0  # inches: a column, the figure, margins
 FORCE, ROW, FLATTEST = 2.3, 0.34, 0.22  # inches: the upper panel, a row of the lower one
 TOP, BELOW = 0.95, 1.25  # inches: above and below the panels
+FIRED = "has fired"
 HEAD = 0.55  # inches: the title alone
 
 
@@ -85,9 +87,9 @@ def unfold(
     above = (HEAD if low() else TOP + FORCE) + 0.45 + head_room
     names = [state.name for state in trace.model.chart.states]
     shown = sorted({mode for each in part.columns for mode in each.modes})
-    entry = 0.75 + LETTER * max(len(names[mode]) for mode in shown)  # inches
+    entry = 0.75 + LETTER * max(map(len, [FIRED, *(names[mode] for mode in shown)]))  # inches
     columns = int(np.clip((wide - 0.2) / entry, 1, 6))
-    rows = -(-len(shown) // columns)
+    rows = -(-(len(shown) + 1) // columns)
     below = BELOW + (times_room - LINE if upright else 0.0) + 1.3 * LINE * (rows - 1)
     height = above + tall + below
     with rc_context(settings()):
@@ -99,12 +101,13 @@ def unfold(
         if not low():
             force = figure.add_axes((left, 1 - (TOP + FORCE) / height, broad, FORCE / height))
             panels.unfolded_force(force, part)
-            panels.lettered(force, next(letters), "F before and after each firing")
+            panels.lettered(force, next(letters), "$F$ before and after each firing")
         states = figure.add_axes((left, below / height, broad, tall / height))
         panels.unfolded_states(states, part)
         up = inches(72 * (head_room + 0.12))  # points
         panels.lettered(states, next(letters), "who fires, and by which edge", pad=up)
         handles = [_swatch(mode, names[mode]) for mode in shown]
+        handles.append(Rectangle((0, 0), 1, 1, label=FIRED, **fired_look()))
         figure.legend(handles=handles, loc="lower left", ncols=columns)
         title = f"{head(trace, title)}\n{_said(part)}"
         figure.suptitle(title, x=0.2 / wide, y=1 - 0.12 / height, ha="left", va="top")

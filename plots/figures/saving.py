@@ -6,12 +6,17 @@ import re
 from collections.abc import Mapping
 from io import BytesIO
 
+from gms_fsm.foundation.text import visible_lines
 from plots.style import RC
-from plots.style.matplotlib import Figure, rc_context
+from plots.style.matplotlib import Figure, Text, rc_context
 
 
 def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
     """Return a figure as bytes."""
+    for each in figure.findobj(Text):
+        written, shown = each.get_text(), visible_lines(each.get_text())
+        if shown != written:  # matplotlib writes it into a comment of an SVG, too
+            each.set(text=shown, parse_math=False)
     buffer = BytesIO()
     # A journal's PDF has fonts that can be selected and edited: TrueType, Type 42.
     with rc_context(RC | {"pdf.fonttype": 42}):

@@ -12,7 +12,7 @@ from typing import cast
 
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots.charts.statechart import ChartSheet, chosen
 from plots.film._chart import FilmChart
 from plots.film._movie import Movie
@@ -23,6 +23,7 @@ from plots.output.svg_artists import EXACT
 from plots.panels.parts.selection import shown as shown_rows
 from plots.style import RC, Theme
 from plots.style.matplotlib import rc_context
+from plots.views.traces import check_trace
 
 FASTEST = 50  # frames per second: GIF delays are in 10 ms, and readers reject a delay of 10 ms
 USUAL = 200  # frames

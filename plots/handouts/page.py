@@ -20,10 +20,11 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import parse_value
 from gms_fsm.systems.models import Model, is_model
 from gms_fsm.systems.system import loaded
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.charts.live_chart import plain_tree
 from plots.charts.statechart import statechart
@@ -34,6 +35,7 @@ from plots.output.svg_artists import EXACT, drawn, smallest
 from plots.style import INK, MONO_FONT, PALE_GREY, SANS_FONT, TEXT_GREY, presets
 from plots.style.mathtext import Formulas, formula
 from plots.style.matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
+from plots.views.traces import check_trace
 
 PAGE = (595.276, 841.89)  # A4
 MARGIN, GAP = 40.0, 14.0
@@ -169,7 +171,7 @@ class _Page:
 
 
 def _lines(text: str, size: float, wide: float) -> list[str]:
-    return wrap(text, max(8, int(wide / (LETTER * size)))) or [""]
+    return wrap(visible(text), max(8, int(wide / (LETTER * size)))) or [""]
 
 
 def _head(page: _Page, model: Model, heading: str) -> float:
@@ -192,7 +194,7 @@ def _head(page: _Page, model: Model, heading: str) -> float:
 def _foot(page: _Page, model: Model) -> float:
     """Write version and model; return where the page may end."""
     page.rule(MARGIN - 6, INNER)
-    page.text(MARGIN, MARGIN - 8, model.title, SMALLEST, color=TEXT_GREY)
+    page.text(MARGIN, MARGIN - 8, visible(model.title), SMALLEST, color=TEXT_GREY)
     version = f"gms-fsm {gms_fsm.__version__}"
     page.text(PAGE[0] - MARGIN, MARGIN - 8, version, SMALLEST, ha="right", color=TEXT_GREY)
     return MARGIN

@@ -8,6 +8,7 @@ from html import escape
 import graphviz
 
 from gms_fsm.errors import OutputError
+from gms_fsm.foundation.text import encoded, visible_lines
 from plots.output.graphviz import drawn
 
 
@@ -21,9 +22,9 @@ def image(picture: str | bytes, words: str) -> str:
     >>> image("<svg></svg>", "nothing")
     '<img style="max-width:100%" alt="nothing" src="data:image/svg+xml;base64,PHN2Zz48L3N2Zz4=">'
     """
-    raw, kind = (picture, "png") if isinstance(picture, bytes) else (picture.encode(), "svg+xml")
+    raw, kind = (picture, "png") if isinstance(picture, bytes) else (encoded(picture), "svg+xml")
     data = b64encode(raw).decode()
-    words = escape(words)
+    words = escape(visible_lines(words))
     return f'<img style="max-width:100%" alt="{words}" src="data:image/{kind};base64,{data}">'
 
 

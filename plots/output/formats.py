@@ -12,6 +12,7 @@ from typing import Any
 from gms_fsm import formats
 from gms_fsm.formats import *  # noqa: F403
 from gms_fsm.formats import Format, Written, of, register
+from gms_fsm.foundation.text import encoded
 
 __all__: list[str] = []
 __all__ += formats.__all__
@@ -23,14 +24,14 @@ def _late(module: str, name: str, *more: Any) -> Callable[[Any], bytes]:
 
     def write(subject: Any) -> bytes:
         written = getattr(import_module(f"plots.{module}"), name)(subject, *more)
-        return written.encode() if isinstance(written, str) else bytes(written)
+        return encoded(written) if isinstance(written, str) else bytes(written)
 
     return write
 
 
 def _dot(graph: Any) -> bytes:
     text: str = graph.source
-    return text.encode()
+    return encoded(text)
 
 
 def _graph(form: str) -> Callable[[Any], bytes]:
@@ -39,7 +40,7 @@ def _graph(form: str) -> Callable[[Any], bytes]:
 
 def _html(page: Any) -> bytes:
     text: str = page.html
-    return text.encode()
+    return encoded(text)
 
 
 # --------------------------------------------------------------------------- the table

@@ -23,6 +23,7 @@ import graphviz
 
 from gms_fsm.errors import OutputError
 from gms_fsm.foundation.extras import missing
+from gms_fsm.foundation.text import encoded
 from plots.style.fonts import FOLDER
 
 PNG_DPI = "144"  # twice a screen point: crisp on dense displays
@@ -98,7 +99,7 @@ def drawn(graph: graphviz.Digraph, form: str) -> bytes | None:
     fonts = {"FONTCONFIG_FILE": str(_settings())}
     done = subprocess.run(
         command,
-        input=graph.source.encode(),
+        input=encoded(graph.source),
         capture_output=True,
         check=False,
         env=os.environ | fonts,
@@ -127,5 +128,5 @@ def _settings() -> Path:
     folders = "\n  ".join([f"<dir>{ours}</dir>", *_OTHERS])
     text = _FONTS.format(folders=folders, ours=ours, cache=escape(folder.as_posix()))
     file = folder / "fonts.conf"
-    file.write_text(text, encoding="utf-8")
+    file.write_bytes(encoded(text))
     return file

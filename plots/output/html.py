@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 from gms_fsm.errors import cut
+from gms_fsm.foundation.text import visible_lines
 
 LONGEST = 400  # characters of a cell
 
@@ -41,7 +42,7 @@ def paragraph(text: str) -> str:
 
 def listing(text: str) -> str:
     """Return a text in a fixed-width font, line by line, escaped."""
-    return f'<pre style="line-height:1.3">{escape(text)}</pre>'
+    return f'<pre style="line-height:1.3">{escape(visible_lines(text))}</pre>'
 
 
 def _side(value: object) -> str:
@@ -50,4 +51,4 @@ def _side(value: object) -> str:
 
 def _text(value: object) -> str:
     text = f"{value:.6g}" if isinstance(value, float) else str(value)
-    return escape(cut(text, LONGEST))
+    return escape(cut(visible_lines(text), LONGEST))

@@ -11,6 +11,7 @@ import json
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.text import visible
 from plots.charts.contents import (
     chart_texts,
     edge_text,
@@ -19,7 +20,6 @@ from plots.charts.contents import (
     lines_of,
     state_texts,
 )
-from plots.charts.labels import printable
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import MermaidText
 
@@ -56,7 +56,7 @@ def mermaid(chart: Chart) -> str:
     <BLANKLINE>
     """
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
-    ids, title = ids_of(chart), json.dumps(printable(chart.name), ensure_ascii=False)
+    ids, title = ids_of(chart), json.dumps(visible(chart.name), ensure_ascii=False)
     write, first = ChartWriter(chart, "stateflow"), ids[chart.default_state.name]
     lines = [f"[*] --> {first}"]
     for state in chart.states:
@@ -74,4 +74,4 @@ def mermaid(chart: Chart) -> str:
 
 
 def _escape(text: str) -> str:
-    return "".join(c if c.isalnum() or c in PLAIN else f"#{ord(c)};" for c in printable(text))
+    return "".join(c if c.isalnum() or c in PLAIN else f"#{ord(c)};" for c in visible(text))

@@ -18,8 +18,7 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import GMSError, MissingExtraError
-from gms_fsm.foundation.display import Form
-from gms_fsm.foundation.logs import Log
+from gms_fsm.foundation.display import Form, Log
 from gms_fsm.foundation.quantities import trimmed
 from gms_fsm.session.explain import Clause, Explanation, Why
 from gms_fsm.session.results import BranchComparison, Here
@@ -34,6 +33,7 @@ from gms_fsm.traces.verdicts import (
     InvariantVerdict,
     PassivityVerdict,
 )
+from gms_fsm.traces.views import range_of_force
 from gms_fsm.verification.findings import Finding, Report
 from plots.charts.live_chart import LiveChart
 from plots.charts.statechart import statechart
@@ -116,7 +116,7 @@ def trace_html(trace: Trace) -> str | None:
     if not several and find_spec("matplotlib") is not None:
         return None
     parts = [trace.contact(name) for name in trace.contacts] if several else [trace]
-    rows = [[p.model.title, p.n, len(p.transitions), p.F.min(), p.F.max()] for p in parts]
+    rows = [[p.model.title, p.n, len(p.transitions), *range_of_force(p)] for p in parts]
     return table(
         ["contact", "elements", "transitions", "least F [N]", "largest F [N]"],
         rows,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.text import visible
 from plots.charts.contents import (
     chart_texts,
     edge_text,
@@ -17,7 +18,6 @@ from plots.charts.contents import (
     lines_of,
     state_texts,
 )
-from plots.charts.labels import printable
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import PlantUMLText
 
@@ -59,7 +59,7 @@ def plantuml(chart: Chart) -> str:
 
 
 def _escape(text: str) -> str:
-    return "".join(c if c.isalnum() or c in PLAIN else _code(c) for c in printable(text))
+    return "".join(c if c.isalnum() or c in PLAIN else _code(c) for c in visible(text))
 
 
 def _code(character: str) -> str:

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.text import visible
 from plots.charts.contents import (
     chart_texts,
     edge_text,
@@ -20,7 +21,6 @@ from plots.charts.contents import (
     lines_of,
     state_texts,
 )
-from plots.charts.labels import printable
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import TikzText
 
@@ -97,7 +97,7 @@ def tikz(chart: Chart) -> str:
             "\\node[guard, anchor=north] at ([yshift=-4mm]current bounding box.south) "
             f"{{{_rows(shared)}}};"
         )
-    head = HEAD.format(name=printable(chart.name))
+    head = HEAD.format(name=visible(chart.name))
     return TikzText(head + "".join(f"  {line}\n" for line in lines) + "\\end{tikzpicture}\n")
 
 
@@ -132,4 +132,4 @@ def _rows(texts: list[str]) -> str:
 
 
 def _escape(text: str) -> str:
-    return "".join(CODES.get(c, c) for c in printable(text))
+    return "".join(CODES.get(c, c) for c in visible(text))

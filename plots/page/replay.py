@@ -27,7 +27,8 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, listed
 from gms_fsm.foundation.extras import missing
-from gms_fsm.foundation.quantities import PREFIXES, SMALLEST, TAKES_PREFIX
+from gms_fsm.foundation.quantities import PREFIXES, SMALLEST, TAKES_PREFIX, UNITS
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
@@ -38,7 +39,6 @@ from gms_fsm.language import (
     SEVERAL,
     SHORT,
 )
-from gms_fsm.records.units import FACTORS
 from gms_fsm.session.explain import ROUNDING
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.prove import Report
@@ -243,6 +243,11 @@ def page_data(
     checked_kind("title", title, str, "a text")
     reports = [checks] if isinstance(checks, Report) else listed("checks", checks, "Reports")
     known = [view.model.chart for each in traces for view in views_of(each)]
+    if not known:
+        raise ParameterError(
+            "a page shows contacts, and this system has none",
+            advice="step through its supervisors with gms-fsm debug, or Session(system, t_end)",
+        )
     for report in reports:
         checked_kind("checks", report, Report, "a Report, from prove(chart)")
         if report.chart not in known:
@@ -263,9 +268,9 @@ def page_data(
         charts += [picture for picture in dict.fromkeys(pictures) if picture not in charts]
         run = stored_run(page, [charts.index(picture) for picture in pictures], reports)
         head = [*names[i : i + 1], each.title]
-        runs.append({"title": ": ".join(head), "of": len(each), **run})
+        runs.append({"title": visible(": ".join(head)), "of": len(each), **run})
     data = {
-        "title": title or " and ".join(dict.fromkeys(map(_heading, traces))),
+        "title": visible(title or " and ".join(dict.fromkeys(map(_heading, traces)))),
         "runs": runs,
         "language": _language(),
         "quantities": {
@@ -318,7 +323,7 @@ def _language() -> dict[str, Any]:
         "constants": dict(CONSTANTS),
         "units": {  # each with its factor, and the unit of SI for what it measures
             unit: [factor, next(name for name, one in units.items() if one == 1.0)]
-            for units in FACTORS.values()
+            for units in UNITS.values()
             for unit, factor in units.items()
         },
     }

@@ -83,8 +83,8 @@ def difference(
     middles, low, high = _envelope(times, values)
     label = f"lowest to highest in each 1/{COLUMNS} of the time"
     band = ax.fill_between(middles, low, high, color=PALE_GREY, linewidth=0.0, label=label)
-    ends = [high] if log else [high, low]
-    return [band, *(line for end in ends for line in draw_curve(ax, middles, end, **look))]
+    drawn: Artists = [band, *draw_curve(ax, middles, high, label="highest in it", **look)]
+    return drawn if log else [*drawn, *draw_curve(ax, middles, low, **look)]
 
 
 def _envelope(times: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:

@@ -10,61 +10,14 @@ import numpy as np
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import MANY, VECTOR_ROWS, Artists, lanes, time_axis
 from plots.panels.parts.selection import PartOptions, selected
-from plots.style import INK, PAPER, state_look
-from plots.style.matplotlib import Axes, RendererBase, Text
-from plots.style.presets import font, pt, to_scale
+from plots.style import INK, state_look
+from plots.style.matplotlib import Axes
+from plots.style.presets import pt, to_scale
 from plots.views.window import Window
 
 __all__ = ["ribbons"]
 
 LANE = 0.8  # height of a ribbon, in rows
-COVERED, HIGH = 0.75, 0.9  # of a span, by the ground of its name
-
-
-class _SpanName(Text):
-    """A state's name inside its span, drawn only if it fits.
-
-    Whether it fits is known only when the picture is drawn, and may change on resizing.
-    """
-
-    def __init__(self, ax: Axes, begin: float, end: float, height: float, name: str) -> None:
-        super().__init__(
-            (begin + end) / 2,
-            height,
-            name,
-            ha="center",
-            va="center",
-            fontsize=font(7.5),
-            color=INK,
-            bbox={
-                "boxstyle": "round,pad=0.12",
-                "facecolor": PAPER,
-                "edgecolor": "none",
-                "alpha": 0.85,
-            },
-        )
-        self.span = (begin, end)
-        self.set_in_layout(False)
-        ax.add_artist(self)
-        self.set_clip_on(True)
-
-    def fits(self, renderer: RendererBase) -> bool:
-        """Return whether most of the span is still seen around the name and its ground."""
-        assert self.axes is not None
-        row = self.get_position()[1]
-        corners = [
-            (t, row + half) for t, half in zip(self.span, (LANE / 2, -LANE / 2), strict=True)
-        ]
-        (left, low), (right, high) = self.axes.transData.transform(corners)
-        patch: Any = self.get_bbox_patch()
-        self.update_bbox_position_size(renderer)
-        box = patch.get_window_extent(renderer)
-        return bool(box.width < COVERED * (right - left) and box.height < HIGH * (high - low))
-
-    def draw(self, renderer: RendererBase) -> None:
-        """Draw the name if it fits."""
-        if self.fits(renderer):
-            super().draw(renderer)
 
 
 def spans(trace: Trace, i: int, window: Window) -> Iterator[tuple[str, float, float]]:
@@ -92,9 +45,8 @@ def ribbons(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     Returns
     -------
     list of Artist
-        One collection per state and element; then the names, each drawn only if it fits, and none
-        of more than six elements; then a band for each interval in which a sign is held, for
-        example on v = 0, or in which an element is between two states.
+        One collection per state and element, for a legend; then a band for each interval in which
+        a sign is held, for example on v = 0, or in which an element is between two states.
     """
     this = selected(trace, **part)
     chosen, (begin, end) = this.elements, this.window
@@ -103,7 +55,6 @@ def ribbons(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     sized = to_scale if len(chosen) <= MANY else dict
     looks: list[dict[str, Any]] = [sized(state_look(number)) for number in range(len(states))]
     drawn: Artists = []
-    names: Artists = []
     for row, i in enumerate(chosen):
         found = list(spans(trace, i, (begin, end)))
         for number, state in enumerate(states):
@@ -111,14 +62,9 @@ def ribbons(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
             look = looks[number] | {"label": state if row == 0 else None}
             look["rasterized"] = len(mine) > VECTOR_ROWS // 20
             drawn.append(ax.broken_barh(mine, (row + 1.0 - LANE / 2, LANE), **look))
-        # A name never fits into less than one hundredth of the axis. In many narrow rows names
-        # would hide what they name: fill and hatch say it.
-        few = len(chosen) <= MANY
-        wide = [span for span in found if few and span[2] - span[1] > 0.01 * (end - begin)]
-        names += [_SpanName(ax, a, b, row + 1.0, name) for name, a, b in wide]
     lanes(ax, chosen)
     time_axis(ax, begin, end)
-    return [*drawn, *names, *_held_bands(ax, trace, chosen, (begin, end))]
+    return [*drawn, *_held_bands(ax, trace, chosen, (begin, end))]
 
 
 def _held_bands(ax: Axes, trace: Trace, chosen: Sequence[int], window: Window) -> Artists:

@@ -84,7 +84,9 @@ def lag_over_time(
     return lines
 
 
-def lag_between_ticks(ax: Axes, lags: Sequence[HeldLag], *, window: tuple[float, float]) -> Artists:
+def lag_between_ticks(
+    ax: Axes, lags: Sequence[HeldLag], paper: float, *, window: tuple[float, float]
+) -> Artists:
     """Draw the difference of F within a few sample times: held, it falls behind until a tick.
 
     Parameters
@@ -93,6 +95,8 @@ def lag_between_ticks(ax: Axes, lags: Sequence[HeldLag], *, window: tuple[float,
         Axes to draw on.
     lags : sequence of HeldLag
         The differences, the longest sample time first.
+    paper : float
+        Residual that the paper reports, N.
     window : (float, float)
         Time interval to show, s.
 
@@ -110,8 +114,10 @@ def lag_between_ticks(ax: Axes, lags: Sequence[HeldLag], *, window: tuple[float,
         lines += ax.plot(MILLI * (t - window[0]), MILLI * both, **to_scale(compared_look(number)))
         ink = compared_look(number)["color"]
         ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=pt(4))
+    for sign in (1, -1):
+        ax.axhline(sign * MILLI * paper, **to_scale(REPORTED))
     ax.set(
-        xlabel=f"$t$ − {window[0]:g} s [ms]",
+        xlabel=f"time after $t$ = {window[0]:g} s [ms]",
         ylabel="difference of $F$ [mN]",
         xlim=(0, MILLI * (window[1] - window[0])),
     )

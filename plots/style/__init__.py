@@ -110,7 +110,7 @@ _ROLES = (
         "fill",
         (PAPER, INK),
         ("#15181D", "#E6E8EB"),
-        "how close a deflection is to its threshold: paper to ink",
+        "how close a deflection is to its threshold; how many: paper to ink",
     ),
     Role(
         "elements",

@@ -183,7 +183,7 @@ def _velocity(graph: graphviz.Digraph) -> None:
     """Draw the input and its connections to the chart and the Stribeck curve."""
     _block(graph, "v", (X_INPUT, Y_VELOCITY), (44, 24), "<<I>v</I>>", **TERMINAL)
     _block(graph, "stribeck", (X_STRIBECK, Y_STRIBECK), (86, 40), "<<I>s</I>(<I>v</I>)>")
-    note = f'<FONT POINT-SIZE="9" COLOR="{TEXT_GREY}">Stribeck, eq. (2)</FONT>'
+    note = f'<FONT POINT-SIZE="9" COLOR="{TEXT_GREY}">Stribeck, eq. (2) of the paper</FONT>'
     caption(graph, "stribeck-note", (X_STRIBECK, Y_NOTE), note, width=86)
     graph.node(
         "branch", "", id="branch", pos=position((X_BRANCH, Y_VELOCITY)), shape="point", width="0.07"
@@ -231,7 +231,7 @@ def _element(
     ):
         port = f"chart-{name}{lane.id}"
         joint(graph, port, at)
-        text = _indexed(f"<I>{name}</I>", lane.index)
+        text = _indexed(f"<I>{'ż' if name == 'dz' else name}</I>", lane.index)
         caption(graph, f"{port}-name", (at[0] + side * inwards, at[1]), text, width=2 * inwards)
 
     _summand(graph, f"sum-F{lane.id}", x_sum, y_force)

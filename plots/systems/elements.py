@@ -7,15 +7,16 @@ distance that the slider has moved relative to the rest position of the contact.
 from __future__ import annotations
 
 import math
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.quantities import in_words
-from gms_fsm.traces.trace import Trace, check_trace
-from plots.panels.parts.selection import checked_row, scaled
+from gms_fsm.foundation.quantities import scale_of, trimmed
+from gms_fsm.traces.trace import Trace
+from plots.panels.parts.selection import checked_row, dotted, scaled
 from plots.style import (
     INK,
     LINE_GREY,
@@ -32,18 +33,23 @@ from plots.systems.mechanical_symbols import (
     hatched,
     spring_points,
 )
+from plots.views.traces import check_trace
 
 ROW = 1.35  # height of one element
 WALL = 6.0  # position of the slider's face, to which springs and dampers are attached
-REST = 3.0  # length of a spring at z = 0
-SWING = 1.4  # displacement of a contact by the largest deflection of a run
+REST = 3.45  # length of a spring at z = 0
+SWING = 1.0  # displacement of a contact by the largest deflection of a run
 CONTACT = 0.5  # width of a contact
 GROUND = 0.36  # its extent below the middle of its row
 MOST = 12  # elements
+SHOWN = 0.6  # of SWING: the deflection of all elements where there is no run
+BODY, ARROW, NUMBERS = 0.9, 0.8, 1.45  # widths: of the slider, of its arrows, of their numbers
+LETTERS = 16.0  # of the caption, per inch
 INCHES, TALLEST = 0.82, 10.2  # of one unit of height; of all of them, on a page of A4
 
 STIFFNESS = {"k": r"$k_{{{}}}$", "sigma_0": r"$\sigma_0$"}
-DAMPING = {"sigma": r"$\sigma_{{{}}}$", "sigma_1": r"$\sigma_1$"}
+# The damping of an element is the sigma_1 of its bristle; sigma_2 is viscous friction.
+DAMPING = {"sigma": r"$\sigma_{{1,{}}}$", "sigma_1": r"$\sigma_1$"}
 
 
 def elements_at(
@@ -52,7 +58,8 @@ def elements_at(
     """Draw a slider on Maxwell elements, deflected as in one row of a run.
 
     A contact in the default state (stick) is plain pale blue and held by a peg; in another state
-    (slip) it is hatched, with an arrow in the direction in which the slider moves.
+    (slip) it is hatched, with an arrow in the direction in which the slider moves. Without a run
+    all contacts stick, deflected alike.
     """
     if trace is not None:
         check_trace(trace)
@@ -69,7 +76,7 @@ def elements_at(
     if trace is not None:
         row = checked_row(trace, row)
     drawn: list[Artist] = []
-    shift = np.zeros(n)
+    shift = np.full(n, SHOWN * SWING if trace is None else 0.0)
     if trace is not None:
         largest = np.nanmax(np.abs(trace.z))
         if largest > 0:
@@ -77,9 +84,28 @@ def elements_at(
     for i in range(n):
         drawn += _element(ax, ROW * (n - i - 0.5), i, n, WALL - REST - float(shift[i]), trace, row)
     drawn += _slider(ax, n, trace, row)
-    ax.set(xlim=(-0.7, WALL + 3.6), ylim=(-0.15, ROW * n + 0.15), aspect="equal")
+    ends = _sides(trace)
+    ax.set(xlim=ends, ylim=(-0.15, ROW * n + 0.15), aspect="equal")
     ax.set_axis_off()
     return drawn
+
+
+def _sides(trace: Trace | None) -> tuple[float, float]:
+    """Return where the drawing ends: left of the ground, right of the slider's arrows."""
+    left, right = WALL - REST - SWING - CONTACT - 0.1, WALL + BODY + ARROW + 0.35
+    return left, right + (0.0 if trace is None else NUMBERS)
+
+
+def _caption(trace: Trace | None) -> str:
+    """Return what the signs of the drawing mean."""
+    said = r"$z_i$: from the contact to its place without deflection (dotted)."
+    if trace is None or trace.model.chart.transitions:
+        said += " Peg: the contact is held by the ground."
+    if trace is not None and trace.model.chart.transitions:
+        said += " Arrow at a contact: it slides that way."
+    if trace is None or "sigma" in trace.model.values:
+        said += r" $\sigma_{1,i}$: damping of element $i$; $\sigma_2$ is viscous friction."
+    return f"{said} $F$: friction on the slider, to the left if $F>0$."
 
 
 def elements_figure(trace: Trace | None, row: int, elements: int, title: str) -> Figure:
@@ -91,7 +117,12 @@ def elements_figure(trace: Trace | None, row: int, elements: int, title: str) ->
         n = elements if trace is None else trace.n
         rows = ROW * n + 0.3
         scale = min(INCHES, TALLEST / rows)  # no taller than a page, with type of the same size
-        figure.set_size_inches(10.3 * scale, 0.4 + scale * rows)
+        left, right = _sides(trace)
+        wide = (right - left) * scale
+        below = wrap(_caption(trace), int(LETTERS * wide))
+        look: dict[str, Any] = {"x": 0.01, "ha": "left", "fontsize": 8}
+        figure.supxlabel("\n".join(below), **look)
+        figure.set_size_inches(wide, 0.5 + 0.15 * len(below) + scale * rows)
         parts = [title] if title else []
         if trace is not None:
             parts += [trace.model.title, f"t = {trace.t[row]:.6g} s"]
@@ -118,10 +149,11 @@ def _element(
     drawn += ax.plot(*spring.T, gid=f"spring {i + 1}", **look)
     drawn += ax.plot(*damper.T, gid=f"damper {i + 1}", **look)
     names = _numbers(trace, i)
-    middle = (left + right) / 2
-    text: dict[str, Any] = {"ha": "center", "fontsize": 8, "color": INK}
-    drawn.append(ax.text(middle, top + 0.16, names[0], va="bottom", **text))
-    drawn.append(ax.text(middle, y - GROUND - 0.2, names[1], va="center", **text))
+    # Numbers stand next to the slider: z has the place below the contact.
+    place, side = ((left + right) / 2, "center") if trace is None else (right + 0.1, "right")
+    text: dict[str, Any] = {"ha": side, "fontsize": 8, "color": INK}
+    drawn.append(ax.text(place, top + 0.16, names[0], va="bottom", **text))
+    drawn.append(ax.text(place, y - GROUND - 0.2, names[1], va="center", **text))
     drawn += _contact(ax, y, i, contact, trace, row)
     drawn += _deflection(ax, y, i, contact, trace, row)
     return drawn
@@ -132,15 +164,16 @@ def _numbers(trace: Trace | None, i: int) -> tuple[str, str]:
     if trace is None:
         return STIFFNESS["k"].format(i + 1), DAMPING["sigma"].format(i + 1)
     values = trace.model.values
-    texts = []
+    texts: list[str] = []
     for symbols in (STIFFNESS, DAMPING):
         name = next((name for name in symbols if name in values), None)
         if name is None:
             texts.append("")
             continue
-        value = np.broadcast_to(values[name], trace.n)[i]
-        unit = trace.model.chart.unit(name)
-        texts.append(f"{symbols[name].format(i + 1)} = {in_words(float(value), unit, 4)}")
+        every = np.broadcast_to(values[name], trace.n)
+        scale = scale_of(every.tolist(), trace.model.chart.unit(name) or "")
+        text = dotted(trimmed(scale.text(float(every[i]))))
+        texts.append(f"{symbols[name].format(i + 1)} = {text}")
     return texts[0], texts[1]
 
 
@@ -162,15 +195,16 @@ def _contact(
     box = Rectangle((contact - CONTACT / 2, ground), CONTACT, GROUND + 0.22, **look)
     drawn.append(ax.add_patch(box))
     label = f"E{i + 1}" if trace is None else f"E{i + 1} {name}"
-    drawn.append(ax.text(low - 0.15, y, label, ha="right", va="center", fontsize=8.5, color=INK))
+    at = contact + CONTACT / 2, y + 0.3
+    drawn.append(ax.text(*at, label, ha="right", va="bottom", fontsize=8.5, color=INK))
     if held and not alone:  # a peg into the ground
         ends = [ground + 0.1, ground - 0.16]
         drawn += ax.plot([contact, contact], ends, "-", color=INK, linewidth=2.0, zorder=4)
     elif trace is not None and not held:
         way = 1.0 if trace.v[row] >= 0 else -1.0
-        drawn.append(
-            arrow_between(ax, (contact, y), (contact + 0.85 * way * CONTACT, y), size=11, lw=1.2)
-        )
+        start, height = contact + way * (CONTACT / 2 + 0.03), ground + 0.1  # beside the box
+        tip = start + 0.85 * way * CONTACT
+        drawn.append(arrow_between(ax, (start, height), (tip, height), size=9, lw=1.2))
     return drawn
 
 
@@ -189,8 +223,11 @@ def _deflection(
         label += f" = {_signed(shown[i], _decimals(shown))} {unit}"
     if abs(contact - rest) > 0.15:
         drawn.append(arrow_between(ax, (contact, height), (rest, height), size=7, lw=1.2))
-    look: dict[str, Any] = {"ha": "right", "va": "center", "fontsize": 8, "color": INK}
-    return [*drawn, ax.text(min(contact, rest) - 0.12, height, label, **look)]
+    # Where there is more room: behind the place without deflection.
+    side = 1.0 if contact < rest else -1.0
+    look: dict[str, Any] = {"va": "center", "fontsize": 8, "color": INK}
+    look["ha"] = "left" if side > 0 else "right"
+    return [*drawn, ax.text(rest + 0.12 * side, height, label, **look)]
 
 
 def _decimals(values: FloatArray) -> int:
@@ -207,23 +244,23 @@ def _signed(value: float, decimals: int) -> str:
 def _slider(ax: Axes, n: int, trace: Trace | None, row: int) -> list[Artist]:
     """Draw the slider with its velocity and the friction on it."""
     look: dict[str, Any] = {"facecolor": PANEL, "edgecolor": INK, "linewidth": 1.3}
-    body = Rectangle((WALL, 0.05), 0.9, ROW * n - 0.1, gid="slider", **look)
+    body = Rectangle((WALL, 0.05), BODY, ROW * n - 0.1, gid="slider", **look)
     drawn: list[Artist] = [ax.add_patch(body)]
     look = {"ha": "center", "va": "center", "fontsize": 9}
-    drawn.append(ax.text(WALL + 0.45, ROW * n / 2, "slider", rotation=90, **look))
+    drawn.append(ax.text(WALL + BODY / 2, ROW * n / 2, "slider", rotation=90, **look))
     v, F = (0.0, 0.0) if trace is None else (float(trace.v[row]), float(trace.F[row]))
     speed, push = "$v$", "$F$"
     if trace is not None:
         factor, unit = scaled(np.array([v]), "m/s")
         speed += f" = {_signed(factor * v, _decimals(np.array([factor * v])))} {unit}"
         push += f" = {_signed(F, _decimals(np.array([F])))} N"
-    edge = WALL + 0.9
+    edge = WALL + BODY
     # v to the right is positive; positive friction pulls the slider to the left.
     for height, text, forward in (
         (0.5 * ROW * n + 0.3, speed, v >= 0),
         (0.5 * ROW * n - 0.3, push, trace is not None and F < 0),
     ):
-        ends = ((edge + 0.1, height), (edge + 0.8, height))
+        ends = ((edge + 0.1, height), (edge + ARROW, height))
         drawn.append(arrow_between(ax, *(ends if forward else ends[::-1]), size=11, lw=1.2))
-        drawn.append(ax.text(edge + 0.9, height, text, ha="left", va="center", fontsize=9))
+        drawn.append(ax.text(edge + ARROW + 0.1, height, text, ha="left", va="center", fontsize=9))
     return drawn

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import textwrap
 
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import names_in, parse_value
 from gms_fsm.systems.system import System
-from plots.charts.labels import printable
 from plots.style import PANEL, PAPER, RC, TEXT_GREY
 from plots.style.matplotlib import Figure, rc_context
 from plots.systems.mechanical_layout import (
@@ -32,6 +32,7 @@ from plots.systems.mechanical_symbols import (
     UNIT,
     Pen,
     damper_points,
+    formula,
     spring_points,
     width,
 )
@@ -59,7 +60,7 @@ def mechanical_figure(system: System) -> Figure:
         foot = _sources(system)
         for k, line in enumerate(foot):
             pen.text(left, bottom - 0.45 - LINE * k, line, ha="left", colour=TEXT_GREY)
-        title = printable(system.name)
+        title = visible(system.name)
         pen.text(left, top + 0.5, title, size=10, bold=True, ha="left", gid="title")
         bottom -= 0.3 + LINE * len(foot) if foot else 0.0
         widest = max([width(title, 10, bold=True), *(width(line) for line in foot)])
@@ -312,14 +313,14 @@ def _sources(system: System) -> list[str]:
     """Return where signals, states and sampled values come from that stand in the picture."""
     given = [each.velocity for each in system.bodies if each.velocity is not None]
     given += [each.rest for each in system.springs]
-    used = {name for text in given for name in names_in(parse_value(str(text), system.names))}
+    used = {name for text in given for name in names_in(parse_value(str(text), system.readable))}
     used |= {name for body in system.bodies for name in names_in(force_of(system, body))}
     lines = []
     flows = {name: text for name, text in system.flow.items() if name in used}
     for text in flows.values():
-        used |= names_in(parse_value(text, system.names))
+        used |= names_in(parse_value(text, system.readable))
     for name, text in reversed([*system.let.items()]):  # earlier ones are used by later ones
-        used |= names_in(parse_value(text, system.names)) if name in used else set()
+        used |= names_in(parse_value(text, system.readable)) if name in used else set()
     for name, signal in system.signals.items():
         if name in used:
             lines += _folded(signal_text(name, signal))
@@ -329,7 +330,7 @@ def _sources(system: System) -> list[str]:
             every = (
                 f"{1e3 * sampled.period:g} ms" if sampled.period < 1 else f"{sampled.period:g} s"
             )
-            lines.append(f"{', '.join(own)}: from {sampled.name}, every {every}")
+            lines.append(f"{', '.join(map(formula, own))}: from {sampled.name}, every {every}")
     for name, text in flows.items():
         lines += _folded(f"d{name}/dt = {text}")
     for name, text in system.let.items():
@@ -341,5 +342,5 @@ def _folded(text: str) -> list[str]:
     """Return an equation as a formula, or a long one as lines of plain text."""
     if "=" in text and len(text) <= FOOT:
         return [written(text)]
-    lines = textwrap.wrap(printable(text), FOOT, subsequent_indent="    ")
+    lines = textwrap.wrap(visible(text), FOOT, subsequent_indent="    ")
     return [line.replace("$", r"\$") for line in lines]

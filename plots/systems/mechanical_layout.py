@@ -16,6 +16,8 @@ from dataclasses import dataclass, field, replace
 from itertools import permutations
 
 from gms_fsm.charts.registry import charts
+from gms_fsm.foundation.quantities import JOINED
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     MATLAB_LIKE,
     Negative,
@@ -27,7 +29,7 @@ from gms_fsm.language import (
     spell,
 )
 from gms_fsm.systems.system import Body, Contact, Spring, System
-from plots.charts.labels import printable, wrapped
+from plots.charts.labels import wrapped
 from plots.systems.mechanical_symbols import LINE, NAME, formula, width
 
 LONGEST = 30  # characters of a line of a force
@@ -152,7 +154,7 @@ class BodyColumn:
         """What stands in the box: the name, and the inertia as a formula."""
         inertia = self.body.inertia
         shown = "" if inertia is None else written(inertia)
-        return printable(self.body.name), shown if len(shown) <= 2 * LONGEST else ""
+        return visible(self.body.name), shown if len(shown) <= 2 * LONGEST else ""
 
     @property
     def motion(self) -> str:
@@ -255,7 +257,8 @@ def label_of(touch: Touch) -> list[str]:
     """Return the lines under the symbol of a contact."""
     contact = touch.contact
     count = f" × {contact.n}" if contact.n > 1 else ""
-    lines = _wrapped(f"{printable(contact.chart.name)}{count}")
+    name = visible(contact.chart.name).replace(" law", f"{JOINED}law")
+    lines = _wrapped(f"{name}{count.replace(' ', JOINED)}")
     if _of_many(touch):
         lines += [formula(v) for v in contact.v]
     for name in SHOWN.get(touch.symbol, ()):
@@ -276,12 +279,13 @@ def _number(touch: Touch, name: str) -> str:
 
 
 def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, NARROW, break_long_words=False)
+    lines = textwrap.wrap(text, NARROW, break_long_words=False)
+    return [line.replace(JOINED, " ") for line in lines]
 
 
 def force_of(system: System, body: Body) -> Value:
     """Return what the text of a body's force says; 0 for a driven one."""
-    return Number(0.0) if body.driven else parse_value(str(body.force), system.names)
+    return Number(0.0) if body.driven else parse_value(str(body.force), system.readable)
 
 
 def written(text: str | float) -> str:
@@ -294,7 +298,7 @@ def written(text: str | float) -> str:
 def _touch(system: System, contact: Contact) -> Touch:
     shares: dict[str, tuple[int, str]] = {}
     for text in contact.v:
-        tree = parse_value(text, system.names)
+        tree = parse_value(text, system.readable)
         for body in system.bodies:
             share = derivative(tree, body.v)
             if share is not None and share != Number(0.0):
@@ -373,7 +377,7 @@ def _sprung(system: System) -> Iterator[Item]:
 
 def _rest(system: System, spring: Spring) -> tuple[str, bool]:
     """Return where a spring is at rest, as a formula, and whether that is an end that moves."""
-    tree = parse_value(str(spring.rest), system.names)
+    tree = parse_value(str(spring.rest), system.readable)
     moves = spring.second is None and bool(names_in(tree) - {*system.numbers})
     return ("" if tree == Number(0.0) else written(spring.rest)), moves
 

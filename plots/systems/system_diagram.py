@@ -22,6 +22,7 @@ from typing import Any
 
 import graphviz
 
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     MATLAB_LIKE,
     Binary,
@@ -37,7 +38,7 @@ from gms_fsm.language import (
 from gms_fsm.systems.signals import Corners, Formula, Signal
 from gms_fsm.systems.springs import field_of, pull, summed
 from gms_fsm.systems.system import Body, Contact, Spring, System
-from plots.charts.labels import escape, printable, wrapped
+from plots.charts.labels import escape, wrapped
 from plots.output.drawings import DrawnGraph
 from plots.style import INK, MONO, PANEL, PAPER, SANS, TEXT_GREY
 from plots.systems.system_routes import Box, DiagramSheet, Join, routed
@@ -49,6 +50,7 @@ LOOKS = {
     "sampled": (1, "filled", PAPER, 1.1),
     "flow": (1, "filled", PAPER, 1.1),
     "let": (1, "filled", PAPER, 1.1),
+    "supervisor": (1, "rounded,filled", PAPER, 1.1),
     "body": (2, "filled", PANEL, 1.8),
     "spring": (3, "filled", PAPER, 1.8),
     "contact": (3, "rounded,filled", PANEL, 1.8),
@@ -105,7 +107,7 @@ class DiagramBlock:
 def system_diagram(system: System) -> DrawnGraph:
     """Draw a system."""
     blocks = list(_blocks(system))
-    graph = blank(graphviz.escape(printable(system.name)))
+    graph = blank(graphviz.escape(visible(system.name)))
     graph.text = "\n".join([system.name, *map(_in_words, blocks)])
     columns = sorted({LOOKS[block.kind][0] for block in blocks})
     boxes = [Box(block.id, *_size(block), columns.index(LOOKS[block.kind][0])) for block in blocks]
@@ -127,7 +129,7 @@ def _in_words(block: DiagramBlock) -> str:
 # --------------------------------------------------------------------------- what is drawn
 def _blocks(system: System) -> Iterator[DiagramBlock]:
     """Yield every part, from what drives to what is driven."""
-    names = system.names
+    names = system.readable
     for name, signal in system.signals.items():
         yield DiagramBlock("signal", name, "signal", (signal_text(name, signal),), ())
     for part in system.sampled:
@@ -150,23 +152,23 @@ def _blocks(system: System) -> Iterator[DiagramBlock]:
         yield _body(system, body)
     for index, spring in enumerate(system.springs):
         yield _spring(system, index, spring)
-    for contact in system.contacts:
+    for contact in system.machines:
         yield _contact(system, contact)
 
 
 def _body(system: System, body: Body) -> DiagramBlock:
     if body.velocity is not None:
-        tree = _tree(body.velocity, system.names)
+        tree = _tree(body.velocity, system.readable)
         texts = () if tree == Name(body.v) else (_equation(body.v, tree),)
         return DiagramBlock("body", body.name, "driven body", texts, _read(system, [tree]))
-    inertia, force = (_tree(each, system.names) for each in (body.inertia or 0.0, body.force))
+    inertia, force = (_tree(each, system.readable) for each in (body.inertia or 0.0, body.force))
     total = force
     for spring in system.springs:
         name = f"{spring.name}.F"
         if body.name == spring.first:
             total = _less(total, Number(-1.0), name)
         elif body.name == spring.second:
-            total = _less(total, _tree(spring.ratio, system.names), name)
+            total = _less(total, _tree(spring.ratio, system.readable), name)
     for v, name in _forces(system):
         total = _less(total, _share(system, v, body), name)
     rate = Name(f"d{body.v}/dt")
@@ -185,24 +187,25 @@ def _spring(system: System, index: int, spring: Spring) -> DiagramBlock:
 
 
 def _contact(system: System, contact: Contact) -> DiagramBlock:
-    chart, bound = contact.chart, {n: _tree(t, system.names) for n, t in contact.inputs.items()}
+    chart, bound = contact.chart, {n: _tree(t, system.readable) for n, t in contact.inputs.items()}
     for name in chart.inputs:  # one of the same name in the system is bound without being named
         if name not in (*bound, *chart.velocities, "t", "x", "s") and name in system.names:
             bound[name] = Name(name)
     several = len(chart.velocities) > 1
     texts = [
-        f"velocity{f' {own}' if several else ''}: {spell(_tree(v, system.names), MATLAB_LIKE)}"
+        f"velocity{f' {own}' if several else ''}: {spell(_tree(v, system.readable), MATLAB_LIKE)}"
         for own, v in zip(chart.velocities, contact.v, strict=True)
     ]
     texts += [_equation(name, tree) for name, tree in bound.items() if tree != Name(name)]
-    note = "contact" if contact.period is None else f"contact, every {_seconds(contact.period)}"
+    kind = "contact" if contact.v else "supervisor"
+    note = kind if contact.period is None else f"{kind}, every {_seconds(contact.period)}"
     if contact.model is None:
         title = f"{chart.name} × {contact.n}" if contact.n > 1 else chart.name
     else:
         title = contact.model.title
     mark = "" if contact.period is None else "hold"
     reads = _read(system, bound.values())
-    return DiagramBlock("contact", contact.name, note, (title, *texts), reads, mark)
+    return DiagramBlock(kind, contact.name, note, (title, *texts), reads, mark)
 
 
 def _forces(system: System) -> Iterator[tuple[str, str]]:
@@ -214,7 +217,7 @@ def _forces(system: System) -> Iterator[tuple[str, str]]:
 
 def _share(system: System, v: str, body: Body) -> Value:
     """Return the coefficient of a body's velocity in that of a contact."""
-    share = derivative(_tree(v, system.names), body.v)
+    share = derivative(_tree(v, system.readable), body.v)
     return Number(0.0) if share is None else share
 
 
@@ -255,6 +258,9 @@ def _owners(system: System) -> Mapping[str, str]:
     owners |= {name: f"flow-{name}" for name in system.flow}
     owners |= {name: f"let-{name}" for name in system.let}
     owners |= {name: f"sampled-{each.name}" for each in system.sampled for name in each.updates}
+    for each in system.machines:
+        block = f"{'contact' if each.v else 'supervisor'}-{each.name}"
+        owners |= {name: block for name in system.readable if f"{each.name}." in name}
     moved = {name: f"body-{body.name}" for body in system.bodies for name in (body.x, body.v)}
     # A body driven by a signal of the name of its velocity: the name is the signal's.
     return moved | owners
@@ -262,7 +268,7 @@ def _owners(system: System) -> Mapping[str, str]:
 
 def _read(system: System, trees: Iterable[Value]) -> tuple[str, ...]:
     found = frozenset[str]().union(*map(names_in, trees))
-    return tuple(name for name in system.names if name in found)
+    return tuple(name for name in system.readable if name in found)
 
 
 def _acting(system: System) -> Iterator[Join]:
@@ -330,7 +336,7 @@ def _draw_title(graph: graphviz.Digraph, system: System, sheet: DiagramSheet) ->
     key = "thick: motion one way, force back to the body; thin: values that are read"
     if system.sampled:
         key += "; dashed: at ticks only"
-    rows = [_text(printable(system.name), bold=True), _text(key, size=10, colour=TEXT_GREY)]
+    rows = [_text(visible(system.name), bold=True), _text(key, size=10, colour=TEXT_GREY)]
     wide = max(BOLD * len(system.name), NARROW * len(key))
     box = Box("title", wide, 40.0, 0)
     at = (sheet.left + 0.5 * wide, sheet.top + 42.0)

@@ -70,6 +70,18 @@ def test_what_was_held_out_is_scored() -> None:
     assert one.by_record == {"rig": one.rmse}
 
 
+def test_progress_is_told_for_each_split_of_all_data_sets() -> None:
+    told: list[tuple[str, float]] = []
+    twice = replace(SMALL, name="two", splits=lambda folder: small(folder) * 2)
+    both = replace(constant(1.0), on=("rig", "two"))
+    make(Path(), data=[SMALL, twice], methods=[constant(0.0), both],
+         progress=lambda *each: told.append(each))  # fmt: skip
+    assert told == [
+        ("rig: constant 0", 0.0), ("rig: constant 1", 0.25),
+        ("two: constant 1, 1 of 2", 0.5), ("two: constant 1, 2 of 2", 0.75),
+    ]  # fmt: skip
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "worst"), [("static curve", 0.7), ("Maxwell-slip, NNLS, 15", 0.05), ("GMS 1", 0.01)]

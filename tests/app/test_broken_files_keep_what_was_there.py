@@ -13,7 +13,7 @@ import pytest
 from gms_fsm import Trace
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.foundation.files import LIST
-from gms_fsm.records.units import convert_numbers
+from gms_fsm.foundation.quantities import convert_numbers
 from tests.scenario_files import (
     MEASURED,
     OPEN_LOOP,

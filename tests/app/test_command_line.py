@@ -118,7 +118,7 @@ def test_usage_errors_and_terminal_codes(broken: CommandLine) -> None:
             assert "Traceback" not in answer.err
     one_message(broken("run", "--", "--debug"), "there is no file or scenario '--debug'")
     answer = broken("run", "escape.toml")
-    one_message(answer, r"\x1b[31m[bold]\x07")
+    one_message(answer, r"\u001b[31m[bold]\u0007")
     assert "\x1b[31m" not in answer.message
 
 

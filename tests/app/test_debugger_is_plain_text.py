@@ -155,10 +155,23 @@ def _piped(script: str, **environment: str) -> subprocess.CompletedProcess[bytes
 
 
 @pytest.mark.slow
-def test_a_pipe_gets_plain_text_and_exit_code_0() -> None:
-    """Also where it cannot carry a character that was typed."""
+@pytest.mark.parametrize(
+    ("script", "code"),
+    [("next\nquit\n", 0), ("nxt\nquit\n", 1), ("goto 0,15\nnext\n", 1), ("# a remark\n\n", 0)],
+)
+def test_a_script_with_a_mistake_ends_with_exit_code_1(script: str, code: int) -> None:
+    """At the prompt a mistake is answered, and leaves no trace."""
+    made = Debugger(_bank(1), "", io.StringIO(script), io.StringIO())
+    assert made.run() == code
+    made = Debugger(_bank(1), "", io.StringIO(script), io.StringIO())
+    made.typed = True
+    assert made.run() == 0
+
+
+def test_a_pipe_gets_plain_text_and_an_exit_code() -> None:
+    """Also where it cannot carry a character that was typed; here a command that there is not."""
     done = _piped("goto 25\nwhy 1\nfrage nach ß und →\nq", PYTHONIOENCODING="ascii:surrogateescape")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 1, done.stderr
     assert done.stderr == b""
     text = done.stdout.replace(b"\r\n", b"\n")
     assert text.startswith(talk(FIG_4, "goto 25", "why 1").rpartition("(t=")[0].encode("ascii"))

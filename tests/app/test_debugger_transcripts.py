@@ -30,7 +30,8 @@ def talk(scenario: str, *commands: str, overrides: tuple[str, ...] = ()) -> str:
     loaded = load_scenario(SCENARIOS / f"{scenario}.toml", overrides)
     out = io.StringIO()
     script = io.StringIO("".join(f"{command}\n" for command in commands))
-    assert run_debugger(loaded, script, out) == 0
+    code = run_debugger(loaded, script, out)
+    assert code == ("\nerror: " in out.getvalue())
     return out.getvalue()
 
 

@@ -112,7 +112,7 @@ def test_each_frame_shows_the_time_of_the_clock(engine: str, pace: float, clock:
     for record in trace.transitions[-5:]:
         assert f"t = {record.t:.9g} s  element {record.element + 1}: " in last
     assert f"last transitions ({len(trace.transitions)} so far)" in last
-    assert f"{pace:g} simulated seconds per second" in last
+    assert f"simulated seconds per second: {pace:g}" in last
     assert re.search(r"\nv [▁▂▃▄▅▆▇█]+ -?[\d.]+ to -?[\d.]+ mm/s", last)
     assert re.search(r"\nF [▁▂▃▄▅▆▇█]+ -?[\d.]+ to -?[\d.]+ N", last)
 

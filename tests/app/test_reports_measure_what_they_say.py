@@ -116,6 +116,19 @@ def test_the_element_table_equals_the_log(case: str, tmp_path: Path) -> None:
     assert f"{len(trace)} rows, {len(log)} transitions" in text
 
 
+def test_the_range_of_the_force_is_over_what_lasts() -> None:
+    """The guide is stuck between two micro-steps with 7 kN; else it has less than 100 N."""
+    table = load_scenario("ball_screw_table", ["run.t_end=1.7"])
+    trace = table.simulate()
+    guide = trace.contact("guide")
+    assert np.abs(guide.F).max() > 7e3
+    ends = [k for k in range(1, len(trace)) if trace.t[k] > trace.t[k - 1]]
+    lasting = guide.F[sorted({*ends, *(k - 1 for k in ends)})]
+    said = f"F from {lasting.min():.4g} to {lasting.max():.4g}\n"
+    assert np.abs(lasting).max() < 100
+    assert said in summary_text(table, trace, trace.trust())
+
+
 # --------------------------------------------------------------------------- R² and RMSE
 MODEL = GMS(
     GMSParameters.from_shares(

@@ -74,8 +74,8 @@ def test_a_text_is_shown_as_it_is_in_a_heading_and_an_item_too(text: str) -> Non
     assert _shown(f"- {plain(line)}") == (line, {"ul", "li"})
 
 
-def test_control_codes_and_bidirectional_marks_are_removed() -> None:
-    assert plain("a\x1b[31mb\u202ec\x00d") == r"a \[31mb c d"
+def test_control_codes_and_bidirectional_marks_are_escapes() -> None:
+    assert plain("a\x1b[31mb\u202ec\x00d") == r"a\\u001b\[31mb\\u202ec\\u0000d"
 
 
 def test_a_summary_shows_title_and_notes(tmp_path: Path) -> None:

@@ -44,12 +44,15 @@ def test_chart_draws_the_chart_of_a_contact(verb: CommandLine) -> None:
 @pytest.mark.slow
 def test_check_proves_the_chart_of_every_contact_once(verb: CommandLine) -> None:
     pytest.importorskip("z3", reason="needs z3 (extra: check)")
-    alone, both = verb("check", "own.toml"), verb("check", "pair.toml")
-    assert (alone.code, both.code) == (0, 0)
-    assert both.out.startswith(f"contact pad1, pad2:\n{alone.out}\ncontact gear:\nBacklash")
+    both, one = verb("check", "pair.toml"), verb("check", "pair.toml", "--contact", "pad2")
+    assert (both.code, one.code) == (0, 0)
+    pads = one.out.removeprefix("contact pad2:\n")
+    assert both.out.startswith(f"contact pad1, pad2:\n{pads}\ncontact gear:\nBacklash")
     assert both.out.count("0 refuted") == 2
-    one = verb("check", "pair.toml", "--contact", "pad2")
-    assert one.out == f"contact pad2:\n{alone.out}"
+    assert (
+        "undecided  the chart: switches of other contacts at the same instant are not followed"
+        in pads
+    )
 
 
 def test_check_refutes_a_chart_file_by_a_counterexample(verb: CommandLine) -> None:

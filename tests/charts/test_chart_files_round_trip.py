@@ -53,6 +53,15 @@ def test_a_layout_is_kept_by_files_of_charts_and_of_runs(tmp_path: Path) -> None
     assert chart.placed({}).layout == {}
 
 
+def test_values_at_the_start_are_kept_by_files_of_charts_and_of_runs(tmp_path: Path) -> None:
+    chart = Chart("one", ("v",), ("z",), (), (State("a"),), (), {"F": "z"}, initial={"z": 0.5})
+    path = chart.save(tmp_path / "one.toml")
+    assert tomllib.loads(path.read_text(encoding="utf-8"))["initial"] == {"z": 0.5}
+    assert Chart.load(path) == chart
+    trace = simulate(ChartModel(chart, {}), Prescribed("0.1"), 0.1).save(tmp_path / "run.npz")
+    assert Trace.load(trace).model.chart == chart
+
+
 CURVE = Stribeck(1.0, 1.5, 0.05)
 CHART = Chart("one", states=(State("a"),), outputs={"F": "v"})
 

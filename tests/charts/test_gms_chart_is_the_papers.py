@@ -10,7 +10,7 @@ import math
 
 import pytest
 
-from gms_fsm import GMS, ElementMachines, GMSParameters, Prescribed, Stribeck
+from gms_fsm import GMS, ElementMachines, GMSParameters, ParameterError, Prescribed, Stribeck
 from gms_fsm.charts import GMS_ELEMENT, LAWS, SLIP_LAWS, gms_element
 from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.language import evaluate, names_in
@@ -136,9 +136,9 @@ def test_laws_agree_forward_and_differ_backward() -> None:
 
 
 def test_there_is_no_default_law() -> None:
-    with pytest.raises(TypeError, match="law"):
+    with pytest.raises(ParameterError, match="law is missing; give law='signed' or 'published'"):
         gms_element()  # type: ignore[call-arg]
-    with pytest.raises(TypeError, match="law"):
+    with pytest.raises(ParameterError, match="law is missing; give law='signed' or 'published'"):
         GMS(GMSParameters.paper("stick-slip"))  # type: ignore[call-arg]
-    with pytest.raises(TypeError):
+    with pytest.raises(ParameterError, match="give at most 1, the others by name: law="):
         GMS(GMSParameters.paper("stick-slip"), "signed")  # type: ignore[misc]

@@ -70,9 +70,14 @@ def test_every_picture_that_is_kept_is_shown() -> None:
 # --------------------------------------------------------------------------- terminals
 SHOWN = {
     "debugger_why": ["24.9999735 s", "-0.7762 m", "false by 0.776 m", "◉ ACTIVE", "2 [z <= -s"],
-    "debugger_small": ["FIRED", "element 1 is in slip at t = 4.91276067 s", "states over time"],
+    "debugger_small": ["FIRED", "element 1 is in stick at t = 87.4999735 s", "arrest fired"],
     "debugger_branches": ["≠≠≠", "branch 1", "first different transition at t =", "FIRED"],
-    "debugger_brake": ["pad 1: friction under a varying load", "locked: v = 0", "face: one-sided"],
+    "debugger_brake": [
+        "pad 1: friction under a varying load",
+        "locked: v = 0",
+        "-7.362 N",
+        "x = -68.63 mm",
+    ],
     "live": [
         "t = 0.29000 s",
         "last transitions (",

@@ -58,4 +58,5 @@ def rebuilt(file: Any, machine: Any) -> Chart:
         outputs=file.OUTPUTS,
         state_outputs=file.STATE_OUTPUTS,
         contact_outputs=file.CONTACT_OUTPUTS,
+        initial=file.INITIAL,
     )

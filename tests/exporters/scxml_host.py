@@ -75,7 +75,7 @@ def run(
         name: float(value if not hasattr(value, "__len__") else value[element])
         for name, value in model.values.items()
     }
-    variables = dict.fromkeys(chart.variables, 0.0)
+    variables = {name: chart.initial.get(name, 0.0) for name in chart.variables}
     state, t, x, count, found = chart.default_state.name, 0.0, 0.0, 0, list[Switch]()
     while True:
         outside = {"t": t, "x": x, "v": velocity(t)}

@@ -15,12 +15,14 @@ import pytest
 from hypothesis import given, settings
 from transitions import Machine
 from transitions import State as MachineState
-from transitions.extensions import HierarchicalMachine
+from transitions.extensions import HierarchicalMachine, LockedMachine
 from transitions.extensions.asyncio import AsyncMachine
-from transitions.extensions.states import Timeout, Volatile, add_state_features
+from transitions.extensions.markup import MarkupMachine
+from transitions.extensions.states import Error, Timeout, Volatile, add_state_features
 
-from gms_fsm import Chart, State, Transition, export
+from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, export, simulate
 from gms_fsm.charts import CHARTS
+from gms_fsm.charts.files.from_scxml import _read_back
 from gms_fsm.errors import ChartError, ExpressionError, ParameterError
 from tests.exporters.charts_to_export import MODELS, imported, model, rebuilt
 from tests.strategies import charts
@@ -80,6 +82,7 @@ def test_any_machine_also_with_locks(chart: Chart) -> None:
         exit={state.name: state.exit for state in chart.states},
         state_outputs={state.name: state.outputs for state in chart.states},
         locked=[state.name for state in chart.states if state.locked],
+        initial=chart.initial,
         impulses=[edge.name for edge in chart.transitions if edge.impulse],
         guards={edge.name: edge.guard for edge in chart.transitions},
         actions={edge.name: edge.actions for edge in chart.transitions},
@@ -145,6 +148,8 @@ def test_texts_beside_go_before_those_of_the_document(tmp_path: Path) -> None:
     assert chart.guard_text("sticks") == "!(v >= 1 || z > 9)"
     assert not chart.transitions[0].actions
     assert chart.states[1].entry == {"z": "2"}
+    given = '<data id="z" expr="Math.random()"/>'
+    assert read(tmp_path, '<data id="z" expr="0"/>', given, initial={"z": 2.0}).initial == {"z": 2}
 
 
 def test_one_event_for_one_edge_that_leaves_several_states(tmp_path: Path) -> None:
@@ -155,6 +160,115 @@ def test_one_event_for_one_edge_that_leaves_several_states(tmp_path: Path) -> No
     assert {edge.name: edge.sources for edge in chart.transitions}["slips"] == ("stick", "slip")
 
 
+ORDINARY = """\
+<scxml xmlns="http://www.w3.org/2005/07/scxml" initial="lamp.red" datamodel="ecmascript">
+  <datamodel>
+    <data id="count" expr="3"/><data id="limit" expr="2 * count"/><data id="share">0.5</data>
+  </datamodel>
+  <state id="lamp.red">
+    <onentry><log label="red" expr="count"/></onentry>
+    <transition event="timer.fast timer.slow" target="lamp-green"/>
+    <transition event="tick" cond="count &lt; limit &amp;&amp; v &gt; share">
+      <assign location="count" expr="count + 1"/>
+    </transition>
+  </state>
+  <state id="lamp-green"><transition event="off.*" target="end"/></state>
+  <final id="end"/>
+</scxml>
+"""
+
+
+def test_an_ordinary_document(tmp_path: Path) -> None:
+    """Several events, dotted names, data, a final state, a log, a transition without target."""
+    (tmp_path / "own.scxml").write_text(ORDINARY, encoding="utf-8")
+    guards = {"timer__fast": "v > 4", "timer__slow": "v > 3", "off": "v < 0"}
+    with pytest.warns(UserWarning, match="<log> is left out.*: state 'lamp.red', onentry"):
+        chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"}, guards=guards)
+    assert chart == Chart(
+        "imported chart",
+        variables=("count",),
+        states=(State("lamp__red"), State("lamp_green"), State("end")),
+        transitions=(
+            Transition("timer__fast", "lamp__red", "lamp_green", "v > 4"),
+            Transition("timer__slow", "lamp__red", "lamp_green", "v > 3"),
+            Transition(
+                "tick",
+                "lamp__red",
+                "lamp__red",
+                "count < limit and v > share",
+                {"count": "count + 1"},
+            ),
+            Transition("off", "lamp_green", "end", "v < 0"),
+        ),
+        outputs={"F": "0"},
+        let={"limit": "6.0", "share": "0.5"},
+        initial={"count": 3.0},
+    )
+
+
+def test_a_state_that_is_done_is_left_from_its_final_state(tmp_path: Path) -> None:
+    text = """<scxml xmlns="http://www.w3.org/2005/07/scxml"><state id="work">
+      <state id="work.busy"><transition cond="v &gt; 1" target="work.idle"/></state>
+      <final id="work.idle"/>
+      <transition event="done.state.work" target="rest"/></state><state id="rest"/></scxml>"""
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
+    edges = {(edge.source, edge.target, edge.guard) for edge in chart.transitions}
+    assert edges == {("work__busy", "work__idle", "v > 1"), ("work__idle", "rest", "True")}
+
+
+def test_an_event_that_a_state_sends_itself_later_is_the_time_in_it(tmp_path: Path) -> None:
+    def state(name: str, delay: str, target: str, more: str = "") -> str:
+        sent = f'<onentry><send event="timeout" delay="{delay}"/></onentry>'
+        edge = f'<transition event="timeout" target="{target}"/>'
+        return f'<state id="{name}">{sent}{edge}{more}</state>'
+
+    stopped = '<onexit><cancel sendid="timeout"/></onexit><transition cond="v>9" target="green"/>'
+    states = state("green", "30s", "yellow") + state("yellow", "500ms", "red")
+    states += state("red", "1.5s", "green", stopped)
+    text = f'<scxml xmlns="http://www.w3.org/2005/07/scxml">{states}</scxml>'
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
+    edges = [(edge.source, edge.target, edge.guard) for edge in chart.transitions]
+    assert edges == [
+        ("green", "yellow", "after(30)"),
+        ("yellow", "red", "after(0.5)"),
+        ("red", "green", "after(1.5)"),
+        ("red", "green", "v>9"),
+    ]
+
+
+def test_what_outer_states_assign_at_the_start_are_initial_values(tmp_path: Path) -> None:
+    outer = '<onentry><assign location="n" expr="n + 1"/></onentry>'
+    inner = '<onentry><assign location="n" expr="2 * n"/></onentry>'
+    text = f"""<scxml xmlns="http://www.w3.org/2005/07/scxml">
+      <datamodel><data id="n" expr="3"/></datamodel>
+      <state id="a">{outer}<state id="b">{inner}</state></state></scxml>"""
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
+    assert simulate(ChartModel(chart, {}), Prescribed("0"), 0.1).F[0] == 8
+    (tmp_path / "own.scxml").write_text(text.replace("n + 1", "v"), encoding="utf-8")
+    with pytest.raises(ChartError, match="at the start its entry assigns 'v' to 'n', which is no"):
+        Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
+
+
+def test_words_of_ecmascript() -> None:
+    assert _read_back("v > 1 || Math.PI === v && n !== 2") == "v > 1 or pi == v and n != 2"
+
+
+def test_one_event_is_two_edges_where_one_would_change_the_priority(tmp_path: Path) -> None:
+    go = '<transition event="go" cond="v > 1" target="c"/>'
+    turn = '<transition event="turn" cond="v > 2" target="d"/>'
+    rest = '<state id="c"/><state id="d"/>'
+    text = f'<state id="a">{go}{turn}</state><state id="b">{turn}{go}</state>{rest}'
+    text = f'<scxml xmlns="http://www.w3.org/2005/07/scxml">{text}</scxml>'
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
+    first = {state: chart.leaving(state)[0][1].target for state in ("a", "b")}
+    assert first == {"a": "c", "b": "d"}
+    assert {edge.name for edge in chart.transitions} == {"turn", "a_c", "b_c"}
+
+
 STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/>'
 
 
@@ -162,32 +276,78 @@ STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/
     ("old", "new", "said"),
     [
         (FOREIGN, "<scxml", "it is not XML"),
+        (FOREIGN, '<scxml xmlns="http://www.w3.org/2005/07/scxml"/>', "it has no <state>"),
         (FOREIGN, "<html/>", "its root is <html>, not <scxml"),
         ("<scxml ", '<!DOCTYPE x [<!ENTITY a "b">]><scxml ', "a document type definition"),
         (STATE, f"<parallel></parallel>{STATE}", "<parallel> has no counterpart in a chart"),
         (STATE, f"<script></script>{STATE}", "<script> has no counterpart in a chart"),
         *(
             (STATE, f"{STATE}<{each}/>", f"state 'stick': <{each}> has no counterpart")
-            for each in ("state", "history", "invoke", "initial")
+            for each in ("parallel", "history", "invoke")
         ),
         (STATE, "<state/>" + STATE, "a <state> has no id"),
         ('initial="stick"', 'initial="stuck"', "there is no initial state 'stuck'"),
+        ('initial="stick"', 'initial="stick slip"', "its initial states are 'stick slip'"),
+        (
+            'initial="stick">',
+            'initial="stick" binding="late"><state id="q"><datamodel><data id="i"/>'
+            "</datamodel></state>",
+            "binding='late' has no counterpart",
+        ),
+        (STATE, '<final id="stick"/>' + STATE, "its state 'stick' is there twice"),
+        (
+            STATE,
+            f'<state id="a"><initial><transition target="b"><log/></transition></initial>'
+            f'<state id="b"/></state>{STATE}',
+            "<initial>: <log> has no counterpart",
+        ),
+        (
+            STATE,
+            "".join(f'<state id="{c}">' for c in "abcdefghi") + "</state>" * 9 + STATE,
+            "it has states on more than 8 levels",
+        ),
+        (STATE, '<final id="e"><donedata/></final>' + STATE, "state 'e': <donedata> has no"),
         ('<data id="z" expr="0"/>', '<data id="z" src="z.json"/>', "<data src=...> has no"),
-        ('target="slip"/>', "/>", "transition 3: a transition without target, or internal"),
-        ('target="slip"/>', 'target="slip" type="internal"/>', "without target, or internal"),
+        ('<data id="z" expr="0"/>', '<data id="q"/>', "<data id='q'>: it has no expr"),
+        ('<data id="z" expr="0"/>', '<data id="q">[1, 2]</data>', "<data id='q'>, column 1"),
+        ('<data id="z" expr="0"/>', '<data id="z" expr="2 * v"/>', "begins as '2 * v', which is"),
+        ('<data id="z" expr="0"/>', '<data id="z" expr="1 / 0"/>', "initial, 'z' is nan; it must"),
         ('target="slip"/>', 'target="slip stick"/>', "its targets are 'slip stick'"),
-        ('target="slip"/>', 'target="nowhere"/>', "target 'nowhere' is not a state"),
+        ('target="slip"/>', 'target="nowhere"/>', "there is no target 'nowhere'"),
+        (
+            "</onentry>",
+            '</onentry><transition cond="v &gt; 1"/>',
+            "state 'slip', transition 1: it leaves nothing, but a chart performs exit and entry",
+        ),
+        (
+            '<transition target="slip"/>',
+            '<transition target="slip" cond="after(3)"/><transition cond="z &gt; 1"/>',
+            "transition 4: it leaves nothing, and the chart reads",
+        ),
         ('event="slips"', 'event="*"', "its event is '*'"),
-        ('event="slips"', 'event="error.x"', "its event is 'error.x'"),
+        ('event="slips"', 'event="done.state.slip"', "its event is 'done.state.slip', and it has"),
+        (
+            STATE,
+            f'{STATE}<onentry><send event="q" delay="1s"/></onentry><transition event="q"'
+            ' target="slip"/>',
+            "state 'stick', onentry: <send> has no",
+        ),
+        (
+            STATE,
+            f'{STATE}<onentry><send event="q" delay="1s"/></onentry><onexit><cancel '
+            'sendid="q"/></onexit><transition event="q" target="slip" cond="z &gt; 1"/>',
+            "state 'stick', onentry: <send> has no",
+        ),
         ('cond="!(v &gt;= 1 || z &gt; 9)"', "", "transition sticks: no guard is given for it"),
         (ASSIGN, '<send event="x"/>', "<send> has no"),
         (ASSIGN, "<if cond='1'/>", "<if> has no"),
+        (ASSIGN, '<run xmlns="urn:mine"/>', "<{urn:mine}run> has no counterpart"),
         ('expr="-Math.abs(z)"', "", "<assign location='z'> has no expr"),
         ("</transition>", '<assign location="z" expr="0"/></transition>', "'z'> is there twice"),
         ('location="z" expr="-', 'location="q" expr="-', "'q' is not a variable"),
         *(
             ("z &lt; -1", cond, "edge 'stick_slip', guard")
-            for cond in ("In('slip')", "z == 1", "z != 1", "Math.cbrt(z) &gt; 1", "_event.data.z")
+            for cond in ("In('slip')", "Math.cbrt(z) &gt; 1", "_event.data.z", "v &gt; 'a'")
         ),
     ],
 )
@@ -238,6 +398,8 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         Chart.from_scxml(tmp_path / "none.scxml")
     with pytest.raises(ParameterError, match="path is 5"):
         Chart.from_scxml(5)  # type: ignore[arg-type]
+    with pytest.raises(ChartError, match="callbacks: a document calls no functions"):
+        Chart.from_scxml(tmp_path / "none.scxml", callbacks={"look": {}})
     with pytest.raises(ChartError, match="there is no argument 'flow'"):
         Chart.from_scxml(tmp_path / "none.scxml", flow={})  # type: ignore[call-arg]
 
@@ -279,8 +441,152 @@ def test_a_text_stands_for_a_condition() -> None:
     machine = row(conditions="is_fast")
     chart = Chart.from_transitions(machine, outputs={"F": "v"}, guards={"slips": "v > 1"})
     assert chart.guard_text("slips") == "v > 1"
-    with pytest.raises(ChartError, match=r"trigger 'slips': no guard is given for it; give one"):
+    with pytest.raises(ChartError, match=r"'slips': no guard is given for it, nor .*'is_fast'"):
         Chart.from_transitions(machine, outputs={"F": "v"})
+    with pytest.raises(ChartError, match=r"trigger 'slips': no guard is given for it; give one"):
+        Chart.from_transitions(row(), outputs={"F": "v"})
+
+
+def test_one_trigger_with_several_edges_whose_conditions_decide_in_order() -> None:
+    machine = Machine(states=["a", "b", "c"], initial="a", auto_transitions=False)
+    machine.add_transition("go", "a", "b", conditions=["is_hot", "is_big"], unless="is_still")
+    machine.add_transition("go", "a", "c", after="count")
+    machine.add_transition("go", ["b", "c"], "=", before="count")
+    callbacks: Any = {"is_hot": "T > 80", "is_big": "n > 3 or n < -3", "is_still": "v < 1"}
+    chart = Chart.from_transitions(
+        machine,
+        inputs=("v", "T"),
+        variables=("n",),
+        outputs={"F": "0"},
+        guards={"go": "v > 2", "c_c": "v > 3"},
+        callbacks={**callbacks, "count": {"n": "n + 1"}},
+    )
+    hot = "v > 2 and (T > 80 and (n > 3 or n < -3) and not (v < 1))"
+    assert chart.transitions == (
+        Transition("a_b", "a", "b", hot),
+        Transition("a_c", "a", "c", "v > 2", {"n": "n + 1"}),
+        Transition("b_b", "b", "b", "v > 2", {"n": "n + 1"}),
+        Transition("c_c", "c", "c", "v > 3", {"n": "n + 1"}),
+    )
+
+
+@pytest.mark.parametrize("kind", [Machine, LockedMachine, MarkupMachine, HierarchicalMachine])
+def test_ordered_transitions_of_any_class_of_machines(kind: Any) -> None:
+    machine = kind(states=["green", "yellow", "red"], initial="green", queued=True)
+    machine.add_ordered_transitions()
+    chart = Chart.from_transitions(machine, outputs={"F": "0"}, guards={"next_state": "after(3)"})
+    edges = [(edge.source, edge.target, edge.guard) for edge in chart.transitions]
+    assert edges == [(*ends, "after(3)") for ends in
+                     (("green", "yellow"), ("yellow", "red"), ("red", "green"))]  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "way"), [("before", "on_exit"), ("after", "on_enter")])
+def test_actions_around_those_of_the_states_are_refused(place: str, way: str) -> None:
+    states = [MachineState("a", **{way: "move"}), MachineState("b", **{way: "move"})]
+    edge = {"trigger": "go", "source": "a", "dest": "b", place: "count"}
+    machine = Machine(states=states, initial="a", transitions=[edge])
+    texts: Any = {"variables": ("m", "n"), "outputs": {"F": "0"}, "guards": {"go": "v > 1"}}
+    texts["callbacks"] = {"move": {"m": "1"}, "count": {"n": "n + 1"}}
+    with pytest.raises(ChartError, match=f"what it assigns {place} the states change cannot be"):
+        Chart.from_transitions(machine, **texts)
+    texts["callbacks"] |= {"move": {}}
+    assert Chart.from_transitions(machine, **texts).transitions[0].actions == {"n": "n + 1"}
+
+
+def test_conditions_that_differ_are_not_one_guard() -> None:
+    machine = Machine(states=["a", "b"], initial="a", auto_transitions=False)
+    machine.add_transition("go", "a", "b", conditions="is_hot")
+    machine.add_transition("go", "b", "b", conditions="is_big")
+    with pytest.raises(ChartError, match=r"condition 'is_hot'; .*and for 'b_b'"):
+        Chart.from_transitions(machine, outputs={"F": "0"}, guards={"go": "v > 1"})
+
+
+def test_the_time_in_a_state_with_states_inside_is_refused() -> None:
+    slip = {"name": "slip", "children": ["b", "c"], "initial": "b"}
+    edges = [["slips", "stick", "slip"], ["sticks", "slip", "stick"]]
+    machine = HierarchicalMachine(states=["stick", slip], initial="stick", transitions=edges)
+    texts: Any = {"outputs": {"F": "0"}, "guards": {"slips": "after(1)", "sticks": "v < 1"}}
+    assert "age" in Chart.from_transitions(machine, **texts).variables
+    texts["guards"] |= {"sticks": "after(2)"}
+    with pytest.raises(ChartError, match="'sticks': its guard reads the time in 'slip', which has"):
+        Chart.from_transitions(machine, **texts)
+
+
+def test_a_timeout_that_triggers_an_edge_is_the_time_in_its_state() -> None:
+    states = ["off", {"name": "on", "timeout": 2.5, "on_timeout": "expire"}]
+    machine = Timed(states=states, initial="off", auto_transitions=False)
+    machine.add_transition("start", "off", "on")
+    machine.add_transition("expire", "on", "off")
+    chart = Chart.from_transitions(machine, outputs={"F": "0"}, guards={"start": "v > 1"})
+    edges = [(edge.name, edge.source, edge.guard) for edge in chart.transitions]
+    assert edges == [("start", "off", "v > 1"), ("expire", "on", "after(2.5)")]
+
+
+def test_callbacks_are_a_table_of_actions() -> None:
+    states = [MachineState("a", on_exit="leave"), MachineState("b", on_enter=["enter", print])]
+    machine = Machine(
+        states=states,
+        initial="a",
+        transitions=[["go", "a", "b"], {"trigger": "again", "source": "b", "dest": None,
+                                        "after": "count"}],
+        prepare_event="look",
+    )  # fmt: skip
+    callbacks: Any = {"leave": {"n": "0"}, "enter": {"m": "1"}, "print": {}, "look": {}}
+    texts: Any = {"variables": ("n", "m"), "outputs": {"F": "0"}}
+    texts["guards"] = {"go": "v > 1", "again": "v > 2"}
+    with pytest.raises(ChartError, match="'again': it leaves nothing, but a chart performs exit"):
+        Chart.from_transitions(machine, callbacks={**callbacks, "count": {"n": "n + 1"}}, **texts)
+    machine.states["b"].on_enter.clear()
+    left = {name: callbacks[name] for name in ("leave", "look")}
+    chart = Chart.from_transitions(machine, callbacks={**left, "count": {"n": "n + 1"}}, **texts)
+    assert chart.states[0].exit == {"n": "0"}
+    assert chart.transitions[1] == Transition("again", "b", "b", "v > 2", {"n": "n + 1"})
+    for wrong, said in (
+        ({**left, "count": "n > 1"}, "'again': its callback after 'count' has no text"),
+        ({**left, "count": {}, "cout": {}}, "callbacks: there is no function 'cout'; did you mean"),
+        ({**left, "count": {}, "look": {"n": "1"}}, "its callback prepare_event 'look' has no cou"),
+        (3, "callbacks is 3; it gives for each function what it says"),
+    ):
+        with pytest.raises(ChartError, match=said):
+            Chart.from_transitions(machine, callbacks=wrong, **texts)
+
+
+def test_a_variable_that_two_callbacks_assign_is_refused() -> None:
+    machine = state(on_enter=["one", "two"])
+    with pytest.raises(ChartError, match="'slip': 'n' is assigned twice in a row, '1' and '2'"):
+        Chart.from_transitions(machine, callbacks={"one": {"n": "1"}, "two": {"n": "2"}}, **TEXTS)
+
+
+def test_states_in_states_are_joined_by_two_underscores() -> None:
+    slip = {"name": "slip", "children": ["forward", "backward"], "initial": "forward",
+            "on_enter": "begin", "on_exit": "end"}  # fmt: skip
+    edges = [["slips", "stick", "slip"], ["turns", "slip_forward", "slip_backward"],
+             ["sticks", "slip", "stick"]]  # fmt: skip
+    machine = HierarchicalMachine(states=["stick", slip], initial="stick", transitions=edges)
+    chart = Chart.from_transitions(
+        machine,
+        variables=("n", "z"),
+        outputs={"F": "z"},
+        flows={"slip": {"z": "v", "n": "1"}, "slip__backward": {"z": "-v"}},
+        guards={"slips": "v > 1", "turns": "v < 0", "sticks": "n > 3"},
+        callbacks={"begin": {"n": "0"}, "end": {"z": "0"}},
+    )
+    inner = ("slip__forward", "slip__backward")
+    assert chart == Chart(
+        "imported chart",
+        variables=("n", "z"),
+        states=(
+            State("stick"),
+            State("slip__forward", flow={"z": "v", "n": "1"}),
+            State("slip__backward", flow={"z": "-v", "n": "1"}),
+        ),
+        transitions=(
+            Transition("turns", inner[0], inner[1], "v < 0"),
+            Transition("slips", "stick", inner[0], "v > 1", {"n": "0"}),
+            Transition("sticks", inner, "stick", "n > 3", {"z": "0"}),
+        ),
+        outputs={"F": "z"},
+    )
 
 
 @add_state_features(Timeout)
@@ -300,30 +606,39 @@ class Passing(Machine):  # type: ignore[misc]
     """A machine whose states make an object while they are active."""
 
 
+@add_state_features(Error)
+class Failing(Machine):  # type: ignore[misc]
+    """A machine with states that must not be reached."""
+
+
 TIMEOUT = {"name": "b", "timeout": 2, "on_timeout": "x"}
 OF_MACHINES = "before_state_change after_state_change prepare_event finalize_event on_exception"
 BEYOND: list[tuple[Any, str]] = [
     ("a machine", "machine is 'a machine'; it must be a transitions.Machine"),
-    (HierarchicalMachine(states=["a"], initial="a"), "a HierarchicalMachine has no counterpart"),
-    (AsyncMachine(states=["a"], initial="a"), "an? AsyncMachine has no counterpart"),
-    (small(queued=True), "queued=True has no counterpart"),
+    (HierarchicalMachine(states=[{"name": "a", "parallel": ["b", "c"]}], initial="a"),
+     r"state 'a': it starts in several states at once \(b, c\)"),
+    (AsyncMachine(states=["a"], initial="a"), "an AsyncMachine has no counterpart"),
     *((small(**{each: "look"}), f"its callback {each} 'look'")
       for each in (*OF_MACHINES.split(), "on_final")),
     (small(initial=None, model=None), "it has no initial state"),
     *((state(**{f"on_{each}": "look"}), f"state 'slip': its callback on_{each} 'look'")
       for each in ("enter", "exit")),
     (small(model=Watching()), "state 'slip': its callback on_enter 'on_enter_slip'"),
-    (state(final=True), "state 'slip': a final state"),
     (Timed(states=["a", TIMEOUT], initial="a"),
      r"state 'b': its timeout of 2 s has no counterpart.*after\(T\)"),
     (Passing(states=["a"], initial="a"), "state 'a'.*a volatile state has no counterpart"),
-    (row(unless="is_slow"), "trigger 'slips': unless has no counterpart"),
+    (Failing(states=["a"], initial="a", auto_transitions=False),
+     "state 'a'.*an error state has no counterpart"),
     *((row(**{each: "look"}), f"trigger 'slips': its callback {each} 'look'")
       for each in ("before", "after", "prepare")),
-    (row(dest=None), "its internal transition in 'stick'"),
-    (small(transitions=[["go", "stick", "slip"], ["go", "slip", "stick"]]),
-     r"trigger 'go': it stands for several edges \(stick -> slip, slip -> stick\)"),
-    (small(transitions=[["go", "stick", "slip"]] * 2), "'go': it stands for several edges"),
+    (small(transitions=[["slips", "stick", "slip"], ["sticks", "slip", "stick"],
+                        ["go", "slip", "stick"]]), "trigger 'go': no guard is given for it"),
+    (row(dest="nowhere"), "trigger 'slips': there is no target 'nowhere'"),
+    (row(source="nowhere"), "trigger 'slips': there is no source 'nowhere'"),
+    (HierarchicalMachine(states=["stick", {"name": "slip", "children": "b", "initial": "c"}],
+                         initial="stick", transitions=[["slips", "stick", "slip"],
+                                                       ["sticks", "stick", "stick"]]),
+     "state 'slip': its initial state 'slip__c' is not"),
 ]  # fmt: skip
 
 
@@ -350,6 +665,8 @@ def test_what_a_machine_has_beyond_a_chart_is_named(machine: Any, said: str) -> 
         ({"locked": ["stuck"]}, "locked: there is no state 'stuck'"),
         ({"parameters": "k"}, "parameters is 'k'; give a tuple"),
         ({"parameters": [{"unit": "N"}]}, "a parameter has no name"),
+        ({"variables": 5}, "variables is 5; give a tuple"),
+        ({"initial": 5}, "initial is 5; it gives a text for each name"),
         ({"parameters": [{"name": "k", "size": 1}]}, "a parameter has unknown fields size"),
         ({"outputs": {}}, "no output 'F'"),
     ],

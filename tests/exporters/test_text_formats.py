@@ -65,6 +65,18 @@ def test_a_friction_that_reads_everything(form: str) -> None:
         assert "## What it does not do" in readme
 
 
+@pytest.mark.parametrize("form", ["c99", "js", "matlab", "modelica", "scxml", "st", "transitions"])
+def test_a_variable_starts_where_its_chart_says(form: str, tmp_path: Path) -> None:
+    for start in (0.3125, 0.4375):
+        states = (State("first", {"z": "v"}),)
+        chart = Chart("one", ("v",), ("z",), (), states, (), {"F": "z"}, initial={"z": start})
+        text = "".join(
+            path.read_text(encoding="utf-8")
+            for path in export(ChartModel(chart, {}), form, tmp_path / str(start), name="own")
+        )
+        assert repr(start) in text
+
+
 def test_names_of_structured_text_give_way_to_each_other(tmp_path: Path) -> None:
     """They differ in more than capitals."""
     chart = Chart(

@@ -54,11 +54,11 @@ def edges_of(chart: Chart, where: Sequence[str]) -> list[Transition]:
 def passes(
     chart: Chart, cycle: Sequence[Transition], point: Mapping[str, float]
 ) -> Iterator[dict[str, float]]:
-    """Go around the cycle while the guards allow it; yield the values after each pass."""
+    """Go around the cycle while its edges are taken; yield the values after each pass."""
     here = dict(point)
     while True:
         for edge in cycle:
-            if not evaluate(chart.guards[edge.name], here):
+            if not taken(chart, edge.name, here):
                 return
             for name, tree in chart.assignments["action", edge.name].items():
                 here[name] = float(evaluate(tree, here))

@@ -21,7 +21,7 @@ from gms_fsm import (
 from gms_fsm.charts import CHARTS
 from gms_fsm.debugger import Debugger
 from gms_fsm.errors import SessionError
-from gms_fsm.session.explain import Clause, explain
+from gms_fsm.session.explain import Clause, clause_unit, explain
 from gms_fsm.session.session import Fired
 from tests.helpers import pulled_mass
 from tests.inspection.sessions import a_system, debugger, fig4, locked, pulled, pushed, warming
@@ -244,3 +244,15 @@ def test_an_interrupt_at_the_prompt_ends_nothing() -> None:
     out = io.StringIO()
     assert Debugger(fig4(), "", Script(), out).run() == 0
     assert "quit exits\n" in out.getvalue()
+
+
+def test_a_clause_about_forces_has_their_unit() -> None:
+    inputs = ("v", "N")
+    states = (State("on"), State("off"))
+    edges = (
+        Transition("lift", "on", "off", guard="N <= 0"),
+        Transition("let_go", "on", "off", guard="F > 2"),
+    )
+    chart = Chart("pad", inputs=inputs, states=states, transitions=edges, outputs={"F": "0.5 * N"})
+    for edge, text in (("lift", "N <= 0"), ("let_go", "F > 2")):
+        assert clause_unit(chart, chart.guards[edge], text) == "N"

@@ -110,8 +110,8 @@ def test_both_decide_the_same_wherever_they_are_asked(name: str) -> None:
     start = Problem.of(*(*what.subject, None)[:2], what.t_end, chosen, **how)
     program, draw = start.program, np.random.default_rng(zlib.crc32(name.encode()))
     engines = (engine_of(start, {}), IfElse(program))
-    charts = [each.chart for each in start.system.contacts for _ in range(each.n)]
-    edges = [*range(-1, sum(len(each.chart.transitions) for each in start.system.contacts))]
+    charts = [each.chart for each in start.system.machines for _ in range(each.n)]
+    edges = [*range(-1, sum(len(each.chart.transitions) for each in start.system.machines))]
     size = 1e-9 + np.abs(start.y)
     for k in range(60):
         y = (draw.normal(size=size.size) * size * 10.0 ** draw.integers(0, 9)).tolist()

@@ -8,12 +8,14 @@ message says what to install, and the machines run.
 
 from __future__ import annotations
 
+import gc
 import os
 import random
 import subprocess
 import sys
 import textwrap
 import types
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,7 @@ from gms_fsm import ChartModel, Prescribed, simulate
 from gms_fsm.foundation.store import CodeFolder
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.program import lower
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording import compiled_run
 from integrators import elementary, loop, step_size
 from integrators.machine_code.front_end import statements
@@ -118,10 +121,10 @@ def test_the_first_process_compiles_and_says_so_and_the_next_does_not(
 ) -> None:
     folder, said = warm
     assert NOTE in said, "the wait is explained"
-    before = {path: path.stat().st_mtime_ns for path in _kept(folder)}
+    before = {path: path.stat().st_ino for path in _kept(folder)}
     assert sorted(path.name.partition("-")[0] for path in before) == ["observe_rows", "record"]
     assert _ended(_start(RUN, GMS_FSM_CACHE=str(folder))) == ("equal 24\n", "")
-    assert {path: path.stat().st_mtime_ns for path in _kept(folder)} == before
+    assert {path: path.stat().st_ino for path in _kept(folder)} == before
     compiled.notify("compiling ...")  # here nobody waits
     assert capsys.readouterr() == ("", "")
 
@@ -445,3 +448,17 @@ def test_llvmlite_is_not_loaded_before_it_is_needed() -> None:
         print("llvmlite" in sys.modules)
     """
     assert _ended(_start(code))[0] == "False\n"
+
+
+# --------------------------------------------------------------------------- memory of calls
+@pytest.mark.parametrize("ending", [False, True])
+def test_memory_is_given_back_but_not_while_the_interpreter_ends(
+    ending: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = compiled_run.CompiledRun(Problem.of(stick_slip("signed"), OPEN_LOOP, 1.0), None)
+    prepared, words = run.columns.prepared, run.columns.block.address
+    prepared._spare.clear()
+    monkeypatch.setattr(weakref.finalize, "_shutdown", ending)
+    del run
+    gc.collect()
+    assert [each.address for each in prepared._spare] == [words] * (not ending)

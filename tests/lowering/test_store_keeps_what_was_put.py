@@ -1,11 +1,14 @@
 """A store returns exactly what was put into it, or nothing, even with several users at once.
 
+What has not been used for longest is removed where all files together would be too large.
+
 Every wrong bit is detected, in name, checksum and content. Damaged files are removed, so that they
 are recreated. The store does not interpret its contents.
 """
 
 from __future__ import annotations
 
+import os
 import random
 import threading
 from pathlib import Path
@@ -90,3 +93,38 @@ def test_concurrent_readers_see_only_complete_content(store: CodeFolder) -> None
         thread.join()
     assert wrong == []
     assert [path.name for path in store.folder.iterdir()] == ["one"]
+
+
+# --------------------------------------------------------------------------- its size
+def test_what_has_not_been_used_for_longest_makes_room(tmp_path: Path) -> None:
+    store = CodeFolder(tmp_path, most=1000)  # three files of 332 bytes
+    for age, name in enumerate(("old", "older", "oldest")):
+        store.put(name, CONTENT)
+        os.utime(tmp_path / name, (1000 - age, 1000 - age))
+    assert store.get("oldest") == CONTENT  # and is the one that was used last
+    store.put("new", CONTENT)
+    assert {path.name for path in tmp_path.iterdir()} == {"old", "oldest", "new"}
+    store.put("large", CONTENT * 4)  # alone too large: it stays until the next one
+    assert [path.name for path in tmp_path.iterdir()] == ["large"]
+
+
+@pytest.mark.slow
+def test_users_at_once_keep_the_size_and_read_whole_files(tmp_path: Path) -> None:
+    contents = {str(k): bytes([k]) * 10_000 for k in range(20)}
+    wrong: list[str] = []
+
+    def use(seed: int) -> None:
+        store = CodeFolder(tmp_path, most=100_000)
+        for name in random.Random(seed).choices(list(contents), k=200):
+            store.put(name, contents[name])
+            if store.get(name) not in (contents[name], None):
+                wrong.append(name)
+
+    threads = [threading.Thread(target=use, args=(seed,)) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    CodeFolder(tmp_path, most=100_000).put("0", contents["0"])
+    assert wrong == []
+    assert 0 < sum(path.stat().st_size for path in tmp_path.iterdir()) <= 100_000

@@ -17,6 +17,7 @@ import pytest
 pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
 
 from gms_fsm.app.paper.held import Lag
+from gms_fsm.identification.certainty.assess import Estimate
 from gms_fsm.identification.certainty.profile import LIMIT
 from plots import figures
 from plots.figures import fit_figure, profiles_figure
@@ -47,14 +48,14 @@ def test_curves_are_those_of_the_fit_with_units() -> None:
     (part,) = small().residuals()
     over_time, residual, loop, over_x, bars = lettered(fit_figure(small(), window=(2.0, 4.0)))
     assert [ax.get_xlabel() for ax in (over_time, loop)] == ["$t$ [s]", "$x$ [µm]"]
-    assert (over_time.get_ylabel(), over_x.get_ylabel()) == ("$F$ [N]", "measured − model [mN]")
+    assert (over_time.get_ylabel(), over_x.get_ylabel()) == ("$F$ [N]", "measured − model [N]")
     assert bars.get_xlabel() == "interval relative to the value [%]"
     inside = (part.t >= 2.0) & (part.t <= 4.0)
     assert np.array_equal(drawn(over_time, "measured").get_xdata(), part.t[inside])
     assert np.array_equal(drawn(over_time, "measured").get_ydata(), part.measured[inside])
     assert np.array_equal(drawn(over_time, "model").get_ydata(), part.modelled[inside])
     assert np.array_equal(drawn(loop, "model").get_ydata(), part.modelled)
-    difference = 1e3 * (part.measured - part.modelled)
+    difference = part.measured - part.modelled
     (line,) = (each for each in residual.lines if len(each.get_xdata()) == part.t.size)
     assert np.array_equal(line.get_ydata(), difference)
     forward, backward = over_x.lines[:2]
@@ -66,7 +67,7 @@ def test_curves_are_those_of_the_fit_with_units() -> None:
 def test_directions_differ_without_colour_and_held_out_rows_are_shaded() -> None:
     _, residual, _, over_x, _ = lettered(fit_figure(small()))
     means = [each for each in over_x.lines if "ward" in str(each.get_label())]
-    assert [each.get_label() for each in means] == ["forward (v > 0)", "backward (v < 0)"]
+    assert [each.get_label() for each in means] == ["forward ($v > 0$)", "backward ($v < 0$)"]
     assert means[0].get_linestyle() != means[1].get_linestyle()
     assert means[0].get_linewidth() != means[1].get_linewidth()
 
@@ -79,10 +80,40 @@ def test_directions_differ_without_colour_and_held_out_rows_are_shaded() -> None
     assert floor is not None
     assert held is not None
     flat = [each.get_ydata() for each in residual.lines if len(each.get_xdata()) == 2]
-    assert sorted(y[0] for y in flat) == pytest.approx([-1e3 * floor, 1e3 * floor])
+    assert sorted(y[0] for y in flat) == pytest.approx([-floor, floor])
     name = residual.get_title(loc="left")
-    sizes = [f"{1e3 * each['rmse']:.3g}" for each in (small().training, held)]
-    assert name == f"residual; RMSE {sizes[0]}, held out {sizes[1]} mN"
+    sizes = [f"{each['rmse']:#.3g} N" for each in (small().training, held)]
+    assert name == f"residual; RMSE {sizes[0]}, held out {sizes[1]}"
+
+
+def test_parameters_are_symbols_with_one_unit_for_each_quantity() -> None:
+    estimates = [
+        Estimate("k1", 20400.0, 20076.0, 20729.0, "N/m"),
+        Estimate("k12", 951.0, 940.0, 962.0, "N/m"),
+        Estimate("weights2", 2.9443e-5, 2.9e-5, 3.0e-5, "m/N"),
+        Estimate("sigma3", 0.3, 0.29, 0.31, "Ns/m"),
+        Estimate("offset", 0.0192, 0.0136, 0.0248, "N"),
+    ]
+    bars = lettered(
+        fit_figure(replace(small(), assessed=replace(small().assessed, table=tuple(estimates))))
+    )[4]
+    assert [label.get_text() for label in bars.get_yticklabels()] == [
+        "$k_{1}$",
+        r"$k_{\mathrm{12}}$",
+        "$w_{2}$",
+        r"$\sigma_{\mathrm{1,3}}$",
+        "offset",
+    ]
+    (values,) = bars.child_axes
+    units = [label.get_text().split()[1] for label in values.get_yticklabels()]
+    assert units == ["kN/m", "kN/m", "µm/N", "mN·s/m", "N"]
+
+
+def test_times_that_are_not_compared_are_not_shown() -> None:
+    (part,) = small().residuals()
+    compared = part.t[part.rows | part.held]
+    for ax in lettered(fit_figure(small()))[:2]:
+        assert ax.get_xlim() == pytest.approx((compared[0], compared[-1]))
 
 
 def test_what_cannot_be_told_has_words_and_no_bar() -> None:

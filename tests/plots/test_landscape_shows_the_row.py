@@ -181,10 +181,28 @@ def test_compound_clauses_have_a_mark_only_and_captions_say_what_is_held() -> No
     assert all(text[0] in "✓✗" for text in compound)
     trace = modelica().run()
     row = int(np.flatnonzero(trace.states[:, 0] == "stuck")[2])
-    said = figures.landscape(trace, 0, row=row).texts[1].get_text()
-    assert said == (
-        f"Held as at the row: F = {trace.F[row]:.4g} N. Computed at every point: load, F_0."
-    ).replace("-", "−")
+    said = " ".join(text.get_text().strip() for text in figures.landscape(trace, 0, row=row).texts)
+    held = f"Held as at the row: F = {trace.F[row]:.4g} N. Computed at every point: load, F_0."
+    assert held.replace("-", "−") in said
+
+
+def test_no_look_of_a_line_has_two_meanings(run: Trace) -> None:
+    figure = figures.landscape(run, 2, row=row_of(run, "break_away_forward", 2) - 40)
+    legend = figure.axes[0].get_legend()
+    assert legend is not None
+    looks = {
+        text.get_text(): (line.get_color(), line.get_linestyle(), line.get_linewidth())
+        for line, text in zip(legend.get_lines(), legend.get_texts(), strict=True)
+    }
+    assert [*looks] == ["border", "path before", "after", "$±s(v)$"]
+    assert len({*looks.values()}) == 4
+
+
+def test_a_caption_stands_under_the_race_where_there_is_room(run: Trace) -> None:
+    figure = figures.landscape(run, 2, row=row_of(run, "break_away_forward", 2) - 40)
+    left, right = (ax.get_position() for ax in figure.axes)
+    caption = [text.get_position() for text in figure.texts if text.get_text() != ""][1:]
+    assert all(x > left.x1 and y < right.y0 for x, y in caption)
 
 
 def test_names_of_one_line_stand_side_by_side_and_those_without_a_place_are_left_out() -> None:

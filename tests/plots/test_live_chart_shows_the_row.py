@@ -162,12 +162,12 @@ def assert_drawn(chart: Chart, drawn: dict[str, Group], look: Any) -> None:
         for group in (guard, line):
             assert ("fired" in classes(group)) == fired
             assert ("leaving" in classes(group)) == leaving
-        colour = colours.fired if fired else colours.ink if leaving else colours.pale
+        colour = colours.fired if fired else colours.ink if leaving else colours.line
         lines = [shape for shape in line.iter() if shape.get("stroke-width")]
         assert {s.get("stroke") for s in lines} == {colour}
         assert {s.get("stroke-width") for s in lines} == {"2.6" if fired else "1.1"}
         shown = [t for t in guard.iter("text") if t.get("visibility") != "hidden"]
-        assert pale == ({t.get("fill") for t in shown} == {colours.pale})
+        assert pale == ({t.get("fill") for t in shown} == {colours.soft})
 
 
 @pytest.mark.slow

@@ -382,9 +382,14 @@ def test_the_dot_is_at_the_row_and_both_panels_have_one_colour_bar(once: Trace) 
             assert dot.get_xydata()[0] == pytest.approx([values[place], once.F[place]])
             if window is None:
                 assert set(ax.collections[0].get_array()) == {0, 1, 2}
-        assert f"t = {once.t[place]:.9g} s" in figure.get_suptitle()
+        assert f"t = {once.t[place]:.6g} s" in figure.get_suptitle()
         assert len(figure.axes) == 3
         assert figure.axes[2].get_ylabel() == "elements in slip"
+    first = once.transitions[0]
+    row = int(np.flatnonzero(once.t == first.t)[-1])
+    said = figures.phase(once, row=row).get_suptitle()
+    alone = (once.transitions.t == first.t).sum() == 1
+    assert said.endswith(f" s: E{first.element + 1} {first.edge}" if alone else " s")
 
 
 # --------------------------------------------------------------------------- contacts of systems

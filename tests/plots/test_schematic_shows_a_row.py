@@ -39,7 +39,7 @@ def texts(drawn: list[Artist]) -> list[str]:
 def test_contact_positions_follow_the_deflections(run: Trace) -> None:
     drawn = elements.elements_at(Figure().subplots(), elements=3)  # symbols without a run
     assert len(parts(drawn, "contact")) == len(parts(drawn, "spring")) == 3
-    assert {"$k_{1}$", r"$\sigma_{3}$", "$z_{2}$", "E3"} <= set(texts(drawn))
+    assert {"$k_{1}$", r"$\sigma_{1,3}$", "$z_{2}$", "E3"} <= set(texts(drawn))
     for row in (0, 400, -1):
         drawn = elements.elements_at(Figure().subplots(), run, row)
         centres = [c.get_x() + c.get_width() / 2 for c in parts(drawn, "contact")]  # type: ignore[attr-defined]
@@ -73,7 +73,7 @@ def test_numbers_have_units_equal_digits_and_a_true_minus(run: Trace) -> None:
         shown = texts(drawn)
         units = {
             "$k_{1}$": "N/m",
-            r"$\sigma_{4}$": "Ns/m",
+            r"$\sigma_{1,4}$": "N·s/m",
             "$z_{2}$": "m",
             "$v$": "m/s",
             "$F$": "N",
@@ -106,7 +106,7 @@ def test_lugre_is_one_bristle_that_neither_sticks_nor_slips() -> None:
     drawn = elements.elements_at(Figure().subplots(), run)
     shown = texts(drawn)
     assert r"$\sigma_0$ = 1 kN/m" in shown
-    assert r"$\sigma_1$ = 31.6 Ns/m" in shown
+    assert r"$\sigma_1$ = 31.6 N·s/m" in shown
     assert "E1 bristle" in shown
     (box,) = parts(drawn, "contact")
     assert to_hex(box.get_facecolor()).upper() not in STATE_FILLS  # type: ignore[attr-defined]

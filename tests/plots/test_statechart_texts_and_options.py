@@ -154,6 +154,12 @@ def test_named_expressions_and_common_forces_are_below() -> None:
     assert lines_of(LUGRE, "bristle")[-1] == "force: F = sigma_0 * z + sigma_1 * dz;"
 
 
+def test_values_at_the_start_are_below_the_states() -> None:
+    chart = Chart("one", ("v",), ("z",), (), (State("a"),), (), {"F": "z"}, initial={"z": -0.5})
+    assert plain(ChartSheet(chart).definitions()) == ["at the start: z = -0.5;"]
+    assert "at the start#58; z = -0.5#59;" in str(mermaid(chart)).replace("#45;", "-")
+
+
 def test_flows_that_all_states_share_are_said_once_below() -> None:
     chart = CHARTS["seven-parameter"]
     assert "during in all states: dv_l = (v - v_l) / tau_L;" in plain(

@@ -175,7 +175,7 @@ def parts(name: str) -> dict[str, Any]:
 def test_twelve_elements_are_one_contact_and_belts_are_below_what_rubs_on_them() -> None:
     figure = schematic(system_of(GMS12, PulledSlider(1.0, 2.0, 0.1)))
     below = " ".join(text.get_text() for text in figure.axes[0].texts)
-    assert below.count("× 12") == 1
+    assert below.count("signed law × 12") == 1  # the law and the count in one line
     boxes = bodies(schematic(BLOCKS).axes[0])
     belt = boxes["body belt"]
     for name in ("one", "two"):

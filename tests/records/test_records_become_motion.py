@@ -10,9 +10,9 @@ from scipy.integrate import cumulative_trapezoid
 
 from gms_fsm import Record
 from gms_fsm.errors import RecordError
+from gms_fsm.foundation.quantities import UNITS, convert_numbers, factor
 from gms_fsm.records.motion import Motion, motion_of
 from gms_fsm.records.record import Column
-from gms_fsm.records.units import FACTORS, convert_numbers, factor
 from tests.scenario_files import MEASURED, CommandLine, changed, read_table, table
 
 SI = {
@@ -49,7 +49,7 @@ EXPECTED["normal"] = EXPECTED["force"]
 
 @pytest.mark.parametrize("quantity", EXPECTED)
 def test_every_unit_reads_as_its_si_value(quantity: str, tmp_path: Path) -> None:
-    assert set(FACTORS.get(quantity, ())) <= set(EXPECTED[quantity])
+    assert set(UNITS.get(quantity, ())) <= set(EXPECTED[quantity])
     values = np.arange(1.0, 7.0)
     for unit, size in EXPECTED[quantity].items():
         assert factor(quantity, unit) == factor(quantity, f" {unit} ") == size

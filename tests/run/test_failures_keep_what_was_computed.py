@@ -6,6 +6,7 @@ rows of tests/refusals.py.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,9 +27,10 @@ from gms_fsm import (
 )
 from gms_fsm.errors import GMSError
 from gms_fsm.run.simulate import Moment
-from gms_fsm.systems.parts import Body, Contact
+from gms_fsm.systems.parts import Body, Contact, Sampled
+from gms_fsm.systems.springs import Spring
 from gms_fsm.systems.system import System
-from gms_fsm.traces.failures import LivelockError, SimulationError, StepLimitError
+from gms_fsm.traces.failures import LivelockError, NotFiniteError, SimulationError, StepLimitError
 from tests.corpus import BOTH_WAYS, Run, flow_of, go, outcome
 from tests.helpers import FASTEST, stick_slip
 from tests.systems_cases import DRY, STICTION
@@ -41,7 +43,9 @@ SAID = {
     "self-loop": ["element 2", "'again'", "from stick to stick", "z >= s"],
     "blow-up": ["step size", "Radau", "rtol", "t = 1.0"],
     "too many steps": ["max_steps = 300 steps"],
-    "a guard of NaN": ["compares NaN"],
+    "a guard of NaN": ["compares NaN", "(x = 0, z1 = 0, z2 = 0)"],
+    "an action of NaN": ["z of element 1 is not finite here", "assigned to it: [1 / (z - z)]"],
+    "root of a negative": ["signal 'v', [0.1*sqrt(3 - t)], is not finite at t = 3 s"],
 }  # fmt: skip
 
 
@@ -138,6 +142,17 @@ def test_steps_below_the_resolution_of_the_clock_are_refused(argument: str) -> N
     assert len(seen) < 20
 
 
+@pytest.mark.parametrize("method", [scipy.integrate.Radau, scipy.integrate.BDF])
+def test_no_stiff_method_is_advised_where_one_is_used(method: Any) -> None:
+    how = {"initial": {"z": [1.0, 1.0]}, "method": method, "atol": 1e-9}
+    for steps, kind in ((100, "StepLimitError"), (10**6, "StepSizeError")):
+        run = Run((flow_of("z * z"), Prescribed("0")), 2.0, how | {"max_steps": steps})
+        said = run.outcome()[1]
+        assert said.startswith(kind)
+        assert "a larger rtol" in said
+        assert "stiff" not in said
+
+
 # --------------------------------------------------------------------------- several contacts
 def _system(back: str) -> System:
     """Two bodies; the second has a chart that switches at v = 0.2, and back."""
@@ -154,6 +169,43 @@ def _system(back: str) -> System:
         ),
         contacts=(Contact("pad", STICTION, DRY, v="v1"), Contact("loop", chart, v="v2", n=2)),
     )
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            {"sampled": (Sampled("pid", period=0.1, updates={"e": "x2", "u": "k / e"}),)},
+            "the update of u in sampled 'pid', [k / e], is not finite here "
+            "(x1 = 0, v1 = 0, x2 = 0, v2 = 0, e = 0, u = inf)",
+        ),
+        (
+            {"flow": {"i": "k / (i - i)"}},
+            "the flow of i, [k / (i - i)], is not finite here (x1 = 0, v1 = 0, x2 = 0, v2 = 0, ",
+        ),
+        (
+            {"springs": (Spring("shaft", "a", "b", k="k", rest="r"),), "signals": {"r": "k / t"}},
+            "signal 'r', [k / t], is not finite at t = 0 s",
+        ),
+        (
+            {
+                "bodies": (
+                    Body("a", inertia=1.0, x="x1", v="v1"),
+                    Body("b", inertia=1.0, force="k / (x2 - x2)", x="x2", v="v2"),
+                )
+            },
+            "the acceleration of body 'b', with the force [k / (x2 - x2)], is not finite here",
+        ),
+    ],
+)
+def test_what_is_not_finite_in_a_system_is_named_with_its_text(
+    changes: dict[str, Any], said: str
+) -> None:
+    system = replace(_system("v > 0.1"), numbers={"k": 2.0}, **changes)
+    for engine in ("ifelse", FASTEST):
+        with pytest.raises(NotFiniteError) as caught:
+            simulate(system, 1.0, engine=engine)
+        assert said in str(caught.value)
 
 
 @pytest.mark.parametrize("engine", ["machines", "ifelse"])

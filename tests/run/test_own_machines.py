@@ -6,12 +6,24 @@ tests/laws/test_own_machines_see_every_firing.py.
 
 from __future__ import annotations
 
+import copy
+import functools
+import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from transitions import Machine
+from transitions.extensions import (
+    GraphMachine,
+    HierarchicalGraphMachine,
+    HierarchicalMachine,
+    LockedMachine,
+)
+from transitions.extensions.asyncio import AsyncMachine
+from transitions.extensions.markup import MarkupMachine
 
 from gms_fsm import (
     Chart,
@@ -113,6 +125,107 @@ def test_more_firings_than_the_columns_hold_at_first(engine: str) -> None:
     machines = watched(model, calls)
     trace = simulate(model, Prescribed("0.3*sin(20*t)"), 25.0, engine=engine, machines=machines)
     assert len(calls) == 6 * len(trace.transitions) > 6 * 512
+
+
+def test_what_a_guard_reads_is_set_or_shown_by_a_run() -> None:
+    machines = ElementMachines(MODEL)
+    element: Any = machines.elements[1]
+    with pytest.raises(AttributeError, match=r"element 2 has no 'z' before a run: run first"):
+        element.may_break_away_forward()
+    with pytest.raises(AttributeError, match="'Element' object has no attribute 'y'"):
+        _ = element.y
+    for z, truth in ((0.9, False), (1.0, True)):
+        element.z, element.s, element.v = z, 1.0, 0.1
+        assert element.may_break_away_forward() is truth
+    ran(machines)
+    assert element.may_break_away_forward() is False
+
+
+class Slipping(Element):
+    """An element that counts its slips; a class that can be pickled."""
+
+    slips = 0
+
+    def on_enter_slip(self, event: Any) -> None:
+        self.slips += 1
+
+
+@called
+@pytest.mark.parametrize("first", [0.0, 7.0])
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda it: pickle.loads(pickle.dumps(it))])
+def test_a_copy_is_a_machine_of_its_own(engine: str, first: float, again: Any) -> None:
+    machines = ElementMachines(MODEL, Slipping)
+    if first:
+        simulate(MODEL, open_loop(), first, engine=engine, machines=machines)
+    before = [(each.state, each.slips) for each in machines.elements]  # type: ignore[attr-defined]
+    other = again(machines)
+    assert other_parts(ran(other, engine), ran(ElementMachines(MODEL))) == []
+    assert [(each.state, each.slips) for each in machines.elements] == before  # type: ignore[attr-defined]
+    pairs = zip(other.elements, before, strict=True)
+    assert [each.slips - earlier for each, (_, earlier) in pairs] == [2] * 4
+
+
+# --------------------------------------------------------------------------- other machines
+QUEUED = functools.partial(Machine, queued=True)
+DRAWN = functools.partial(GraphMachine, graph_engine="mermaid", show_conditions=True)
+OTHERS = [QUEUED, LockedMachine, MarkupMachine, DRAWN, HierarchicalMachine]
+
+
+@pytest.mark.parametrize("kind", OTHERS, ids=str)
+def test_any_class_of_machines_sees_the_same_firings(kind: Any) -> None:
+    seen: list[list[tuple[Any, ...]]] = []
+    for each in (Machine, kind):
+        machines = ElementMachines(MODEL, machine=each)
+        calls: list[tuple[Any, ...]] = []
+        machines.machine.after_state_change = [
+            lambda event, calls=calls: calls.append((event.model.t, event.event.name))
+        ]
+        simulate(MODEL, Prescribed("0.2"), 3.0, engine=machines)
+        assert [element.state for element in machines.elements] == ["slip"] * 4
+        seen.append(calls)
+    assert seen[0] == seen[1] != []
+
+
+@pytest.mark.parametrize(
+    "kind", [DRAWN, functools.partial(HierarchicalGraphMachine, **DRAWN.keywords)]
+)
+def test_the_graph_of_an_element_shows_guards_and_its_state(kind: Any) -> None:
+    machines = ElementMachines(MODEL, machine=kind)
+    simulate(MODEL, Prescribed("0.1"), 0.5, engine=machines, initial=STARTED)
+    graphs = [element.get_graph().source for element in machines.elements]  # type: ignore[attr-defined]
+    assert all("abs(v) <= v_c and abs(z) < s" in graph for graph in graphs)
+    active = [[name for name in ("stick", "slip") if f"Class {name} s_active" in g] for g in graphs]
+    assert active == [[each] for each in STARTED["states"]]
+
+
+@called
+def test_a_queue_hides_no_interference(engine: str) -> None:
+    machines = ElementMachines(MODEL, machine=QUEUED)
+    machines.machine.prepare_event = [lambda event: setattr(event.model, "v", 0.0)]
+    with pytest.raises(CallbackError, match="a callback set v of element 1"):
+        ran(machines, engine)
+    machines = ElementMachines(
+        MODEL, machine=functools.partial(QUEUED, ignore_invalid_triggers=True)
+    )
+    with pytest.raises(CallbackError, match="a callback changed the element's values before"):
+        ran(machines, progress=lambda _: setattr(machines.elements[0], "state", "slip"))
+    machines = ElementMachines(MODEL, machine=QUEUED)
+    machines.machine.on_enter_slip(lambda event: event.model.break_away_forward())
+    with pytest.raises(CallbackError, match="a callback changed a state"):
+        ran(machines, engine)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        (AsyncMachine, "the triggers of an AsyncMachine are awaited"),
+        (list, "a class of the package transitions"),
+        (functools.partial(Machine, model_attribute="mode"), "the state of an element in 'mode'"),
+    ],
+)
+def test_what_is_no_machine_of_this_kind_is_refused(kind: Any, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        ElementMachines(MODEL, machine=kind)
 
 
 # --------------------------------------------------------------------------- callbacks
@@ -264,11 +377,26 @@ def test_a_state_forced_between_firings_is_detected_at_the_next_one() -> None:
 
 
 @called
-def test_values_may_not_change_before_the_guard_and_mean_nothing_behind_it(engine: str) -> None:
+@pytest.mark.parametrize("place", ["prepare_event", "after_state_change"])
+def test_values_of_the_run_may_not_be_set(engine: str, place: str) -> None:
+    """Also not those of another element; before and after a run they are anybody's."""
     machines = ElementMachines(MODEL)
-    machines.machine.on_enter_slip(lambda event: setattr(event.model, "z", 1e9))
-    assert other_parts(ran(machines, engine), ran(ElementMachines(MODEL))) == []
-    machines.machine.prepare_event = [lambda event: setattr(event.model, "v", 0.0)]
+    machines.elements[3].z = 7.0
+    setattr(machines.machine, place, [lambda event: setattr(machines.elements[3], "z", 1e9)])
+    said = (
+        r"element 1, edge 'break_away_forward' at t = .* set z of element 4 to 1000000000.0; "
+        "callbacks may only read; write the assignment into the chart: actions of the edge"
+    )
+    with pytest.raises(CallbackError, match=said) as caught:
+        ran(machines, engine)
+    assert len(caught.value.trace) > 1
+    machines.elements[3].z = 7.0
+
+
+@called
+def test_values_may_not_change_before_the_guard(engine: str) -> None:
+    machines = ElementMachines(MODEL)
+    machines.machine.prepare_event = [lambda event: vars(event.model).update(v=0.0)]
     said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only read"
     with pytest.raises(CallbackError, match=said) as caught:
         ran(machines, engine)

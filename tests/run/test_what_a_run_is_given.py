@@ -17,6 +17,7 @@ import pytest
 from gms_fsm import (
     Chart,
     ChartModel,
+    FrictionState,
     Prescribed,
     Session,
     Settings,
@@ -97,6 +98,19 @@ def test_every_element_enters_with_its_own_numbers(engine: Any) -> None:
         begun = simulate(ENTERED, STEADY, 3.0, t_start=2.0, engine=engine, initial=initial)
         assert begun.z[0].tolist() == z
         assert begun.variable("w")[0].tolist() == w
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_variables_start_where_their_chart_says_unless_the_run_says_else(engine: Any) -> None:
+    states = (State("first", {"z": "v"}, entry={"w": "2 * z"}),)
+    model = ChartModel(
+        Chart("begun", ("v",), ("z", "w"), (), states, (), {"F": "z"}, initial={"z": 0.25}), {}, n=2
+    )
+    for initial, z in (({}, [0.25, 0.25]), ({"z": [1.0, 2.0]}, [1.0, 2.0])):
+        begun = simulate(model, STEADY, 1.0, engine=engine, initial=initial)
+        assert begun.z[0].tolist() == z
+        assert begun.variable("w")[0].tolist() == [2 * each for each in z]
+    assert FrictionState(model).variables["z"].tolist() == [0.25, 0.25]
 
 
 @pytest.mark.slow

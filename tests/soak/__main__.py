@@ -207,10 +207,11 @@ PARTS = (
     "systems",
     "exact",
     "doubts",
+    "verdicts",
 )
 COUNTS = {
     "kills": 200, "examples": 300, "transitions": 1_000_000, "trials": 2000, "records": 1000,
-    "systems": 500, "exact": 1000, "doubts": 400,
+    "systems": 500, "exact": 1000, "doubts": 400, "verdicts": 400,
 }  # fmt: skip
 
 
@@ -244,6 +245,7 @@ def main() -> None:
         "systems": ("tests.soak.random_systems", str(given.systems)),
         "exact": ("tests.soak.exact_systems", str(given.exact)),
         "doubts": ("tests.soak.doubts", str(given.doubts)),
+        "verdicts": ("tests.soak.verdicts", str(given.verdicts)),
     }
     none_differs = f"0 of {given.records} differ"
 

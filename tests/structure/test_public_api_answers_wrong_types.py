@@ -45,6 +45,7 @@ from gms_fsm import (
     Spring,
     State,
     Stribeck,
+    Supervisor,
     Sweep,
     System,
     Trace,
@@ -160,6 +161,8 @@ def right() -> dict[str, Any]:
     """
     examples = [make() for name, make in OBJECTS.items() if name not in RECORDS]
     examples += [BODY, CONTACT, STATE, EDGE, Bench(), Spring("shaft", "a", k=1.0)]
+    idle = Chart("idle", velocities=(), states=(State("on"),))
+    examples += [Supervisor("mode", idle)]
     examples += [Sampled("pid", period=1e-3, updates={"u": "t"}, initial={"u": 1.0})]
     found = {
         f"{type(example).__name__}.{each.name}": getattr(example, each.name)

@@ -108,6 +108,27 @@ def of_friction(source: Source) -> Iterator[int]:
             yield node.lineno  # type: ignore[attr-defined]
 
 
+def leaving(source: Source) -> Iterator[int]:
+    """Text leaves the program, as bytes or to a terminal, through `gms_fsm.foundation.text`."""
+    inside = set[ast.AST]()  # of what only tells texts apart, or is made visible
+    for node in ast.walk(source.tree):
+        called = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
+        if isinstance(node, ast.Yield) or called.endswith(("sha256", ".update")):
+            inside.update(ast.walk(node))
+        given = map(ast.unparse, node.args) if isinstance(node, ast.Call) else ()
+        if any(each.startswith(("visible", "encoded")) for each in given):
+            inside.add(node)
+    for node in ast.walk(source.tree):
+        if not isinstance(node, ast.Call) or node in inside:
+            continue
+        called = ast.unparse(node.func)
+        word = called.rpartition(".")[2]
+        bare = word in ("encode", "isprintable") and not node.args
+        stream = called.endswith(("stdout.write", "stderr.write", ".writestr"))
+        if bare or stream or word in ("print", "echo") or (word == "write_text" and "." in called):
+            yield node.lineno
+
+
 def long(source: Source) -> Iterator[int]:
     """No function is too long, unless a comment directly above it says why."""
     lines = source.text.splitlines()
@@ -215,6 +236,35 @@ RULES = {
         ("integrators/",),
         ("x = 'stick-slip'", "z = 1", "def f(z): ...", "import pandas", "x = 'gms-fsm'"),
         ("import numpy as np", "size = 1"),
+    ),
+    "text leaves through one function": Rule(
+        leaving,
+        ("gms_fsm/", "plots/"),
+        (
+            "print(title)",
+            "file.write(text.encode())",
+            "typer.echo(f'{title}')",
+            "stdout.write(title)",
+            "console.print(title)",
+            "path.write_text(title)",
+            "''.join(c for c in title if c.isprintable())",
+        ),
+        (
+            "print(visible(title))",
+            "file.write(encoded(text))",
+            "sha256(text.encode())",
+            "write_text(path, title)",
+            "video.encode(frame)",
+        ),
+        but=("gms_fsm/app/lessons/",),  # texts of ours
+        known=(
+            "gms_fsm/foundation/text.py",
+            "gms_fsm/app/live.py",  # numbers, and names that are identifiers
+            "gms_fsm/app/verbs/console.py",
+            "gms_fsm/app/verbs/fit.py",  # a table of visible cells
+            "gms_fsm/debugger/_terminal.py",
+            "gms_fsm/language/_read.py",  # counts bytes
+        ),
     ),
     "nothing is too long": Rule(
         long,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,29 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gms_fsm import GMS, Body, Chart, ChartModel, Contact, GMSParameters, State, System
+from gms_fsm import (
+    GMS,
+    Body,
+    Chart,
+    ChartModel,
+    Contact,
+    GMSParameters,
+    LuGre,
+    Prescribed,
+    Slider,
+    State,
+    Stribeck,
+    System,
+    Transition,
+)
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.registry import entry
 from gms_fsm.session.session import Session
 from gms_fsm.systems.models import demonstration
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.numbers import known_in, law_of, value_in, varied, with_law
+from gms_fsm.systems.parts import Sampled
+from gms_fsm.systems.rigs import TextRig
 
 STICTION = {"F_c": 1.0, "F_s": 1.5, "b": 0.1}
 
@@ -64,6 +81,43 @@ def test_one_number(name: str, factor: float) -> None:
     other = varied(WHOLE, {name: value})
     assert numbers_of(other) == numbers_of(WHOLE) | {name: np.ravel(value).tolist()}
     assert same(other, WHOLE)
+
+
+@given(st.sampled_from([*known_in(WHOLE)]), st.sampled_from([1.0, 1.05]))
+def test_systems_are_equal_whose_numbers_are(name: str, factor: float) -> None:
+    one, two = (
+        varied(mounted(several()), {name: np.asarray(value_in(WHOLE, name)) * factor}).system
+        for _ in range(2)
+    )
+    assert one == two
+    assert hash(one) == hash(two)
+    assert (one == WHOLE.system) == (factor == 1.0 or not np.any(value_in(WHOLE, name)))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda k: GMS(GMSParameters.paper("stick-slip").replaced(k=[k, 1, 1, 1]), law="signed"),
+        lambda k: LuGre(sigma_0=k, sigma_1=1, sigma_2=0, stribeck=Stribeck(1, 1.5, 1e-3)),
+        lambda k: ChartModel(CHARTS["stiction"], STICTION | {"F_s": k}),
+        lambda k: Prescribed([(0, 0), (1, k)]),
+        lambda k: Slider(1.0, (np.arange(2.0), np.array([0, k]))),
+        lambda k: TextRig("pushed", "(P - F) / m", {"P": "sin(t)"}, {"m": k}),
+        lambda k: State("stick", flow={"z": f"{k} * v"}),
+        lambda k: Transition("slips", ("stick", "hold"), "slip", guard=f"z > {k}"),
+    ],
+)
+def test_parts_are_equal_whose_values_are(make: Any) -> None:
+    assert make(2.0) == make(2.0) != make(3.0)
+    assert len({make(2.0), make(2.0), make(3.0)}) == 2
+
+
+def test_updates_of_a_sampler_in_another_order_are_another_sampler() -> None:
+    one, other = (
+        Sampled("pid", period=1e-3, updates=dict(updates))
+        for updates in itertools.permutations([("u", "w"), ("w", "u")])
+    )
+    assert one != other
 
 
 def test_another_law() -> None:

@@ -163,6 +163,28 @@ def test_a_stuck_pad_beside_a_wall_carries_nothing_of_what_the_wall_takes() -> N
         assert found == {"hit": pytest.approx(1.6), "wall": pytest.approx(1.6)}
 
 
+LATCH = Chart(
+    "latch",
+    variables=("wear",),
+    parameters=("rate", "most"),
+    states=(State("closed", {"wear": "rate"}, locked=True), State("open", outputs={"F": "0"})),
+    transitions=(Transition("gives", "closed", "open", guard="wear > most and F > 1"),),
+)
+
+
+@pytest.mark.parametrize(
+    "engine", [pytest.param(e, marks=pytest.mark.slow) if e == "compiled" else e for e in ENGINES]
+)
+def test_a_lock_lets_go_of_an_impulse_by_what_its_element_has_seen(engine: str) -> None:
+    latch = Contact("latch", LATCH, {"rate": 1.0, "most": 1.0}, v="v_b")
+    hit = stop("hit", "v_a - v_b")
+    system = System("door", bodies=[mass("a", 1.0), mass("b", 1.0)], contacts=[latch, hit])
+    for speed, gives in ((1.0, False), (0.25, True)):  # struck after 0.5 s, or after 2 s
+        trace = simulate(system, 3.0, initial={"v_a": speed}, engine=engine)
+        assert (("latch", "gives") in edges(trace)) == gives
+        assert (trace.body("b").v[-1] > 0) == gives
+
+
 HIT = Chart(
     "hit",
     inputs=("x", "v"),

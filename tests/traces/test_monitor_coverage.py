@@ -118,3 +118,22 @@ def test_an_event_missed_between_steps_is_missed_here_too() -> None:
     assert located.edges["arrest"] == (1,)
     assert looked.edges["arrest"] == (0,)
     assert "edge arrest" in looked.never
+
+
+def test_an_edge_that_leaves_several_states_counts_once_for_each() -> None:
+    chart = Chart(
+        "two ways home",
+        states=(State("rest"), State("left"), State("right")),
+        transitions=(
+            Transition("go_left", "rest", "left", guard="v < -0.1"),
+            Transition("go_right", "rest", "right", guard="v > 0.1"),
+            Transition("home", ("left", "right"), "rest", guard="abs(v) <= 0.1"),
+        ),
+        outputs={"F": "0"},
+    )
+    found = coverage(run(ChartModel(chart, {}), Prescribed("0.2*sin(t)"), 4.0))  # v > 0 until pi
+    assert found.edges == {
+        "go_left": (1,), "go_right": (1,), "home from left": (0,), "home from right": (1,)
+    }  # fmt: skip
+    assert "edges 3 of 4" in found.text
+    assert found.never == ("edge home from left", "|v| <= 0.1 of home from left true")

@@ -65,6 +65,13 @@ def test_an_invariant_of_the_system_is_located() -> None:
     assert getattr(pulled, "t", None) == pytest.approx(6.0, abs=1e-9)
 
 
+def test_numbers_of_an_invariant_may_have_units() -> None:
+    texts = ["pad.F <= 1200 mN", "pad: F <= 1200 mN", "abs(bank.v) < 50 mm/s or t < 3 min"]
+    pad, own, bank = run(texts).monitors.values()
+    assert getattr(pad, "t", None) == getattr(own, "t", None) == pytest.approx(6.0, abs=1e-9)
+    assert bank.ok
+
+
 def test_clauses_of_locked_states_are_covered() -> None:
     verdict = run(["pad: coverage"]).monitors["pad: coverage"]
     assert isinstance(verdict, CoverageVerdict)

@@ -103,7 +103,10 @@ def make(
     """Train and score the methods; Ctrl-C ends it with what is complete."""
     chosen = [each for each in data if not only or each.name in only]
     read = [(each, each.splits(folder)) for each in chosen]  # so that missing data are said first
-    sections, complete = [], True
+    sections, complete, done = [], True, 0
+    total = sum(
+        len(splits) for each, splits in read for method in methods if each.name in method.on
+    )
     for each, splits in read:
         held = held_rows(splits)
         rows: list[Row] = []
@@ -113,10 +116,9 @@ def make(
             rows.append(Row(model, rmse=pooled, by_record=dict(errors), note=note))
         mine = [method for method in methods if each.name in method.on]
         try:
-            for i, method in enumerate(mine):
-                if progress is not None:
-                    progress(f"{each.name}: {method.name}", i / len(mine))
-                rows.append(_row(method, each, splits))
+            for method in mine:
+                rows.append(_row(method, each, splits, progress, done / total, total))
+                done += len(splits)
         except KeyboardInterrupt:
             complete = False
         licence = next(iter(held.values())).licence
@@ -126,13 +128,23 @@ def make(
     return Card(tuple(sections), _machine(), complete)
 
 
-def _row(method: Method, data: DataSet, splits: Sequence[Any]) -> Row:
+def _row(
+    method: Method,
+    data: DataSet,
+    splits: Sequence[Any],
+    progress: Progress | None,
+    done: float,
+    total: int,
+) -> Row:
     began = time.perf_counter()
     forces: dict[str, FloatArray] = {}
     squares, count = 0.0, 0
     predictor: Predictor | None = None
     try:
-        for split in splits:
+        for k, split in enumerate(splits):
+            of = f", {k + 1} of {len(splits)}" * (len(splits) > 1)
+            if progress is not None:
+                progress(f"{data.name}: {method.name}{of}", done + k / total)
             predictor = method.train(split.training, data.smoothing, predictor)
             for record in split.held:
                 forces[record.name] = predictor.predict(record)[record.chosen]

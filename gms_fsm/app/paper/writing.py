@@ -43,6 +43,7 @@ FIGURES = (
 ELEMENTS = 3  # in Fig. 1 and 2a
 USED = "switch", "flow"  # in Fig. 2c
 LISTED = "Fig. 2c: the switching as if-else code, generated from the chart of Fig. 2b"
+PARTED = 0.1  # N: runs that differ by more have parted
 LINE = 1.35  # distance of its lines, in sizes of the font
 
 
@@ -144,25 +145,31 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         return np.array([evaluate(tree, {"t": t}) for t in trace.t.tolist()])
 
     def fig3(name: str, title: str, limit: float | None = None) -> object:
-        chart = traces[f"{name}_chart"].refined(figures.SMOOTH)
+        chart, ifelse = (
+            traces[f"{name}_{engine}"].refined(figures.SMOOTH) for engine in ("chart", "ifelse")
+        )
+        peak = int(chart.F.argmax())  # at the arrest of element 1
+        more = chart.F[peak] - chart.F[min(peak + 1, len(chart) - 1)]
         return figures.figure_3(
             chart,
-            traces[f"{name}_ifelse"],
+            ifelse,
             traces["fig3_lugre"],
             applied(chart),
             title=title,
             phases=figures.FIG3_PHASES if force == FORCE else [("", np.inf)],
             limit=limit,
+            reason=r"before the arrest, as $v$ → 0, $s(v)$ rises from $F_c$ to $F_s$,"
+            f"\nand $\\sigma_{{1,1}}$ d$z_1$/d$t$ adds {more:.1f} N",
         )
 
     pictures = {
-        "fig1": schematic_figure(elements=ELEMENTS),
+        "fig1": schematic_figure(elements=ELEMENTS, title=f"Slider on {ELEMENTS} Maxwell elements"),
         "fig2c": _listing(traces["fig4_ifelse"]),
         "fig3": fig3("fig3", "Fig. 3, non-drifting: a force below break-away"),
         "fig3_slipping": fig3(
             "fig3_slipping",
             "Fig. 3 with weights 0.25/k (our addition): element 1 slips, and still no drift",
-            limit=0.62,
+            limit=0.75,
         ),
         "fig4": figures.figure_4(traces["fig4_chart"], traces["fig4_ifelse"], traces["fig4_lugre"]),
         "fig4_laws": figures.compare_laws(
@@ -173,14 +180,15 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         ),
         "residual": figures.residuals(
             {
-                "Fig. 4 run (stick-slip, published law)": force_difference(
+                f"Fig. 4 run (stick-slip, published law){_parting(traces)}": force_difference(
                     traces["fig4_step"], traces["fig4_chart"]
                 ),
                 "Fig. 3 run (non-drifting)": force_difference(
                     traces["fig3_step"], traces["fig3_chart"]
                 ),
             },
-            "Difference of $F$: guards once per step (at most 1 ms, rtol 1e-4) and located",
+            "Difference of $F$: guards looked at once per step (at most 1 ms, rtol $10^{-4}$), "
+            "minus located",
         ),
         "residual_held": held_figure(traces, force),
     }
@@ -189,6 +197,17 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         for name, figure in pictures.items()
         for file in formats.files(name, "figure")
     ]
+
+
+def _parting(traces: Mapping[str, Trace]) -> str:
+    """Return when the two runs of Fig. 4 part, if they do: after the first arrest."""
+    step, located = traces["fig4_step"], traces["fig4_chart"]
+    log = located.transitions
+    arrests = log.t[log.edge == "arrest"]
+    times, apart = force_difference(step, located)
+    if not arrests.size or not np.abs(apart[times > arrests[0]]).max(initial=0.0) > PARTED:
+        return ""
+    return f"; they part at the first arrest, {arrests[0]:.1f} s"
 
 
 def _listing(trace: Trace) -> Figure:
@@ -203,15 +222,15 @@ def _listing(trace: Trace) -> Figure:
     tall = max(len(text.splitlines()) for text in texts) + 4
     size = 7.0  # points
     figure = Figure(figsize=(width("m", size) / 72 * sum(wide), LINE * size / 72 * tall))
-    figure.suptitle(LISTED, x=0.01, y=1 - 0.6 / tall, ha="left", size=9.0)
-    look: dict[str, Any] = {"size": size, "family": "monospace", "va": "top", "linespacing": LINE}
+    figure.suptitle(LISTED, x=0.01, y=1 - 0.6 / tall, ha="left", size=9.0, color=INK)
+    look: dict[str, Any] = {"size": size, "family": "monospace", "va": "baseline"}
     for text, x in zip(texts, (0.01, 0.01 + wide[0] / sum(wide)), strict=True):
         code = [each.partition("#")[0] for each in text.splitlines()]
-        comments = [
-            " " * len(a) + b[len(a) :] for a, b in zip(code, text.splitlines(), strict=True)
-        ]
-        figure.text(x, 1 - 3 / tall, "\n".join(code), color=INK, **look)
-        figure.text(x, 1 - 3 / tall, "\n".join(comments), color=TEXT_GREY, **look)
+        # Line by line: in one text the letters of a line would decide its height.
+        for number, (line, whole) in enumerate(zip(code, text.splitlines(), strict=True)):
+            comment = " " * len(line) + whole[len(line) :]
+            for part, ink in ((line, INK), (comment, TEXT_GREY)):
+                figure.text(x, 1 - (3 + number) / tall, part, color=ink, **look)
     return figure
 
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from gms_fsm.app.verbs.console import note, progress_bars, say
+from gms_fsm.app.verbs.console import named_bar, note, say
 from gms_fsm.app.verbs.options import INTERRUPTED, OutputFolder
-
-if TYPE_CHECKING:
-    from rich.progress import TaskID
 
 
 def benchmark_command(
@@ -38,15 +35,7 @@ def benchmark_command(
     folder = Path(os.environ.get("GMS_FSM_DATA", ".")) if data is None else data
     names = [data_set(name).name for name in only or ()]
     output_folder(output, FILES)
-    with progress_bars() as bars:
-        tasks: dict[str, TaskID] = {}
-
-        def show(name: str, done: float) -> None:
-            if not tasks:
-                bars.start()
-                tasks[""] = bars.add_task(name, total=1.0)
-            bars.update(tasks[""], completed=done, description=name)
-
+    with named_bar() as show:
         card = make(folder, only=names, progress=show)
     files = write(card, output)
     say(f"{len(files)} files in {output}; start with {files[0]}")

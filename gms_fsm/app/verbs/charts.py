@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import say
+from gms_fsm.app.verbs.console import put, say
 from gms_fsm.app.verbs.options import ChartName, ContactName, Law
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.files import output_folder, write_text
@@ -77,7 +77,7 @@ def chart_command(
     from gms_fsm.app.verbs.catalogue import catalogue, chosen
 
     if listed:
-        typer.echo(catalogue())
+        put(catalogue())
         return
     import plots
 
@@ -92,7 +92,7 @@ def chart_command(
         theme=theme.value,
         names=names,
     )
-    typer.echo(str(plots.render(graph, output)))
+    put(str(plots.render(graph, output)))
 
 
 def handout_command(
@@ -123,7 +123,7 @@ def handout_command(
         if own.run:
             trace = load_scenario(own.path).simulate()
             model = trace.contact(contact or trace.contacts[0])
-    typer.echo(str(plots.handout(model, output)))
+    put(str(plots.handout(model, output)))
 
 
 def check_command(
@@ -151,26 +151,30 @@ def check_command(
     settles is reported, but does not count as refuted. Of a system, the
     charts of all contacts are checked.
     """
-    from gms_fsm import prove
     from gms_fsm.app._own_files import own_file
     from gms_fsm.app.verbs.catalogue import checkable, chosen
     from gms_fsm.charts.registry import domain_of
+    from gms_fsm.verification.facts import facts_of
+    from gms_fsm.verification.prove import prove_facts
 
     if names:
         say(checkable())
         return
     own = own_file(name, law)
     no_contact(contact, own)
-    charts = {"": chosen("check", name, law)[1]} if own is None else own.charts(contact)
+    charts = {"": facts_of(chosen("check", name, law)[1])} if own is None else own.facts(contact)
     folder = None if output is None else output_folder(output)
-    reports = {each: prove(chart, domain or domain_of(chart)) for each, chart in charts.items()}
+    reports = {
+        names: prove_facts(facts, domain or domain_of(facts.chart))
+        for names, facts in charts.items()
+    }
     texts = [str(report) for report in reports.values()]
     if own is not None and own.system is not None:
         texts = [f"contact {each}:\n{text}" for each, text in zip(reports, texts, strict=True)]
     text = "\n\n".join(texts)
     say(text)
     for path in [] if folder is None else _write_reports(text, [*reports.values()], folder):
-        typer.echo(str(path))
+        put(str(path))
     if any(report.refuted for report in reports.values()):
         raise typer.Exit(1)
 
@@ -240,7 +244,7 @@ def blocks_command(
                 "no system is given", place="--schematic", advice="name a system or scenario file"
             )
         picture = plots.block_diagram(4 if elements is None else elements)
-        typer.echo(str(plots.render(picture, output)))
+        put(str(plots.render(picture, output)))
         return
     from gms_fsm.app._own_files import own_file
 
@@ -258,9 +262,9 @@ def blocks_command(
     if schematic:
         from plots import figures
 
-        typer.echo(str(figures.save(plots.schematic(own.system), output)))
+        put(str(figures.save(plots.schematic(own.system), output)))
         return
-    typer.echo(str(plots.render(plots.block_diagram(own.system), output)))
+    put(str(plots.render(plots.block_diagram(own.system), output)))
 
 
 def code_command(
@@ -299,7 +303,7 @@ def code_command(
             raise ParameterError(
                 f"{name} says what the friction acts on", place="--rig", advice="leave it out"
             )
-        typer.echo(printed(_start_of_file(own)), nl=False)
+        put(printed(_start_of_file(own)), nl=False)
         return
     rigs: dict[RigName, Rig] = {
         RigName.prescribed: Prescribed(VELOCITY),
@@ -324,7 +328,7 @@ def code_command(
             other = f"--rig slider, or {other}"
         advice = f"{error.advice}; here, give {other}"
         raise error.replaced(advice=advice).inside(name) from None
-    typer.echo(printed(start), nl=False)
+    put(printed(start), nl=False)
 
 
 def _start_of_file(own: OwnFile) -> Problem:

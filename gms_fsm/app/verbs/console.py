@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from gms_fsm.foundation.quantities import WIDTH, wrapped
+from gms_fsm.foundation.text import visible_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -69,21 +70,25 @@ def note(message: Warning | str, *_: object, **__: object) -> None:
 def say(text: str) -> None:
     """Print a result, in lines that fit the terminal; names of files stay whole."""
     for part in _parts(text):
-        typer.echo(part)
+        put(part)
+
+
+def put(text: str = "", *, nl: bool = True) -> None:
+    """Print a text whose lines stay as they are, such as code or a path."""
+    typer.echo(visible_lines(text), nl=nl)
 
 
 def _line(label: str, style: str, text: str) -> None:
     from rich.text import Text
 
-    printable = (c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
-    said = Text("\n".join(_parts(f"{label} {''.join(printable)}")))
+    said = Text("\n".join(_parts(f"{label} {text}")))
     said.stylize(style, 0, len(label))
     messages(soft_wrap=True).print(said, highlight=False)
 
 
 def _parts(text: str) -> Iterator[str]:
     width = shutil.get_terminal_size((WIDTH, 24)).columns
-    for line in text.split("\n"):
+    for line in visible_lines(text).split("\n"):
         yield from wrapped(line, width, whole=True)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gms_fsm.app.verbs.console import note
+from gms_fsm.app.verbs.console import note, put
 from gms_fsm.app.verbs.options import ContactName, Law
 from gms_fsm.errors import ParameterError
 
@@ -53,7 +53,7 @@ def export_command(
 
     if listed:
         wide = max(map(len, known))
-        typer.echo("\n".join(f"{each.name:<{wide}}  {each.kind}" for each in known.values()))
+        put("\n".join(f"{each.name:<{wide}}  {each.kind}" for each in known.values()))
         return
     if not to:
         raise ParameterError(
@@ -70,7 +70,7 @@ def export_command(
     chosen = called or default
     folder = Path(f"{chosen or 'friction'}-{to}") if output is None else output
     for path in export(given, to, folder, name=chosen, **more):
-        typer.echo(str(path))
+        put(str(path))
 
 
 def _given(

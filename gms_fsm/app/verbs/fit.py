@@ -9,6 +9,7 @@ import typer
 
 from gms_fsm.app.verbs.console import note, say
 from gms_fsm.app.verbs.options import INTERRUPTED, Overrides, PresetName, ScenarioFile
+from gms_fsm.foundation.text import visible
 
 if TYPE_CHECKING:
     from gms_fsm.identification.result import Fit
@@ -64,7 +65,8 @@ def _print(found: Fit) -> None:
         table.add_column(head, justify="right" if head == "value" else "left", no_wrap=True)
     table.add_column("note", overflow="fold")  # only this column gives way
     for each in found.table:
-        table.add_row(*map(Text, (each.name, *each.shown, each.unit, each.note)))
+        texts = (each.name, *each.shown, each.unit, each.note)
+        table.add_row(*(Text(visible(text)) for text in texts))
     Console(width=max(Console().width, NARROWEST)).print(table)
     if found.weakest:
         say(found.weakest)

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.verbs.console import messages, named_bar, note, opening, say
+from gms_fsm.app.verbs.console import messages, named_bar, note, opening, put, say
 from gms_fsm.app.verbs.options import (
     INTERRUPTED,
     ContactName,
@@ -256,7 +256,7 @@ def schema_command() -> None:
     """Print the JSON schema of scenario files, for editors."""
     from gms_fsm.app.scenario import schema
 
-    typer.echo(json.dumps(schema(), indent=2))
+    put(json.dumps(schema(), indent=2))
 
 
 def debug_command(
@@ -302,13 +302,13 @@ def lesson_command(
         from gms_fsm.app.lessons.engine.notebooks import write_notebook
 
         for each in [numbered(number)] if number else LESSONS:
-            typer.echo(str(write_notebook(each, output)))
+            put(str(write_notebook(each, output)))
         return
     chosen = numbered(number)
     with messages().status(f"running lesson {chosen}"):
         taught = teach(chosen, output)
     for line in taught.lines:
         say(line)
-    typer.echo()
+    put()
     for path in taught.files:
-        typer.echo(str(path))
+        put(str(path))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gms_fsm.app.verbs.console import progress_bars
+from gms_fsm.app.verbs.console import progress_bars, put
 from gms_fsm.app.verbs.options import ContactName, End, OutputFolder, PresetName, Start, TraceFile
 from gms_fsm.errors import TraceFileError
 from gms_fsm.foundation.arguments import unknown
@@ -75,7 +75,7 @@ def plot_command(
         pictures = (overview, figures.ribbons_figure(run, window=window))
     for figure, names in zip(pictures, files, strict=True):
         for name in names:
-            typer.echo(str(figures.save(figure, folder / name)))
+            put(str(figures.save(figure, folder / name)))
 
 
 def animate_command(
@@ -115,7 +115,7 @@ def animate_command(
             t_end=end,
             progress=show,
         )
-    typer.echo(str(film))
+    put(str(film))
 
 
 def replay_command(
@@ -150,4 +150,4 @@ def replay_command(
     reports = [prove(chart) for chart in charts] if check else []
     window = _window(runs[0], start, end)
     page = write_replay(output, *runs, title=title, names=names, window=window, checks=reports)
-    typer.echo(str(page))
+    put(str(page))

@@ -2,138 +2,246 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from transitions import Machine
 from transitions.extensions.asyncio import AsyncMachine
-from transitions.extensions.nesting import HierarchicalMachine
+from transitions.extensions.states import Error
 
-from gms_fsm.charts.files.imported import ImportedEdge
+from gms_fsm.charts.files.imported import (
+    Assigned,
+    ImportedEdge,
+    ImportedState,
+    Route,
+    all_of,
+    joined,
+    spelled,
+)
 from gms_fsm.errors import ChartError
+from gms_fsm.foundation.arguments import unknown
 
 HERE = "transitions machine"
-KINDS = {HierarchicalMachine: "its states can nest", AsyncMachine: "its callbacks are awaited"}
-MACHINE_CALLBACKS = (
-    "before_state_change",
-    "after_state_change",
-    "prepare_event",
-    "finalize_event",
-    "on_exception",
-    "on_final",
-)
+# What does not run when a transition is taken, or not only then: it may not assign.
+LOOKING = ("prepare_event", "finalize_event", "on_exception", "on_final")
 
 
-def read(machine: object) -> tuple[list[str], list[ImportedEdge]]:
-    """Return the states, the default state first, and the edges in the order of their priority."""
+class Callbacks:
+    """What the functions of a machine say, given as texts by their names."""
+
+    def __init__(self, given: object) -> None:
+        if not isinstance(given, Mapping):
+            raise ChartError(
+                "it gives for each function what it says, for example {'is_hot': 'T > 80', "
+                "'count': {'n': 'n + 1'}}",
+                place=f"{HERE}: callbacks",
+                value=given,
+            )
+        self.given, self.known = given, dict[str, None]()
+
+    def actions(self, functions: list[Any], kind: str, place: str) -> Assigned:
+        """Return what callbacks assign, one after the other."""
+        found = []
+        for each in functions:
+            name = self._name(each)
+            text = self.given.get(name)
+            if not isinstance(text, Mapping):
+                raise ChartError(
+                    f"its callback {kind} {name!r} has no text",
+                    place=place,
+                    advice=f"give what it assigns, callbacks={{{name!r}: {{'z': '0'}}}}; {{}} for "
+                    "one that only looks on",
+                )
+            found.append(text)
+        return joined(found, place)
+
+    def nothing(self, functions: list[Any], kind: str, place: str) -> None:
+        """Refuse callbacks that assign."""
+        if self.actions(functions, kind, place):
+            raise ChartError(
+                f"its callback {kind} {self._name(functions[0])!r} has no counterpart in a "
+                "chart: it runs without a transition, too",
+                place=place,
+                advice="assign it in states or transitions",
+            )
+
+    def guard(self, conditions: list[Any], place: str) -> tuple[str | None, str]:
+        """Return conditions as one text, and the name of one whose text is not given."""
+        found = []
+        for each in conditions:
+            name = self._name(each.func)
+            text = self.given.get(name)
+            if text is None:
+                return None, name
+            if not isinstance(text, str):
+                raise ChartError(
+                    f"callbacks[{name!r}] is {text!r}", place=place, advice="a condition is a text"
+                )
+            found.append(text if each.target else f"not ({text})")
+        return (all_of(found) if found else None), ""
+
+    def check_all_known(self) -> None:
+        """Refuse texts for functions that the machine does not have."""
+        for name in self.given:
+            if name not in self.known:
+                raise unknown("function", name, self.known, ChartError, place=f"{HERE}: callbacks")
+
+    def _name(self, function: Any) -> str:
+        name = function if isinstance(function, str) else getattr(function, "__name__", "")
+        self.known[name or repr(function)] = None
+        return name or repr(function)
+
+
+def read(
+    machine: object, callbacks: object
+) -> tuple[list[ImportedState], Route, list[ImportedEdge]]:
+    """Return the states, the initial one, and the edges in the order of their priority."""
     if not isinstance(machine, Machine):
         raise ChartError("it must be a transitions.Machine", place="machine", value=machine)
-    _check_machine(machine)
-    names = [_state(state) for state in machine.states.values()]
-    initial = machine.initial
-    first = str(getattr(initial, "name", initial))
-    if first not in names:
+    if isinstance(machine, AsyncMachine):
+        raise ChartError(
+            f"an {type(machine).__name__} has no counterpart in a chart: its callbacks are awaited",
+            place=HERE,
+            advice="write it as a machine without Async",
+        )
+    reader = _MachineReader(machine, Callbacks({} if callbacks is None else callbacks))
+    for name in LOOKING:
+        reader.callbacks.nothing(getattr(machine, name), name, HERE)
+    states = [*reader.states(machine, ())]
+    edges = [*reader.edges(machine, (), states)]
+    first = _only_name(machine.initial, HERE)
+    if first is None or reader.route(first) not in [each.route for each in states]:
         raise ChartError(
             "it has no initial state", place=HERE, advice="give one, Machine(..., initial='stick')"
         )
-    names.sort(key=lambda name: name != first)
-    edges = [
-        _edge(trigger, event)
-        for trigger, event in machine.events.items()
-        if not (machine.auto_transitions and _is_automatic(trigger, names))
-    ]
-    return names, edges
+    start = reader.route(first)
+    entered = {start, *(edge.target for edge in edges), *(state.first for state in states)}
+    reader.check_timers(edges)
+    reader.callbacks.check_all_known()
+    return [*_rested(states, entered)], start, edges
 
 
-def _is_automatic(trigger: str, states: list[str]) -> bool:
-    """Return whether a machine made a trigger by itself: it leads from anywhere to a state."""
-    return trigger.startswith("to_") and trigger.removeprefix("to_") in states
+def _rested(states: list[ImportedState], entered: set[Route | None]) -> Iterator[ImportedState]:
+    """Yield the states; one in which a machine can rest, beside its parts, has a part for that."""
+    for state in states:
+        resting = (*state.route, "")
+        if state.first != resting:
+            yield state
+        elif state.route in entered:
+            yield state
+            yield ImportedState(resting, state.place)
+        else:
+            yield replace(state, first=())
 
 
-def _check_machine(machine: Any) -> None:
-    for kind, why in KINDS.items():
-        if isinstance(machine, kind):
-            raise ChartError(
-                f"a {type(machine).__name__} has no counterpart in a chart: {why}",
-                place=HERE,
-                advice="write one state for each combination, in a plain Machine",
-            )
-    if machine.has_queue:
+def _only_name(initial: Any, place: str) -> str | None:
+    """Return the name of the one state in which something starts."""
+    several = initial if isinstance(initial, list) else [initial]
+    if len(several) != 1:
+        names = ", ".join(str(_only_name(each, place)) for each in several)
         raise ChartError(
-            "queued=True has no counterpart in a chart: there every trigger returns True",
-            place=HERE,
-            advice="leave it out",
+            f"it starts in several states at once ({names}), and a chart has one active state",
+            place=place,
+            advice="write one state for each combination",
         )
-    for name in MACHINE_CALLBACKS:
-        _no_callbacks(getattr(machine, name), name, HERE, "a chart calls nothing; leave it out")
+    (one,) = several
+    return None if one is None else str(getattr(one, "name", one))
 
 
-def _state(state: Any) -> str:
-    name, place = str(state.name), f"{HERE}, state {state.name!r}"
-    for kind, keyword in (("on_enter", "entry"), ("on_exit", "exit")):
-        _no_callbacks(
-            getattr(state, kind),
-            kind,
+class _MachineReader:
+    """Reads a machine, with the states in its states."""
+
+    def __init__(self, machine: Any, callbacks: Callbacks) -> None:
+        self.machine, self.callbacks = machine, callbacks
+        self.separator = getattr(machine.state_cls, "separator", None)
+        self.timers: dict[tuple[Route, tuple[Any, ...]], float] = {}  # by what they call
+        self.before, self.after = (
+            callbacks.actions(getattr(machine, name), name, HERE)
+            for name in ("before_state_change", "after_state_change")
+        )
+
+    def route(self, name: str) -> Route:
+        """Return where a name leads."""
+        return tuple(name.split(self.separator)) if self.separator else (name,)
+
+    def states(self, owner: Any, around: Route) -> Iterator[ImportedState]:
+        """Yield the states of a machine or of a state, each before its parts."""
+        for key, state in owner.states.items():
+            name = str(getattr(key, "name", key))
+            route = (*around, name)
+            place = f"{HERE}, state {spelled(route)!r}"
+            entry = self.callbacks.actions(state.on_enter, "on_enter", place)
+            exit_ = self.callbacks.actions(state.on_exit, "on_exit", place)
+            if getattr(state, "timeout", 0):
+                self.timers[route, tuple(state.on_timeout)] = state.timeout
+            if hasattr(state, "volatile_cls"):
+                raise ChartError("a volatile state has no counterpart in a chart", place=place)
+            accepted = getattr(state, "is_accepted", False) or self.left(route)
+            if isinstance(state, Error) and not accepted:
+                raise ChartError("an error state has no counterpart in a chart", place=place)
+            self.callbacks.nothing(getattr(state, "on_final", []), "on_final", place)
+            inner = getattr(state, "states", {})
+            first = None
+            if inner:
+                begins = _only_name(state.initial, place)
+                # Without one, a machine can rest in the state itself.
+                first = (*route, *self.route(begins)) if begins else (*route, "")
+            yield ImportedState(route, place, entry, exit_, first)
+            if inner:
+                yield from self.states(state, route)
+
+    def left(self, route: Route) -> bool:
+        """Return whether an edge leaves a state."""
+        return bool(self.machine.get_triggers((self.separator or "").join(route)))
+
+    def check_timers(self, edges: list[ImportedEdge]) -> None:
+        """Refuse timeouts that do more than to trigger an edge out of their state."""
+        for (route, called), seconds in self.timers.items():
+            waiting = [each for each in edges if (each.source, (each.trigger,)) == (route, called)]
+            if not waiting or any(each.also or each.missing for each in waiting):
+                raise ChartError(
+                    f"its timeout of {seconds!r} s has no counterpart in a chart",
+                    place=f"{HERE}, state {spelled(route)!r}",
+                    advice="let it call a trigger that leaves the state without conditions, or "
+                    "write an edge with the guard 'after(T)'",
+                )
+
+    def edges(
+        self, owner: Any, around: Route, states: list[ImportedState]
+    ) -> Iterator[ImportedEdge]:
+        """Yield the edges of a machine, and those that its states have for their own parts."""
+        names = [(self.separator or "").join(each.route) for each in states]
+        for trigger, event in owner.events.items():
+            made = trigger.startswith("to_") and trigger.removeprefix("to_") in names
+            if self.machine.auto_transitions and made:
+                continue  # by the machine itself: from anywhere to a state
+            for rows in event.transitions.values():
+                for row in rows:
+                    yield self.edge(str(trigger), row, around)
+        for key, state in owner.states.items():
+            if getattr(state, "states", {}):
+                name = str(getattr(key, "name", key))
+                yield from self.edges(state, (*around, name), states)
+
+    def edge(self, trigger: str, row: Any, around: Route) -> ImportedEdge:
+        """Return a transition."""
+        place = f"{HERE}, trigger {trigger!r}"
+        source = (*around, *self.route(str(row.source)))
+        target = None if row.dest is None else (*around, *self.route(str(row.dest)))
+        self.callbacks.nothing(row.prepare, "prepare", place)
+        before = self.callbacks.actions(row.before, "before", place)
+        after = self.callbacks.actions(row.after, "after", place)
+        also, missing = self.callbacks.guard(row.conditions, place)
+        seconds = self.timers.get((source, (trigger,)))
+        return ImportedEdge(
+            trigger,
+            source,
+            target,
             place,
-            f"give what it assigns as text, {keyword}={{{name!r}: {{'z': '0'}}}}, and remove it",
-        )
-    if getattr(state, "timeout", 0):
-        raise ChartError(
-            f"its timeout of {state.timeout!r} s has no counterpart in a chart",
-            place=place,
-            advice="write an edge with the guard 'after(T)'",
-        )
-    if hasattr(state, "volatile_cls"):
-        raise ChartError("a volatile state has no counterpart in a chart", place=place)
-    if state.final:
-        raise ChartError(
-            "a final state has no counterpart in a chart: friction does not end",
-            place=place,
-            advice="leave final=True out",
-        )
-    return name
-
-
-def _edge(trigger: str, event: Any) -> ImportedEdge:
-    place = f"{HERE}, trigger {trigger!r}"
-    rows = [row for each in event.transitions.values() for row in each]
-    for row in rows:
-        if row.dest is None:
-            raise ChartError(
-                f"its internal transition in {row.source!r} has no counterpart in a chart",
-                place=place,
-                advice="write a transition from the state to itself",
-            )
-        for kind in ("prepare", "before", "after"):
-            _no_callbacks(
-                getattr(row, kind),
-                kind,
-                place,
-                f"give what it assigns as text, actions={{{trigger!r}: {{'z': '0'}}}}, and "
-                "remove it",
-            )
-        if not all(condition.target for condition in row.conditions):
-            raise ChartError(
-                "unless has no counterpart in a chart",
-                place=place,
-                advice=f"write it into the guard, guards={{{trigger!r}: 'not (...)'}}",
-            )
-    sources = tuple(str(row.source) for row in rows)
-    targets = {str(row.dest) for row in rows}
-    if len(targets) != 1 or len(set(sources)) != len(sources):
-        edges = ", ".join(f"{row.source} -> {row.dest}" for row in rows)
-        raise ChartError(
-            f"it stands for several edges ({edges})",
-            place=place,
-            advice="give each edge a trigger of its own, which is its name in the chart",
-        )
-    return ImportedEdge(trigger, sources, targets.pop(), place)
-
-
-def _no_callbacks(given: list[Any], kind: str, place: str, advice: str) -> None:
-    if given:
-        called = getattr(given[0], "__name__", str(given[0]))
-        raise ChartError(
-            f"its callback {kind} {called!r} has no counterpart in a chart",
-            place=place,
-            advice=advice,
+            None if seconds is None else f"after({seconds!r})",
+            also=also,
+            missing=missing,
+            before=joined((self.before, before), place),
+            after=joined((after, self.after), place),
         )

@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.parts import State, Transition, texts_of
-from gms_fsm.errors import ChartError
+from gms_fsm.charts.reader import AGE
+from gms_fsm.errors import ChartError, ExpressionError
 from gms_fsm.foundation.arguments import unknown
+from gms_fsm.language import Value, evaluate, names_in, parse_value
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
+
+Route = tuple[str, ...]  # names of states, the outermost first
+Assigned = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class ImportedState:
+    """A state as another program has it; `first` is what is entered inside of one with parts."""
+
+    route: Route
+    place: str
+    entry: Assigned = field(default_factory=dict)
+    exit: Assigned = field(default_factory=dict)
+    first: Route | None = None
 
 
 @dataclass(frozen=True)
@@ -21,20 +39,66 @@ class ImportedEdge:
 
     Parameters
     ----------
-    name : str
-        Of the edge.
+    trigger : str
+        The event at which it is taken; it may be shared with other edges.
+    source, target : tuple of str
+        The states it leaves and enters; without a target nothing is left.
+    place : str
+        Where it is written, for messages.
+    guard : str or None
+        Its condition, if it has one.
+    also : str or None
+        A condition that holds beside whatever is given as guard.
+    missing : str
+        A condition whose text is not known.
+    actions, before, after : mapping of str to str
+        What it assigns; before anything is left, and after everything is entered.
+    stays : int or None
+        How many of the outer states it does not leave; None for those that what is active shares
+        with the target.
+    """
+
+    trigger: str
+    source: Route
+    target: Route | None
+    place: str
+    guard: str | None = None
+    also: str | None = None
+    missing: str = ""
+    actions: Assigned = field(default_factory=dict)
+    before: Assigned = field(default_factory=dict)
+    after: Assigned = field(default_factory=dict)
+    stays: int | None = None
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What edges that are given one guard have in common."""
+        return self.target, self.guard, self.also, self.missing
+
+
+@dataclass(frozen=True)
+class FlatEdge:
+    """An edge between states without parts.
+
+    Parameters
+    ----------
+    number : int
+        Of the imported edge.
     sources : tuple of str
         The states it leaves.
     target : str
         The state it enters.
-    place : str
-        Where it is written, for messages.
+    around : tuple of mapping
+        What is assigned when outer states are left, and when others are entered.
+    name : str
+        Of the edge.
     """
 
-    name: str
+    number: int
     sources: tuple[str, ...]
     target: str
-    place: str
+    around: tuple[tuple[Assigned, ...], tuple[Assigned, ...]]
+    name: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,14 +112,16 @@ class Texts:
     variables: Iterable[str] = ()
     parameters: Iterable[Parameter | str | Mapping[str, Any]] = ()
     let: Mapping[str, str] = field(default_factory=dict)
-    flows: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    flows: Mapping[str, Assigned] = field(default_factory=dict)
     guards: Mapping[str, str] = field(default_factory=dict)
-    entry: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    exit: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    actions: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    entry: Mapping[str, Assigned] = field(default_factory=dict)
+    exit: Mapping[str, Assigned] = field(default_factory=dict)
+    actions: Mapping[str, Assigned] = field(default_factory=dict)
+    callbacks: Mapping[str, str | Assigned] = field(default_factory=dict)
     outputs: Mapping[str, str] = field(default_factory=dict)
-    state_outputs: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    state_outputs: Mapping[str, Assigned] = field(default_factory=dict)
     contact_outputs: Mapping[str, str] = field(default_factory=dict)
+    initial: Mapping[str, float] = field(default_factory=dict)
     locked: Iterable[str] = ()
     impulses: Iterable[str] = ()
 
@@ -66,6 +132,10 @@ class Texts:
         for name in given:
             if name not in known:
                 raise unknown("argument", name, known, ChartError, place=here)
+        for name in given.keys() & {"inputs", "velocities", "variables", "parameters"}:
+            _several(given[name], f"{here}: {name}")
+        for name in given.keys() & {"let", "initial"}:
+            texts_of(given[name], f"{here}: {name}")
         return cls(**given)
 
 
@@ -79,42 +149,60 @@ class GivenTexts(TypedDict, total=False):
     variables: Iterable[str]
     parameters: Iterable[Parameter | str | Mapping[str, Any]]
     let: Mapping[str, str]
-    flows: Mapping[str, Mapping[str, str]]
+    flows: Mapping[str, Assigned]
     guards: Mapping[str, str]
-    entry: Mapping[str, Mapping[str, str]]
-    exit: Mapping[str, Mapping[str, str]]
-    actions: Mapping[str, Mapping[str, str]]
+    entry: Mapping[str, Assigned]
+    exit: Mapping[str, Assigned]
+    actions: Mapping[str, Assigned]
+    callbacks: Mapping[str, str | Assigned]
     outputs: Mapping[str, str]
-    state_outputs: Mapping[str, Mapping[str, str]]
+    state_outputs: Mapping[str, Assigned]
     contact_outputs: Mapping[str, str]
+    initial: Mapping[str, float]
     locked: Iterable[str]
     impulses: Iterable[str]
 
 
+# --------------------------------------------------------------------------- the chart
 def built(
-    kind: type[Chart], states: list[str], edges: list[ImportedEdge], given: Texts, here: str
-) -> Chart:
-    """Return the chart."""
-    by_state = {
-        name: _known(getattr(given, name), states, "state", f"{here}: {name}")
-        for name in ("flows", "entry", "exit", "state_outputs")
+    kind: type[Chart],
+    states: list[ImportedState],
+    first: Route,
+    edges: list[ImportedEdge],
+    given: Texts,
+    here: str,
+) -> tuple[Chart, list[FlatEdge]]:
+    """Return the chart, and its edges with the numbers of those they are made from."""
+    texts = {
+        part: _known(
+            getattr(given, part), [*map(spelled, _routes(states))], "state", f"{here}: {part}"
+        )
+        for part in ("flows", "entry", "exit", "state_outputs")
     }
-    names = [edge.name for edge in edges]
-    actions = _known(given.actions, names, "edge", f"{here}: actions")
+    states = [
+        replace(
+            each,
+            entry=texts["entry"].get(spelled(each.route), each.entry),
+            exit=texts["exit"].get(spelled(each.route), each.exit),
+        )
+        for each in states
+    ]
+    leaves, flat, outer = flattened(states, first, edges)
+    start = _started(outer, dict.fromkeys(given.variables, 0.0) | {**given.initial})
+    names = [spelled(each.route) for each in leaves]
+    used = [*given.inputs, *given.velocities, *given.variables, *given.let]
+    flat = named(flat, edges, [*names, *used])
+    known = [*dict.fromkeys([each.name for each in flat] + [each.trigger for each in edges])]
+    actions = _known(given.actions, known, "edge", f"{here}: actions")
     guards = texts_of(given.guards, f"{here}: guards")
-    _check_known(guards, names, "edge", f"{here}: guards")
-    for edge in edges:
-        if edge.name not in guards:
-            raise ChartError(
-                "no guard is given for it",
-                place=edge.place,
-                advice=f"give one as text, guards={{{edge.name!r}: 'z > s'}}; 'True' for always",
-            )
+    _check_known(guards, known, "edge", f"{here}: guards")
+    conditions = _guards(flat, edges, guards)
     locked = dict.fromkeys(map(str, _several(given.locked, f"{here}: locked")))
-    _check_known(locked, states, "state", f"{here}: locked")
+    _check_known(locked, [*map(spelled, _routes(states))], "state", f"{here}: locked")
     impulses = dict.fromkeys(map(str, _several(given.impulses, f"{here}: impulses")))
-    _check_known(impulses, names, "edge", f"{here}: impulses")
-    return kind(
+    _check_known(impulses, known, "edge", f"{here}: impulses")
+    parts = {spelled(each.route): each for each in leaves}
+    chart = kind(
         given.name,
         given.inputs,
         given.variables,
@@ -122,33 +210,301 @@ def built(
         tuple(
             State(
                 name,
-                flow=by_state["flows"].get(name, {}),
-                entry=by_state["entry"].get(name, {}),
-                exit=by_state["exit"].get(name, {}),
-                outputs=by_state["state_outputs"].get(name, {}),
-                locked=name in locked,
+                flow=_inherited(texts["flows"], each.route),
+                entry=each.entry,
+                exit=each.exit,
+                outputs=_inherited(texts["state_outputs"], each.route),
+                locked=any(spelled(outer) in locked for outer in _outwards(each.route)),
             )
-            for name in states
+            for name, each in parts.items()
         ),
         tuple(
             Transition(
-                edge.name,
-                edge.sources,
-                edge.target,
-                guards[edge.name],
-                actions.get(edge.name),
-                impulse=edge.name in impulses,
+                each.name,
+                each.sources,
+                each.target,
+                conditions[each.name],
+                _actions(each, edges[each.number], actions, parts),
+                impulse=each.name in impulses or edges[each.number].trigger in impulses,
             )
-            for edge in edges
+            for each in flat
         ),
         given.outputs,
         given.reference,
         let=given.let,
         velocities=given.velocities,
         contact_outputs=given.contact_outputs,
+        initial=start,
     )
+    for each in flat:
+        _check_time(chart, each, edges[each.number], parts)
+    return chart, flat
 
 
+def _check_time(
+    chart: Chart, each: FlatEdge, edge: ImportedEdge, leaves: Mapping[str, ImportedState]
+) -> None:
+    """Refuse an edge for which the time in a state would mean something else."""
+    if AGE in names_in(chart.guards[each.name]) and spelled(edge.source) not in leaves:
+        raise ChartError(
+            f"its guard reads the time in {spelled(edge.source)!r}, which has states inside: a "
+            "chart knows the time in these",
+            place=edge.place,
+            advice="count the time in a variable with the flow '1'",
+        )
+    if edge.target is None and AGE in chart.variables:
+        raise ChartError(
+            "it leaves nothing, and the chart reads the time in a state, which an edge from a "
+            "state to itself starts again",
+            place=edge.place,
+            advice="count the time in a variable with the flow '1'",
+        )
+
+
+def _guards(
+    flat: list[FlatEdge], edges: list[ImportedEdge], given: Mapping[str, str]
+) -> dict[str, str]:
+    """Return the guard of each edge: what is given by its name, or by that of its trigger.
+
+    What is given for a trigger with several kinds of edges is joined to their own conditions.
+    """
+    found: dict[str, str] = {}
+    lacking: dict[str, ImportedEdge] = {}
+    for each in flat:
+        edge = edges[each.number]
+        alike = {one.kind for one in edges if one.trigger == edge.trigger}
+        shared = given.get(edge.trigger)
+        whole = given.get(each.name, shared if len(alike) == 1 else None)
+        parts = [shared, edge.guard] if whole is None else [whole]
+        texts = [text for text in (*parts, edge.also) if text is not None]
+        if not texts or (whole is None and edge.missing):
+            lacking.setdefault(each.name if edge.missing else edge.trigger, edge)
+        else:
+            found[each.name] = all_of(texts)
+    if lacking:
+        (name, edge), *others = lacking.items()
+        more = f", and for {', '.join(repr(each) for each, _ in others)}" if others else ""
+        told = f", nor a text for its condition {edge.missing!r}" if edge.missing else ""
+        either = f", or callbacks={{{edge.missing!r}: 'z > s'}}" if edge.missing else ""
+        raise ChartError(
+            f"no guard is given for it{told}",
+            place=edge.place,
+            advice=f"give one as text, guards={{{name!r}: 'z > s'}}{either}{more}; 'True' for "
+            "always",
+        )
+    return found
+
+
+def _actions(
+    each: FlatEdge,
+    edge: ImportedEdge,
+    given: Mapping[str, Assigned],
+    leaves: Mapping[str, ImportedState],
+) -> Assigned:
+    """Return what an edge assigns, which a chart does between exit and entry."""
+    own = given.get(each.name, given.get(edge.trigger, edge.actions))
+    left, entered = each.around
+    whole = edge.target is not None
+    for texts, part, other in (
+        (edge.before, "before", any(leaves[one].exit for one in each.sources)),
+        (edge.after, "after", leaves[each.target].entry),
+    ):
+        if texts and other and whole:
+            raise ChartError(
+                f"what it assigns {part} the states change cannot be kept: a chart assigns in the "
+                "order exit, action, entry",
+                place=edge.place,
+                advice="assign it in the transition itself, or leave exit and entry out",
+            )
+    if not whole and any(leaves[one].exit or leaves[one].entry for one in each.sources):
+        raise ChartError(
+            f"it leaves nothing, but a chart performs exit and entry of {each.target!r}",
+            place=edge.place,
+            advice="move what they assign to the edges that enter and leave it",
+        )
+    return joined((edge.before, *left, own, *entered, edge.after), edge.place)
+
+
+def all_of(conditions: Iterable[str]) -> str:
+    """Return conditions as one."""
+    several = [*conditions]
+    if len(several) == 1:
+        return several[0]
+    return " and ".join(f"({each})" if " or " in each else each for each in several)
+
+
+def joined(texts: Iterable[Assigned], place: str) -> dict[str, str]:
+    """Return assignments one after the other as one; none may be there twice."""
+    found: dict[str, str] = {}
+    for each in texts:
+        for name, text in each.items():
+            if name in found:
+                raise ChartError(
+                    f"{name!r} is assigned twice in a row, {found[name]!r} and {text!r}",
+                    place=place,
+                    advice="a chart assigns one expression to a variable",
+                )
+            found[name] = text
+    return found
+
+
+# --------------------------------------------------------------------------- nested states
+def spelled(route: Route) -> str:
+    """Return the name of a state in the chart."""
+    return "__".join(name for name in route if name)
+
+
+def _outwards(route: Route) -> list[Route]:
+    """Return a state and those around it, the innermost first."""
+    return [route[:k] for k in range(len(route), 0, -1)]
+
+
+def _routes(states: list[ImportedState]) -> list[Route]:
+    return [each.route for each in states]
+
+
+def _inherited(texts: Mapping[str, Assigned], route: Route) -> dict[str, str]:
+    """Return the texts of a state over those of the states around it."""
+    found: dict[str, str] = {}
+    for outer in reversed(_outwards(route)):
+        found |= texts.get(spelled(outer), {})
+    return found
+
+
+def flattened(
+    states: list[ImportedState], first: Route, edges: list[ImportedEdge]
+) -> tuple[list[ImportedState], list[FlatEdge], list[ImportedState]]:
+    """Return the states without parts, the default one first, and all edges between them.
+
+    Edges of inner states go before those of outer ones. The third list has the states around the
+    default one, which are entered when the chart starts.
+    """
+    by_route = {each.route: each for each in states}
+
+    def inside(route: Route) -> Route:
+        state = by_route[route]
+        if state.first is None:
+            return route
+        if state.first not in by_route or state.first[: len(route)] != route:
+            raise ChartError(
+                f"its initial state {spelled(state.first)!r} is not inside of it",
+                place=state.place,
+            )
+        return inside(state.first)
+
+    for edge in edges:
+        for end, route in (("source", edge.source), ("target", edge.target)):
+            if route is not None and route not in by_route:
+                raise unknown(
+                    end, spelled(route), map(spelled, by_route), ChartError, place=edge.place
+                )
+
+    default = inside(first)
+    leaves = [each for each in states if each.first is None]
+    leaves.sort(key=lambda each: each.route != default)
+    rows: list[FlatEdge] = []
+    for number, edge in sorted(enumerate(edges), key=lambda each: -len(each[1].source)):
+        for leaf in leaves:
+            if leaf.route[: len(edge.source)] != edge.source:
+                continue
+            source = leaf.route
+            target = source if edge.target is None else inside(edge.target)
+            kept = len(source) - 1
+            if edge.target is not None:
+                kept = _shared(source, edge.target) if edge.stays is None else edge.stays
+            left = [by_route[each].exit for each in _outwards(source[:-1]) if len(each) > kept]
+            entered = [by_route[each].entry for each in _outwards(target[:-1]) if len(each) > kept]
+            around = tuple(filter(None, left)), tuple(filter(None, reversed(entered)))
+            rows.append(FlatEdge(number, (spelled(source),), spelled(target), around))
+    return leaves, rows, [by_route[each] for each in reversed(_outwards(default[:-1]))]
+
+
+def _shared(source: Route, target: Route) -> int:
+    """Return how many outer states two have in common; a target that is active is entered again."""
+    same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(source, target, strict=False))
+    count = len([*same])
+    return count - 1 if count == len(target) else count
+
+
+def _started(outer: list[ImportedState], values: dict[str, float]) -> dict[str, float]:
+    """Return the values at the start, after the entries of outer states; zeros are left out."""
+    for each in outer:
+        for name, text in each.entry.items():
+            try:
+                values[name] = number_of(parse_value(text, values), values)
+            except ExpressionError:
+                raise ChartError(
+                    f"at the start its entry assigns {text!r} to {name!r}, which is no number yet",
+                    place=each.place,
+                    advice="assign it in the state that is entered inside of it",
+                ) from None
+    return {name: value for name, value in values.items() if value}
+
+
+def number_of(tree: Value, values: Mapping[str, float]) -> float:
+    """Return the value of an expression at the start; NaN, which a chart refuses, without one."""
+    try:
+        return float(evaluate(tree, values))
+    except (ArithmeticError, ValueError):
+        return math.nan
+
+
+# --------------------------------------------------------------------------- names
+def named(rows: list[FlatEdge], edges: list[ImportedEdge], taken: list[str]) -> list[FlatEdge]:
+    """Give every row the name of its edge; rows that differ in their source only are one.
+
+    An edge has the name of its trigger if no other has the same, or else ``source_target``.
+    """
+    groups: dict[str, list[FlatEdge]] = {}
+    for row in rows:
+        groups.setdefault(edges[row.number].trigger, []).append(row)
+
+    def alike(group: list[FlatEdge]) -> bool:
+        kinds = {
+            repr((row.target, edge.kind, edge.actions, edge.before, edge.after, row.around))
+            for row in group
+            for edge in [edges[row.number]]
+        }
+        return len(kinds) == 1 and len({row.sources for row in group}) == len(group)
+
+    whole = {name for name, group in groups.items() if name and name not in taken and alike(group)}
+    while True:
+        called = _called(rows, edges, whole, [*taken, *whole])
+        places = {name: k for k, name in reversed([*enumerate(called)])}
+        last: dict[str, int] = {}
+        wrong = set()
+        for row, name in zip(rows, called, strict=True):
+            if places[name] < last.get(row.sources[0], -1):  # one edge would change the priority
+                wrong.add(name)
+            last[row.sources[0]] = places[name]
+        if not wrong & whole:
+            break
+        whole -= wrong
+    found: dict[str, FlatEdge] = {}
+    for row, name in zip(rows, called, strict=True):
+        before = found[name].sources if name in found else ()
+        found[name] = replace(found.get(name, row), name=name, sources=(*before, *row.sources))
+    return [*found.values()]
+
+
+def _called(
+    rows: list[FlatEdge], edges: list[ImportedEdge], whole: set[str], taken: list[str]
+) -> list[str]:
+    used, found = {*taken}, list[str]()
+    for row in rows:
+        name = edges[row.number].trigger
+        if name not in whole:
+            made = name = f"{row.sources[0]}_{row.target}"
+            for k in itertools.count(2):
+                if name not in used:
+                    break
+                name = f"{made}_{k}"
+            used.add(name)
+        found.append(name)
+    return found
+
+
+# --------------------------------------------------------------------------- what is given
 def _known(
     given: Mapping[str, Mapping[str, str]], names: list[str], kind: str, place: str
 ) -> Mapping[str, Mapping[str, str]]:

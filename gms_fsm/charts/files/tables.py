@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from gms_fsm.charts.parameters import Parameter
-from gms_fsm.charts.parts import State, Transition
+from gms_fsm.charts.parts import NO_GUARD, State, Transition
 from gms_fsm.charts.reader import AGE
 from gms_fsm.errors import ChartError
 from gms_fsm.foundation.tables import ONE, TABLE, Table, Texts, built, read_file, write_file
@@ -55,7 +55,9 @@ class EdgeTable(Table):
     name: str
     source: Texts = Field(alias="from", description="the state it leaves, its source")
     target: str = Field(alias="to", description="the state it enters, its target")
-    guard: str = Field(description="the condition under which it is taken")
+    guard: str = Field(NO_GUARD, description="the condition under which it is taken")
+    event: str = Field("", description="the event that it waits for; the guard may be left out")
+    emit: Texts = Field([], description="events for the machines of the system")
     actions: dict[str, str] = Field({}, alias="do", description="actions: new values of variables")
     impulse: bool = False
 
@@ -83,6 +85,7 @@ class ChartTable(Table):
     let: dict[str, str] = Field({})
     outputs: dict[str, str] = Field({})
     contact_outputs: dict[str, str] = Field({})
+    initial: dict[str, float] = Field({})
     states: list[StateTable] = Field(alias="state")
     transitions: list[EdgeTable] = Field([], alias="edge")
     layout: dict[str, list[float]] = Field({})
@@ -98,8 +101,9 @@ class ChartTable(Table):
     def _plain_names(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Write plain names of parameters as one list; else each as a table."""
         data: dict[str, Any] = write(self)
-        if not self.layout:  # most charts have none
-            data.pop("layout", None)
+        for name in ("initial", "layout"):  # most charts have none
+            if not getattr(self, name):
+                data.pop(name, None)
         given = data.get("parameter", [])
         if not all(isinstance(each, str) for each in given):
             data["parameter"] = [
@@ -114,6 +118,7 @@ class ChartTable(Table):
         edges: dict[str, dict[str, Any]] = {}
         for edge in chart.transitions:
             one = {name: getattr(edge, name) for name in EdgeTable.model_fields}
+            one["emit"] = list(edge.emit)
             one["source"] = edges[edge.name]["source"] if edge.name in edges else []
             one["source"].append(edge.source)
             edges[edge.name] = one
@@ -134,6 +139,7 @@ class ChartTable(Table):
                 "let": chart.let,
                 "outputs": chart.outputs,
                 "contact_outputs": chart.contact_outputs,
+                "initial": chart.initial,
                 "states": [dict(vars(state)) for state in chart.states],
                 "transitions": list(edges.values()),
                 "layout": {name: list(place) for name, place in chart.layout.items()},

@@ -9,9 +9,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from gms_fsm.foundation.extras import require
+from gms_fsm.foundation.text import visible
 
 require("textual", "tui")
 
+from rich.text import Text
 from textual import events, on
 from textual.app import App, ComposeResult
 from textual.binding import Binding
@@ -237,7 +239,7 @@ class FullScreen(App[int]):
         if self.only_last:
             begin = self.last
             if self.said[begin].startswith("(t="):  # the title has the command
-                panel.border_title, begin = self.said[begin], begin + 1
+                panel.border_title, begin = Text(visible(self.said[begin])), begin + 1
         return drawn.answer_rows(self.said[begin:], width)
 
     def _chart(self, width: int) -> list[PanelLine]:
@@ -246,7 +248,7 @@ class FullScreen(App[int]):
         states = chart_states(commands.session, commands.element)
         name = commands.elements.name(commands.element)
         title = f"{name}: {commands.elements.chart(commands.element).name}"
-        panel.border_title = title if len(title) <= width - 2 else name
+        panel.border_title = Text(visible(title) if len(title) <= width - 2 else name)
         art, shorter = (chart_art(states, width, names=names) for names in (True, False))
         if len(art) > len(shorter):
             art = shorter
@@ -284,7 +286,7 @@ class FullScreen(App[int]):
             rows = _time.curve_rows(values, lead, shown.now) + rows
         axis = " " * lead + _time.axis(*span, parts)
         panel.lead, panel.span, panel.parts = lead, span, parts
-        panel.border_title = title
+        panel.border_title = Text(visible(title))
         panel.show([*rows, PanelLine(line((axis, "dim")))], self.palette)
         self.call_after_refresh(panel.keep_visible, 0)
 

@@ -78,8 +78,7 @@ def element_rows(view: Screen, chosen: int, width: int) -> list[PanelLine]:
         rows += _table(contact, chosen, width)
     for body in view.bodies:
         given = " (given)" if body.driven else ""
-        (x, position), (v, velocity) = body.x, body.v
-        text = f"{body.name}: {x} = {quantity(position)}, {v} = {quantity(velocity)}{given}"
+        text = f"{body.name}: {body.text()}{given}"
         rows += [PanelLine(line((part, "dim"))) for part in wrapped(text, width)]
     for each in view.values:
         values = ", ".join(f"{name} = {quantity(value)}" for name, value in each.values.items())

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from rich.text import Text
 
+from gms_fsm.foundation.text import visible
 from plots.style import ROLES, Theme, colour
 
 STATES = 6  # looks of states; the ribbons' marks repeat in the same rhythm
@@ -77,7 +78,7 @@ def painted(lines: Iterable[Line], palette: Mapping[str, str]) -> Text:
         if number:
             text.append("\n")
         for span in each:
-            text.append(span.text, palette[span.role])
+            text.append(visible(span.text), palette[span.role])
     return text
 
 

@@ -50,8 +50,8 @@ class Panel(ScrollableContainer, can_focus=True, inherit_bindings=False):
 
     @property
     def columns(self) -> int:
-        """Columns for text, beside a scroll bar."""
-        return max(10, self.outer_size.width - self.styles.gutter.width - 1)
+        """Columns for text, with a gap before the scroll bar."""
+        return max(10, self.outer_size.width - self.styles.gutter.width - 2)
 
     def show(self, rows: Sequence[PanelLine], palette: Mapping[str, str]) -> None:
         """Show lines instead of those shown."""

@@ -27,6 +27,7 @@ from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.fmi.model import FmuModel
 from gms_fsm.exporters.fmi.units import base_units
 from gms_fsm.exporters.fmi.variables import FmuVariable, types_of, variables_of
+from gms_fsm.foundation.text import encoded, visible
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 _SYSTEMS = {  # by operating system: folders of FMI 2, system of FMI 3, ending
@@ -182,7 +183,7 @@ def _archive(files: Mapping[str, str | bytes]) -> bytes:
             info = zipfile.ZipInfo(name, EPOCH)
             info.compress_type = zipfile.ZIP_DEFLATED
             info.external_attr = 0o644 << 16
-            archive.writestr(info, content)
+            archive.writestr(info, encoded(content) if isinstance(content, str) else content)
     return data.getvalue()
 
 
@@ -200,7 +201,7 @@ def _binary(
     else:
         with tempfile.TemporaryDirectory() as place:
             for each, text in sources.items():
-                (Path(place) / each).write_text(text, encoding="utf-8")
+                (Path(place) / each).write_bytes(encoded(text))
             made = Path(place) / f"{name}{ending}"
             compiled = [each for each in sources if each.endswith(".c")]
             command = [compiler, *FLAGS, *compiled, "-o", made.name, "-lm"]
@@ -240,7 +241,7 @@ def tag(name: str, /, *inside: str, **attributes: object) -> str:
         for key, value in attributes.items()
         if value is not None and value != ""
     }
-    head = "".join([name, *(f" {key}={quoteattr(text)}" for key, text in texts.items())])
+    head = "".join([name, *(f" {key}={quoteattr(visible(text))}" for key, text in texts.items())])
     if not inside:
         return f"<{head}/>"
     lines = [f"  {line}" for each in inside for line in each.splitlines()]
@@ -256,21 +257,21 @@ def units_of(variables: Iterable[FmuVariable]) -> dict[str, dict[str, int]]:
 # --------------------------------------------------------------------------- documentation
 def _readme(subject: Subject, described: Described, version: int, why: str) -> str:
     variables, (folder, ending) = described.variables, _platform(version)
-    charts = dict.fromkeys(contact.chart.name for contact in subject.start.system.contacts)
+    charts = dict.fromkeys(contact.chart.name for contact in subject.start.system.machines)
     inputs, outputs = (
         "\n".join(_line(each) for each in variables if each.causality == causality)
         for causality in ("input", "output")
     )
     return filled(
         "fmi/fmu.md",
-        title=subject.title,
+        title=visible(subject.title),
         version=version,
         writer=__version__,
         name=described.name,
         file=_file(described.name, version),
         what="friction whose velocity is an input" if subject.alone else "a whole system",
         kinds="Model Exchange and Co-Simulation" if described.exchange else "Co-Simulation",
-        charts=", ".join(charts),
+        charts=visible(", ".join(charts)),
         binary=f"There is no binary in it: {why}. Compile the sources."
         if why
         else f"The binary is for {folder}; for other machines compile the sources.",
@@ -304,11 +305,12 @@ def _held(subject: Subject, described: Described, version: int) -> str:
 
 def _line(each: FmuVariable) -> str:
     unit = f" [{each.unit}]" if each.unit else ""
-    return f"- `{each.name}`{unit} {each.meaning}".rstrip()
+    return f"- `{each.name}`{unit} {visible(each.meaning)}".rstrip()
 
 
 def _page(title: str, readme: str) -> str:
     return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}'
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>'
+        f"{html.escape(visible(title))}"
         f"</title></head>\n<body><pre>\n{html.escape(readme)}</pre></body></html>\n"
     )

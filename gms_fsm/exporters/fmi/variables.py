@@ -127,7 +127,7 @@ def types_of(start: Problem) -> dict[str, tuple[str, ...]]:
     """Return the states of the elements by the name of their enumeration, one for each contact."""
     return {
         f"{contact.name} states": tuple(state.name for state in contact.chart.states)
-        for contact in start.system.contacts
+        for contact in start.system.machines
     }
 
 

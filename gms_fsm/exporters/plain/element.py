@@ -25,6 +25,7 @@ from gms_fsm.exporters.plain.parts import (
     StateParts,
     Variable,
 )
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     Call,
     Comparison,
@@ -36,7 +37,7 @@ from gms_fsm.language import (
 )
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall, both_sides, plan_of
-from gms_fsm.systems.reading.assembly import CURVE_LOAD, Assembly, Bank, ContactEdge, assembled, of
+from gms_fsm.systems.reading.assembly import CURVE_LOAD, Assembly, Bank, ContactEdge, of
 
 __all__ = ["NamedFriction"]
 
@@ -122,7 +123,7 @@ class NamedFriction:
         (['stribeck', 's'], ['stick', 'slip'])
         """
         contact = subject.contact  # refuses a system, a chart without numbers, locks
-        read = assembled(subject.start.system)
+        read = subject.start.system.assembly
         (bank,) = read.banks
         _refuse_feedback(bank, f"chart {contact.chart.name!r}")
         every = frozenset(words)
@@ -465,4 +466,4 @@ class PlanReader:
 
 
 def _about(parameter: Parameter) -> str:
-    return ": ".join(part for part in (parameter.unit, parameter.meaning) if part)
+    return visible(": ".join(part for part in (parameter.unit, parameter.meaning) if part))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -19,6 +18,7 @@ from gms_fsm.exporters.plain.form import (
     TwoWays,
     Verbatim,
 )
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import Dialect, Node, spell
 
 
@@ -60,9 +60,10 @@ class Forms:
 
     def clean(self, text: str) -> str:
         """Return a text that may stand in a comment."""
+        text = visible(text)
         for mark, instead in self.marks.items():
             text = text.replace(mark, instead)
-        return re.sub(r"\s+", " ", text)
+        return text
 
     def note(self, text: str) -> str:
         """Return a comment at the end of a line; nothing for no text."""

@@ -14,6 +14,7 @@ from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import plain_c, plain_c_notes
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import visible
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.systems.signals import Corners
 
@@ -136,7 +137,7 @@ def _readme(subject: Subject, made: CEngine) -> str:
     return filled(
         "c/c99.md",
         name=name,
-        title=subject.title,
+        title=visible(subject.title),
         arguments="".join(f"{each}0, {each}1, " for each in made.inputs),
         inputs=inputs,
         method=settings.method_name,

@@ -28,6 +28,7 @@ from gms_fsm.exporters._c import filled
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import visible
 from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.lowering.compiling import packed
 from gms_fsm.lowering.program import equations
@@ -132,7 +133,7 @@ class _Module(ABC):
         return filled(
             "js/js.mjs",
             name=self.subject.name,
-            title=" ".join(self.subject.title.split()),
+            title=visible(self.subject.title),
             version=__version__,
             tables=_folded(map(script_number, tables)),
             words=self.layout.words,
@@ -148,7 +149,7 @@ class _Module(ABC):
             states=_table(
                 {
                     contact.name: [state.name for state in contact.chart.states]
-                    for contact in self.start.system.contacts
+                    for contact in self.start.system.machines
                 }
             ),
             edges=_rows(self._edges()),
@@ -178,7 +179,7 @@ class _Module(ABC):
         return filled(
             "js/js.md",
             name=self.subject.name,
-            title=" ".join(self.subject.title.split()),
+            title=visible(self.subject.title),
             example=self.example(),
             errors=self.errors,
             method=settings.method_name,
@@ -230,7 +231,7 @@ class _Module(ABC):
                 "source": edge.source,
                 "target": edge.target,
             }
-            for contact in self.start.system.contacts
+            for contact in self.start.system.machines
             for edge in contact.chart.transitions
         ]
 
@@ -474,7 +475,7 @@ def _folded(parts: Iterable[str]) -> str:
 
 
 def _note(each: Quantity) -> str:
-    return f" // {each.about}" if each.about else ""
+    return f" // {visible(each.about)}" if each.about else ""
 
 
 register(

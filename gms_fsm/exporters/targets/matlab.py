@@ -25,6 +25,7 @@ from gms_fsm.exporters.plain.form import (
 from gms_fsm.exporters.plain.parts import Expression, Let, StateParts
 from gms_fsm.exporters.plain.walker import Forms, Walker
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     CHOICES,
     MATLAB,
@@ -490,7 +491,7 @@ class FunctionFile:
         name = self.name
         further = "".join(f", {each}0, {each}1" for each, _ in self.element.inputs[1:])
         return f"""\
-# {self.element.title} for MATLAB and GNU Octave
+# {visible(self.element.title)} for MATLAB and GNU Octave
 
 - {name}.m: the function `{name}`
 

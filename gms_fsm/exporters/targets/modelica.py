@@ -12,6 +12,7 @@ from gms_fsm.exporters.plain.element import NamedFriction
 from gms_fsm.exporters.plain.parts import Constant, Leaving
 from gms_fsm.exporters.plain.walker import indented
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     MODELICA,
     Both,
@@ -229,7 +230,7 @@ class ModelOfElements:
         name = self.name
         wires = "".join(f" friction.{each} = ...;" for each, _ in self.element.inputs[1:])
         return f"""\
-# {self.element.title} as a Modelica model
+# {visible(self.element.title)} as a Modelica model
 
 - {name}.mo: the model `{name}`, and `{self.kind}`, of which it is made; no library is needed
 
@@ -277,7 +278,7 @@ def _joined(part: Split) -> Condition:
 
 
 def _string(text: str) -> str:
-    clean = re.sub(r"\s+", " ", text).replace("\\", "/").replace('"', "'")
+    clean = visible(text).replace("\\", "/").replace('"', "'")
     return f'"{clean}"'
 
 

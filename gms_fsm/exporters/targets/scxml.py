@@ -31,9 +31,9 @@ from gms_fsm.exporters.alone import (
     check_moved_from_outside,
     element_numbers,
     fields_of,
-    one_line,
 )
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import referenced, visible
 from gms_fsm.language import ECMASCRIPT, names_in
 from gms_fsm.systems.system import LEAST_LOAD, Contact, loaded
 
@@ -112,7 +112,7 @@ def _document(name: str, chart: Chart, numbers: Mapping[str, float]) -> str:
         write.state(root, state.name)
     ET.indent(root, "  ")
     head = f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- Written by gms-fsm {__version__}. -->\n'
-    return head + ET.tostring(root, encoding="unicode") + "\n"
+    return head + referenced(ET.tostring(root, encoding="unicode")) + "\n"
 
 
 def _outside(chart: Chart) -> dict[str, str]:
@@ -152,7 +152,7 @@ def _data(root: ET.Element, chart: Chart, numbers: Mapping[str, float]) -> None:
         value = {"expr": repr(numbers[name])} if name in numbers else {}
         ET.SubElement(model, "data", {"id": name, **value})
     for name in _outside(chart):
-        ET.SubElement(model, "data", {"id": name, "expr": "0.0"})
+        ET.SubElement(model, "data", {"id": name, "expr": repr(chart.initial.get(name, 0.0))})
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
     numbers = (
         "The chart has no numbers: set every <data> without expr before the first step."
         if contact is None
-        else f"Numbers: those of {one_line(contact.title)}, one document for each element."
+        else f"Numbers: those of {visible(contact.title)}, one document for each element."
     )
     curve = ""
     if contact is not None and contact.stribeck is not None:
@@ -211,7 +211,7 @@ def _readme(files: list[str], chart: Chart, contact: Contact | None) -> str:
         f"\n- python-statemachine keeps the names {', '.join(kept)} for itself." if kept else ""
     )
     return f"""\
-# {one_line(chart.name)} as SCXML
+# {visible(chart.name)} as SCXML
 
 Written by gms-fsm {__version__}, format scxml.
 

@@ -15,6 +15,7 @@ from gms_fsm.exporters.plain.form import PlainForm, declared, plain_form
 from gms_fsm.exporters.plain.parts import Constant
 from gms_fsm.exporters.plain.walker import Forms, Walker, indented
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import STRUCTURED_TEXT
 
 __all__ = ["WORDS", "structured_text"]
@@ -240,7 +241,7 @@ class StructuredText:
         inputs = "".join(f", {each} := ..." for each, _ in element.inputs[1:])
         sgn = f" and the function {name}_sgn" if f"{name}_sgn(" in self.text() else ""
         return f"""\
-# {element.title} as structured text (IEC 61131-3)
+# {visible(element.title)} as structured text (IEC 61131-3)
 
 - {name}.st: the function block {name}{sgn}
 

@@ -26,10 +26,10 @@ from gms_fsm.exporters.alone import (
     check_moved_from_outside,
     element_numbers,
     fields_of,
-    one_line,
     slow_velocity,
 )
 from gms_fsm.formats import Format, register
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import ELEMENTARY, NAMESPACE, Condition, Node, Value, parse_value, sgn, spell
 from gms_fsm.language.normal import renamed
 from gms_fsm.lowering.generated import bare, elementary_text
@@ -61,7 +61,7 @@ def _write(subject: Subject) -> dict[str, str]:
 
 def _head(chart: Chart) -> str:
     return (
-        f"# {one_line(chart.name)}: elements as models of one transitions.Machine.\n"
+        f"# {visible(chart.name)}: elements as models of one transitions.Machine.\n"
         f"# Written by gms-fsm {__version__}; needs only the package transitions.\n"
     )
 
@@ -109,6 +109,7 @@ def _data(chart: Chart) -> dict[str, Any]:
         "OUTPUTS": dict(chart.outputs),
         "STATE_OUTPUTS": _filled({state.name: dict(state.outputs) for state in chart.states}),
         "CONTACT_OUTPUTS": dict(chart.contact_outputs),
+        "INITIAL": dict(chart.initial),
     }
 
 
@@ -196,7 +197,8 @@ def _element(chart: Chart, contact: Contact | None) -> Iterator[str]:
     yield "    def __init__(self, numbers, weight):"
     yield "        vars(self).update(numbers)"
     yield "        self._weight = weight"
-    yield f"        vars(self).update(dict.fromkeys({tuple(chart.variables)!r}, 0.0))"
+    starts = {name: chart.initial.get(name, 0.0) for name in chart.variables}
+    yield f"        vars(self).update({starts!r})"
     yield ""
     if contact is not None and contact.stribeck is not None:
         curve = parse_value(contact.stribeck.text, [*contact.stribeck.numbers, "v"])
@@ -370,10 +372,10 @@ def _readme(name: str, chart: Chart, contact: Contact | None) -> str:
     numbers = (
         "none: fill in VALUES, one mapping for each element"
         if contact is None
-        else f"those of {one_line(contact.title)}, {contact.n} element{'s' * (contact.n != 1)}"
+        else f"those of {visible(contact.title)}, {contact.n} element{'s' * (contact.n != 1)}"
     )
     return f"""\
-# {one_line(chart.name)} as a transitions machine
+# {visible(chart.name)} as a transitions machine
 
 Written by gms-fsm {__version__}, format transitions.
 
@@ -401,7 +403,7 @@ Build the chart again
         velocities=file.VELOCITIES, variables=file.VARIABLES, parameters=file.PARAMETERS,
         let=file.LET, flows=file.FLOWS, guards=file.GUARDS, entry=file.ENTRY, exit=file.EXIT,
         actions=file.ACTIONS, outputs=file.OUTPUTS, state_outputs=file.STATE_OUTPUTS,
-        contact_outputs=file.CONTACT_OUTPUTS,
+        contact_outputs=file.CONTACT_OUTPUTS, initial=file.INITIAL,
     )
 
 States: {states}

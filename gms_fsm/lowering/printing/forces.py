@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import Literal, TypeAlias
 
 from gms_fsm.language import Name, names_in
+from gms_fsm.lowering.places import Places
 from gms_fsm.lowering.printing.lines import TABLES, CodeLine, ProgramWriter, Signs
 from gms_fsm.lowering.printing.locks import Locks
 from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import BankPlan, Computed, Gradient, ProgramPlan, gradient_of
 from gms_fsm.systems.reading.assembly import Bank, of
+from gms_fsm.systems.reading.order import is_deferred, order_of
+
+Part: TypeAlias = Literal["all", "outputs", "rates"]  # of what a machine gives out
 
 
 class ForceWriter(ProgramWriter):
@@ -44,8 +49,23 @@ class ForceWriter(ProgramWriter):
     ) -> list[CodeLine]:
         """Write the rates and the forces of all contacts, and the accelerations."""
         lines: list[CodeLine] = []
-        for bank in self.plan.banks:
-            lines += self.bank_forces(bank, signs, wanted, rates=rates, observed=observed)
+        made: set[str] = set()
+        for bank in order_of(self.read):
+            lines += self.late_definitions(made, signs) if wanted else []
+            plan = self.plan.banks[bank.index]
+            # Rates that read what machines give out are computed after all of it.
+            part: Part = "outputs" if is_deferred(self.read, bank) else "all"
+            lines += self.bank_forces(
+                plan, signs, wanted, rates=rates, observed=observed, part=part
+            )
+            made |= {*bank.forces}
+        lines += self.late_definitions(made, signs) if wanted else []
+        for bank in self.read.banks if rates or observed else ():
+            if is_deferred(self.read, bank):
+                plan = self.plan.banks[bank.index]
+                lines += self.bank_forces(
+                    plan, signs, wanted, rates=rates, observed=observed, part="rates"
+                )
         if wanted and (rates or self.locking):
             for body in self.read.free:
                 value = self.plan.accelerations[body.name]
@@ -54,6 +74,16 @@ class ForceWriter(ProgramWriter):
         if wanted and self.locking:
             lines += self.driven_accelerations()
             lines += self.locks.forces()
+        return lines
+
+    def late_definitions(self, made: set[str], signs: Signs) -> list[CodeLine]:
+        """Write what is computed from what machines give out, as far as that is known."""
+        lines: list[CodeLine] = []
+        for each in self.read.definitions:
+            needs = self.read.closure([each.name]) & self.late
+            if each.name in self.late - made and needs <= made | {each.name}:
+                lines += self.defined(each.name, signs)
+                made.add(each.name)
         return lines
 
     def bank_forces(
@@ -65,12 +95,14 @@ class ForceWriter(ProgramWriter):
         rates: bool = False,
         observed: bool = False,
         held: bool = False,
+        part: Part = "all",
     ) -> list[CodeLine]:
         """Write the loop over the elements of a contact, and its force; `held` stores both."""
         bank, y = plan.bank, self.layout.y
         if bank.periodic and not held:
             return self.held_forces(bank, wanted, rates=rates, observed=observed)
         forces = wanted and (plan.moves or observed or not rates or self.locking)
+        forces, later = forces and part != "rates", part == "outputs"
         used = {name for tree in plan.common.values() for name in names_in(tree)} | {
             name
             for each in plan.states
@@ -80,7 +112,7 @@ class ForceWriter(ProgramWriter):
         needed = {
             name
             for name in bank.variables
-            if rates or observed or held or (forces and bank.rate(name) in used)
+            if ((rates or observed or held) and not later) or (forces and bank.rate(name) in used)
         }
         # Only a contact with several velocities has several forces.
         several = {force: f"F_i{'' if q == 0 else f'_{q}'}" for q, force in enumerate(bank.forces)}
@@ -98,28 +130,21 @@ class ForceWriter(ProgramWriter):
                 else:
                     branch += self.computed(several[force], each.forces[force], signs, "  # (3)")
             branches[each.state] = branch
-        after: list[CodeLine] = []
-        for force in bank.forces if forces else ():
-            total = self.local(force)
-            if force not in plan.common:
-                after.append(CodeLine(f"{total} += {several[force]}"))
-            elif observed or held:
-                after.append(self.put(several[force], plan.common[force], "  # (3)"))
-                after.append(CodeLine(f"{total} += {several[force]}"))
-            else:
-                tree = plan.common[force]
-                after.append(
-                    CodeLine(f"{total} += {self.spell(tree)}  # (3)", computed_names(tree))
-                )
-        if observed:
+        after = self.summed(plan, several, stored=observed or held) if forces else []
+        if observed and part != "rates":
             after += self.elements_seen(plan, several)
-        if rates:
-            after += [self.store("dy", y, v, self.local(bank.rate(v))) for v in bank.variables]
+        places: list[tuple[str, Places[str], Callable[[str], str]]] = []
+        if not later:
+            places += [("out", self.layout.observed, bank.rate)] * observed
+            places += [("dy", y, str)] * rates
         if held:
+            places.append(("y", y, lambda v: bank.held(bank.rate(v))))
+        for array, layout, place in places:
             after += [
-                self.store("y", y, bank.held(bank.rate(v)), self.local(bank.rate(v)))
+                self.store(array, layout, place(v), self.local(bank.rate(v)))
                 for v in bank.variables
             ]
+        if held:
             after += [
                 self.store("y", y, bank.held(f"{force}_elements"), several[force])
                 for force in bank.forces
@@ -133,6 +158,21 @@ class ForceWriter(ProgramWriter):
                 CodeLine(f"y[{y.text(bank.held(force))}] = {self.local(force)}")
                 for force in bank.forces
             ]
+        return lines
+
+    def summed(self, plan: BankPlan, several: Mapping[str, str], *, stored: bool) -> list[CodeLine]:
+        """Add what an element gives out to what its machine does."""
+        lines: list[CodeLine] = []
+        for force in plan.bank.forces:
+            total, tree = self.local(force), plan.common.get(force)
+            if tree is None:
+                lines.append(CodeLine(f"{total} += {several[force]}"))
+            elif stored:
+                lines.append(self.put(several[force], tree, "  # (3)"))
+                lines.append(CodeLine(f"{total} += {several[force]}"))
+            else:
+                text = f"{total} += {self.spell(tree)}  # (3)"
+                lines.append(CodeLine(text, computed_names(tree)))
         return lines
 
     def held_forces(
@@ -177,11 +217,8 @@ class ForceWriter(ProgramWriter):
         """Store what is observed of an element."""
         bank, seen = plan.bank, self.layout.observed
         lines = [self.threshold_seen(bank)]
-        lines += [
-            self.store("out", seen, f"{force}_elements", several[force]) for force in bank.forces
-        ]
         return lines + [
-            self.store("out", seen, bank.rate(v), self.local(bank.rate(v))) for v in bank.variables
+            self.store("out", seen, f"{force}_elements", several[force]) for force in bank.forces
         ]
 
     def threshold_seen(self, bank: Bank) -> CodeLine:

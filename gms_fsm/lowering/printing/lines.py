@@ -8,21 +8,24 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from gms_fsm.language import Binary, Call, Name, Node, Value, frozen, spell
+from gms_fsm.language import Binary, Call, Name, Node, Value, frozen, names_in, spell
 from gms_fsm.language.functions import ROUGH
 from gms_fsm.language.tree import walk
 from gms_fsm.lowering.places import Places, total
 from gms_fsm.lowering.printing.names import computed_names
-from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall
+from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall, moving
 from gms_fsm.systems.reading.assembly import of
-from integrators import LIVE
+from integrators import FOR_A_SIGN, LIVE, WAITING
 
 # Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
 # may be marked as live.
 Signs = Literal["held", "live", "given"]
 QUICK = (*ROUGH, "sqrt")  # functions that need no library
+# A chain of elif is a tree as deep as it is long, and readers call themselves at each level.
+MOST_BRANCHES = 50
 TABLES = "the tables"  # what a signal that is a table reads
 
 
@@ -35,6 +38,22 @@ class CodeLine(NamedTuple):
     text: str
     reads: frozenset[str] = frozenset()
     lazy: str = ""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A part of what happens when an edge is taken.
+
+    Parameters
+    ----------
+    lines : list of CodeLine
+        Assignments.
+    hits : bool
+        An impulse follows them, and the next phase starts with the velocities after it.
+    """
+
+    lines: list[CodeLine]
+    hits: bool
 
 
 def reads_of(lines: Iterable[CodeLine]) -> frozenset[str]:
@@ -52,6 +71,35 @@ def indented(lines: Iterable[CodeLine]) -> list[CodeLine]:
     return [line._replace(text="    " + line.text) for line in lines]
 
 
+class Case(NamedTuple):
+    """Lines for some values of an integer: the first of them, and the test of being one."""
+
+    first: str
+    test: str
+    lines: list[CodeLine]
+    note: str = ""
+    reads: frozenset[str] = frozenset()
+
+
+def chosen(number: str, branches: Sequence[Case], *, all_values: bool = False) -> list[CodeLine]:
+    """Write an if-else over an integer, in the order of its values; a long one as two halves."""
+    if len(branches) > MOST_BRANCHES:
+        half = len(branches) // 2
+        first, rest = branches[:half], branches[half:]
+        return [
+            CodeLine(f"if {number} < {rest[0].first}:", rest[0].reads),
+            *indented(chosen(number, first, all_values=all_values)),
+            CodeLine("else:"),
+            *indented(chosen(number, rest, all_values=all_values)),
+        ]
+    lines = []
+    for k, each in enumerate(branches):
+        last, word = all_values and k == len(branches) - 1, "elif" if k else "if"
+        head = f"else:  # {each.first}" if last else f"{word} {number} {each.test}:{each.note}"
+        lines += [CodeLine(head, each.reads), *indented(each.lines)]
+    return lines
+
+
 class ProgramWriter(ABC):
     """Writes values, loops over elements and functions of a plan.
 
@@ -66,9 +114,7 @@ class ProgramWriter(ABC):
         self.names, self.layout = plan.names, plan.layout
         self.sizes = [block.size for block in plan.layout.y.blocks]
         # What is computed with the forces, never at the head of a function.
-        self.late = {name for bank in plan.read.banks for name in (*bank.forces, *bank.rates)} | {
-            f"{body.name} a" for body in plan.read.system.bodies
-        }
+        self.late = plan.read.late
 
     # ------------------------------------------------------------------ values
     def spell(self, node: Node) -> str:
@@ -121,6 +167,16 @@ class ProgramWriter(ABC):
         elif call.function == "sgn":
             return CodeLine(f"{rough.name} = {value}", sizes)
         return CodeLine(f"{rough.name} = {value}", sizes | computed_names(call))
+
+    def why(self, u: Value) -> int:
+        """Say why a sign is watched; one of the time alone changes while nothing moves.
+
+        Not the sign of a given motion: there something moves, and errors limit the steps.
+        """
+        motions = {name for body in self.read.system.bodies for name in (body.x, body.v)}
+        alone = {*moving(self.read.expanded(u), self.read)} == {"t"}
+        alone = alone and not self.read.closure(names_in(u)) & motions
+        return FOR_A_SIGN | (WAITING if alone else 0)
 
     # ------------------------------------------------------------------ what elements read first
     def element(self, bank: int, reads: frozenset[str], signs: Signs) -> list[CodeLine]:
@@ -237,21 +293,18 @@ class ProgramWriter(ABC):
         """Write an if-else over the element's state."""
         states = self.names.states[bank]
         filled = [
-            (states[state], body if _does_something(body) else [*body, CodeLine("pass")])
+            Case(
+                states[state],
+                f"== {states[state]}",
+                body if _does_something(body) else [*body, CodeLine("pass")],
+            )
             for state, body in branches.items()
         ]
         if not any(_does_something(body) for body in branches.values()):
             return []
         if len(filled) == 1:
             return next(iter(branches.values()))
-        mode = self.mode(bank)
-        lines = []
-        for number, (constant, body) in enumerate(filled):
-            word = "if" if number == 0 else "elif"
-            last = number == len(filled) - 1
-            head = f"else:  # {constant}" if last else f"{word} {mode} == {constant}:"
-            lines += [CodeLine(head), *indented(body)]
-        return lines
+        return chosen(self.mode(bank), filled, all_values=True)
 
     def mode(self, bank: int, element: str = "i") -> str:
         """Spell the mode of an element of a contact."""
@@ -337,6 +390,16 @@ class ProgramWriter(ABC):
             if name.endswith(".curve S"):
                 return self.curve(name, value, signs)
             return [*self.computed(target, value, signs), *self.rounded(name)]
+        if (counts := self.read.defined[name].counts) is not None:
+            bank = self.read.banks[counts[0]]
+            state = self.names.states[bank.index][counts[1]]
+            size = self.sizes[bank.index]
+            return [
+                CodeLine(f"{target} = 0.0"),
+                CodeLine(f"for i in range({size}):", frozenset({f"#{size}"})),
+                CodeLine(f"    if {self.mode(bank.index)} == {state}:"),
+                CodeLine(f"        {target} += 1.0"),
+            ]
         if (name, "times") in self.plan.tables.shared:
             return [
                 CodeLine(f"{target} = piecewise_linear(t, {self.table(name)})", frozenset({TABLES}))
@@ -363,8 +426,3 @@ class ProgramWriter(ABC):
         """Spell the corners of a signal: their times and values."""
         places = (self.plan.tables.text((name, column)) for column in ("times", "values"))
         return ", ".join(f"tables[{place}]" for place in places)
-
-
-def one_line(text: str) -> str:
-    """Return text fit for a comment: a line break would end it."""
-    return "".join(c if c.isprintable() else " " for c in text)

@@ -24,7 +24,7 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
 from gms_fsm.language import Binary, Name, Negative, Number, Value, names_in, spell
-from gms_fsm.lowering.printing.lines import CodeLine, ProgramWriter, indented
+from gms_fsm.lowering.printing.lines import CodeLine, ProgramWriter, indented, reads_of
 from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import times
 from gms_fsm.systems.system import Body
@@ -437,9 +437,11 @@ class Locks:
         for r, each in enumerate(self.rows):
             right[r] = Binary("-", self.relative(each.row, names), Name(f"goal_{r}"))
         solved = [*(CodeLine(f"l_{r} = keep_{r}") for r in rows), *self.solve(right)]
-        if letting := self.letting():
+        read, letting = self.letting()
+        if letting:
             inside = [CodeLine("again = 0"), *solved]
             solved = [
+                *read,
                 CodeLine("again = 1"),
                 CodeLine("while again == 1:"),
                 *indented(inside + letting),
@@ -457,10 +459,15 @@ class Locks:
         ]
         return [CodeLine("if hit > 0:"), *indented(lines)]
 
-    def letting(self) -> list[CodeLine]:
-        """Write which lock lets go instead of carrying the impulse: the first one that does."""
+    def letting(self) -> tuple[list[CodeLine], list[CodeLine]]:
+        """Write which lock lets go instead of carrying the impulse: the first one that does.
+
+        Before it stands what the guards read of the only element of a contact that locks.
+        """
         lines: list[CodeLine] = []
+        first_read: list[CodeLine] = []
         for bank in self.read.banks:
+            begun = len(lines)
             first = [r for r, each in enumerate(self.rows) if each.bank == bank.index]
             place = self.writer.mode(bank.index, "0")
             for edge in bank.edges:
@@ -480,7 +487,13 @@ class Locks:
                 )
                 lines += [CodeLine(f"    keep_{r} = 0.0") for r in first]
                 lines.append(CodeLine("    again = 1"))
-        return lines
+            reads = reads_of(lines[begun:])
+            lines[begun:] = self.writer.outward(bank.index, lines[begun:])
+            if any(self.read.owner.get(name) == bank.index for name in reads):
+                own = self.writer.element(bank.index, self.writer.own(bank.index, reads), "live")
+                index = [CodeLine("i = 0")] if len(self.read.banks) > 1 else []
+                first_read += [*index, *self.writer.outward(bank.index, own)]
+        return first_read, lines
 
     def jolts(self) -> list[CodeLine]:
         """Write which contacts have been moved by more than the motion itself moves them."""

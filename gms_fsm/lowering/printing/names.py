@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -104,8 +105,13 @@ def names_of(read: Assembly) -> QuantityNames:
     local: dict[str, str] = {"t": "t"}
     plain: dict[str, str] = {}
     for name in system.names:
-        if name != "t":
+        if name != "t" and "." not in name:
             local[name] = choice.free(name)
+    for name in system.events:
+        local[name] = choice.free(name)
+    for each in read.definitions:
+        if each.counts is not None:
+            local[each.name] = choice.free(re.sub(r"\W+", "_", each.name).strip("_"))
     for body in system.bodies:
         local[f"{body.name} a"] = choice.free(f"a_{body.name}")
     for bank in read.banks:

@@ -33,6 +33,7 @@ from gms_fsm.lowering.layout import SystemLayout, sizes_of
 from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.lowering.printing.names import QuantityNames, names_of
 from gms_fsm.systems.reading.assembly import ONE, Assembly, Bank, of
+from gms_fsm.systems.reading.order import read_by
 from gms_fsm.systems.signals import Corners, Function
 
 
@@ -353,7 +354,7 @@ def _acceleration(read: Assembly, body: str) -> Value:
     """Return the acceleration of a free body over the forces of its contacts."""
     tree = read.forces[body]
     for bank in read.banks:
-        for force, row in zip(bank.forces, bank.jacobian, strict=True):
+        for force, row in zip(bank.forces, bank.jacobian, strict=False):  # a supervisor has none
             if body in row:
                 tree = Binary("-", tree, times(row[body], Name(force)))
     return Binary("/", tree, read.inertias[body])
@@ -570,8 +571,18 @@ def _bank(read: Assembly, bank: Bank, smoothing: _Smoothing) -> BankPlan:
         tuple(states),
         common,
         {name: smoothing(tree) for name, tree in bank.totals.items()},
-        any(free & {*row} for row in bank.jacobian),
+        any(free & {*row} for row in bank.jacobian) or bool(_read_elsewhere(read) & {*bank.forces}),
     )
+
+
+def _read_elsewhere(read: Assembly) -> frozenset[str]:
+    """Return what smooth texts read, but for what a machine reads of itself."""
+    trees = [*read.forces.values(), *read.flow.values()]
+    trees += [each.tree for each in read.definitions if each.tree is not None]
+    found = read.closure(name for tree in trees for name in names_in(tree))
+    flows = (tree for bank in read.banks for tree in bank.flows.values())
+    found |= read.closure(name for tree in flows for name in names_in(tree))
+    return found.union(*(read_by(read, bank) for bank in read.banks))
 
 
 def gradient_of(u: Value, read: Assembly) -> Gradient:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from gms_fsm.charts.chart import SUPPLIED
+from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     Binary,
     Comparison,
@@ -19,10 +19,19 @@ from gms_fsm.language import (
     split,
 )
 from gms_fsm.lowering.places import total
-from gms_fsm.lowering.printing.lines import CodeLine, Signs, indented, one_line, reads_of
+from gms_fsm.lowering.printing.lines import (
+    MOST_BRANCHES,
+    Case,
+    CodeLine,
+    Phase,
+    Signs,
+    chosen,
+    indented,
+    reads_of,
+)
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
 from gms_fsm.lowering.printing.names import computed_names
-from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sides, moving
+from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sides
 from gms_fsm.systems.reading.assembly import Bank, ContactEdge, of
 from integrators import FOR_A_GUARD, FOR_A_SIGN, JUMPED, LIVE, WAITING
 
@@ -42,22 +51,6 @@ FUNCTIONS = (
 )
 
 
-@dataclass(frozen=True)
-class Phase:
-    """A part of what happens when an edge is taken.
-
-    Parameters
-    ----------
-    lines : list of CodeLine
-        Assignments.
-    hits : bool
-        An impulse follows them, and the next phase starts with the velocities after it.
-    """
-
-    lines: list[CodeLine]
-    hits: bool
-
-
 def python(plan: ProgramPlan) -> str:
     """Return a program as Python text.
 
@@ -74,7 +67,7 @@ def python(plan: ProgramPlan) -> str:
     """
     printer = _PythonPrinter(plan)
     lines = [
-        f"# {one_line(plan.title)}",
+        f"# {visible(plan.title)}",
         "# Generated from the chart; parameters are arguments, so one text serves all values.",
         "",
     ]
@@ -122,16 +115,19 @@ class _PythonPrinter(LockFunctions):
                 leaving = self.leaving(bank, state)
                 # Where the velocity has jumped, an arrest would take it: another edge, or none.
                 refused = [(edge, f"-2 - {constant}") for edge, constant in leaving if edge.arrests]
-                for edge, constant in (*leaving, *refused):
-                    word, guard = "elif" if rows else "if", self.spell(edge.guard)
+                for k, (edge, constant) in enumerate((*leaving, *refused)):
+                    word, guard = "elif" if k % MOST_BRANCHES else "if", self.spell(edge.guard)
                     if edge.arrests and not constant.startswith("-"):
                         guard = f"{jolt} != {JUMPED} and ({guard})"
                     if edge.name in skipped:
                         guard = f"skip != {constant} and {guard}"
-                    rows += [
+                    pair = [
                         CodeLine(f"{word} {guard}:", computed_names(edge.guard)),
                         CodeLine(f"    edge = {constant}  # {state} -> {edge.target}"),
                     ]
+                    if k and k % MOST_BRANCHES == 0:
+                        rows.append(CodeLine("if edge == -1:"))
+                    rows += pair if k < MOST_BRANCHES else indented(pair)
                 branches[state] = rows
             place = f"out[{self.machine(bank.index)}]"
             before = [CodeLine("edge = -1")] + [CodeLine(f"skip = {place}")] * bool(skipped)
@@ -196,11 +192,11 @@ class _PythonPrinter(LockFunctions):
         """Write one phase of what the edges do, by contact and edge."""
         lines, several, word = list[CodeLine](), len(self.read.banks) > 1, "if"
         for bank, found in zip(self.read.banks, phases, strict=True):
-            inner: list[CodeLine] = []
-            for edge, constant in zip(bank.edges, self.names.edges[bank.index], strict=True):
-                if edge.name in found:
-                    test = f"{'elif' if inner else 'if'} edge == {constant}:"
-                    inner += [CodeLine(test), *indented(found[edge.name].lines)]
+            edges = zip(bank.edges, self.names.edges[bank.index], strict=True)
+            inner = chosen(
+                "edge",
+                [Case(k, f"== {k}", found[e.name].lines) for e, k in edges if e.name in found],
+            )
             first = self.element(bank.index, self.own(bank.index, reads_of(inner)), "live")
             body = self.outward(bank.index, [*first, *inner])
             if several and inner:
@@ -218,7 +214,9 @@ class _PythonPrinter(LockFunctions):
         for name, value in edge.steps:
             # What is computed from variables is computed again from what they are now.
             tree = self.fresh(value, bank, moved=bool(found))
-            if name in bank.variables:
+            if name in bank.chart.events:
+                lines.append(CodeLine(f"y[{self.layout.y.text(name)}] = 1.0  # {name}"))
+            elif name in bank.variables:
                 lines.append(self.put(self.local(name), tree))
                 place, sizes = self.at("y", self.layout.y, name)
                 lines.append(CodeLine(f"{place} = {self.local(name)}", sizes))
@@ -261,7 +259,8 @@ class _PythonPrinter(LockFunctions):
     def flow(self, signs: Signs) -> list[str]:
         y = self.layout.y
         free = {body.name for body in self.read.free}
-        lines = self.forces(signs, wanted=bool(free), rates=True)
+        seen = any(plan.moves for plan in self.plan.banks)
+        lines = self.forces(signs, wanted=bool(free) or seen, rates=True)
         for body in self.read.system.bodies:
             lines.append(
                 CodeLine(f"dy[{y.text(body.x)}] = {self.local(body.v)}", frozenset({body.v}))
@@ -274,6 +273,7 @@ class _PythonPrinter(LockFunctions):
                     lines += self.computed(place, self.plan.accelerations[body.name], signs)
         for name, value in self.plan.flow.items():
             lines += self.computed(f"dy[{y.text(name)}]", value, signs)
+        lines += [CodeLine(f"dy[{y.text(name)}] = 0.0") for name in self.read.system.events]
         for each in self.read.system.sampled:
             lines += [CodeLine(f"dy[{y.text(name)}] = 0.0") for name in each.updates]
         if signs == "live":
@@ -334,27 +334,28 @@ class _PythonPrinter(LockFunctions):
         return lines
 
     def normal(self) -> list[str]:
-        lines: list[CodeLine] = []
+        branches = []
         for each in self.plan.gradients:
-            word, inner = "elif" if lines else "if", self.gradient(each)
+            inner = self.gradient(each)
             surfaces, note = self.plan.surfaces, f"  # {self.spell(each.value)}"
             sizes = frozenset(f"#{size}" for size in surfaces.sizes(each.surface))
             if each.surface in surfaces.shared:
-                place = surfaces.text(each.surface)
-                lines.append(CodeLine(f"{word} surface == {place}:{note}"))
+                start = surfaces.text(each.surface)
+                test, reads = f"== {start}", frozenset[str]()
             else:
                 end, start = (surfaces.start_text(each.surface, k) for k in (1, 0))
                 u = each.surface
                 bank = u.bank if isinstance(u, Pair) else self.read.bank_of(each.value)
                 assert bank is not None
                 size = frozenset({f"#{self.sizes[bank]}"})
-                lines.append(CodeLine(f"{word} surface < {end}:{note}", sizes | size))
+                test, reads = f"< {end}", sizes | size
                 first = self.element(bank, self.own(bank, reads_of(inner)), "live")
                 inner = [
                     CodeLine(f"i = surface - ({start})"),
                     *self.outward(bank, [*first, *inner]),
                 ]
-            lines += indented(inner or [CodeLine("pass")])
+            branches.append(Case(start, test, inner or [CodeLine("pass")], note, reads))
+        lines = chosen("surface", branches)
         if lines:
             y = self.layout.y
             every = frozenset(f"#{block.size}" for block in y.blocks if block.names)
@@ -421,16 +422,6 @@ class _PythonPrinter(LockFunctions):
         sizes = frozenset(f"#{size}" for size in held.sizes(u))
         text = f"held[{held.text(u)}] = sgn({self.spell(u)})"
         return CodeLine(text, sizes | computed_names(u))
-
-    def why(self, u: Value) -> int:
-        """Say why a sign is watched; one of the time alone changes while nothing moves.
-
-        Not the sign of a given motion: there something moves, and errors limit the steps.
-        """
-        motions = {name for body in self.read.system.bodies for name in (body.x, body.v)}
-        alone = {*moving(self.read.expanded(u), self.read)} == {"t"}
-        alone = alone and not self.read.closure(names_in(u)) & motions
-        return FOR_A_SIGN | (WAITING if alone else 0)
 
     def watch(self, relation: Comparison, why: int = FOR_A_SIGN) -> CodeLine:
         relations = self.plan.relations
@@ -539,7 +530,11 @@ class _PythonPrinter(LockFunctions):
     def values(self) -> list[str]:
         shown, late = self.layout.shown, []
         for name in shown.shared:
-            late.append(frozenset({name}) if name in self.late else frozenset())
+            late.append(self.closure(frozenset({name})))
+        for bank in self.read.banks:
+            for name in (*bank.chart.inputs, *bank.chart.let):
+                if (tree := bank.means.get(name)) is not None:
+                    late.append(computed_names(tree))
         lines = [*self.before_guards(late), *self.moved_locks()]
         for bank in self.read.banks:
             start = of(bank.name, "")
@@ -576,6 +571,11 @@ class _PythonPrinter(LockFunctions):
             if bit := self.read.bit(plan.bank):
                 lines += [CodeLine(f"if bits & {bit}:  # {plan.bank.name}")]
                 lines += indented(self.bank_forces(plan, "live", True, held=True))
+        if bit := self.read.events_bit:
+            lines.append(CodeLine(f"if bits & {bit}:  # all machines were asked"))
+            lines += [CodeLine(f"    y[{y.text(name)}] = 0.0") for name in self.read.system.events]
+        if reads_of(lines) & self.late:
+            lines = [*self.forces("live", wanted=True), *lines]
         return self.function(
             "tick(bits, t, y, mode, p)",
             "Update what ticks: samplers, and what discrete machines give out.",

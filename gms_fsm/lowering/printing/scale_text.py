@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.language import (
     Binary,
     Number,
@@ -24,7 +25,6 @@ from gms_fsm.language import (
     spell,
     split,
 )
-from gms_fsm.systems.reading.texts import ByIdentity
 
 INF = math.inf
 # A velocity in a guard is a window to pass through, not a typical size of motion: its weight.
@@ -93,7 +93,8 @@ def _sizes(key: ByIdentity[Chart]) -> _Sizes:
     states = tuple(dict.fromkeys(("x", "v", *chart.velocities, *chart.variables)))
     rates = [f"d{name}" for name in chart.variables]
     others = [name for name in (*chart.inputs, *chart.velocities) if name != "s"]
-    zero_at_rest = ("t", *states, *rates, *others)
+    late = {*chart.force_names, *chart.rate_names} - {*chart.parameter_names}
+    zero_at_rest = ("t", *states, *rates, *others, *sorted(late))
     rest: dict[str, Value] = dict.fromkeys(zero_at_rest, Number(0.0))
     lets: dict[str, Value] = {}
     for name, tree in chart.lets.items():
@@ -104,7 +105,6 @@ def _sizes(key: ByIdentity[Chart]) -> _Sizes:
         return places.setdefault(_spelled(renamed(tree, rest)), len(places))
 
     guards = chart.guards.values()
-    late = {*chart.force_names, *chart.rate_names} - {*chart.parameter_names}
     pairs = dict.fromkeys(c for guard in guards for c in comparisons(split(guard)))
     margins = [
         margin

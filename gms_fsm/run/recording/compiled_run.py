@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-import sys
-from collections.abc import Callable, Mapping
+import weakref
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from gms_fsm.run.recording.recording import check_end, explained, interference_e
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.firings import Firings
-from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.rows import Rows, joined, packed
 from gms_fsm.traces.trace import Trace
 from integrators import hybrid, loop
 from integrators.loop import Memory
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from integrators.runners.compiled import RecordArguments
 
 WORTH_A_LOOK = 500_000  # steps: machine code takes fewer in less time than it takes to look ahead
+LARGE = 4_000_000  # bytes of the columns of rows at the beginning, at most
+WIDE = 256  # states and modes from which on rows are packed when their columns are full
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
 
 
@@ -147,9 +149,11 @@ class Columns:
         size, modes = layout.y.size, layout.modes
         self.prepared = _prepared(start)
         self.engine, self.block = self.prepared.engine, self.prepared.block()
+        # A method __del__ would run while the interpreter ends, too, where modules are emptied.
+        weakref.finalize(self, self.prepared.take_back, self.block).atexit = False
         self.run_of: RecordArguments = self.block.contents
         self.p = compiled.packed(start.program.p) if p is None else p
-        few = max(16, min(1024, 4_000_000 // size))  # initial number of rows
+        few = max(16, min(1024, LARGE // (8 * (size + modes))))  # initial number of rows
         rows = {"all": few, "t_eval": 0, "end": 0}[start.output]
         if start.options.times is not None:
             rows = len(start.options.times)
@@ -174,6 +178,7 @@ class Columns:
         log.rows_microstep, log.rows_mode = rows_microstep, rows_mode
         log.stops_t, log.stops_microstep = stops_t, stops_microstep
         log.stops_y, log.stops_mode = stops_y, stops_mode
+        self.packed: tuple[Rows, ...] = ()  # those before the rows in the columns
         self.handed_out = False  # whether a trace has the columns of rows, and not a copy
         self._begin()
         if stops:
@@ -181,10 +186,6 @@ class Columns:
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
             self.log.stops_microstep[0] = 0
             self.log.stops = 1
-
-    def __del__(self, ended: Callable[[], bool] = sys.is_finalizing) -> None:
-        if not ended() and hasattr(self, "block"):  # at the end modules are emptied already
-            self.prepared.take_back(self.block)
 
     def run(self, most_steps: int, *, pause: bool) -> int:
         """Run the machine code; see `integrators.runners.columns.record`."""
@@ -219,6 +220,7 @@ class Columns:
         """Empty the columns and return to the start."""
         if self.handed_out:
             self._replace_rows()
+        self.packed = ()
         start, log = self.start, self.log
         b: Any = self.buffers  # arrays
         memory, sliding = b.memory, b.sliding
@@ -255,6 +257,7 @@ class Columns:
 
     def state(self) -> dict[str, Any]:
         """Return the contents as arrays, for a checkpoint; 0 where nothing has been written."""
+        self._unpack()
         out, log = self.buffers.out, self.log
         found: dict[str, Any] = {name: getattr(log, name) for name in arrays_of(LogColumns)}
         found |= {"rows_t": out.rows_t, "rows_y": out.rows_y}
@@ -281,12 +284,49 @@ class Columns:
         """Double the columns that are full."""
         out, log = self.buffers.out, self.log
         if out.every_step and out.row + 1 >= len(out.rows_t):
-            _double(out, "rows_t", "rows_y")
-            _double(log, "rows_microstep", "rows_mode")
+            layout = self.start.program.layout
+            if layout.y.size + layout.modes >= WIDE and self.buffers.memory.taken:
+                self._pack()
+            else:
+                _double(out, "rows_t", "rows_y")
+                _double(log, "rows_microstep", "rows_mode")
         if log.firings >= len(log.t):
             _double(log, "t", "machine", "edge", "numbers")
         if 0 < len(log.stops_t) <= log.stops:
             _double(log, "stops_t", "stops_microstep", "stops_y", "stops_mode")
+
+    def _columns(self) -> tuple[Any, ...]:
+        """Return the columns of rows."""
+        out, log = self.buffers.out, self.log
+        return out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode
+
+    def _pack(self) -> None:
+        """Take the rows that are complete out of their columns."""
+        b = self.buffers
+        taken, count = int(b.memory.taken), int(b.out.row)
+        rest = [column[taken:count].copy() for column in self._columns()]
+        self.packed += (packed(_rows(taken, *self._columns())),)
+        if self.handed_out:
+            self._replace_rows()
+        for column, rows in zip(self._columns(), rest, strict=True):
+            column[: count - taken] = rows
+        b.memory.taken, b.out.row = 0, count - taken
+
+    def _unpack(self) -> None:
+        """Put all rows back into the columns."""
+        if not self.packed:
+            return
+        out: Any = self.buffers.out
+        log: Any = self.log
+        whole = [
+            np.concatenate([*(getattr(each, name) for each in self.packed), column])
+            for name, column in zip(("t", "microstep", "y", "mode"), self._columns(), strict=True)
+        ]
+        count = sum(map(len, self.packed))
+        out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode = whole
+        self.buffers.memory.taken += count
+        out.row += count
+        self.packed, self.handed_out = (), False
 
     def interrupted(self, before: tuple[float, list[float], tuple[int, ...]]) -> None:
         """Recover from machine code that was interrupted by an error in a user's function.
@@ -316,16 +356,11 @@ class Columns:
 
     def around(self, t: float) -> tuple[Place, Place | None]:
         """Return the last row at or before a time, and the next one."""
-        out, log, start = self.buffers.out, self.log, self.start
-        rows: Any = out  # arrays
-        count = out.row
-        row = int(np.searchsorted(rows.rows_t[:count], t, "right")) - 1
-        modes: Any = log.rows_mode
-        places = [
-            (float(rows.rows_t[i]), rows.rows_y[i].tolist(), tuple(modes[i].tolist()))
-            for i in (row, row + 1)
-            if 0 <= i < count
-        ]
+        start, count = self.start, self.buffers.out.row
+        parts = [*self.packed, Rows(*(column[:count] for column in self._columns()))]
+        times = np.concatenate([each.t for each in parts])
+        row = int(np.searchsorted(times, t, "right")) - 1
+        places = [_place(parts, i) for i in (row, row + 1) if 0 <= i < times.size]
         if row < 0:
             mode = start.program.layout.not_sliding(start.mode)
             places.insert(0, (start.t_start, list(start.y), mode))
@@ -353,16 +388,19 @@ class Columns:
 
     def trace(self) -> Trace:
         """Return the trace of all recorded data."""
-        start, log, out = self.start, self.log, self.buffers.out
-        count = out.row
+        start, log = self.start, self.log
         if start.output == "end":
             t, y, mode = self.latest
             rows = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
         else:
             self._complete()
-            columns: Any = out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode
-            self.handed_out = count == len(out.rows_t)
-            rows = Rows(*columns) if self.handed_out else _rows(count, *columns)
+            count, columns = self.buffers.out.row, self._columns()
+            self.handed_out = not self.packed and count == len(columns[0])
+            if self.packed:
+                last = [packed(_rows(count, *columns))] if count else []
+                rows = joined([*self.packed, *last])
+            else:
+                rows = Rows(*columns) if self.handed_out else _rows(count, *columns)
         stops = rows
         if start.output == "t_eval":
             stops = _rows(
@@ -461,6 +499,15 @@ def _double(record: Any, *names: str) -> None:
     for name in names:
         column = getattr(record, name)
         setattr(record, name, np.concatenate([column, np.zeros_like(column)]))
+
+
+def _place(parts: Sequence[Rows], row: int) -> Place:
+    """Return a row of several tables that follow each other."""
+    for rows in parts:
+        if row < len(rows):
+            break
+        row -= len(rows)
+    return float(rows.t[row]), rows.y[row].tolist(), tuple(rows.mode[row].tolist())
 
 
 def _rows(count: int, *columns: Any) -> Rows:

@@ -13,7 +13,7 @@ from gms_fsm.run.problem import Problem
 
 def own_machines(given: Any, start: Problem) -> dict[str, ElementMachines]:
     """Return the user's machines by contact."""
-    contacts, named = start.system.contacts, start.what.named
+    contacts, named = start.system.machines, start.what.named
     if not isinstance(given, Mapping):
         if len(contacts) > 1:
             raise ParameterError(
@@ -29,7 +29,7 @@ def own_machines(given: Any, start: Problem) -> dict[str, ElementMachines]:
         contact = start.system.contact(name)
         place = f"machines[{name!r}]" if named else "machines"
         checked_kind(place, each, ElementMachines, "an ElementMachines, or left out")
-        if each.model is not contact and each.model is not contact.model:
+        if each.model not in (contact, contact.model):
             advice = f"make them as ElementMachines(system.contact({name!r}))" if named else ""
             raise ParameterError(
                 f"{place}: these ElementMachines were made for a different model", advice=advice
@@ -40,6 +40,6 @@ def own_machines(given: Any, start: Problem) -> dict[str, ElementMachines]:
 
 def engine_of(start: Problem, machines: Mapping[str, ElementMachines]) -> MachineEngine:
     """Return the machines of all contacts: the user's, and new ones for the others."""
-    contacts = start.system.contacts
+    contacts = start.system.machines
     parts = [machines.get(each.name) or ElementMachines(each) for each in contacts]
     return MachineEngine(parts, start.program, start.mode)

@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 
 import integrators
-from gms_fsm.charts.chart import Chart, State
+from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.language import names_in, rough_points
+from gms_fsm.language import rough_points
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.log_columns import CONTACT, LogRecord
 from gms_fsm.run.machines import Interference
 from gms_fsm.run.problem import STEPS_A_TICK, Problem
 from gms_fsm.run.recording.moment import Place, Recording, scope_of
+from gms_fsm.run.recording.not_finite import culprit, state_there
 from gms_fsm.traces.failures import (
     CallbackError,
     LivelockError,
@@ -32,7 +33,7 @@ from gms_fsm.traces.failures import (
     StepSizeError,
 )
 from gms_fsm.traces.rows import Rows
-from gms_fsm.traces.scope import FORCE, Scope, parameter_values
+from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
 from integrators import (
     Arc,
@@ -197,27 +198,25 @@ class Recorder:
 # --------------------------------------------------------------------------- wording of errors
 def explained(error: HybridError, recorder: Recording) -> SimulationError:
     """Translate an error of the loop into the terms of the model."""
-    trace = recorder.trace()
+    trace, start = recorder.trace(), recorder.start
     if isinstance(error, NotFinite):
-        values = [float(f"{u:.6g}") for u in error.y]
         return NotFiniteError(
-            f"{_not_finite(error, recorder)} here or just after (x, v, z ... = {values}): {error}",
+            f"{culprit(start, error)} ({state_there(start, error)}): {error}",
             trace,
             t=error.t,
             advice="look at the signals and parameters there",
         )
     if isinstance(error, StepTooSmall):
+        stiff = f"try a stiff method ({start.implicit}), " if start.implicit else "give "
         return StepSizeError(
             "the step size fell below the resolution of the clock: the flow changes too fast for "
             "this method",
             trace,
             t=error.t,
-            advice="try a stiff method (method=scipy.integrate.Radau), a larger rtol/atol, or look "
-            "for a singular parameter",
+            advice=f"{stiff}a larger rtol/atol, or look for a singular parameter",
         )
     if isinstance(error, TooManySteps):
         reason, advice = _slow(recorder)
-        start = recorder.start
         ticks = len(start.program.ticks)
         besides = f", besides {STEPS_A_TICK} for each of {ticks:,} ticks," if ticks else ""
         return StepLimitError(
@@ -228,9 +227,9 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
             advice=advice,
         )
     if isinstance(error, Refused):
-        return _refused(error, recorder.start, trace)
+        return _refused(error, start, trace)
     if isinstance(error, Entangled):
-        names = recorder.start.program.surface_names
+        names = start.program.surface_names
         crossing = " and ".join(f"{names[k]} = 0" for k in error.surfaces)
         if len(error.surfaces) == 1:
             return NotUniqueError(
@@ -250,7 +249,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         )
     if not isinstance(error, Livelock):
         return SimulationError(str(error), trace, t=error.t)
-    return _livelock(error, recorder.start, trace)
+    return _livelock(error, start, trace)
 
 
 def _refused(error: Refused, start: Problem, trace: Trace) -> LockError:
@@ -386,8 +385,8 @@ def _slow(recorder: Recording) -> tuple[str, str]:
             f": {who} {element + 1} has switched {count} times (chattering)",
             "separate its guards for the two directions by a gap, or give a larger max_steps",
         )
-    implicit = recorder.start.implicit
-    return "", f"give a larger max_steps, a larger rtol, or for a stiff run {implicit}"
+    start, more = recorder.start, "give a larger max_steps, a larger rtol"
+    return "", f"{more}, or for a stiff run {start.implicit}" if start.implicit else more
 
 
 def interference_error(error: Interference, recorder: Recording) -> CallbackError:
@@ -403,47 +402,6 @@ def _opposite_edge(chart: Chart, taken: Any) -> str:
     if len(set(taken.edge.tolist())) != 2 or other is None:
         return "and a way back"
     return f"and that of {other.name}, [{other.guard}],"
-
-
-def _not_finite(error: NotFinite, recorder: Recording) -> str:
-    """Name the quantity that is not finite where a run ended, if it can be determined."""
-    start = recorder.start
-    for bank in start.program.layout.banks:
-        chart = start.system.contact(bank.name).chart
-        scope = scope_of(start, error.t, error.y, error.mode, bank.name)
-        whose = f" of {bank.name}" if start.what.named else ""
-        if not math.isfinite(scope.v):
-            return f"the velocity v{whose} is not finite"
-        states = {state.name: state for state in chart.states}
-        for i, F in enumerate(scope.each(FORCE)):
-            if not math.isfinite(F):
-                state = states[scope.states[i]]
-                return _infinite_force(chart, state, i, F, parameter_values(scope.model, i), whose)
-        for variable in chart.variables:
-            for i, name in enumerate(scope.states):
-                if not math.isfinite(scope.each(f"d{variable}")[i]):
-                    state = states[name]
-                    return (
-                        f"the flow of {variable} in state {state.name}, "
-                        f"[{state.flow.get(variable, '0')}], is not finite in "
-                        f"{bank.name if whose else 'element'} {i + 1}"
-                    )
-    return "a signal or a flow is not finite"
-
-
-def _infinite_force(
-    chart: Chart, state: State, i: int, F: float, values: Mapping[str, float], whose: str
-) -> str:
-    """Name the force text of an element that is not finite, with the numbers that it reads."""
-    text = state.outputs.get("F") or chart.outputs.get("F", "")
-    tree = chart.forces[state.name, "F"]
-    names = names_in(tree) & values.keys() if tree is not None else ()
-    numbers = ", ".join(f"{name} = {values[name]:.6g}" for name in sorted(names))
-    known = f"({F:g}{f', with {numbers}' if numbers else ''})"
-    return (
-        f"the force of {whose.removeprefix(' of ') or 'element'} {i + 1} in state {state.name}, "
-        f"[{text}], is not finite {known}"
-    )
 
 
 def check_end(recorder: Recording) -> None:

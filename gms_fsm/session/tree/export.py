@@ -9,7 +9,7 @@ from typing import Any
 
 from gms_fsm.errors import OutputError
 from gms_fsm.foundation.arguments import checked_path
-from gms_fsm.foundation.files import write_whole
+from gms_fsm.foundation.files import write_text
 from gms_fsm.foundation.toml import written
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
@@ -32,7 +32,7 @@ def save_scenario(path: str | Path, start: Problem, title: str, notes: str) -> P
         here = BranchRow(start.t_start, 0, list(start.y), tuple(start.mode))
         more["initial"] = _nested(initial_values(start, here))
     text = f"{written(head)}{tables}\n{written(more)}"
-    return write_whole(path, lambda file: file.write(text.encode()))
+    return write_text(path, text)
 
 
 def _run(start: Problem) -> dict[str, Any]:

@@ -94,6 +94,7 @@ def pokeable(start: Problem) -> list[str]:
     updated = (name for each in system.sampled for name in each.updates)
     moved = (name for body in system.bodies for name in (body.x, body.v))
     shared = [name for name in (*moved, *system.flow, *updated) if name in layout.y.shared]
+    shared += layout.events
     own = [bank.of(name) for bank in layout.banks for name in bank.variables if name != AGE]
     return [*shared, *own]
 
@@ -147,7 +148,7 @@ def _resolved(start: Problem, key: object) -> tuple[str, int | None]:
             raise _constant(key, "number", "system")
         if key in start.system.signals:
             raise _constant(key, "signal", "system")
-        for contact in start.system.contacts:
+        for contact in start.system.machines:
             plain = key.removeprefix(f"{contact.name}.")
             if plain in contact.chart.parameter_names:
                 raise _constant(key, "parameter", "system")

@@ -266,4 +266,5 @@ def _judge_minimum(path: Track, row: int, relation: int, found: Gathering) -> No
     if abs(least) > path.uncertainty(row, [relation])[0]:
         return
     for i, edge in _nearly_enabled(path, row, at, y, mode).items():
-        _add_miss(path, i, edge, at, found, "grazing", path.program.relations[relation])
+        if not _is_only_late(path, i, edge, row):
+            _add_miss(path, i, edge, at, found, "grazing", path.program.relations[relation])

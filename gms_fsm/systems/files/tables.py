@@ -20,7 +20,7 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import SignalError
 from gms_fsm.foundation.tables import ONE, TABLE, TEXT, Numbers, Table, Texts, Value, built
 from gms_fsm.systems.models import ChartModel, Model
-from gms_fsm.systems.parts import Body, Contact, Motion, Sampled
+from gms_fsm.systems.parts import Body, Contact, Motion, Sampled, Supervisor
 from gms_fsm.systems.signals import Corners, Formula, Function, Signal, as_signal
 from gms_fsm.systems.springs import Spring
 
@@ -241,6 +241,28 @@ class ContactTable(Table):
         return contact_from(self, chart, model)
 
 
+class SupervisorTable(Table):
+    """A supervisor: a chart without velocity, with values."""
+
+    name: str
+    inputs: dict[str, Value] = Field({})
+    period: float | None = None
+    chart: ChartTable
+    values: dict[str, Numbers] = Field({})
+
+    @classmethod
+    def of(cls, machine: Supervisor, **more: Any) -> SupervisorTable:
+        """Describe a supervisor; its chart may be given, as a name."""
+        numbers = {**numbers_table(machine), **more}
+        return cls(name=machine.name, inputs=dict(machine.inputs), period=machine.period, **numbers)
+
+    def build(self, chart: Chart | None = None) -> Supervisor:
+        """Return an equivalent supervisor, with its chart if that is known."""
+        made = built(self.chart.build, "chart", kind=Chart) if chart is None else chart
+        values = values_of(self.values)
+        return Supervisor(self.name, made, values, inputs=self.inputs, period=self.period)
+
+
 def described(contact: Contact) -> dict[str, Any]:
     """Describe a contact without its chart or model."""
     return {
@@ -284,20 +306,26 @@ class SystemTable(Table):
     signals: dict[str, SignalField] = Field({})
     flow: dict[str, Value] = Field({})
     let: dict[str, Value] = Field({}, description="named expressions that texts can use")
-    bodies: list[BodyTable] = Field(alias="body")
+    bodies: list[BodyTable] = Field([], alias="body")
     springs: list[SpringTable] = Field([], alias="spring")
-    contacts: list[ContactTable] = Field(alias="contact")
+    contacts: list[ContactTable] = Field([], alias="contact")
+    supervisors: list[SupervisorTable] = Field([], alias="supervisor")
     sampled: list[SampledTable] = Field([])
 
     @classmethod
     def of(cls, system: System) -> SystemTable:
         """Describe a system; a Python function as a signal is named as such."""
-        return cls(**plain(system), contacts=[ContactTable.of(each) for each in system.contacts])
+        return cls(
+            **plain(system),
+            contacts=[ContactTable.of(each) for each in system.contacts],
+            supervisors=[SupervisorTable.of(each) for each in system.supervisors],
+        )
 
     def build(self, kind: type[System]) -> System:
         """Return an equivalent system; its class is given, as it imports this module."""
         contacts = [built(each.build, "contacts", i) for i, each in enumerate(self.contacts)]
-        return system_from(kind, self, contacts)
+        machines = [built(each.build, "supervisors", i) for i, each in enumerate(self.supervisors)]
+        return system_from(kind, self, contacts, machines)
 
 
 def plain(system: System) -> dict[str, Any]:
@@ -345,8 +373,10 @@ def plain(system: System) -> dict[str, Any]:
     }
 
 
-def system_from(kind: type[System], table: SystemTable, contacts: list[Contact]) -> System:
-    """Return the system that a table describes, with its contacts."""
+def system_from(
+    kind: type[System], table: SystemTable, contacts: list[Contact], machines: list[Supervisor]
+) -> System:
+    """Return the system that a table describes, with its contacts and its supervisors."""
     return kind(
         table.name,
         bodies=tuple(built(Body, "bodies", i, **vars(each)) for i, each in enumerate(table.bodies)),
@@ -354,6 +384,7 @@ def system_from(kind: type[System], table: SystemTable, contacts: list[Contact])
             built(Spring, "springs", i, **vars(each)) for i, each in enumerate(table.springs)
         ),
         contacts=tuple(contacts),
+        supervisors=tuple(machines),
         signals={
             name: built(signal_of, "signals", name, name=name, table=each)
             for name, each in table.signals.items()

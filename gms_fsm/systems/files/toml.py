@@ -16,7 +16,9 @@ from gms_fsm.charts.registry import chart_named, charts
 from gms_fsm.errors import OutputError, ParameterError, ScenarioError
 from gms_fsm.foundation.files import inside
 from gms_fsm.foundation.tables import ONE, TABLE, Table, built, read_file, write_file
+from gms_fsm.foundation.toml import parsed
 from gms_fsm.records.record import Record
+from gms_fsm.scenarios import shipped
 from gms_fsm.systems.files.tables import (
     ContactTable,
     CornersTable,
@@ -24,6 +26,7 @@ from gms_fsm.systems.files.tables import (
     ModelTable,
     SignalField,
     StribeckTable,
+    SupervisorTable,
     SystemTable,
     contact_from,
     described,
@@ -33,13 +36,18 @@ from gms_fsm.systems.files.tables import (
 )
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model
-from gms_fsm.systems.parts import Contact
+from gms_fsm.systems.parts import Contact, Supervisor
 
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
 
 KNOWN, OWN = "<known>", "<own>"
 FILE, HERE = "<file>", "<here>"
+# Keys of scenario files, by what reads them.
+OF_A_SCENARIO = {
+    "load_scenario": ("model", "rig"),
+    "load_system": ("title", "notes", "run", "initial", "output", "record", "fit"),
+}
 
 
 def _chart_form(given: Any) -> str:
@@ -89,6 +97,18 @@ class ContactInFile(ContactTable):
             build: Callable[[], Model] = self.model.build
             model = built(build, "model")
         return contact_from(self, chart, model)
+
+
+class SupervisorInFile(SupervisorTable):
+    """A supervisor of a system file."""
+
+    chart: ChartField = Field(  # type: ignore[assignment]
+        description="a chart file next to this one, the name of an included chart, or a table"
+    )
+
+    def chosen(self, folder: Path) -> Supervisor:
+        """Return the supervisor; its chart may be a file in a folder."""
+        return self.build(built(_chart, "chart", given=self.chart, folder=folder))
 
 
 def _chart(given: str | ChartTable, folder: Path) -> Chart:
@@ -147,7 +167,8 @@ class SystemFile(SystemTable):
     """A system file."""
 
     signals: dict[str, SignalInFile] = Field({})  # type: ignore[assignment]
-    contacts: list[ContactInFile] = Field(alias="contact")  # type: ignore[assignment]
+    contacts: list[ContactInFile] = Field([], alias="contact")  # type: ignore[assignment]
+    supervisors: list[SupervisorInFile] = Field([], alias="supervisor")  # type: ignore[assignment]
 
     def chosen(self, folder: Path, kind: type[System]) -> System:
         """Return the system; its charts may be files in a folder."""
@@ -167,13 +188,33 @@ class SystemFile(SystemTable):
             else each
             for name, each in self.signals.items()
         }
-        return system_from(kind, self.model_copy(update={"signals": signals}), contacts)
+        machines = [
+            built(each.chosen, "supervisors", i, folder=folder)
+            for i, each in enumerate(self.supervisors)
+        ]
+        table = self.model_copy(update={"signals": signals})
+        return system_from(kind, table, contacts, machines)
 
 
 def load(path: Path, kind: type[System]) -> System:
     """Read a system file; errors name file, line, key and text."""
+    if not path.exists() and str(path) in shipped():
+        raise _scenario(path, f"load_system({str(path)!r})")
+    given = parsed(path)
+    for reader, keys in OF_A_SCENARIO.items():
+        if found := [name for name in given if name in keys]:
+            raise _scenario(path, f"{reader}({str(path)!r})", f", with the key {found[0]!r}")
     build = functools.partial(SystemFile.chosen, folder=path.parent, kind=kind)
     return read_file(path, SystemFile, ScenarioError, build)
+
+
+def _scenario(path: Path, call: str, why: str = "") -> ScenarioError:
+    """Return the error of a scenario file, which has more than a system."""
+    return ScenarioError(
+        f"it is a scenario{why}",
+        place=str(path),
+        advice=f"read it with gms_fsm.app.scenario.{call}",
+    )
 
 
 def save(system: System, path: Path) -> Path:
@@ -184,7 +225,8 @@ def save(system: System, path: Path) -> Path:
 def save_as(kind: type[SystemFile], system: System, path: Path, **further: Any) -> Path:
     """Write a file that holds a system and more."""
     contacts = [ContactInFile(**described(each), **_numbers(each)) for each in system.contacts]
-    table = kind(**{**plain(system), "contacts": contacts, **further})
+    machines = [SupervisorInFile.of(each, **_numbers(each)) for each in system.supervisors]
+    table = kind(**{**plain(system), "contacts": contacts, "supervisors": machines, **further})
     for name, signal in table.signals.items():
         if isinstance(signal, FunctionTable):
             raise OutputError(

@@ -8,7 +8,6 @@ the velocity of a driven body, a relative velocity, an input, a named expression
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,15 +24,15 @@ from gms_fsm.language import (
     Number,
     Value,
     derivative,
-    evaluate,
     names_in,
     parse_value,
     renamed,
 )
 from gms_fsm.language.normal import renamed_in
-from gms_fsm.systems.given import derivative_free, is_positive
-from gms_fsm.systems.parts import LEAST_LOAD, LOAD, Body, Contact
+from gms_fsm.systems.given import derivative_free, is_positive, rank_of
+from gms_fsm.systems.parts import COUNTS, LEAST_LOAD, LOAD, Body, Contact
 from gms_fsm.systems.reading.definitions import ContactEdge, Definition
+from gms_fsm.systems.reading.order import check_loops, in_order
 from gms_fsm.systems.reading.values import numbers_of, of
 from gms_fsm.systems.signals import Formula
 from gms_fsm.systems.springs import added, spring_forces
@@ -197,6 +196,14 @@ class Assembly:
     own: Mapping[str, tuple[int, np.ndarray]]
 
     @cached_property
+    def late(self) -> frozenset[str]:
+        """What machines give out, and the shared quantities computed from it."""
+        given = {name for bank in self.banks for name in (*bank.forces, *bank.rates)}
+        given |= {f"{body.name} a" for body in self.system.bodies}
+        shared = (each.name for each in self.definitions if each.bank is None)
+        return frozenset(given) | {name for name in shared if self.closure([name]) & given}
+
+    @cached_property
     def free(self) -> tuple[Body, ...]:
         """The bodies that are not driven."""
         return tuple(body for body in self.system.bodies if not body.driven)
@@ -221,6 +228,12 @@ class Assembly:
             return 0
         periodic = [each.index for each in self.banks if each.contact.period is not None]
         return 1 << (len(self.system.sampled) + periodic.index(bank.index))
+
+    @property
+    def events_bit(self) -> int:
+        """The bit, among all that ticks, with which events are forgotten; 0 if there are none."""
+        periodic = sum(each.periodic for each in self.banks)
+        return 1 << (len(self.system.sampled) + periodic) if self.system.events else 0
 
     def bank_of(self, tree: Value | Condition) -> int | None:
         """Return the bank whose elements have one value of a tree each; None if there is one."""
@@ -248,7 +261,6 @@ class Assembly:
         return renamed(tree, inside) if inside else tree
 
 
-@functools.lru_cache(maxsize=64)
 def assembled(system: System) -> Assembly:
     """Read all texts of a system; a system is read once, when it is constructed."""
     return SystemReader(system).read()
@@ -261,11 +273,13 @@ class SystemReader:
         self.system, self.here = system, Part(f"system {system.name!r}")
         self.definitions: list[Definition] = []
         self.shared, self.own = numbers_of(system)
+        self.aliases: dict[str, Value] = {}  # of the relative velocities that are those of a body
 
     def value(self, text: str | float, names: Iterable[str], owner: Part) -> Value:
         """Return the tree of a text that may read some names."""
         try:
-            return parse_value(text if isinstance(text, str) else repr(float(text)), names)
+            tree = parse_value(text if isinstance(text, str) else repr(float(text)), names)
+            return renamed(tree, self.aliases) if self.aliases else tree
         except ExpressionError as error:
             raise error.at(owner) from None
 
@@ -281,13 +295,14 @@ class SystemReader:
                 formula = signal.tree if isinstance(signal, Formula) else None
                 self.definitions.append(Definition(name, formula, signal=signal))
         given = ["t", *system.signals, *numbers]
+        self.see_machines()
         forces, inertias = {}, {}
         for i, body in enumerate(system.bodies):
             owner = self.here.of(f"body {body.name!r}", "bodies", i)
             if body.velocity is None:
                 assert body.inertia is not None
-                forces[body.name] = self.value(body.force, system.names, owner.of("force", "force"))
-                tree = self.value(body.inertia, system.names, owner.of("inertia", "inertia"))
+                forces[body.name] = self.value(body.force, self.names, owner.of("force", "force"))
+                tree = self.value(body.inertia, self.names, owner.of("inertia", "inertia"))
                 inertias[body.name] = tree
             elif not (body.velocity == body.v and body.v in system.signals):
                 tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
@@ -302,28 +317,29 @@ class SystemReader:
             if name in forces:
                 forces[name] = added(forces[name], sign, term)
         flow = {
-            name: self.value(text, system.names, self.here.of(f"flow of {name!r}", "flow", name))
+            name: self.value(text, self.names, self.here.of(f"flow of {name!r}", "flow", name))
             for name, text in system.flow.items()
         }
         updates = {}
         for i, each in enumerate(system.sampled):
             own = {"period": Number(each.period)}
             owner = self.here.of(f"sampled {each.name!r}", "sampled", i)
+            known = [*self.names, "period"]
             updates[each.name] = {
-                name: renamed(
-                    self.value(
-                        text, [*system.names, "period"], owner.of(repr(name), "updates", name)
-                    ),
-                    own,
-                )
+                name: renamed(self.value(text, known, owner.of(repr(name), "updates", name)), own)
                 for name, text in each.updates.items()
             }
-        banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
+        banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.machines))
         self.check_inertias(inertias)
         self.check_locks(banks)
-        return Assembly(
+        trees = [each.tree for each in self.definitions if each.tree is not None]
+        trees += [*forces.values(), *flow.values()]
+        trees += [tree for each in updates.values() for tree in each.values()]
+        used = frozenset[str]().union(*map(names_in, trees))
+        used |= {name for bank in banks for tree in bank.means.values() for name in names_in(tree)}
+        read = Assembly(
             system,
-            tuple(self.definitions),
+            in_order(each for each in self.definitions if each.counts is None or each.name in used),
             banks,
             forces,
             inertias,
@@ -332,6 +348,25 @@ class SystemReader:
             self.shared,
             self.own,
         )
+        check_loops(read)
+        return read
+
+    def see_machines(self) -> None:
+        """Define how many elements are in a state, and what the velocities of contacts are."""
+        moved = {body.v for body in self.system.bodies}
+        for index, machine in enumerate(self.system.machines):
+            for state in machine.chart.states:
+                for word in COUNTS:
+                    name = f"{word}({machine.name}.{state.name})"
+                    self.definitions.append(Definition(name, None, counts=(index, state.name)))
+            for text, name in zip(machine.v, machine.chart.velocities, strict=True):
+                if text in moved:
+                    self.aliases[of(machine.name, name)] = Name(text)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names that a text of the system can use."""
+        return self.system.readable
 
     def bank(self, index: int, contact: Contact) -> Bank:
         """Return a contact with the texts of its chart read."""
@@ -343,7 +378,7 @@ class SystemReader:
         own_names: dict[str, str] = {}  # of what an action can set
         # Velocities and the position, those of a body where they are just that.
         jacobian, moved = [], {body.v: body for body in self.system.bodies}
-        velocities = []
+        velocities, at = [], ""
         for text, name in zip(contact.v, chart.velocities, strict=True):
             tree = self.value(text, [*moved, *self.system.numbers], owner.of("v", "v"))
             row = self.coefficients(tree, moved, text, owner)
@@ -356,7 +391,7 @@ class SystemReader:
                 if "x" in contact.inputs:
                     where = self.text_of_input(contact, "x", owner)
                 position = self.defined(of(c, "x"), where)
-                names["x"] = position
+                names["x"], at = position, position.id
         for name in chart.inputs:
             if name not in names and not (name == "s" and model is not None):
                 names[name] = self.input(contact, name, owner)
@@ -370,6 +405,10 @@ class SystemReader:
         rates = [of(c, f"rate {name}" if name in names else name) for name in chart.rate_names]
         for name in (*chart.force_names, *chart.rate_names):
             names.setdefault(name, Name(of(c, name)))
+
+        for event in chart.events:
+            own_names[event] = event
+            names[event] = Name(event)
 
         def steps(*keys: tuple[str, str]) -> tuple[tuple[str, Value], ...]:
             return tuple(
@@ -394,7 +433,7 @@ class SystemReader:
             velocities=tuple(velocities),
             forces=tuple(of(c, name) for name in chart.force_names),
             rates=tuple(rates),
-            position=position.id,
+            position=at,
             threshold=threshold,
             jacobian=tuple(jacobian),
             flows={
@@ -465,7 +504,9 @@ class SystemReader:
                         )
             if all(state.locked for state in chart.states):
                 always.append(bank)
-                if _rank(always, free, self.system.numbers) < sum(len(b.jacobian) for b in always):
+                if rank_of(always, free, self.system.numbers) < sum(
+                    len(b.jacobian) for b in always
+                ):
                     names = ", ".join(repr(each.name) for each in always)
                     raise ParameterError(
                         f"the contacts {names} are always locked, and the lock of "
@@ -508,7 +549,7 @@ class SystemReader:
 
     def input(self, contact: Contact, name: str, owner: Part) -> Value:
         """Bind an input of a chart."""
-        if name not in contact.inputs and name not in self.system.names:
+        if name not in contact.inputs and name not in self.names:
             raise ParameterError(
                 f"its chart reads the input {name!r}, which is not bound",
                 place=owner.words,
@@ -521,7 +562,7 @@ class SystemReader:
     def text_of_input(self, contact: Contact, name: str, owner: Part) -> Value:
         """Read what an input is."""
         text = contact.inputs.get(name, name)
-        return self.value(text, self.system.names, owner.of(f"input {name!r}", "inputs", name))
+        return self.value(text, self.names, owner.of(f"input {name!r}", "inputs", name))
 
     def curve(self, contact: Contact, index: int, names: dict[str, Value], owner: Part) -> str:
         """Define the Stribeck curve of a model and the thresholds; return their name."""
@@ -557,13 +598,3 @@ class SystemReader:
                 Definition(of(c, name), renamed(tree, names), index if per_element else None)
             )
             names[name] = Name(of(c, name))
-
-
-def _rank(banks: Iterable[Bank], free: list[str], numbers: Mapping[str, float]) -> int:
-    """Return how many velocities of contacts are independent of each other."""
-    rows = [
-        [float(evaluate(row.get(body, ZERO), numbers)) for body in free]
-        for bank in banks
-        for row in bank.jacobian
-    ]
-    return int(np.linalg.matrix_rank(np.array(rows)))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def renumbered(read: Assembly, system: System) -> Assembly:
     """Return what was read with the numbers of another system of the same texts."""
     shared, own = numbers_of(system)
-    pairs = zip(read.banks, system.contacts, strict=True)
+    pairs = zip(read.banks, system.machines, strict=True)
     banks = tuple(replace(bank, contact=contact) for bank, contact in pairs)
     signals = {name: each for name, each in system.signals.items() if not isinstance(each, str)}
     definitions = tuple(replace(each, signal=signals.get(each.name)) for each in read.definitions)

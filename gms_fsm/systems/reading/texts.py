@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.display import full_text
+from gms_fsm.foundation.equality import ByIdentity
 
 if TYPE_CHECKING:
     from gms_fsm.systems.system import System
-
-T = TypeVar("T")
 
 
 def texts_of_system(system: System) -> tuple[Any, ...]:
@@ -29,7 +28,7 @@ def texts_of_system(system: System) -> tuple[Any, ...]:
             contact.period is None,
             contact.stribeck and contact.stribeck.text,
         )
-        for contact in system.contacts
+        for contact in system.machines
     ]
     signals = [
         (name, signal if isinstance(signal, str) else (type(signal), getattr(signal, "text", "")))
@@ -52,16 +51,3 @@ def texts_of_system(system: System) -> tuple[Any, ...]:
 @functools.lru_cache(maxsize=256)
 def _text_of(chart: ByIdentity[Chart]) -> str:
     return full_text(chart.it)
-
-
-class ByIdentity(Generic[T]):
-    """An object compared by identity, because its data cannot be hashed."""
-
-    def __init__(self, it: T) -> None:
-        self.it = it
-
-    def __hash__(self) -> int:
-        return id(self.it)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, ByIdentity) and other.it is self.it

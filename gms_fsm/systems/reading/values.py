@@ -19,7 +19,7 @@ def numbers_of(system: System) -> tuple[dict[str, float], dict[str, tuple[int, n
     """Return all numbers of a system by name."""
     shared: dict[str, float] = {}
     own: dict[str, tuple[int, np.ndarray]] = {}
-    for contact in system.contacts:  # what a model brings besides its chart's parameters
+    for contact in system.machines:  # what a model brings besides its chart's parameters
         if (model := contact.model) is not None:
             if (curve := model.stribeck) is not None:
                 for name, value in curve.numbers.items():
@@ -28,7 +28,7 @@ def numbers_of(system: System) -> tuple[dict[str, float], dict[str, tuple[int, n
                 shared[of(contact.name, "curve v flat")] = curve.flat
             shared[of(contact.name, "model sigma_2")] = model.sigma_2
     shared |= system.numbers
-    for index, contact in enumerate(system.contacts):
+    for index, contact in enumerate(system.machines):
         weights = contact.weights
         own[of(contact.name, "threshold weight")] = index, np.asarray(weights, dtype=np.float64)
         for name, given in contact.values.items():

@@ -35,7 +35,7 @@ def columns_of(trace: Trace) -> dict[str, NDArray[Any]]:
     table |= {name: trace.rows.y[:, layout.y.index(name)] for name in layout.y.shared}
     table |= {body.v: trace.body(body.name).v for body in system.bodies if body.driven}
     table |= slides
-    for name in trace.contacts:
+    for name in trace.what.contacts:
         for part in _of_contact(trace.contact(name)):
             table |= {f"{name}.{title}": column for title, column in part.items()}
     return table
@@ -50,7 +50,7 @@ def _of_contact(trace: Trace) -> tuple[dict[str, NDArray[Any]], dict[str, NDArra
         for name in stored_names(trace.what, layout).values()
         if name.startswith(start) and name in trace.seen
     ]
-    shared = {"x": trace.x}
+    shared = {"x": trace.x} if bank.position else {}
     shared |= {
         name.removeprefix(start): trace.seen[name]
         for name in kept

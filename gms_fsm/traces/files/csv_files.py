@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
 from gms_fsm.foundation.files import folder_lock, leftovers, write_together
+from gms_fsm.foundation.text import encoded
 from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS
 from gms_fsm.systems.numbers import column_name
 from gms_fsm.traces.files.columns import column_title
@@ -75,7 +76,7 @@ def write(
         text.detach()
 
     def put_log(file: IO[bytes]) -> None:
-        file.writelines(part.encode() for part in log_texts(firings))
+        file.writelines(encoded(part) for part in log_texts(firings))
 
     write_together({path: put_rows, log_path(path): put_log})
     return path
@@ -129,7 +130,7 @@ def _kinds(ran: RunDescription, head: Sequence[str]) -> dict[str, Kind]:
             kinds |= {column_name(title, i): NUMBER for i in range(count)}
         else:
             kinds[title] = NUMBER
-    for bank, contact in zip(layout.banks, ran.what.system.contacts, strict=True):
+    for bank, contact in zip(layout.banks, ran.what.system.machines, strict=True):
         states = {state.name: k for k, state in enumerate(contact.chart.states)}
         title = column_title(layout, bank.of("state"), short=short)
         kind = Kind(states.__getitem__, np.dtype(np.int64))

@@ -87,7 +87,7 @@ class Parts:
 def checked(parts: Parts) -> Parts:
     """Check the parts of a file and return them, completed."""
     layout, system = parts.ran.layout, parts.ran.what.system
-    states = [len(each.chart.states) for each in system.contacts for _ in range(each.n)]
+    states = [len(each.chart.states) for each in system.machines for _ in range(each.n)]
     tables = {"rows": _with_slides(parts.rows, layout)}
     if parts.stops is not parts.rows:
         tables["stops"] = _with_slides(parts.stops, layout)

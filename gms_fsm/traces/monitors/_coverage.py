@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm.charts.chart import Transition
 from gms_fsm.language import MATLAB_LIKE, Condition, clauses, names_in, spell, truths
 from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
@@ -18,8 +19,11 @@ def coverage(trace: Trace) -> CoverageVerdict:
     inside = {state.name: mode == m for m, state in enumerate(chart.states)}
     states = {name: _each(places) for name, places in inside.items()}
     edges = {
-        edge.name: tuple(
-            np.bincount(log["element"][log["edge"] == edge.name], minlength=trace.n).tolist()
+        _called(edge): tuple(
+            np.bincount(
+                log["element"][(log["edge"] == edge.name) & (log["source"] == edge.source)],
+                minlength=trace.n,
+            ).tolist()
         )
         for edge in chart.transitions
     }
@@ -33,7 +37,7 @@ def coverage(trace: Trace) -> CoverageVerdict:
                 known[part] = truths(part, values, mode.shape)
             truth, here = known[part], inside[edge.source]
             sides = _each(truth & here), _each(here & ~truth)
-            seen.append(ClauseSeen(edge.name, spell(part, MATLAB_LIKE), *sides))
+            seen.append(ClauseSeen(_called(edge), spell(part, MATLAB_LIKE), *sides))
     never = [f"state {name}" for name, been in states.items() if not any(been)]
     never += [f"edge {name}" for name, taken in edges.items() if not any(taken)]
     for clause in seen:
@@ -53,6 +57,11 @@ def coverage(trace: Trace) -> CoverageVerdict:
             "initial values would show more"
         )
     return CoverageVerdict(not never, text, states, edges, tuple(seen), tuple(never))
+
+
+def _called(edge: Transition) -> str:
+    """Return the name of an edge; of one that leaves several states also which one it leaves."""
+    return edge.name if len(edge.sources) == 1 else f"{edge.name} from {edge.source}"
 
 
 def _count(found: Iterable[Iterable[object]]) -> str:

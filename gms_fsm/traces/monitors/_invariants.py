@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import ExpressionError, SignalError
+from gms_fsm.errors import ExpressionError, SignalError, UnitError
 from gms_fsm.foundation.quantities import named_numbers
 from gms_fsm.language import Condition, names_in, parse_condition, states_in, truths
 from gms_fsm.systems.models import Model
@@ -20,7 +20,7 @@ from gms_fsm.traces.between import first_true, interpolated
 from gms_fsm.traces.monitors._kinds import Invariant, elements_text
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import Scope, invariant_names
-from gms_fsm.traces.system_scope import SystemScope, owners_of, system_names
+from gms_fsm.traces.system_scope import SystemScope, in_si, owners_of, system_names
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import InvariantVerdict
 
@@ -39,10 +39,17 @@ def read_invariant(monitor: Invariant, what: Mounted) -> Condition:
     n = 0 if model is None else model.n
     try:
         return parse_condition(
-            monitor.text, names, states, n, own_state=model is not None, owners=owners
+            in_si(what, monitor.text, names=names),
+            names,
+            states,
+            n,
+            own_state=model is not None,
+            owners=owners,
         )
     except ExpressionError as error:
         raise error.at("invariant") from None
+    except UnitError as error:
+        raise error.inside(f"invariant {monitor.text!r}") from None
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,8 @@ class Invariant:
     Parameters
     ----------
     text : str
-        Condition in the expression language. It can use t, x, v, F; variables (z), the threshold s
+        Condition in the expression language; a number may have a unit, as in ``"v < 3 mm/s"``. It
+        can use t, x, v, F; variables (z), the threshold s
         and parameters of each element, and must then hold for every element; z1, s1, F1 for a
         single element; and ``state == slip`` or ``state(1) == slip``. In a system it can use the
         system's names, and those of its contacts, such as ``gear.F``.

@@ -96,7 +96,8 @@ def _why_not(trace: Trace) -> str:
 def _forces(model: Model) -> list[Value | None]:
     """Return the different forces of an element over its states; None for that of a locked one."""
     states = model.chart.states
-    return list(dict.fromkeys(model.chart.forces[state.name, "F"] for state in states))
+    found = (model.chart.forces.get((state.name, "F")) for state in states)  # none of a supervisor
+    return list(dict.fromkeys(found))
 
 
 def _spring(model: Model) -> tuple[FloatArray, FloatArray] | None:
@@ -149,7 +150,7 @@ def _lost(trace: Trace, k: FloatArray, sigma: FloatArray) -> tuple[FloatArray, F
 def _velocity(trace: Trace, rates: FloatArray) -> FloatArray:
     """Return the velocity of the contact, given the rates of the state vector on the last axis."""
     system = trace.what.system
-    index = [contact.name for contact in system.contacts].index(trace.places.name)
+    index = [contact.name for contact in system.machines].index(trace.places.name)
     row = system.assembly.banks[index].jacobian[0]
     total = np.zeros(rates.shape[:-1])
     for body in system.bodies:

@@ -38,8 +38,8 @@ from plots.style import (
     LINE_GREY,
     PALE_GREY,
     PAPER,
-    TEXT_GREY,
     VERMILION,
+    element_colour,
 )
 from plots.style.matplotlib import Axes, NullLocator, to_rgb
 from plots.style.presets import font, pt
@@ -50,8 +50,8 @@ __all__ = ["landscape", "pins"]
 
 GRID = (801, 401)  # points of the plane at which guards are evaluated
 ARROWS = (19, 13)  # of the flow field
-DASHES = ("-", "--", "-.", ":")
-DASHED: Any = (0, (2, 1.4))  # the path after the row
+BORDER: Any = (0, (6, 1.6))  # of a clause
+AFTER: Any = (0, (1.2, 1.2))  # the path after the row
 
 Floats = NDArray[np.float64]
 
@@ -113,7 +113,7 @@ def _column(trace: Trace, name: str, element: int) -> Floats:
 
 def with_unit(chart: Chart, name: str, value: float) -> str:
     """Return a value as text, with a prefixed unit where the unit is known."""
-    return in_words(value, unit_of(chart, name), 4).replace("-", "−").replace("^2", "²")
+    return in_words(value, unit_of(chart, name), 4).replace("-", "−")
 
 
 def path_window(trace: Trace, row: int, element: int) -> Window:
@@ -196,9 +196,9 @@ def landscape(
     v, z = grid_of(ax, view, GRID)
     names = LineNames(ax)
     drawn: Artists = _regions(ax, plane, v, z, view.factor, names)
-    drawn += _flow(ax, trace, plane, view)
+    drawn += _flow(ax, trace, plane, view, names)
     drawn += _clauses(ax, plane, v, z, view.factor, names)
-    drawn += _threshold(ax, plane, v, view.factor, names)
+    drawn += _threshold(ax, plane, v, view.factor)
     around = path_window(trace, plane.row, element) if window is None else window
     drawn += _path(ax, trace, plane, element, checked_window(trace, around), view, names)
     here = plane.here[0], view.factor * plane.here[1]
@@ -270,19 +270,18 @@ def _clauses(
 ) -> Artists:
     """Draw where the two sides of each clause are equal."""
     texts: dict[tuple[Value, Value], list[str]] = {}
-    looks: dict[tuple[Value, Value], tuple[str, str]] = {}
+    colours: dict[tuple[Value, Value], str] = {}
     for number, edge in enumerate(plane.edges):
         colour = EDGE_COLOURS[number % len(EDGE_COLOURS)]
-        for place, clause in enumerate(clauses(plane.chart.guards[edge.name])):
+        for clause in clauses(plane.chart.guards[edge.name]):
             for relation in _relations(clause):
                 if not plane.reads(relation) & {*plane.names}:
                     continue
                 key = relation.left, relation.right
-                shared = key in looks and looks[key][0] != colour
-                looks[key] = (INK if shared else colour, DASHES[place % len(DASHES)])
+                colours[key] = INK if colours.get(key, colour) != colour else colour
                 texts.setdefault(key, []).append(spell(clause, MATLAB_LIKE))
     drawn: Artists = []
-    for (left, right), (colour, dash) in looks.items():
+    for (left, right), colour in colours.items():
         margin = plane.margin(Relation("<", left, right), v, z)
         if not (np.nanmin(margin) <= 0 <= np.nanmax(margin)):
             continue
@@ -292,7 +291,7 @@ def _clauses(
             margin,
             levels=[0.0],
             colors=[colour],
-            linestyles=[dash],
+            linestyles=[BORDER],
             linewidths=pt(1.5),
             zorder=4,
         )
@@ -307,7 +306,7 @@ def _relations(clause: Condition) -> Sequence[Relation | Comparison]:
     return (clause,) if isinstance(clause, Relation) else comparisons(split(clause))
 
 
-def _threshold(ax: Axes, plane: Plane, v: Floats, factor: float, names: LineNames) -> Artists:
+def _threshold(ax: Axes, plane: Plane, v: Floats, factor: float) -> Artists:
     """Draw s(v) and -s(v), broad and pale, so that a clause on the same curve can be seen."""
     if plane.threshold is None:
         return []
@@ -324,8 +323,6 @@ def _threshold(ax: Axes, plane: Plane, v: Floats, factor: float, names: LineName
             zorder=3,
             label=name,
         )
-        curve = np.column_stack([v[0], sign * factor * s])
-        names.lines.append(NamedLine(name, TEXT_GREY, (curve,)))
     return drawn
 
 
@@ -338,7 +335,7 @@ def _path(
     view: PlaneWindow,
     names: LineNames,
 ) -> Artists:
-    """Draw the path around the row: solid before it, dashed after it."""
+    """Draw the path around the row: solid before it, dotted after it."""
     part = shown(trace, window)
     v, z = part.v, view.factor * _column(part, plane.names[1], element)
     now = float(trace.t[plane.row])
@@ -348,14 +345,22 @@ def _path(
     jumps = np.flatnonzero(np.diff(part.t) == 0) + 1
     times, points = (np.insert(each, jumps, np.nan, axis=0) for each in (part.t, points))
     gaps = np.isnan(times)
-    for keep, dash, name in ((times <= now, "-", "before"), (times >= now, DASHED, "after")):
+    colour = path_colour(plane, element, trace.n)
+    for keep, dash, name in ((times <= now, "-", "before"), (times >= now, AFTER, "after")):
         x, y = points[keep | gaps].T
-        drawn += ax.plot(x, y, color=INK, linestyle=dash, linewidth=pt(1.2), zorder=6, label=name)
+        look: Any = {"color": colour, "linestyle": dash, "linewidth": pt(1.2), "zorder": 6}
+        drawn += ax.plot(x, y, label=name, **look)
         names.curves.append(points[keep])
     return drawn
 
 
-def _flow(ax: Axes, trace: Trace, plane: Plane, view: PlaneWindow) -> Artists:
+def path_colour(plane: Plane, element: int, elements: int) -> str:
+    """Return the colour of a path: that of the element, or ink for a quantity of the contact."""
+    own = plane.names[1] in plane.chart.variables
+    return element_colour(element, elements) if own else INK
+
+
+def _flow(ax: Axes, trace: Trace, plane: Plane, view: PlaneWindow, names: LineNames) -> Artists:
     """Draw the direction of the flow; lengths of arrows mean nothing."""
     tree = plane.chart.flows.get((plane.state, plane.names[1]))
     dv = acceleration(trace, plane.row)
@@ -378,12 +383,15 @@ def _flow(ax: Axes, trace: Trace, plane: Plane, view: PlaneWindow) -> Artists:
         ahead = place + along * length / box.width * 2 * end
         higher = up * length / box.height * (view.high - view.low)
     v_ahead = np.asarray(scale.inverted().transform(ahead.ravel())).reshape(ahead.shape)
+    tails = np.stack([np.broadcast_to(each, rate.shape) for each in (v, view.factor * z)], axis=-1)
+    arrows = np.stack([v_ahead - v, view.factor * higher], axis=-1)
+    names.curves += [*np.stack([tails, tails + arrows], axis=-2).reshape(-1, 2, 2)]
     return [
         ax.quiver(
-            np.broadcast_to(v, rate.shape),
-            view.factor * np.broadcast_to(z, rate.shape),
-            v_ahead - v,
-            view.factor * higher,
+            tails[..., 0],
+            tails[..., 1],
+            arrows[..., 0],
+            arrows[..., 1],
             angles="xy",
             scale_units="xy",
             scale=1.0,

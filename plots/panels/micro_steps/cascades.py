@@ -8,7 +8,7 @@ import numpy as np
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import (
     Artists,
     beside,
@@ -22,6 +22,7 @@ from plots.panels.parts.selection import PartOptions, RunPart, has_threshold, is
 from plots.style import INK, LINE_GREY, PAPER
 from plots.style.matplotlib import Axes
 from plots.style.presets import font, pt
+from plots.views.traces import check_trace
 from plots.views.window import Window
 
 __all__ = ["cascade", "cascade_window", "margins", "marks"]

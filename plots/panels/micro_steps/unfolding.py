@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from plots.panels.parts.axes import Artists, beside
 from plots.panels.parts.selection import checked_elements, checked_window, is_number, scaled
-from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, state_look
+from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, VERMILION, state_look
 from plots.style.matplotlib import Axes, Rectangle
 from plots.style.presets import font, inches, pt, to_scale
+from plots.views.traces import check_trace
 from plots.views.window import Window
 
 __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
@@ -27,6 +28,7 @@ __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
 MOST_COLUMNS = 24  # more cannot be read side by side
 GAP = 0.55  # width of the gap between instants, in columns
 TURNS = 10  # of a zigzag, per inch
+OVER = 0.4  # inches: by how much a name may be wider than its column
 FEW = 8  # elements; of more, only new states are named
 LETTER = 0.075  # inches: width of a letter of 8 points
 LINE = 0.15  # inches: height of a line of 8 points
@@ -310,8 +312,8 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     for each in part.columns:
         if each.element >= 0:
             row = part.elements.index(each.element)
-            frame = Rectangle((each.left + 0.03, row + 0.55), 0.94, 0.9, fill=False, edgecolor=INK)
-            frame.set(linewidth=pt(2.4), zorder=5)
+            frame = Rectangle((each.left + 0.03, row + 0.55), 0.94, 0.9, **fired_look())
+            frame.set(zorder=5)
             drawn.append(ax.add_patch(frame))
     drawn += _edge_names(ax, part, wide)
     ax.set(
@@ -341,11 +343,19 @@ def column_width(wide: float, part: Unfolded) -> float:
     return wide / inches(part.width + 0.2)
 
 
+def fired_look() -> dict[str, Any]:
+    """Return the look of the frame around the element that has just fired."""
+    return {"fill": False, "edgecolor": VERMILION, "linewidth": pt(2.4)}
+
+
 def edge_texts(part: Unfolded, wide: float) -> tuple[dict[str, str], bool, float]:
     """Return how the edges are written above columns of a width."""
     edges = {each.edge for each in part.columns if each.edge}
     broken = {edge: edge.replace("_", "_\n").rstrip("\n") for edge in edges}
-    if LETTER * max(map(len, edges)) + 0.06 < wide:
+    # Beside a column without a name there is more room.
+    named = [each.left for each in part.columns if each.edge]
+    apart = wide * float(np.diff(named).min(initial=1.0 + OVER / wide))
+    if LETTER * max(map(len, edges)) + 0.06 < apart:
         return {edge: edge for edge in edges}, False, LINE
     if LETTER * max(len(line) for each in broken.values() for line in each.split("\n")) < wide:
         return broken, False, LINE * max(each.count("\n") + 1 for each in broken.values())

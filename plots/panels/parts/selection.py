@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
 from gms_fsm.foundation.quantities import scale_of
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import picked
+from plots.views.traces import check_trace
 from plots.views.window import Window, window_of
 
 __all__ = ["has_threshold", "shown"]
@@ -228,3 +230,14 @@ def scaled(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
     finite = np.abs(values[np.isfinite(values)])
     scale = scale_of(float(finite.max(initial=0.0)), unit)
     return scale.factor, scale.unit
+
+
+def dotted(unit: str) -> str:
+    """Return a unit with dots in its products, or a text that ends with it.
+
+    Examples
+    --------
+    >>> dotted("300 mNs/m"), dotted("Nm/rad")
+    ('300 mN·s/m', 'N·m/rad')
+    """
+    return re.sub(r"N(?=[sm])", "N·", unit)

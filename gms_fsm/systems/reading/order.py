@@ -1,0 +1,71 @@
+"""In which order what machines give out can be computed: each after what it reads of others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.language import names_in
+from gms_fsm.systems.reading.definitions import Definition
+
+if TYPE_CHECKING:
+    from gms_fsm.systems.reading.assembly import Assembly, Bank
+
+
+def order_of(read: Assembly) -> tuple[Bank, ...]:
+    """Return the machines, each after those whose outputs its own outputs read."""
+    found: list[Bank] = []
+    waiting = [*read.banks]
+    while waiting:
+        given = {name for each in waiting for name in each.forces}
+        ready = [each for each in waiting if not read_by(read, each) & given]
+        if not ready:
+            names = ", ".join(each.name for each in waiting)
+            closing = " and ".join(sorted(read_by(read, waiting[0]) & given))
+            raise ParameterError(
+                f"the outputs of {names} follow from each other: {closing} closes the loop (an "
+                "algebraic loop)",
+                place=f"system {read.system.name!r}",
+                advice="put a further state between them, or give one of them a period",
+            )
+        found += ready[:1]
+        waiting.remove(ready[0])
+    return tuple(found)
+
+
+def check_loops(read: Assembly) -> None:
+    """Refuse machines whose outputs follow from each other."""
+    order_of(read)
+
+
+def read_by(read: Assembly, bank: Bank) -> frozenset[str]:
+    """Return what the outputs of a machine are computed from, but for its own."""
+    if bank.periodic:  # what it gives out is held
+        return frozenset()
+    given = (each for each in bank.outputs.values() if each is not None)
+    trees = [*given, *bank.totals.values()]
+    names = read.closure(name for tree in trees for name in names_in(tree))
+    rates = [tree for (_, name), tree in bank.flows.items() if bank.rate(name) in names]
+    names |= read.closure(name for tree in rates for name in names_in(tree))
+    return names - {*bank.forces, *bank.rates}
+
+
+def is_deferred(read: Assembly, bank: Bank) -> bool:
+    """Return whether rates of a machine, on which no output depends, read outputs."""
+    if bank.periodic:
+        return False
+    names = read.closure(name for tree in bank.flows.values() for name in names_in(tree))
+    return bool(names & read.late - read_by(read, bank))
+
+
+def in_order(definitions: Iterable[Definition]) -> tuple[Definition, ...]:
+    """Return definitions, each after those that it names; others keep their order."""
+    waiting, found = [*definitions], list[Definition]()
+    while waiting:
+        left = {each.name for each in waiting}
+        ready = (each for each in waiting if each.tree is None or not names_in(each.tree) & left)
+        each = next(ready, waiting[0])  # a loop is refused later
+        found.append(each)
+        waiting.remove(each)
+    return tuple(found)

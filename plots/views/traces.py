@@ -1,0 +1,21 @@
+"""What is asked of a trace before anything of it is drawn."""
+
+from __future__ import annotations
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.traces.trace import Trace
+
+
+def check_trace(trace: object) -> None:
+    """Raise `ParameterError` unless an object to be drawn is a trace of one contact."""
+    if not isinstance(trace, Trace):
+        raise ParameterError(
+            "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
+        )
+    if not trace.model.chart.velocities:  # a system with several contacts refuses here
+        raise ParameterError(
+            "a supervisor has no velocity and no force to draw",
+            place="trace",
+            value=trace,
+            advice="its states are in .states, its chart is drawn by plots.statechart",
+        )
