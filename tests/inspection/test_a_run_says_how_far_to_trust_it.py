@@ -64,7 +64,7 @@ def test_a_motion_that_fits_has_none():
         (
             bank(),
             "0.5*cos(t)",
-            "the stroke of 1 m is 2e\\+05 times the largest threshold.*unit of the motion",
+            "the stroke of 1 m is 1.7e\\+05 times the largest threshold.*unit of the motion",
         ),
         (
             bank(v_c=1e-2),
@@ -207,8 +207,8 @@ def test_a_repeated_run_says_how_far_its_times_and_its_end_move():
     model, rig = pulled_mass()
     (found,) = simulate(model, rig, 20.0).trust(again=True).of("repeat")
     assert re.match(
-        r"with rtol/100 the sequence of \d+ transitions holds, its times move by at most "
-        r"[\d.]+ [µn]s; the end state \(SI units\) moves: x by [\d.e-]+",
+        r"with tolerances 100 times finer the sequence of \d+ transitions holds, and times move by "
+        r"at most [\d.]+ [µn]s; at the end [\w ]+ moves by [\d.e-]+ \(SI\), [\d.e-]+ of its",
         found.text,
     )
 

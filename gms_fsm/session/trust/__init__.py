@@ -20,6 +20,8 @@ from gms_fsm.traces.verdicts import KINDS, Doubt, Trust
 
 __all__ = ["trust_of"]
 
+TRIED = ("grazing", "close call")  # what a repeated run decides
+
 
 def trust_of(trace: Trace, *, again: bool = False) -> Trust:
     """Return the findings about a run; see `gms_fsm.Trace.trust`."""
@@ -30,7 +32,12 @@ def trust_of(trace: Trace, *, again: bool = False) -> Trust:
         return Trust(tuple(each for each in whole if each.contact in ("", trace.which)))
     found = [*_findings(trace.whole(), at_times=trace.stops is not trace.rows)]
     if again:
-        found += repeated(trace)
+        repeat = [*repeated(trace)]
+        if all(each.severity == "note" for each in repeat):  # what was doubted holds
+            found = [
+                replace(each, severity="note") if each.kind in TRIED else each for each in found
+            ]
+        found += repeat
     found.sort(key=lambda each: (each.severity != "warning", KINDS.index(each.kind)))
     return Trust(tuple(found))
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.gms import TABLE_I
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.quantities import in_words
 from gms_fsm.language import Call, Name, Number, Relation, Value, clauses, evaluate, names_in
 from gms_fsm.lowering.scales import scales_of
@@ -122,13 +123,17 @@ def _sizes(trace: Trace) -> Iterator[str]:
                 f"{deflected:.2g} of it, the smallest threshold {smallest}); if this "
                 f"is not intended, check the units of {_scaling(model)}motion (m)"
             )
-    elif stroke > FAR * float(thresholds.max()):
-        times = f"{stroke / float(thresholds.max()):.2g} times"
+    elif stroke > FAR * (most := _largest(trace, thresholds)):
+        times = f"{stroke / most:.2g} times"
         yield (
             f"the stroke of {in_words(stroke, 'm', 3)} is {times} the largest threshold: nearly "
             "all of it is gross sliding; if pre-sliding is intended, check the unit of the motion "
             "(m)"
         )
+
+
+def _largest(trace: Trace, thresholds: FloatArray) -> float:
+    return float(trace.s.max() if "s" in trace.model.chart.inputs else thresholds.max())
 
 
 def _of_table_1(model: Model) -> bool:

@@ -77,19 +77,19 @@ def _repels(path: Track, k: int, t: float, y: list[float], mode: list[int]) -> b
 
 
 def impulses(path: Track) -> Iterator[Doubt]:
-    """Yield a note for each edge that takes momentum on purpose."""
+    """Yield a note for each contact whose edges take momentum on purpose."""
     found = path.trace.impulses
-    for contact, edge in dict.fromkeys(zip(found.contact, found.edge, strict=True)):
-        mine = found[(found.contact == contact) & (found.edge == edge)]
-        t, energy = float(mine.t[0]), float(mine.energy.sum())
-        whose = path.trace.what.whose(str(contact))
+    for contact in dict.fromkeys(found.contact.tolist()):
+        mine = found[found.contact == contact]
+        edges = " and ".join(dict.fromkeys(mine.edge.tolist()))
+        times = sorted({*mine.t.tolist()})
+        whose, energy = path.trace.what.whose(contact), in_words(float(mine.energy.sum()), "J", 3)
         yield Doubt(
             "impulse",
             "note",
-            f"{edge}{f' of {whose}' * bool(whose)} takes momentum on purpose, "
-            f"{len({*mine.t.tolist()})} times, first at t = {t:.9g} s, and "
-            f"{in_words(energy, 'J', 3)} in total",
-            tuple(sorted({*mine.t.tolist()})),
+            f"{edges}{f' of {whose}' * bool(whose)} take {energy} in total from the bodies by "
+            f"impulses, as the chart says, {len(times)} times, first at t = {times[0]:.9g} s",
+            tuple(times),
             whose,
         )
 
@@ -123,23 +123,24 @@ def growth(trace: Trace) -> Iterator[Doubt]:
 
 def _grown(trace: Trace, name: str, i: int, rate: np.ndarray) -> Iterator[Doubt]:
     t, mode = trace.t, trace.modes[:, i]
-    steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(t)
-    steps[(mode[1:] != mode[:-1]) | ~(np.minimum(rate[1:], rate[:-1]) > 0.0)] = 0.0
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], steps > 0.0, [0]]).astype(int)))
+    on = (mode[1:] == mode[:-1]) & (np.minimum(rate[1:], rate[:-1]) > 0.0)
+    steps = np.where(on, 0.5 * (rate[1:] + rate[:-1]) * np.diff(t), 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], on, [0]]).astype(int)))
     grown = [(float(steps[a:b].sum()), int(a), int(b)) for a, b in edges.reshape(-1, 2)]
     grown = [each for each in grown if each[0] > math.log(GROWN)]
     if not grown:
         return
     most, first = max(grown), grown[0][1]
     state = trace.model.chart.states[int(mode[first])].name
-    times = f"by up to {math.exp(min(most[0], 700.0)):.3g} times"
     whose = trace.which
+    often = f"{len(grown)} times, " if len(grown) > 1 else ""
     yield Doubt(
         "growth",
         "warning" if most[0] > math.log(MUCH) else "note",
-        f"{name} of {trace.subject.element(trace.places.name, i)} grows by itself in {state}, from "
-        f"t = {t[first]:.6g} s on: there an error is multiplied, {times} (t = {t[most[1]]:.6g} to "
-        f"{t[most[2]]:.6g} s){_cure(trace)}",
+        f"in {state} an error in {name} of {trace.subject.element(trace.places.name, i)} grows by "
+        f"itself, {often}first from t = {t[first]:.6g} s on, by up to "
+        f"{math.exp(min(most[0], 700.0)):.3g} times (t = {t[most[1]]:.6g} to {t[most[2]]:.6g} s)"
+        f"{_cure(trace)}",
         tuple(float(t[a]) for _, a, _ in grown),
         whose,
         i,
@@ -148,4 +149,4 @@ def _grown(trace: Trace, name: str, i: int, rate: np.ndarray) -> Iterator[Doubt]
 
 def _cure(trace: Trace) -> str:
     title = trace.model.title
-    return "; the signed law has no such state" if "published" in title else ""
+    return "; with the signed law it does not" if "published" in title else ""

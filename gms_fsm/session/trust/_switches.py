@@ -57,7 +57,7 @@ def _judge_ties(path: Track, row: int, found: Gathering) -> None:
     if len(tied) < 2:
         return
     same, machines = _order_is_free(path, t, y, mode), [i for i, _ in tied]
-    text = f"several elements switch at the same instant, {{when}} ({_listed(path, machines)})"
+    text = f"several switch at the same instant, {{when}} ({_listed(path, machines)})"
     text += (
         "; the order makes no difference"
         if same
@@ -122,8 +122,9 @@ def _judge_crossing(path: Track, row: int, found: Gathering) -> None:
         if _is_undone(m[k], rate[k], bend[k], doubt[k], AS_LONG * step):
             name = path.program.relations[r]
             text = (
-                f"{edge} of {path.who(i)} fires {{when}}, where {name} is reached by less than "
-                "the tolerances: an error of that size would leave it out"
+                f"{path.whose(i) or 'an element'} switches where {name} is reached by less than "
+                f"the tolerances, {{when}} ({edge} of {path.who(i)}): an error of that size would "
+                "leave the switch out; a smaller rtol tells"
             )
             found.add("grazing", bank.name, t, text, **where)  # type: ignore[arg-type]
             return
@@ -144,8 +145,8 @@ def _judge_crossing(path: Track, row: int, found: Gathering) -> None:
         at, state = path.moved(row, longest)
         same = _order_is_free(path, at, state, list(mode))
         names = _listed(path, sorted([*machines, *others]))
-        text = f"elements switch closer together than the tolerances resolve, {{when}} ({names} "
-        text += f"within {longest:.2g} s)"
+        text = f"{names} switch closer together than the {longest:.2g} s to which their times are "
+        text += "certain, {when}"
         text += (
             "; the order makes no difference" if same else "; another order gives another result"
         )
