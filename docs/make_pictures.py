@@ -289,6 +289,7 @@ AGEING = Chart(  # docs/howto/own-chart.md explains it
 def draw_howto() -> None:
     """Write the pictures of the how-to pages."""
     plots.render(plots.statechart(AGEING), FOLDER / "howto_own_chart.png")
+    plots.render(plots.statechart(names_of("own-chart.md")["brake"]), FOLDER / "howto_nested.png")
     report = prove(BROKEN["memoryless"].chart)
     (finding,) = report.refuted
     note = [*wrap(f"{finding.check}: {finding.text}", 38), *wrap(finding.example, 38)]

@@ -435,7 +435,45 @@ LAMP = Chart(
     ),
 )
 
+# States in states: what is inherited, histories, ages of outer states, entries and exits.
+LIGHT = ChartModel(
+    Chart(
+        "two-level light",
+        variables=("n", "u"),
+        parameters=("T",),
+        states=(
+            State("off", outputs={"F": "0"}, exit={"u": "0.5 * u"}),
+            State(
+                "on",
+                flow={"u": "age"},
+                entry={"n": "n + 1"},
+                exit={"n": "0.5 * n"},
+                outputs={"F": "u + v"},
+                states=(
+                    State("red", entry={"u": "u - 1"}, exit={"n": "n + 10"}),
+                    State(
+                        "go",
+                        states=(State("amber"), State("green", flow={"u": "2"})),
+                        initial="green",
+                    ),
+                ),
+                initial="go",
+                history=True,
+            ),
+        ),
+        transitions=(
+            Transition("fails", "on", "off", guard="after(5 * T)"),
+            Transition("again", "off", "on", guard="after(T)"),
+            Transition("slow", "on.go.green", "on.go.amber", guard="after(T)"),
+            Transition("stop", "on.go", "on.red", guard="after(1.5 * T)", actions={"u": "u / 2"}),
+            Transition("start", "on.red", "on.go", guard="after(1.3 * T)"),
+        ),
+    ),
+    {"T": 0.3},
+)
+
 OWN_RUNS: dict[str, Maker] = {
+    "states in states": _on(LIGHT, Prescribed("0.2 * sin(t)"), 6.0),
     "ages": _on(ChartModel(LAMP, {"T": 0.3}), Prescribed("0"), 5.0),
     "odd names": _on(odd_names(), Prescribed("0.3*sin(t)"), 20.0),
     "wear": _on(wear(), Prescribed("0.3*sin(2*pi*t/17)"), 40.0),

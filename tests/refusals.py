@@ -1286,6 +1286,11 @@ def edge(**changes: Any) -> dict[str, Any]:
     return {"transitions": (dataclasses.replace(GO, **changes), BACK)}
 
 
+def inside(*states: State, **changes: Any) -> dict[str, Any]:
+    """Return the valid chart's states with states inside the second one, and further changes."""
+    return {**state(states=states or (State("one"), State("two"))), **changes}
+
+
 def state(**changes: Any) -> dict[str, Any]:
     """Return the valid chart's states with the second one changed."""
     return {"states": (STICK, dataclasses.replace(SLIP, **changes))}
@@ -1295,6 +1300,9 @@ rows = {
     "unknown source": (edge(source="glue"),),
     "line end in a name": (edge(source="gl\nue"),),
     "unknown one of two sources": (edge(source=("stick", "glue")),),
+    "unknown state inside another": (inside(**edge(target="slip.three")),),
+    "state inside another by its name alone": (inside(**edge(target="two")),),
+    "age of two levels": (inside(**edge(source=("stick", "slip"), guard="after(1)")),),
 }
 group("chart", ChartError, chart, rows, "chart 'rubber', edge 'go'")
 rows = {
@@ -1345,6 +1353,18 @@ rows = {
     "variable and parameter": ({"parameters": (*K, "z")},),
     "derivative and parameter": ({"parameters": (*K, "dz")},),
     "state twice": ({"states": (STICK, STICK)},),
+    "state inside and parameter": (inside(parameters=(*K, "slip__two")),),
+    "age and parameter": (inside(parameters=(*K, "slip__age")),),
+    "edge of a history and parameter": (
+        {
+            "states": (
+                STICK,
+                dataclasses.replace(SLIP, states=(State("a"), State("b")), history=True),
+            ),
+            "parameters": (*K, "go__b"),
+        },
+    ),
+    "path for a name": (inside(State("one.two")),),
     "state and edge": (edge(name="slip"),),
     "parameter and edge": (edge(name="k"),),
     "parameter t": ({"parameters": (*K, "t")},),
@@ -1404,12 +1424,41 @@ rows = {
     "edge of none": (lambda: chart({"transitions": ()}).guard_text("go"),),
 }
 group("part of a chart", ChartError, called, rows, "")
+
+
+def nest() -> State:
+    """Return a state in which states nest deeper than anybody reads."""
+    found = State("s")
+    for level in range(20):
+        found = State(f"s{level}", states=(found,))
+    return found
+
+
 rows = {
     "part that no state has": (
         "state 'stick'",
         ...,
         lambda: State("stick", flow={"z": "v"}, during="z = 0"),
     ),
+    "edges of composite states without end": (
+        "chart 'rubber'",
+        ...,
+        lambda: chart(inside(*(State(f"s{i}") for i in range(2500)), **edge(source="slip"))),
+    ),
+    "state inside twice": ("state 'slip'", ..., lambda: inside(STICK, STICK)),
+    "history of nothing": ("state 'slip'", ..., lambda: State("slip", history=True)),
+    "deep history": (
+        "state 'slip': history",
+        "deep",
+        lambda: State("slip", states=(STICK,), history="deep"),  # type: ignore[arg-type]
+    ),
+    "initial state elsewhere": (
+        "state 'slip'",
+        ...,
+        lambda: State("slip", states=(STICK,), initial="stuck"),
+    ),
+    "text for a state inside": ("state 'slip'", ..., lambda: State("slip", states=("stick",))),  # type: ignore[arg-type]
+    "states that nest without end": ("state 's7'", ..., nest),
     "argument of transitions": (
         "Transition",
         ...,
@@ -1607,7 +1656,6 @@ group(
     rows,
 )
 
-NESTED: Any = {"states": (STICK,)}
 rows = {
     "equation that is a table": (
         "state 'slip', flow of 'z', column 1",
@@ -1616,10 +1664,6 @@ rows = {
     ),
 }
 group("wrong kind", ExpressionError, lambda call: call(), rows)
-rows = {
-    "states in a state": ("state 'outer'", ..., lambda: State(name="outer", flow={}, **NESTED)),
-}
-group("wrong kind", ChartError, lambda call: call(), rows)
 PUSHED, SWEPT = Prescribed(0.2), {"v_s": [1e-3, 2e-3]}
 rows = {
     "rig before model": ("model", PUSHED, (PUSHED, stick_slip("signed"), 3.0, SWEPT)),

@@ -14,11 +14,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
+from gms_fsm.charts.nesting import Nesting, check_ends, check_paths
 from gms_fsm.charts.parameters import QUANTITIES, Parameter, check_rules
 from gms_fsm.charts.parts import (
     State,
     Transition,
-    check_size,
+    check_parts,
     event_name,
     parameter_of,
     places_of,
@@ -67,12 +68,13 @@ class Chart:
         Constants, each with a unit and a rule; a plain name stands for a parameter of unknown unit
         that may be any finite number.
     states : sequence of State
-        The first one is the default state.
+        The first one is the default state. Of states inside others the chart has the innermost,
+        called by their paths: ``slip.forward``.
     transitions : sequence of Transition
-        Among the edges that leave one state, earlier ones have priority. Guards may read ``F``, the
-        force of the contact, ``a``, its acceleration, ``age``, the time in the present state [s],
-        and ``after(T)``, short for ``age >= T``; on an edge from a state to itself ``every(T)`` may
-        be written, which means the same: the age begins anew each time.
+        Among the edges that leave one state, earlier ones have priority, but those of inner states
+        precede those of the states around them. Guards may read ``F``, the force of the contact,
+        ``a``, its acceleration, ``age``, the time since the state that the edge leaves was entered,
+        s, and ``after(T)``, short for ``age >= T``; on an edge to itself ``every(T)`` is the same.
     outputs : mapping of str to str
         ``F``, the element's force [N], in all states that give none of their own; may use
         ``d<variable>`` for a derivative.
@@ -130,6 +132,10 @@ class Chart:
     # By state and force; None where the state is locked.
     forces: Mapping[tuple[str, str], Value | None] = field(init=False, repr=False, compare=False)
     lets: Mapping[str, Value] = field(init=False, repr=False, compare=False)
+    # Variables that no text declares: times in states, and histories.
+    hidden: tuple[str, ...] = field(init=False, repr=False, compare=False)
+    # As written; `states` and `transitions` are the innermost states and the edges between them.
+    nesting: Nesting = field(init=False, repr=False)
     totals: Mapping[str, Value] = field(init=False, repr=False, compare=False)
 
     def __init__(
@@ -169,12 +175,14 @@ class Chart:
             given[each] = texts_of({} if texts is None else texts, f"{here}: {each}")
         for each, value in given.items():  # copies: nobody else can change a frozen chart
             object.__setattr__(self, each, value)
+        object.__setattr__(self, "nesting", Nesting(self.states, self.transitions))
         self._check_names()
         check_rules(self.parameters, here)
+        object.__setattr__(self, "states", self.nesting.leaves())
         object.__setattr__(self, "initial", values_of(initial or {}, self.variables, here))
         object.__setattr__(self, "layout", places_of(layout or {}, self.states, here))
-        expanded = tuple(each for edge in self.transitions for each in edge.each())
-        for each, value in {**ChartReader(self).trees(), "transitions": expanded}.items():
+        object.__setattr__(self, "transitions", self.nesting.rows())
+        for each, value in ChartReader(self).trees().items():
             object.__setattr__(self, each, value)
 
     def __repr__(self) -> str:
@@ -189,16 +197,7 @@ class Chart:
                 raise ChartError(
                     "it must be a text", place=f"{here}: {text}", value=getattr(self, text)
                 )
-        for each, wanted, example in (
-            ("states", State, "State('stick', flow={'z': 'v'})"),
-            ("transitions", Transition, "Transition('slips', 'stick', 'slip', guard='z > s')"),
-        ):
-            for given in getattr(self, each):
-                if not isinstance(given, wanted):
-                    raise ChartError(
-                        f"{each} has {shown(given)}", place=here, advice=f"write it as {example}"
-                    )
-        check_size(len(self.states), sum(len(each.sources) for each in self.transitions), here)
+        check_parts(self.states, self.transitions, here)
         groups = (
             ("input", "inputs", dict.fromkeys([*self.inputs, *self.velocities])),
             ("variable", "variables", self.variables),
@@ -229,34 +228,19 @@ class Chart:
                         key=key,
                     )
                 owner[name] = kind
+        for level in self.nesting.levels.values():
+            _check_name(level.state.name, "state", here, (*level.key, "name"))
+        check_paths(self.nesting, owner, here)
         for name in sorted({*self.force_names} & owner.keys()):
             raise ChartError(f"{owner[name]} name {name!r} is taken by a force", place=here)
-        known = [s.name for s in self.states]
-        for i, edge in enumerate(self.transitions):
-            for end, state in (
-                *(("source", each) for each in edge.sources),
-                ("target", edge.target),
-            ):
-                if state not in known:
-                    raise ChartError(
-                        f"{end} {state!r} is not a state",
-                        place=f"{here}, edge {edge.name!r}",
-                        advice=f"states: {_listed(known)}",
-                        key=("transitions", i, end),
-                    )
-            if edge.impulse and not self.states[known.index(edge.target)].locked:
-                raise ChartError(
-                    f"it takes an impulse, but its target {edge.target!r} is not locked",
-                    place=f"{here}, edge {edge.name!r}",
-                    advice="leave impulse out; an action that sets the velocity is an impulse too",
-                    key=("transitions", i, "impulse"),
-                )
+        check_ends(self.nesting, owner, here)
 
     @property
     def force_names(self) -> tuple[str, ...]:
         """What it gives out: ``F``, then ``F_<velocity>``; without velocity its outputs."""
         if not self.velocities:
-            own = [name for state in self.states for name in state.outputs]
+            levels = self.nesting.levels.values()
+            own = [name for level in levels for name in level.state.outputs]
             return tuple(dict.fromkeys([*self.outputs, *own]))
         return ("F", *(f"F_{each}" for each in self.velocities[1:]))
 
@@ -301,8 +285,8 @@ class Chart:
             With the keys ``name``, ``reference``, ``inputs``, ``velocities``, ``variables``,
             ``parameters`` (a list of names) or ``[[parameter]]`` (name, unit, rule, per_element,
             meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[initial]``,
-            ``[[state]]`` (name, flow, entry, exit, outputs, locked) and ``[[edge]]`` (name, from,
-            to, guard, do, impulse).
+            ``[[state]]`` (name, flow, entry, exit, outputs, locked, initial, history; those inside
+            one as ``[[state.state]]``) and ``[[edge]]`` (name, from, to, guard, do, impulse).
 
         Returns
         -------
@@ -331,8 +315,8 @@ class Chart:
         """Build a chart from a machine of the package transitions, and texts given beside it.
 
         The machine gives states, edges and their priority: the order of the triggers and of their
-        transitions, those of inner states first. States in states become ``outer__inner``. An edge
-        has the name of its trigger, or ``source_target`` if the trigger has edges that differ.
+        transitions, those of inner states first. Texts name an inner state ``outer__inner``. An
+        edge has the name of its trigger, or ``source_target`` if the trigger has edges that differ.
 
         Parameters
         ----------
@@ -405,7 +389,7 @@ class Chart:
         ------
         ChartError, ExpressionError
             If the document cannot be read, or has something without counterpart in a chart, which
-            is named, such as a parallel state, a history, a script; or if a text is wrong.
+            is named, such as a parallel state, a deep history, a script; or if a text is wrong.
 
         Examples
         --------
@@ -518,7 +502,7 @@ class Chart:
         Parameters
         ----------
         name : str
-            A state's name.
+            A state's name; a composite state stands for the one that is entered with it.
 
         Returns
         -------
@@ -530,13 +514,29 @@ class Chart:
         ChartError
             If there is no such state.
         """
-        names = [s.name for s in self.states]
-        if name not in names:
+        if not isinstance(name, str) or name not in self.nesting.levels:
             raise ChartError(
                 f"chart {self.name!r} has no state {shown(name)}",
-                advice=f"its states are {_listed(names)}",
+                advice=f"its states are {_listed(self.nesting.levels)}",
             )
-        return names.index(name)
+        return [s.name for s in self.states].index(self.nesting.ways(name)[0][1])
+
+    def assigned(self, edge: Transition | None = None) -> tuple[tuple[str, Value], ...]:
+        """Return what an edge assigns, in order: exits, action, entries.
+
+        Parameters
+        ----------
+        edge : Transition, optional
+            One of `transitions`; without one, the start of a run, which enters the default state.
+
+        Returns
+        -------
+        tuple of (str, Value)
+            Variables and velocities, each with its new value.
+        """
+        given = checked_kind("edge", edge, (Transition, type(None)), "a Transition of the chart")
+        performed = self.nesting.begins() if given is None else given.performs
+        return tuple(each for key in performed for each in self.assignments[key].items())
 
     def leaving(self, state: str) -> tuple[tuple[int, Transition], ...]:
         """Return the edges that leave a state, each with its index, highest priority first.

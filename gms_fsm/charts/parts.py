@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field
 from math import isfinite, nan
 from typing import Any
 
@@ -13,6 +14,7 @@ from gms_fsm.foundation.arguments import refusing, unknown
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import EVENT
 
+DEEPEST_STATE = 8  # levels; deeper ones nobody could read
 MOST_PARTS = 5_000  # states and edges of a chart; more would take minutes to read and to compile
 NO_GUARD = "an event alone"  # what stands for a guard that is left out
 
@@ -31,13 +33,14 @@ def check_size(states: int, edges: int, place: str) -> None:
 
 @refusing(
     ChartError,
-    "states do not nest, so write one state for each combination",
     instead={"during": "flow", "on_enter": "entry", "on_exit": "exit"},
 )
 @by_value()
 @dataclass(frozen=True, eq=False)
 class State:
     """One state of a machine: how its variables evolve, and what force it gives, while active.
+
+    A state with `states` of its own is composite: one of them is active while it is.
 
     Parameters
     ----------
@@ -54,6 +57,12 @@ class State:
     locked : bool
         While the state is active, the velocities of the contact are held at 0, and its forces are
         those that hold them.
+    states : sequence of State, optional
+        The states inside. They inherit `flow`, `outputs` and `locked`, unless they give their own.
+    initial : str, optional
+        The state inside that is entered with this one; the first one unless another is named.
+    history : bool
+        Whether the state inside that was active last is entered again.
 
     Examples
     --------
@@ -61,6 +70,8 @@ class State:
     'stick'
     >>> State("forward", outputs={"F": "F_c + b * v"}).outputs["F"]
     'F_c + b * v'
+    >>> State("slip", states=(State("forward"), State("backward"))).initial
+    'forward'
     """
 
     name: str
@@ -69,14 +80,65 @@ class State:
     exit: Mapping[str, str] = field(default_factory=dict)
     outputs: Mapping[str, str] = field(default_factory=dict)
     locked: bool = False
+    states: tuple[State, ...] = ()
+    initial: str = ""
+    history: bool = False
 
     def __post_init__(self) -> None:
         here = f"state {shown(self.name)}"
         for each in ("flow", "entry", "exit", "outputs"):
             # Copies: nobody else can change a frozen chart.
             object.__setattr__(self, each, texts_of(getattr(self, each), f"{here}: {each}"))
-        if not isinstance(self.locked, bool):
-            raise ChartError("it must be True or False", place=f"{here}: locked", value=self.locked)
+        for each in ("locked", "history"):
+            given = getattr(self, each)
+            if not isinstance(given, bool):
+                raise ChartError("it must be True or False", place=f"{here}: {each}", value=given)
+        object.__setattr__(self, "states", tuple_of(self.states, f"{here}: states"))
+        self._check_inside(here)
+        if self.states and not self.initial:
+            object.__setattr__(self, "initial", self.states[0].name)
+
+    def _check_inside(self, here: str) -> None:
+        for i, each in enumerate(self.states):
+            if not isinstance(each, State):
+                raise ChartError(
+                    f"states has {shown(each)}",
+                    place=here,
+                    advice="write it as State('forward', outputs={'F': 'F_c'})",
+                    key=("states", i),
+                )
+        names = [each.name for each in self.states]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ChartError(
+                    f"the name {name!r} is used twice in it",
+                    place=here,
+                    advice="every name must be unique",
+                    key=("states", i, "name"),
+                )
+        if self.initial and self.initial not in names:
+            raise ChartError(
+                f"initial {shown(self.initial)} is not a state inside it",
+                place=here,
+                advice=f"states inside: {', '.join(map(repr, names)) or 'none'}",
+                key=("initial",),
+            )
+        if self.history and not self.states:
+            raise ChartError(
+                "it has a history, and no states inside",
+                place=here,
+                advice="give its states, or leave history out",
+                key=("history",),
+            )
+        if self.depth > DEEPEST_STATE:
+            raise ChartError(
+                f"it has states on more than {DEEPEST_STATE} levels", place=here, key=("states",)
+            )
+
+    @property
+    def depth(self) -> int:
+        """Number of levels of states, itself included."""
+        return 1 + max((each.depth for each in self.states), default=0)
 
 
 @refusing(
@@ -94,7 +156,8 @@ class Transition:
     name : str
         The edge's name, unique in its chart, for example ``"arrest"``.
     source : str or sequence of str
-        The state it leaves, or several that it leaves alike.
+        The state it leaves, or several that it leaves alike; from a composite state it leaves
+        whichever state inside is active. A state inside another is named with it, ``slip.forward``.
     target : str
         The state it enters.
     guard : str
@@ -127,6 +190,8 @@ class Transition:
     event: str = field(repr=False)
     emit: tuple[str, ...] = field(repr=False)
     sources: tuple[str, ...] = field(init=False, repr=False)
+    # Whose assignments are performed, in this order: ("exit", "stick"), ("action", "slips") ...
+    performs: tuple[tuple[str, str], ...] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -172,20 +237,40 @@ class Transition:
             ("event", event),
             ("emit", emitted),
             ("sources", sources),
+            ("performs", ()),
         ):
             object.__setattr__(self, each, value)
 
-    def each(self) -> tuple[Transition, ...]:
-        """Return one transition per source; each knows all of them."""
-        parts = tuple(replace(self, source=source) for source in self.sources)
-        for part in parts:
-            object.__setattr__(part, "sources", self.sources)
-        return parts
+    def leaving(self, source: str) -> Transition:
+        """Return the transition that leaves one of its sources, and knows all of them."""
+        one = copy(self)
+        object.__setattr__(one, "source", source)
+        return one
 
 
 def event_name(event: str) -> str:
     """Return what an event is called in trees, where it is 1 while machines are asked for it."""
     return EVENT + event
+
+
+def check_parts(states: Sequence[object], transitions: Sequence[object], here: str) -> None:
+    """Refuse what is no state or no transition, and too many of them."""
+    for each, given, wanted, example in (
+        ("states", states, State, "State('stick', flow={'z': 'v'})"),
+        (
+            "transitions",
+            transitions,
+            Transition,
+            "Transition('slips', 'stick', 'slip', guard='z > s')",
+        ),
+    ):
+        for part in given:
+            if not isinstance(part, wanted):
+                raise ChartError(
+                    f"{each} has {shown(part)}", place=here, advice=f"write it as {example}"
+                )
+    edges = [each for each in transitions if isinstance(each, Transition)]
+    check_size(len(states), sum(len(each.sources) for each in edges), here)
 
 
 def texts_of(given: object, owner: str) -> dict[str, str]:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from gms_fsm.charts.nesting import AGE, Level, joined
 from gms_fsm.charts.parts import event_name
 from gms_fsm.errors import ChartError, ExpressionError, Part
 from gms_fsm.language import (
@@ -18,13 +19,13 @@ from gms_fsm.language import (
     names_in,
     parse_condition,
     parse_value,
+    renamed,
 )
+from gms_fsm.language.normal import renamed_in
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
-    from gms_fsm.charts.parts import State
-
-AGE = "age"  # s since the state was entered; a variable of every chart that reads it
+    from gms_fsm.charts.parts import State, Transition
 
 
 class ChartReader:
@@ -47,7 +48,7 @@ class ChartReader:
         self.late = [
             each for each in (*chart.force_names, *chart.rate_names) if each not in declared
         ]
-        self.ages = False
+        self.ages: set[str] = set()  # the variables that texts read
 
     def trees(self) -> dict[str, Any]:
         """Return what the chart keeps, by its name."""
@@ -61,26 +62,28 @@ class ChartReader:
         flows: dict[tuple[str, str], Value] = {}
         forces: dict[tuple[str, str], Value | None] = {}
         assignments: dict[tuple[str, str], dict[str, Value]] = {}
-        for i, state in enumerate(chart.states):
-            owner = here.of(f"state {state.name!r}", "states", i)
-            self.only(state.flow, chart.variables, owner.of("flow", "flow"))
+        for level in chart.nesting.levels.values():
+            owner = self.state(level)
+            self.only(level.state.flow, chart.variables, owner.of("flow", "flow"))
+            self.only_forces(level.state.outputs, owner.of("outputs", "outputs"))
+            for kind, texts in (("entry", level.state.entry), ("exit", level.state.exit)):
+                found = self.assignments(texts, owner.of(kind, kind), level.age)
+                assignments[kind, level.path] = found
+        for state in chart.states:
             for variable in chart.variables:
-                flows[state.name, variable] = self.value(
-                    state.flow.get(variable, "0"),
-                    [*self.known_now, *self.forces_for(variable)],
-                    owner.of(f"flow of {variable!r}", "flow", variable),
-                )
-            for kind, texts in (("entry", state.entry), ("exit", state.exit)):
-                assignments[kind, state.name] = self.assignments(texts, owner.of(kind, kind))
+                flows[state.name, variable] = self.flow(state, variable)
             for force in chart.force_names:
-                forces[state.name, force] = self.force(state, force, owner)
+                forces[state.name, force] = self.force(state, force)
         guards: dict[str, Condition] = {}
-        for i, edge in enumerate(chart.transitions):
+        for i, edge in enumerate(chart.nesting.transitions):
             owner = here.of(f"edge {edge.name!r}", "transitions", i)
-            guard = self.guard(edge.guard, owner.of("guard", "guard"))
-            guards[edge.name] = _awaiting(edge.event, guard) if edge.event else guard
+            age = self.age_of(edge, owner)
+            guard = self.guard(edge.guard, owner.of("guard", "guard"), age)
+            guard = _awaiting(edge.event, guard) if edge.event else guard
+            for name, conditions, _ in chart.nesting.entries(edge):
+                guards[name] = joined(guard, conditions)
             assignments["action", edge.name] = {
-                **self.assignments(edge.actions, owner.of("action", "actions")),
+                **self.assignments(edge.actions, owner.of("action", "actions"), age),
                 **{event_name(each): Number(1.0) for each in edge.emit},
             }
         totals = {
@@ -88,14 +91,10 @@ class ChartReader:
             for force in chart.force_names
             if force in chart.contact_outputs
         }
-        variables = chart.variables
-        if self.ages:
-            variables = (*variables, AGE)
-            for state in chart.states:
-                flows[state.name, AGE] = Number(1.0)
-                assignments["entry", state.name][AGE] = Number(0.0)
+        hidden = self.hidden(flows, assignments)
         return {
-            "variables": variables,
+            "variables": (*chart.variables, *hidden),
+            "hidden": hidden,
             "lets": self.lets,
             "flows": flows,
             "forces": forces,
@@ -121,9 +120,44 @@ class ChartReader:
         """The names that can be used, with the expressions read so far."""
         return [*self.known, *self.lets]
 
-    def force(self, state: State, force: str, owner: Part) -> Value | None:
+    def hidden(
+        self,
+        flows: dict[tuple[str, str], Value],
+        assignments: dict[tuple[str, str], dict[str, Value]],
+    ) -> tuple[str, ...]:
+        """Add the variables that no text declares: times in states, and histories."""
+        levels = self.chart.nesting.levels.values()
+        found = dict.fromkeys(level.age for level in levels if level.age in self.ages)
+        for level in levels:
+            if level.age in found:
+                assignments["entry", level.path][level.age] = Number(0.0)
+            if level.state.history:
+                found[level.last] = None
+                for number, inside in enumerate(level.inside()):
+                    assignments["entry", inside][level.last] = Number(float(number))
+        for state in self.chart.states:
+            chain = self.chart.nesting.levels[state.name].chain
+            running = {self.chart.nesting.levels[path].age for path in chain}
+            for name in found:
+                flows[state.name, name] = Number(1.0 if name in running else 0.0)
+        return tuple(found)
+
+    def state(self, level: Level) -> Part:
+        """Return what errors call a state."""
+        return self.here.of(f"state {level.path!r}", *level.key)
+
+    def flow(self, state: State, variable: str) -> Value:
+        """Read a flow in a state."""
+        level = self.chart.nesting.giver("flow", state.name, variable)
+        if level is None:
+            return Number(0.0)
+        part = self.state(level).of(f"flow of {variable!r}", "flow", variable)
+        names = [*self.known_now, *self.forces_for(variable)]
+        return self.value(level.state.flow[variable], names, part, level.age)
+
+    def force(self, state: State, force: str) -> Value | None:
         """Read a force in a state; None where the state is locked."""
-        self.only_forces(state.outputs, owner.of("outputs", "outputs"))
+        owner = self.state(self.chart.nesting.levels[state.name])
         if state.locked:
             if force in state.outputs:
                 raise ChartError(
@@ -133,7 +167,8 @@ class ChartReader:
                     key=(*owner.key, "outputs", force),
                 )
             return None
-        texts = {**self.chart.outputs, **state.outputs}
+        giver = self.chart.nesting.giver("outputs", state.name, force)
+        texts = self.chart.outputs if giver is None else giver.state.outputs
         if force not in texts:
             raise ChartError(
                 f"no output {force!r}",
@@ -142,9 +177,22 @@ class ChartReader:
                 key=owner.key,
             )
         rates = [f"d{variable}" for variable in self.chart.variables]
-        whose = owner if force in state.outputs else self.here
-        owner = whose.of(f"output {force!r}", "outputs", force)
-        return self.value(texts[force], [*self.known_now, *rates], owner)
+        whose, age = (self.here, AGE) if giver is None else (self.state(giver), giver.age)
+        part = whose.of(f"output {force!r}", "outputs", force)
+        return self.value(texts[force], [*self.known_now, *rates], part, age)
+
+    def age_of(self, edge: Transition, owner: Part) -> str:
+        """Return the variable that age means to an edge: the time in the state that it leaves."""
+        ages = dict.fromkeys(self.chart.nesting.levels[each].age for each in edge.sources)
+        texts = [edge.guard, *edge.actions.values()]
+        if len(ages) > 1 and any(_age(text) for text in texts):
+            raise ChartError(
+                f"it reads the age of {' and of '.join(map(repr, edge.sources))}",
+                place=owner.words,
+                advice="write an edge for each of them",
+                key=owner.key,
+            )
+        return next(iter(ages))
 
     def total(self, text: str, force: str) -> Value:
         """Read the force of a contact over the sum of its elements' forces."""
@@ -170,25 +218,27 @@ class ChartReader:
             name for each in found for name in (self.inside(each) if each in self.lets else {each})
         )
 
-    def guard(self, text: str, owner: Part) -> Condition:
+    def guard(self, text: str, owner: Part, age: str) -> Condition:
         """Read a guard."""
         try:
             tree = parse_condition(text, [*self.known_now, *self.late, *_age(text)])
         except ExpressionError as error:
             raise error.at(owner) from None
-        self.ages |= AGE in names_in(tree)
-        return tree
+        if AGE not in names_in(tree):
+            return tree
+        self.ages.add(age)
+        return renamed_in(tree, {AGE: Name(age)})
 
-    def assignments(self, texts: Mapping[str, str], owner: Part) -> dict[str, Value]:
+    def assignments(self, texts: Mapping[str, str], owner: Part, age: str) -> dict[str, Value]:
         """Read assignments to variables and velocities."""
         self.only(texts, (*self.chart.variables, *self.chart.velocities), owner)
         names = [*self.known_now, *self.late]
         return {
-            name: self.value(text, names, Part(f"{owner.words} {name!r}", (*owner.key, name)))
+            name: self.value(text, names, Part(f"{owner.words} {name!r}", (*owner.key, name)), age)
             for name, text in texts.items()
         }
 
-    def value(self, text: str, names: Iterable[str], owner: Part) -> Value:
+    def value(self, text: str, names: Iterable[str], owner: Part, age: str = AGE) -> Value:
         """Read a value."""
         names = [*names, *_age(text)]
         try:
@@ -196,8 +246,10 @@ class ChartReader:
         except ExpressionError as error:
             self.refuse_loop(text, names, owner)
             raise error.at(owner) from None
-        self.ages |= AGE in names_in(tree)
-        return tree
+        if AGE not in names_in(tree):
+            return tree
+        self.ages.add(age)
+        return renamed(tree, {AGE: Name(age)})
 
     def refuse_loop(self, text: str, names: list[str], owner: Part) -> None:
         """Refuse F and a where they would depend on themselves."""

@@ -97,7 +97,7 @@ class Joint:
                 advice="give it another name",
             )
         # The entry of its default state sees the first velocity.
-        self.enters = bool(self._chart.assignments["entry", self._chart.default_state.name])
+        self.enters = bool(self._chart.assigned())
 
     # ------------------------------------------------------------------ samples
     def enter(self, t: float, lines: Mapping[str, Line]) -> None:

@@ -138,9 +138,9 @@ class Commands:
 
     @property
     def states(self) -> list[str]:
-        """Names of the states of all charts."""
+        """Names of the states of all charts, composite ones among them."""
         charts = (contact.chart for contact in self.session.system.machines)
-        return list(dict.fromkeys(state.name for chart in charts for state in chart.states))
+        return list(dict.fromkeys(path for chart in charts for path in chart.nesting.levels))
 
     @property
     def _edges(self) -> list[str]:
@@ -392,7 +392,7 @@ class Commands:
             yield from self.do_breaks("")
             return
         form = re.fullmatch(
-            rf"(?:({'|'.join(KINDS)})\s+)?(\w+)(?:\s+(?:element\s+)?({self.elements.pattern}))?"
+            rf"(?:({'|'.join(KINDS)})\s+)?(\w[\w.]*)(?:\s+(?:element\s+)?({self.elements.pattern}))?"
             r"(?:\s+if\s+(.+?))?(?:\s+hits\s+(\d+))?",
             arg,
         )

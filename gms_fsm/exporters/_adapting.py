@@ -91,7 +91,7 @@ def check_first_call(subject: Subject, words: Collection[str]) -> None:
         chart = contact.chart
         given = {*chart.inputs, *chart.velocities, *chart.declared} - {*chart.variables}
         given -= {*chart.parameter_names}
-        for name, tree in chart.assignments["entry", chart.default_state.name].items():
+        for name, tree in chart.assigned():
             read = set(names_in(tree))
             while (
                 more := {u for each in read & {*chart.lets} for u in names_in(chart.lets[each])}

@@ -13,6 +13,7 @@ from string import Template
 from typing import Any
 
 from gms_fsm._version import __version__
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.coupling.joint import FAILURES
 from gms_fsm.coupling.memory import MOST_SWITCHES
 from gms_fsm.exporters._adapting import STEPS, check_first_call, step_arguments, translate, word_of
@@ -79,9 +80,9 @@ def engine_of(subject: Subject) -> CEngine:
     for bank in start.program.layout.banks:
         chart = start.system.contact(bank.name).chart
         owner = "" if alone else f"{bank.name}_"
-        states |= {f"{owner}{each.name}": k for k, each in enumerate(chart.states)}
+        states |= {f"{owner}{spelled(each.name)}": k for k, each in enumerate(chart.states)}
         for edge in chart.transitions:  # one for each source
-            source = f"_from_{edge.source}" if len(edge.sources) > 1 else ""
+            source = f"_from_{spelled(edge.source)}" if len(edge.sources) > 1 else ""
             edges[f"{owner}{edge.name}{source}"] = f"{owner}{edge.name}"
     for each in (*states, *edges):
         identifier(each, (), f"state or edge {each!r}")

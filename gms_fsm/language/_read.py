@@ -558,12 +558,25 @@ class _Reader:
         return f"state(1) == {self.own.states[-1]}"
 
     def in_state(self, whose: Owner, element: int, op: ast.cmpop, name: ast.expr) -> Condition:
-        if not isinstance(name, ast.Name) or name.id not in whose.states:
+        path = _dotted(name)
+        inside = [each for each in whose.states if f"{each}.".startswith(f"{path}.")]
+        if not inside:
             raise self.refuse("unknown state", name, "the states " + ", ".join(whose.states))
         if not isinstance(op, ast.Eq | ast.NotEq):
             raise self.refuse("states are compared by == or !=", name, self.compared())
-        found = InState(element, name.id)
+        each = tuple(InState(element, state) for state in inside)  # those in a composite state
+        found = each[0] if len(each) == 1 else Either(each)
         return found if isinstance(op, ast.Eq) else Not(found)
+
+
+def _dotted(node: ast.expr) -> str:
+    """Return a name with dots as a text; empty if it is none."""
+    match node:
+        case ast.Name(id=name):
+            return name
+        case ast.Attribute(value=value, attr=name):
+            return f"{_dotted(value)}.{name}"
+    return ""
 
 
 def _plain(node: ast.expr) -> str:

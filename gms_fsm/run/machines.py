@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from transitions import Machine, MachineError
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.errors import ChartError, ParameterError, shown
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.language import PYTHON, Condition, names_in, spell
@@ -31,10 +32,11 @@ class Element:
 
     Callbacks can read: ``t`` [s], ``x`` [m], ``v`` [m/s], the threshold ``s``, each variable
     (``z`` [m]) and each parameter (``k``, ``sigma``, ``C``, ``v_c``) of the chart, the current
-    ``state`` and the element's ``index`` counted from 0. Parameters are read-only: the run is
-    integrated with those of the model. Values of the run cannot be set while it goes on; before it
-    they can, for ``element.may_break_away_forward()``. Derive from it to give elements methods that
-    `transitions` calls by name, for example ``on_enter_slip(self, event)``.
+    ``state`` (one inside others is spelled ``slip__forward``) and the element's ``index`` counted
+    from 0. Parameters are read-only: the run is integrated with those of the model. Values of the
+    run cannot be set while it goes on; before it they can, for
+    ``element.may_break_away_forward()``. Derive from it to give elements methods that `transitions`
+    calls by name, for example ``on_enter_slip(self, event)``.
     """
 
     # No __slots__ and no generated __eq__: transitions fails with the former, and registers models
@@ -160,17 +162,17 @@ class ElementMachines:
         self.machine = _new_machine(
             machine,
             model=self.elements,
-            states=[state.name for state in chart.states],
+            states=[spelled(state.name) for state in chart.states],
             transitions=[
                 {
                     "trigger": edge.name,
-                    "source": edge.source,
-                    "dest": edge.target,
+                    "source": spelled(edge.source),
+                    "dest": spelled(edge.target),
                     "conditions": [self.guards[edge.name]],
                 }
                 for edge in chart.transitions
             ],
-            initial=chart.default_state.name,
+            initial=spelled(chart.default_state.name),
             auto_transitions=False,
             send_event=True,
         )
@@ -199,9 +201,11 @@ class ElementMachines:
             rows = []
             own = {edge.name: index for index, edge in chart.leaving(state.name)}
             for edge in {edge.name: edge for edge in chart.transitions}.values():
-                for transition in self.machine.get_transitions(edge.name, source=state.name):
+                source = spelled(state.name)
+                for transition in self.machine.get_transitions(edge.name, source=source):
                     conditions = [c.func for c in transition.conditions]
-                    if conditions != [self.guards[edge.name]] or transition.dest != edge.target:
+                    target = spelled(edge.target)
+                    if conditions != [self.guards[edge.name]] or transition.dest != target:
                         raise ChartError(
                             f"the machine was given conditions {conditions} or the target "
                             f"{transition.dest!r}, which are not in chart {chart.name!r}",
@@ -223,7 +227,7 @@ class ElementMachines:
                         f"chart {chart.name!r} has it once",
                         advice="change the chart, the only source of switching",
                     )
-            table.append(rows)
+            table.append(sorted(rows, key=lambda row: row[0]))
         known = {edge.name for edge in chart.transitions}
         for trigger in self.machine.get_triggers(*self.machine.states):
             if trigger not in known:
@@ -355,8 +359,8 @@ class MachineEngine:
     def set_state(self, machine: int, state: str) -> None:
         """Put one element into a state, without callbacks."""
         element = self.elements[machine]
-        self.parts[machine].machine.set_state(state, element)
-        self.states[machine] = state
+        self.parts[machine].machine.set_state(spelled(state), element)
+        self.states[machine] = spelled(state)
         graphs = getattr(self.parts[machine].machine, "model_graphs", {})
         if id(element) in graphs:  # the state that it shows as active changes only with a firing
             vars(element)["get_graph"](force_new=True)
@@ -426,7 +430,7 @@ class MachineEngine:
                 place,
                 t,
             )
-        self.states[machine] = row.target
+        self.states[machine] = spelled(row.target)
         for i, (element, state) in enumerate(zip(self.elements, self.states, strict=True)):
             if element.state != state:
                 raise Interference(

@@ -429,7 +429,7 @@ def _given(
             for name in layout.y.own
             if name not in y and name.startswith(bank.of(""))
         }
-    state, mode = layout.y.joined(y), list[int]()
+    mode = list[int]()
     for bank, part in zip(layout.banks, system.machines, strict=True):
         chart = part.chart
         default = [chart.default_state.name] * bank.n
@@ -439,8 +439,13 @@ def _given(
             raise ParameterError(
                 f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
             )
-        mode += [chart.state_index(str(name)) for name in wanted]
-    return state, mode, {*given}
+        active = [chart.state_index(str(name)) for name in wanted]
+        for level in chart.nesting.composite:
+            if level.state.history and bank.of(level.last) not in given:
+                leaves = (chart.states[k].name for k in active)
+                y[bank.of(level.last)] = [chart.nesting.remembered(level, each) for each in leaves]
+        mode += active
+    return layout.y.joined(y), mode, {*given}
 
 
 @functools.lru_cache(maxsize=64)
@@ -489,7 +494,7 @@ def _not_locked(chart: Chart) -> str:
 def _enters(system: System) -> bool:
     """Return whether the default state of some chart has an entry."""
     charts = (contact.chart for contact in system.machines)
-    return any(chart.assignments["entry", chart.default_state.name] for chart in charts)
+    return any(chart.assigned() for chart in charts)
 
 
 def _entered(
@@ -509,7 +514,7 @@ def _entered(
     layout = program.layout
     for bank, contact in zip(layout.banks, system.machines, strict=True):
         chart = contact.chart
-        for name in chart.assignments["entry", chart.default_state.name]:
+        for name, _ in chart.assigned():
             if name in chart.velocities and 0 in mode[bank.elements]:
                 raise ParameterError(
                     f"the entry of the default state {chart.states[0].name!r} sets {name!r}",

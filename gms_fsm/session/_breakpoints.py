@@ -64,7 +64,7 @@ def new_breakpoint(
         contact, index = start.what.whose(bank.name), machine - bank.first
     charts = [chart_of(start, bank) for bank in banks if contact in ("", bank.name)]
     edges = [edge.name for chart in charts for edge in chart.transitions]
-    states = [state.name for chart in charts for state in chart.states]
+    states = [path for chart in charts for path in chart.nesting.levels]
     known, what = (states, "state") if kind in ("enter", "leave") else (edges, "edge")
     if name not in known:
         error = unknown(what, name, known, SessionError)
@@ -106,8 +106,9 @@ def _happens(point: Breakpoint, branch: Branch, row: int, machine: int) -> bool:
         fired = branch.fired(row)
         if fired is None or fired.element != i or fired.contact not in ("", bank.name):
             return False
-        names = {"fires": fired.edge, "enter": fired.target, "leave": fired.source}
-        return names[point.kind] == point.name
+        edge = next(each for _, each in chart.leaving(fired.source) if each.name == fired.edge)
+        done = {"fires": "action", "enter": "entry", "leave": "exit"}[point.kind], point.name
+        return done in edge.performs or done == ("action", edge.name)
     if point.name not in chart.guards:  # of another contact
         return False
     sources = source_of(point.name, chart)

@@ -345,7 +345,8 @@ class System:
         found = [*self.names]
         for each in self.machines:
             chart, one = each.chart, each.n == 1
-            found += [f"{w}({each.name}.{s.name})" for w in COUNTS[not one :] for s in chart.states]
+            paths = chart.nesting.levels
+            found += [f"{word}({each.name}.{path})" for word in COUNTS[not one :] for path in paths]
             own = (*chart.variables[: len(chart.variables) * one], *chart.velocities)
             found += [f"{each.name}.{name}" for name in (*own, *chart.force_names)]
         return tuple(dict.fromkeys(found))

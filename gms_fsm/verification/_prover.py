@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, TypeAlias
 
+from gms_fsm.charts.nesting import AGE
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.foundation.extras import require
 from gms_fsm.language import (
@@ -35,7 +36,7 @@ from gms_fsm.language import (
     parse_condition,
     spell,
 )
-from gms_fsm.verification._subject import AGE, ChartSubject
+from gms_fsm.verification._subject import ChartSubject
 from gms_fsm.verification.findings import Check, Finding, Status, listed
 
 PATIENCE = 5.0  # s, per query to z3

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.nesting import AGE
 from gms_fsm.language import (
     Binary,
     Condition,
@@ -29,7 +30,6 @@ from gms_fsm.language.normal import renamed_in
 from gms_fsm.verification.facts import ContactFacts
 
 ZERO = Number(0.0)
-AGE = "age"
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +242,7 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
         assumed=(
             *([f"{mobility} > 0"] if moves else []),
             *([f"{viscous} >= 0"] if viscous else []),
-            *([f"{AGE} >= 0"] if AGE in chart.variables else []),
+            *(f"{name} >= 0" for name in chart.hidden),
         ),
         facts=facts,
     )
@@ -253,9 +253,7 @@ def _steps(
 ) -> dict[tuple[str, str], tuple[tuple[str, Value], ...]]:
     return {
         (edge.source, edge.name): tuple(
-            (name, renamed(tree, lets))
-            for place in (("exit", edge.source), ("action", edge.name), ("entry", edge.target))
-            for name, tree in chart.assignments[place].items()
+            (name, renamed(tree, lets)) for name, tree in chart.assigned(edge)
         )
         for edge in chart.transitions
     }

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from gms_fsm.charts.chart import Transition
+from gms_fsm.charts.nesting import AGE
 from gms_fsm.language import Condition, Requirement, Value, derivative, names_in, split
 from gms_fsm.verification._flows import inclusive, moving, ways
 from gms_fsm.verification._prover import (
@@ -19,7 +20,6 @@ from gms_fsm.verification._prover import (
     names_of,
     refuted,
 )
-from gms_fsm.verification._subject import AGE
 from gms_fsm.verification._switching import changed
 from gms_fsm.verification.findings import Finding
 

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 import graphviz
 
 from plots.charts.cells import Label
-from plots.charts.drawing import DOT_SIZE, Drawing, DrawnLine, Node, graph_drawing
+from plots.charts.drawing import DOT_SIZE, Drawing, DrawnLine, Node
 from plots.charts.labels import Piece, Row, element_id
 from plots.charts.layout.layers import ARROW, Point, straight
-from plots.charts.matrix import matrix_drawing
 
 if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
@@ -44,9 +43,8 @@ def arrange(
     alike = folded or (sheet.form == "matrix" and sheet.tally is None)
     shared = alike and len(numbers) > 1
     shown = [numbers[0]] if shared else list(numbers)
-    draw = matrix_drawing if sheet.form == "matrix" else graph_drawing
     titles = [None if bare else _title(sheet, numbers, n, shared, values) for n in shown]
-    regions = [_Region(draw(sheet, n), title) for n, title in zip(shown, titles, strict=True)]
+    regions = [_Region(sheet.drawing(n), title) for n, title in zip(shown, titles, strict=True)]
     grid = _Grid.of(regions, SHOWN if sheet.live else PRINTED)
     legend = _legend(sheet, grid.width, grid.height)
     foot = sheet.cells.text(below) if below else None

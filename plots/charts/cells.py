@@ -96,9 +96,18 @@ class CellWriter:
         return Label(f"<{_table(look, wide, tall, body)}>", wide, tall)
 
     def state(
-        self, rows: Sequence[Row], marked: bool = False, least: tuple[float, float] = (0, 0)
+        self,
+        rows: Sequence[Row],
+        marked: bool = False,
+        least: tuple[float, float] = (0, 0),
+        *,
+        inside: bool = False,
     ) -> Label:
-        """Set the box of a state: its title, and below a rule the other rows, with one indent."""
+        """Set the box of a state: its title, and below a rule the other rows, with one indent.
+
+        What is spare is above and below these; with states inside all of it is below, and what is
+        drawn there is seen through it.
+        """
         heights = [self._height(row) for row in rows]
         small = PLAIN * self.scale <= LEAST
         text = ceil(max(map(self._width, rows)) * (WIDER if small else 1))
@@ -109,27 +118,31 @@ class CellWriter:
         wide, tall = max(wide, ceil(least[0])), max(tall, ceil(least[1]))
         inner = wide - 2 * border
         title, *more = (
-            self._row([Piece("", "pad"), *row], height, inner)
+            self._row([Piece("", "pad"), *row], height, inner, ground=inside)
             for row, height in zip(rows, heights, strict=True)
         )
-        look = f'BORDER="{border}" COLOR="{ink}" BGCOLOR="{self.colours.paper}" STYLE="ROUNDED" '
-        spare = tall - sum(heights) - 2 * border - bool(more)
+        ground = "" if inside else f'BGCOLOR="{self.colours.paper}" '
+        look = f'BORDER="{border}" COLOR="{ink}" {ground}STYLE="ROUNDED" '
+        ruled = inside or bool(more)
+        spare = tall - sum(heights) - 2 * border - ruled
+        top = 0 if inside else spare // 2
         above, below = (
-            f'<TR><TD HEIGHT="{room}"></TD></TR>' * bool(room)
-            for room in (spare // 2, spare - spare // 2)
+            f'<TR><TD HEIGHT="{room}"></TD></TR>' * bool(room) for room in (top, spare - top)
         )
         texts = "".join(more)
-        body = f"{title}<HR/>{above}{texts}{below}" if more else f"{above}{title}{below}"
+        body = f"{title}<HR/>{above}{texts}{below}" if ruled else f"{above}{title}{below}"
         return Label(f"<{_table(look, wide, tall, body)}>", wide, tall)
 
-    def _row(self, row: Row, height: int, wide: int, first: int = 0) -> str:
+    def _row(
+        self, row: Row, height: int, wide: int, first: int = 0, *, ground: bool = False
+    ) -> str:
         """Return one line as a row of a table; its pieces are a table in it."""
         cells, at = "", 0.0
         for i, piece in enumerate(self._pieces(row)):
             end = at + self._piece_width(piece)
             if i == 0 and first:
                 end = first
-            cells += self._cell(piece, max(round(end) - round(at), 1), height)
+            cells += self._cell(piece, max(round(end) - round(at), 1), height, ground)
             at = max(end, at + 1)
         # Graphviz would spread the cells over the line: the last one fills it.
         cells += f"<TD {_size(wide - round(at), height)}></TD>"
@@ -143,8 +156,9 @@ class CellWriter:
         groups = (list(group) for _, group in alike)
         return [replace(each[0], text="".join(piece.text for piece in each)) for each in groups]
 
-    def _cell(self, piece: Piece, wide: int, height: int) -> str:
+    def _cell(self, piece: Piece, wide: int, height: int, ground: bool) -> str:
         size = _size(wide, height)
+        size += f' BGCOLOR="{self.colours.paper}"' if ground else ""
         if piece.role == "pad":
             return f"<TD {size}></TD>"
         _, face, bold, soft = _FACES.get(piece.role, _FORMULA)

@@ -15,6 +15,7 @@ from plots.charts.layout.layers import LayerEdge, Point, layered, straight
 from plots.charts.layout.placed import placed, ring
 
 if TYPE_CHECKING:
+    from gms_fsm.charts.chart import Transition
     from plots.charts.statechart import ChartSheet
 
 
@@ -122,27 +123,33 @@ def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
         marked = state.name in sheet.marked
         kind = "state marked" if marked else "state"
         nodes.append(Node(name, kind, at, cells.state(own, marked, size)))
-    lines = [_default_line(dot, names[0], laid.dot, laid.states[0], laid.sizes[0], sheet.direction)]
+    lines = [default_line(dot, names[0], laid.dot, laid.states[0], laid.sizes[0], sheet.direction)]
     for (edge, _), box, link, at, line in zip(
         edges, boxes, links, laid.labels, laid.lines, strict=True
     ):
         guard = edge_id(chart, element, "guard", edge)
         name = edge_id(chart, element, "edge", edge)
-        look = {}
-        if sheet.tally is not None and not sheet.tally.times(number, edge):
-            look = {"style": "dashed"}
-        marked = edge.name in sheet.marked
-        if marked:
-            look |= {"class": "marked", "penwidth": MARKED}
+        look, marked = edge_look(sheet, number, edge), edge.name in sheet.marked
         nodes.append(Node(guard, "guard marked" if marked else "guard", at, box))
         ends = names[link.source], names[link.target]
         lines.append(DrawnLine(name, ends, tuple(line), True, look))
     return Drawing(laid.width, laid.height, tuple(nodes), tuple(lines))
 
 
-def _default_line(
+def edge_look(sheet: ChartSheet, number: int, edge: Transition) -> dict[str, str]:
+    """Return the attributes of an edge's line: one never taken is dashed, a marked one wide."""
+    look = {}
+    if sheet.tally is not None and not sheet.tally.times(number, edge):
+        look = {"style": "dashed"}
+    if edge.name in sheet.marked:
+        look |= {"class": "marked", "penwidth": MARKED}
+    return look
+
+
+def default_line(
     dot: str, state: str, at: Point, centre: Point, size: tuple[float, float], direction: str
 ) -> DrawnLine:
+    """Return the arrow from the dot to the default state."""
     (x, y), (to_x, to_y) = at, centre
     if direction == "TB":
         start, end = (x, y + DOT_SIZE / 2), (x, to_y - size[1] / 2)

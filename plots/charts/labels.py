@@ -9,6 +9,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 
 from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.foundation.text import visible
 from gms_fsm.traces.trace import Trace, dwell_times
 from plots.charts.contents import chart_texts, state_texts
@@ -168,7 +169,7 @@ def warn_of_missing_glyphs(write: ChartWriter, note: str = "") -> None:
         own = (text for _, texts in state_texts(write, state) for text in texts)
         places[f"state {state.name!r}"] = " ".join([state.name, *own])
     for edge in chart.transitions:
-        action = write.actions(chart.assignments["action", edge.name])
+        action = write.actions(edge)
         places[f"edge {edge.name!r}"] = f"{write.text(chart.guards[edge.name])} {action}"
     places["the texts of the whole chart"] = " ".join(
         text for _, texts in chart_texts(write) for text in texts
@@ -205,7 +206,7 @@ def part_id(element: str, kind: str, name: str) -> str:
     'element1-state-slip'
     """
     # Names in a chart are identifiers; other characters could be read as a port or as DOT syntax.
-    return f"{element}-{kind}-" + re.sub(r"\W", "_", name)
+    return f"{element}-{kind}-" + re.sub(r"\W", "_", spelled(name))
 
 
 def edge_id(chart: Chart, element: str, kind: str, edge: Transition) -> str:

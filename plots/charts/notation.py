@@ -6,7 +6,7 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.language import (
     EVENT,
     MATHEMATICS,
@@ -109,16 +109,23 @@ class ChartWriter:
         written = (MATHEMATICS if self.math else MATLAB_LIKE).operators
         return {Both: str(written["and"].write).strip(), Either: str(written["or"].write).strip()}
 
-    def actions(self, trees: Mapping[str, Value]) -> str:
-        """Write the assignments of an edge on one line; empty if there are none."""
-        if not trees:
-            return ""
+    def actions(self, edge: Transition) -> str:
+        """Write what an edge assigns on one line; empty if there is nothing.
+
+        What the states at its ends assign stands in these, and what no text declares nowhere.
+        """
+        chart = self.chart
+        done = edge.performs[1:-1] or (("action", edge.name),)
+        pairs = [pair for key in done for pair in chart.assignments[key].items()]
         texts = [
             f"send({name.removeprefix(EVENT)})" + ";" * (not self.math)
             if name.startswith(EVENT)
             else self.assignment(name, tree)
-            for name, tree in trees.items()
+            for name, tree in pairs
+            if name not in chart.hidden
         ]
+        if not texts:
+            return ""
         return "/ " + ", ".join(texts) if self.math else "{" + " ".join(texts) + "}"
 
 

@@ -10,12 +10,13 @@ classes are stable, so that the SVG can be restyled without a new layout: class 
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import graphviz
 
 from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.nesting import Level
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, listed, one_of
 from gms_fsm.foundation.text import visible
@@ -28,9 +29,12 @@ from plots.charts.contents import (
     chart_in_words,
     chart_texts,
     edges_by_priority,
+    guard_of,
+    level_texts,
     state_texts,
+    written_edges,
 )
-from plots.charts.drawing import graph_drawing
+from plots.charts.drawing import Drawing, graph_drawing
 from plots.charts.labels import (
     DOT,
     LONGEST_LINE,
@@ -42,7 +46,8 @@ from plots.charts.labels import (
     with_indices,
     wrapped,
 )
-from plots.charts.matrix import WIDEST
+from plots.charts.matrix import WIDEST, matrix_drawing
+from plots.charts.nested import nested_drawing
 from plots.charts.notation import NOTATIONS, ChartWriter
 from plots.output.drawings import DrawnGraph
 from plots.style import CHART_THEMES, SANS, ChartTheme
@@ -149,7 +154,7 @@ def statechart(
             advice=f"it must be one of the chart that is drawn, {chart.name!r}",
         )
     pointed = tuple(listed("marked", marked, "names of states and edges"))
-    parts = [*(state.name for state in chart.states), *(edge.name for edge in chart.transitions)]
+    parts = [*chart.nesting.levels, *(edge.name for edge in chart.transitions)]
     for name in pointed:
         one_of("marked", name, parts)
     tally = Tally(counts) if counts else None
@@ -320,13 +325,13 @@ class ChartSheet:
             return self
         every = self._numbers(0)
         free = self.form == "auto" and not self.live and not self.chart.layout
-        many = free and len(self.chart.transitions) > MOST_EDGES
+        many = free and len([*self.edges()]) > MOST_EDGES
         if self.form == "matrix" or many:
             return replace(self, form="matrix", numbered=every)
         for longest, scale in NARROWER:
             numbered = self._numbers(longest)
             sheet = replace(self, form="graph", numbered=numbered, scale=scale)
-            if self.chart.layout or graph_drawing(sheet, 0).width <= WIDEST:
+            if self.chart.layout or sheet.drawing(0).width <= WIDEST:
                 return sheet
         if not free:
             return sheet
@@ -336,12 +341,28 @@ class ChartSheet:
         """Return numbers for guards with longer lines; equal guards and actions share one."""
         texts: dict[str, int] = {}
         numbers: dict[str, int] = {}
-        for _, edge in edges_by_priority(self.chart):
+        for _, edge in self.edges():
             lines = self._lines_of(edge)
             widest = max(sum(len(piece.text) for piece in row) for row in lines)
             if len(lines) > MOST_LINES or widest > longest:
                 numbers[edge.name] = texts.setdefault(self.legend_text(edge), len(texts) + 1)
         return numbers
+
+    @property
+    def nested(self) -> bool:
+        """Whether states are drawn in states; what a run has done is shown by the leaves alone."""
+        bare = self.tally is None and not self.live and not self.chart.layout
+        return bool(self.chart.nesting.composite) and bare and self.form != "matrix"
+
+    def edges(self) -> Iterator[tuple[int, Transition]]:
+        """Yield the edges that are drawn, each with its priority."""
+        return (written_edges if self.nested else edges_by_priority)(self.chart)
+
+    def drawing(self, number: int) -> Drawing:
+        """Return an element as it is drawn."""
+        if self.form == "matrix":
+            return matrix_drawing(self, number)
+        return (nested_drawing if self.nested else graph_drawing)(self, number)
 
     def _lines_of(self, edge: Transition) -> list[Row]:
         return replace(self, tally=None, names=False, numbered={}).guard_rows(edge, 1, 0)
@@ -381,7 +402,7 @@ class ChartSheet:
         """Return the guards that stand below the picture: ``g1 = ...``, wrapped."""
         rows: list[Row] = []
         written = 0
-        for _, edge in edges_by_priority(self.chart):
+        for _, edge in self.edges():
             number = self.numbered.get(edge.name, 0)
             if number > written:
                 written, head = number, f"g{number} = "
@@ -392,8 +413,8 @@ class ChartSheet:
 
     def legend_text(self, edge: Transition) -> str:
         """Return an edge's guard and action as one text."""
-        action = self.write.actions(self.chart.assignments["action", edge.name])
-        return f"{self.write.text(self.chart.guards[edge.name])} {action}".rstrip()
+        action = self.write.actions(edge)
+        return f"{self.write.text(guard_of(self.chart, edge))} {action}".rstrip()
 
     def _indexed(self, row: Row) -> Row:
         return with_indices(row) if self.write.math else row
@@ -418,6 +439,13 @@ class ChartSheet:
             rows.append([Piece(self.tally.of_state(number, state.name), "count")])
         return rows
 
+    def level_rows(self, level: Level) -> list[Row]:
+        """Return the text in the box of a state that may have states inside."""
+        title = [Piece(level.state.name, "title")]
+        if level.state.history:
+            title.append(Piece("  history", "note"))
+        return [title, *map(self._indexed, _rows(level_texts(self.write, level)))]
+
     def guard_rows(self, edge: Transition, priority: int, number: int) -> list[Row]:
         """Return the text on an edge, clause by clause."""
         rows: list[Row] = [[Piece(edge.name, "word")]] if self.names else []
@@ -437,7 +465,7 @@ class ChartSheet:
         return [[Piece("[", "bracket"), number, *each, Piece("]", "bracket")]]
 
     def _guard_lines(self, edge: Transition) -> list[Row]:
-        guard = self.chart.guards[edge.name]
+        guard = guard_of(self.chart, edge)
         lines = [
             (line, clause)
             for clause, part in enumerate(clauses(guard))
@@ -455,7 +483,7 @@ class ChartSheet:
             if i + 1 == len(lines):
                 row.append(Piece("]", "bracket"))
             rows.append(self._indexed(row))
-        action = self.write.actions(self.chart.assignments["action", edge.name])
+        action = self.write.actions(edge)
         lines_of_action = wrapped(action, LONGEST_LABEL)
         return rows + [self._indexed([Piece(line, "action")]) for line in lines_of_action]
 

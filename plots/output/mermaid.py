@@ -15,10 +15,10 @@ from gms_fsm.foundation.text import visible
 from plots.charts.contents import (
     chart_texts,
     edge_text,
-    edges_by_priority,
     ids_of,
     lines_of,
-    state_texts,
+    state_lines,
+    written_edges,
 )
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import MermaidText
@@ -57,14 +57,9 @@ def mermaid(chart: Chart) -> str:
     """
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
     ids, title = ids_of(chart), json.dumps(visible(chart.name), ensure_ascii=False)
-    write, first = ChartWriter(chart, "stateflow"), ids[chart.default_state.name]
-    lines = [f"[*] --> {first}"]
-    for state in chart.states:
-        own = ids[state.name]
-        lines.append(f'state "{_escape(state.name)}" as {own}')
-        # The space after the colon is needed: Mermaid would read ":#58;" as a style.
-        lines += [f"{own} : {_escape(line)}" for line in lines_of(state_texts(write, state))]
-    for priority, edge in edges_by_priority(chart):
+    write, first = ChartWriter(chart, "stateflow"), ids[chart.nesting.states[0].name]
+    lines = [*state_lines(write, ids, _escape)]
+    for priority, edge in written_edges(chart):
         label = _escape(edge_text(write, priority, edge))
         lines.append(f"{ids[edge.source]} --> {ids[edge.target]} : {label}")
     if shared := lines_of(chart_texts(write)):

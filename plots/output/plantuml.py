@@ -13,10 +13,10 @@ from gms_fsm.foundation.text import visible
 from plots.charts.contents import (
     chart_texts,
     edge_text,
-    edges_by_priority,
     ids_of,
     lines_of,
-    state_texts,
+    state_lines,
+    written_edges,
 )
 from plots.charts.notation import ChartWriter
 from plots.output.drawings import PlantUMLText
@@ -43,14 +43,10 @@ def plantuml(chart: Chart) -> str:
     """
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
     ids, write = ids_of(chart), ChartWriter(chart, "stateflow")
-    first = ids[chart.default_state.name]
+    first = ids[chart.nesting.states[0].name]
     lines = ["@startuml", f"title {_escape(chart.name)}", "hide empty description"]
-    lines.append(f"[*] --> {first}")
-    for state in chart.states:
-        own = ids[state.name]
-        lines.append(f'state "{_escape(state.name)}" as {own}')
-        lines += [f"{own} : {_escape(line)}" for line in lines_of(state_texts(write, state))]
-    for priority, edge in edges_by_priority(chart):
+    lines += state_lines(write, ids, _escape)
+    for priority, edge in written_edges(chart):
         label = _escape(edge_text(write, priority, edge))
         lines.append(f"{ids[edge.source]} --> {ids[edge.target]} : {label}")
     if shared := lines_of(chart_texts(write)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ TABLE = PAGE.partition("## Constructs of state charts")[2].partition("\n## ")[0]
 ROWS = [[cell.strip() for cell in row.split("|")[1:-1]] for row in TABLE.splitlines() if "|" in row]
 LINES = {row[0]: row[4] for row in ROWS[2:]}
 A, B, C = State("a"), State("b"), State("c")
+OUTER = State("b", states=(State("x"), State("y")))
 
 
 def chart(*parts: State | Edge, **more: Any) -> Chart:
@@ -92,6 +94,38 @@ def actions() -> None:
 def entry_and_exit() -> None:
     parts = State("a", exit={"n": "n + 1"}), State("b", entry={"n": "10 * n"})
     assert last(run(*parts, go("t > 1", {"n": "n + 4"}))) == 50
+
+
+def nested() -> None:
+    assert run(A, OUTER, go("t > 1")).states[-1].tolist() == ["b.x"]
+
+
+def outer_edges() -> None:
+    found = run(OUTER, A, Edge("outer", "b", "a", "t > 1"), Edge("inner", "b.x", "b.y", "t > 1"))
+    assert taken(found) == ["inner", "outer"]
+
+
+def shared() -> None:
+    inside = State("x", flow={"n": "2 * v"}), State("y")
+    outer = State("b", flow={"n": "v"}, states=inside)
+    assert last(run(outer, Edge("on", "b.x", "b.y", "t > 1"))) == pytest.approx(3.0)
+
+
+def outer_time() -> None:
+    inner = Edge("inner", "b.x", "b.y", "t > 0.5")
+    found = run(OUTER, A, inner, Edge("outer", "b", "a", "after(0.75)"))
+    assert found.transitions.t[1] == pytest.approx(0.75, abs=1e-9)
+
+
+def histories() -> None:
+    edges = (
+        Edge("inner", "b.x", "b.y", "t > 0.2"),
+        Edge("out", "b", "a", "t > 0.5 and t < 0.6"),
+        Edge("back", "a", "b", "after(0.2)"),
+    )
+    for history, entered in ((True, "b.y"), (False, "b.x")):
+        states = replace(OUTER, history=history), A
+        assert run(*states, *edges).transitions.target[2] == entered
 
 
 def while_active() -> None:
@@ -167,6 +201,11 @@ YES: dict[str, Callable[[], object]] = {
     "several edges in a row": in_a_row,
     "actions of an edge": actions,
     "entry and exit": entry_and_exit,
+    "states in states": nested,
+    "edges of an outer state": outer_edges,
+    "what states inside share": shared,
+    "time in an outer state": outer_time,
+    "histories": histories,
     "while a state is active": while_active,
     "outputs of a state": outputs,
     "time in a state": time_in_a_state,
@@ -185,6 +224,7 @@ NO: dict[str, tuple[str, Callable[[], object]]] = {
         lambda: document('<onentry><send delay="1s"/></onentry>'),
     ),
     "the same with entry or exit": ("performs exit and entry of 'a'", lambda: document(INNER)),
+    "deep histories": ("history is 'deep'", lambda: replace(OUTER, history="deep")),  # type: ignore[arg-type]
     "parallel states": ("<parallel>", lambda: document('<state id="a"/><parallel id="b"/>')),
     "several targets": ("'a b'", lambda: document('<transition target="a b"/>')),
     "junctions": ("'junction' is not a state", lambda: chart(Edge("go", "a", "junction", "True"))),

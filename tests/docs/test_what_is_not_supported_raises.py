@@ -55,7 +55,7 @@ def parallel() -> None:
 
 # Each call stands for its statement; tests/exporters tries all formats and all parts of charts.
 REFUSED: dict[str, list[Callable[[], object]]] = {
-    "Nested": [lambda: State("a", states=()), parallel],  # type: ignore[call-arg]
+    "Parallel": [parallel, lambda: State("a", states=(State("b"),), history="deep")],  # type: ignore[arg-type]
     "`delay`": [
         lambda: system("delay(x, 1)"),
         lambda: system("if(duration(x > 0) > 1, 1, 0)"),

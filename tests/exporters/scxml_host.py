@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any, Protocol
 
 from gms_fsm import Trace
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.language import Node, evaluate, parse_value
 from gms_fsm.systems.models import Model
 
@@ -39,7 +40,7 @@ class PythonStateMachine:
         """Send ``values`` and ``step``; return the state, and the data model."""
         self.machine.send("values", **values)
         self.machine.send("step")
-        (state,) = self.machine.configuration
+        (state,) = (each for each in self.machine.configuration if not each.states)
         return state.id, vars(self.machine.model)
 
     def close(self) -> None:
@@ -75,14 +76,18 @@ def run(
         name: float(value if not hasattr(value, "__len__") else value[element])
         for name, value in model.values.items()
     }
-    variables = {name: chart.initial.get(name, 0.0) for name in chart.variables}
+    # The tool keeps histories by itself.
+    kept = chart.nesting.histories
+    variables = {name: chart.initial.get(name, 0.0) for name in chart.variables if name not in kept}
+    paths = {spelled(each.name): each.name for each in chart.states}
     state, t, x, count, found = chart.default_state.name, 0.0, 0.0, 0, list[Switch]()
     while True:
         outside = {"t": t, "x": x, "v": velocity(t)}
         if curve is not None:
             outside["s"] = float(model.weights[element] * curve(outside["v"]))
         known = {name: outside[name] for name in {*chart.inputs, *chart.velocities}}
-        after, given = tool.step({**known, **variables})
+        entered, given = tool.step({**known, **variables})
+        after = paths[entered]
         if after != state:
             found.append((t, state, after))
         state, variables = after, {name: float(given[name]) for name in variables}

@@ -24,7 +24,9 @@ from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, export, si
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.files.from_scxml import _read_back
 from gms_fsm.errors import ChartError, ExpressionError, ParameterError
+from tests.corpus import LIGHT
 from tests.exporters.charts_to_export import MODELS, imported, model, rebuilt
+from tests.exporters.nested_charts import made
 from tests.strategies import charts
 
 
@@ -214,7 +216,7 @@ def test_a_state_that_is_done_is_left_from_its_final_state(tmp_path: Path) -> No
     (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
     chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
     edges = {(edge.source, edge.target, edge.guard) for edge in chart.transitions}
-    assert edges == {("work__busy", "work__idle", "v > 1"), ("work__idle", "rest", "True")}
+    assert edges == {("work.busy", "work.idle", "v > 1"), ("work.idle", "rest", "True")}
 
 
 def test_an_event_that_a_state_sends_itself_later_is_the_time_in_it(tmp_path: Path) -> None:
@@ -247,7 +249,13 @@ def test_what_outer_states_assign_at_the_start_are_initial_values(tmp_path: Path
     (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
     chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
     assert simulate(ChartModel(chart, {}), Prescribed("0"), 0.1).F[0] == 8
-    (tmp_path / "own.scxml").write_text(text.replace("n + 1", "v"), encoding="utf-8")
+    text = text.replace("n + 1", "v")
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
+    assert simulate(ChartModel(chart, {}), Prescribed("2"), 0.1).F[0] == 4
+    internal = '<transition type="internal" cond="v &gt; 5" target="b"/><state id="b">'
+    text = text.replace('<state id="b">', internal)  # which makes the states flat
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
     with pytest.raises(ChartError, match="at the start its entry assigns 'v' to 'n', which is no"):
         Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
 
@@ -501,13 +509,17 @@ def test_conditions_that_differ_are_not_one_guard() -> None:
         Chart.from_transitions(machine, outputs={"F": "0"}, guards={"go": "v > 1"})
 
 
-def test_the_time_in_a_state_with_states_inside_is_refused() -> None:
+def test_the_time_in_a_state_with_states_inside_goes_on_or_is_refused() -> None:
     slip = {"name": "slip", "children": ["b", "c"], "initial": "b"}
     edges = [["slips", "stick", "slip"], ["sticks", "slip", "stick"]]
     machine = HierarchicalMachine(states=["stick", slip], initial="stick", transitions=edges)
     texts: Any = {"outputs": {"F": "0"}, "guards": {"slips": "after(1)", "sticks": "v < 1"}}
     assert "age" in Chart.from_transitions(machine, **texts).variables
     texts["guards"] |= {"sticks": "after(2)"}
+    assert "slip__age" in Chart.from_transitions(machine, **texts).variables
+    edges.append(["again", "slip", "slip_b"])  # does not leave slip, which makes the states flat
+    machine = HierarchicalMachine(states=["stick", slip], initial="stick", transitions=edges)
+    texts["guards"] |= {"again": "v > 2"}
     with pytest.raises(ChartError, match="'sticks': its guard reads the time in 'slip', which has"):
         Chart.from_transitions(machine, **texts)
 
@@ -557,7 +569,7 @@ def test_a_variable_that_two_callbacks_assign_is_refused() -> None:
         Chart.from_transitions(machine, callbacks={"one": {"n": "1"}, "two": {"n": "2"}}, **TEXTS)
 
 
-def test_states_in_states_are_joined_by_two_underscores() -> None:
+def test_states_in_states_stay_nested_with_texts_by_names_of_two_underscores() -> None:
     slip = {"name": "slip", "children": ["forward", "backward"], "initial": "forward",
             "on_enter": "begin", "on_exit": "end"}  # fmt: skip
     edges = [["slips", "stick", "slip"], ["turns", "slip_forward", "slip_backward"],
@@ -571,22 +583,41 @@ def test_states_in_states_are_joined_by_two_underscores() -> None:
         guards={"slips": "v > 1", "turns": "v < 0", "sticks": "n > 3"},
         callbacks={"begin": {"n": "0"}, "end": {"z": "0"}},
     )
-    inner = ("slip__forward", "slip__backward")
+    inside = (State("forward"), State("backward", flow={"z": "-v"}))
+    outer: Any = {"flow": {"z": "v", "n": "1"}, "entry": {"n": "0"}, "exit": {"z": "0"}}
     assert chart == Chart(
         "imported chart",
         variables=("n", "z"),
-        states=(
-            State("stick"),
-            State("slip__forward", flow={"z": "v", "n": "1"}),
-            State("slip__backward", flow={"z": "-v", "n": "1"}),
-        ),
+        states=(State("stick"), State("slip", **outer, states=inside)),
         transitions=(
-            Transition("turns", inner[0], inner[1], "v < 0"),
-            Transition("slips", "stick", inner[0], "v > 1", {"n": "0"}),
-            Transition("sticks", inner, "stick", "n > 3", {"z": "0"}),
+            Transition("slips", "stick", "slip", "v > 1"),
+            Transition("turns", "slip.forward", "slip.backward", "v < 0"),
+            Transition("sticks", "slip", "stick", "n > 3"),
         ),
         outputs={"F": "z"},
     )
+
+
+def test_nested_charts_come_back_from_scxml_with_their_histories(tmp_path: Path) -> None:
+    for k, chart in enumerate([LIGHT.chart, *(made(seed).chart for seed in range(12))]):
+        assert back(chart, "scxml", tmp_path / str(k)) == chart, chart.name
+
+
+def test_a_nested_chart_comes_back_from_transitions(tmp_path: Path) -> None:
+    inside = State("stick"), State("slip", {"z": "0"}, entry={"z": "z / 2"})
+    chart = Chart(
+        "brake",
+        variables=("z",),
+        states=(State("open"), State("closed", {"z": "v"}, exit={"z": "0"}, states=inside)),
+        transitions=(
+            Transition("close", "open", "closed", "v > 0"),
+            Transition("release", "closed", "open", "after(2) or v < -1"),
+            Transition("slips", "closed.stick", "closed.slip", "abs(z) > 1"),
+            Transition("sticks", "closed.slip", "closed.stick", "z * v < 0"),
+        ),
+        outputs={"F": "z"},
+    )
+    assert back(chart, "transitions", tmp_path) == chart
 
 
 @add_state_features(Timeout)

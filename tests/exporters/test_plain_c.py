@@ -28,7 +28,7 @@ from gms_fsm import (
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import plain_c
-from tests.corpus import JUMPING
+from tests.corpus import JUMPING, LIGHT
 from tests.exporters.c_programs import COMPILERS, needs_c, plain_compared, plain_step
 from tests.exporters.frictions import case, loaded
 
@@ -70,6 +70,20 @@ def test_functions_that_jump_have_the_bits_of_the_engine(tmp_path: Path) -> None
     ]
     assert found == F[:-1]
     assert len(trace.transitions) > 10
+
+
+@needs_c
+@pytest.mark.slow
+def test_states_in_states(tmp_path: Path) -> None:
+    """Ages and histories are variables of the struct; exits and entries are those of the chart."""
+    step = plain_step(tmp_path, Subject.of(LIGHT, "c99", name="light"))
+    how: Any = {"method": "euler", "step": 2.0**-6, "events": "step", "engine": "ifelse"}
+    trace = simulate(LIGHT, Prescribed("cos(3 * t)"), 12.0, **how)
+    last = np.append(np.diff(trace.t) > 0.0, True)
+    t, F = trace.t[last].tolist(), trace.F[last].tolist()
+    found = [step(math.cos(3 * one), two - one) for one, two in itertools.pairwise(t)]
+    assert found == pytest.approx(F[:-1], rel=1e-12)
+    assert len(trace.transitions) > 30
 
 
 def test_no_memory_but_the_struct() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, export, simulate
 from tests.exporters.charts_to_export import model
+from tests.exporters.nested_charts import made, run_of, seen_by
 from tests.exporters.scxml_host import PythonStateMachine, moved_by, run, switches_of
 from tests.helpers import stick_slip
 
@@ -55,6 +56,17 @@ def test_a_chart_with_functions_that_jump(tmp_path: Path) -> None:
     mine = run(PythonStateMachine(path), friction, 0, moved_by(velocity), 25.0, 0.05)
     assert len(mine) > 4
     assert mine == switches_of(trace, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 8, 17])
+def test_random_states_in_states(seed: int, tmp_path: Path) -> None:
+    """The same state, and the same value that every entry, exit and action changes, each step."""
+    pytest.importorskip("statemachine", reason="needs python-statemachine")
+    path, *_ = export(made(seed), "scxml", tmp_path, name="own")
+    seen, trace = run_of(made(seed))
+    assert seen_by(PythonStateMachine(path), made(seed)) == seen
+    assert len(trace.transitions) > 5
 
 
 def test_the_readme_is_a_program(tmp_path: Path) -> None:

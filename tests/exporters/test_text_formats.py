@@ -12,14 +12,16 @@ from gms_fsm import Chart, ChartModel, FrictionState, State, export
 from gms_fsm.charts.registry import entry
 from gms_fsm.exporters import Subject, formats
 from gms_fsm.systems.models import demonstration
+from tests.corpus import LIGHT
 from tests.exporters.frictions import case, loaded
 
 
 @pytest.mark.slow
 def test_blark_parses_structured_text() -> None:
     blark = pytest.importorskip("blark")
-    subject = Subject.of(case("gms-4-signed", 0).model, "st", name="friction")
-    blark.parse_source_code(formats()["st"].write(subject)["friction.st"])
+    for given in (case("gms-4-signed", 0).model, LIGHT):
+        subject = Subject.of(given, "st", name="friction")
+        blark.parse_source_code(formats()["st"].write(subject)["friction.st"])
 
 
 @pytest.mark.slow

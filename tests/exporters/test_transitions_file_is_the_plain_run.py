@@ -25,8 +25,9 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import CHARTS, GMS_ELEMENT
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.language import evaluate, parse_value
-from tests.corpus import JUMPING
+from tests.corpus import JUMPING, LIGHT
 from tests.exporters.charts_to_export import MODELS, SLOW, imported, model
 from tests.helpers import matrix, stick_slip
 
@@ -61,6 +62,7 @@ CASES: dict[str, Case] = {
     "a load from outside": (LOADED, {"v": "sin(2 * t)", **LOAD}, 20.0, 1e-2, 10),
     "functions that jump": (JUMPS, {"v": "0.6 * cos(1.3 * t)"}, 9.0, 1e-2, 10),
     "a load on the thresholds of a model": (PRESSED, {"v": SINE}, 25.0, 2e-2, 2),
+    "states in states": (LIGHT, {"v": SINE}, 20.0, 3e-2, 40),
 }
 
 
@@ -96,7 +98,7 @@ def test_every_switch_and_the_force_are_equal(name: str, tmp_path: Path) -> None
         if edge is not None
     ]
     assert switches == [
-        (float(each.t), int(each.element), str(each.edge), str(each.target))
+        (float(each.t), int(each.element), str(each.edge), spelled(str(each.target)))
         for each in trace.transitions
     ]
     assert len(switches) > least

@@ -20,6 +20,7 @@ import pytest
 
 from gms_fsm import Prescribed, export, simulate
 from tests.exporters.charts_to_export import MODELS, model
+from tests.exporters.nested_charts import made, run_of, seen_by
 from tests.exporters.scxml_host import PythonStateMachine, moved_by, run, switches_of
 from tests.helpers import ROOT
 
@@ -133,6 +134,35 @@ def kept(tool: str, ran: Ran, folder: Path, start: Callable[[Path], Any]) -> Non
     count = sum(stepped(name, folder / name, start) for name in NAMES)
     what = f"{len(NAMES)} included charts stepped, all elements"
     ran("scxml", tool, what, f"{count} switches, all as in simulate with Euler's method")
+
+
+def nested(
+    tool: str, ran: Ran, folder: Path, start: Callable[[Path], PythonStateMachine | Scion], n: int
+) -> None:
+    """Step random charts with states in states, and keep the tool's row."""
+    count = 0
+    for seed in range(n):
+        path, *_ = export(made(seed), "scxml", folder / str(seed), name="own")
+        seen, trace = run_of(made(seed))
+        machine = start(path)
+        try:
+            assert seen_by(machine, made(seed)) == seen, seed
+        finally:
+            machine.close()
+        count += len(trace.transitions)
+    what = f"{n} random charts of states in states stepped"
+    ran("scxml", tool, what, f"{count} switches, all as in simulate, and every entry and exit")
+
+
+def test_nested_states_in_python_statemachine(ran: Ran, tmp_path: Path) -> None:
+    tool = f"python-statemachine {version('python-statemachine')}"
+    nested(tool, ran, tmp_path, PythonStateMachine, 200)
+
+
+def test_nested_states_in_scion(ran: Ran, scion: Path, tmp_path: Path) -> None:
+    package = json.loads((scion / "node_modules/@scion-scxml/scxml/package.json").read_text())
+    tool = f"SCION {package['version']} (node)"
+    nested(tool, ran, tmp_path, lambda path: Scion(path, scion), 40)
 
 
 def test_python_statemachine(ran: Ran, tmp_path: Path) -> None:

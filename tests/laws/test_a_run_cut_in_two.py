@@ -19,6 +19,7 @@ CUT = {
     "fig. 3, slipping": 0.77, "wear": 0.5, "lugre slider": 0.3, "karnopp": 0.6,
     "maxwell-slip": 0.4, "elasto-plastic": 0.3, "system two blocks": 0.37,
     "every kind of contact": 0.45, "system pushed against a stop": 0.2, "loads": 0.7,
+    "states in states": 0.43,
 }  # fmt: skip
 
 

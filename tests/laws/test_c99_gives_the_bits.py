@@ -20,6 +20,7 @@ TRANSLATED = (
     "functions that jump",
     "system servo",
     "system puck",
+    "states in states",
 )
 
 

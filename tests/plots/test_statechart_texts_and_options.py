@@ -71,8 +71,11 @@ def test_rates_and_assignments() -> None:
     assert write.flow("z", value) == "ż = v"
     assert write.flow("Δζ", value) == "dΔζ/dt = v"
     assert write.assignment("z", value) == "z := v"
-    assert write.actions({"z": value, "Δζ": value}) == "/ z := v, Δζ := v"
-    assert ChartWriter(LUGRE, "stateflow").actions({"z": value}) == "{z = v;}"
+    stops = Transition("stops", "a", "a", guard="True", actions={"z": "v", "Δζ": "v"})
+    own = State("a", outputs={"F": "0"})
+    chart = Chart("c", (), ("z", "Δζ"), states=(own,), transitions=(stops,))
+    assert ChartWriter(chart, "math").actions(stops) == "/ z := v, Δζ := v"
+    assert ChartWriter(chart, "stateflow").actions(stops) == "{z = v; Δζ = v;}"
 
 
 # --------------------------------------------------------------------------- lines

@@ -11,19 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-from gms_fsm.charts.files.imported import (
+from gms_fsm.charts.files.imported import Texts, built, number_of
+from gms_fsm.charts.files.routes import (
     FlatEdge,
     ImportedEdge,
     ImportedState,
     Route,
-    Texts,
-    built,
-    number_of,
+    outside,
     spelled,
 )
 from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
+from gms_fsm.charts.nesting import AGE, is_age
 from gms_fsm.charts.parts import check_size
-from gms_fsm.charts.reader import AGE
 from gms_fsm.errors import ChartError, ExpressionError, Part, why
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.language import ECMASCRIPT, names_in, parse_value
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
 LARGEST = 10_000_000  # bytes: no chart needs as many
 DEEPEST = 8  # levels of states: deeper ones nobody could read
 AT_TOP = ("datamodel", "state", "final")
-IN_STATE = ("onentry", "onexit", "transition", "datamodel", "initial", "state", "final")
+IN_STATE = ("onentry", "onexit", "transition", "datamodel", "initial", "history", "state", "final")
 WORDS = {
     "&&": " and ", "||": " or ", "!": " not ", "true": "True", "===": "==", "!==": "!=",
     "Math.PI": "pi",
@@ -276,11 +275,29 @@ class _Document:
             _texts(self.assigned(_all(element, "onentry"), f"{place}, onentry")),
             _texts(self.assigned(_all(element, "onexit"), f"{place}, onexit")),
             self._first(element, place) if parts else None,
+            bool(self._history(element, place)),
         )
+
+    def _history(self, element: ET.Element, place: str) -> str:
+        """Return what a history enters at first, if the state has one that enters it."""
+        for each in _all(element, "history"):
+            inside = _all(each, "transition")
+            deep = each.get("type", "shallow") != "shallow"
+            if deep or each.get("id") != element.get("initial") or len(inside) != 1:
+                raise ChartError(
+                    "<history> has no counterpart in a chart, unless it is shallow and the initial "
+                    "state of the state around it",
+                    place=place,
+                    advice=NO_COUNTERPART["history"],
+                )
+            for _ in _only(inside[0], (), f"{place}, <history>"):
+                pass
+            return inside[0].get("target", "")
+        return ""
 
     def _first(self, element: ET.Element, place: str) -> Route:
         """Return what is entered inside of a state with parts."""
-        name = element.get("initial")
+        name = self._history(element, place) or element.get("initial")
         for initial in _all(element, "initial"):
             for transition in _only(initial, ("transition",), f"{place}, <initial>"):
                 name = transition.get("target", "")
@@ -306,7 +323,7 @@ class _Document:
         place = f"{place} {name or number}"
         target = element.get("target")
         to = None if target is None else self._route(target, "target", place)
-        at, stays = source, 0 if to is None else _outside(source, to)
+        at, stays = source, 0 if to is None else outside(source, to)
         if to is not None and element.get("type") == "internal":
             inner = len(to) > len(source) and to[: len(source)] == source
             stays = len(source) if inner else stays
@@ -401,12 +418,6 @@ def _brings_values(element: ET.Element) -> bool:
     return all(each.get("expr") == f"_event.data.{each.get('location')}" for each in element)
 
 
-def _outside(source: Route, target: Route) -> int:
-    """Return how many states around both there are."""
-    pairs = zip(source[:-1], target[:-1], strict=False)
-    return len([*itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)])
-
-
 # --------------------------------------------------------------------------- edges
 def _ordered(rows: list[ScxmlTransition], here: str) -> list[ScxmlTransition]:
     """Return the rows in the chart's own order, if the document keeps it."""
@@ -437,7 +448,7 @@ def _texts(assigned: Mapping[str, tuple[str, str | None]]) -> dict[str, str]:
     return {
         name: _read_back(expression) if text is None else text
         for name, (expression, text) in assigned.items()
-        if not (name == AGE and (ours or expression == "0.0"))
+        if not (is_age(name) and (ours or expression == "0.0"))
     }
 
 
@@ -459,7 +470,8 @@ class _DataModel:
         ]
         outside = {*given.inputs, *given.velocities, *parameters, *given.let}
         if root.find(f"{{{OURS}}}chart") is not None:
-            outside |= {AGE}  # a chart makes it by itself
+            ids = (each.get("id", "") for each in root.iter() if _tag(each) == "data")
+            outside |= {AGE, *filter(is_age, ids)}  # a chart makes them by itself
         data = cls([*given.variables], {}, {}, dict(given.initial))
         for each in root.iter():
             name = each.get("id", "")
@@ -563,9 +575,10 @@ def _check_kept(
         for route, element in document.elements.items():
             name = spelled(route)
             place = f"{document.here}, state {name!r}, {tag}"
-            if name not in beside and (kind, name) in chart.assignments:
+            (owner,) = {name, ".".join(route)} & {*chart.nesting.levels} or {""}
+            if name not in beside and owner:
                 found = document.assigned(_all(element, tag), place)
-                _check_assigned(found, assignments(chart, kind, name), place)
+                _check_assigned(found, assignments(chart, kind, owner), place)
 
 
 def _check_assigned(

@@ -10,15 +10,8 @@ from transitions import Machine
 from transitions.extensions.asyncio import AsyncMachine
 from transitions.extensions.states import Error
 
-from gms_fsm.charts.files.imported import (
-    Assigned,
-    ImportedEdge,
-    ImportedState,
-    Route,
-    all_of,
-    joined,
-    spelled,
-)
+from gms_fsm.charts.files.imported import all_of, joined
+from gms_fsm.charts.files.routes import Assigned, ImportedEdge, ImportedState, Route, spelled
 from gms_fsm.errors import ChartError
 from gms_fsm.foundation.arguments import unknown
 

@@ -8,97 +8,29 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, TypedDict
 
+from gms_fsm.charts.files.routes import (
+    Assigned,
+    FlatEdge,
+    ImportedEdge,
+    ImportedState,
+    Route,
+    flat_states,
+    flattened,
+    nests,
+    routes,
+    spelled,
+    tree,
+    written,
+)
+from gms_fsm.charts.nesting import AGE
 from gms_fsm.charts.parameters import Parameter
-from gms_fsm.charts.parts import State, Transition, texts_of
-from gms_fsm.charts.reader import AGE
+from gms_fsm.charts.parts import Transition, texts_of
 from gms_fsm.errors import ChartError, ExpressionError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.language import Value, evaluate, names_in, parse_value
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
-
-Route = tuple[str, ...]  # names of states, the outermost first
-Assigned = Mapping[str, str]
-
-
-@dataclass(frozen=True)
-class ImportedState:
-    """A state as another program has it; `first` is what is entered inside of one with parts."""
-
-    route: Route
-    place: str
-    entry: Assigned = field(default_factory=dict)
-    exit: Assigned = field(default_factory=dict)
-    first: Route | None = None
-
-
-@dataclass(frozen=True)
-class ImportedEdge:
-    """An edge as another program has it.
-
-    Parameters
-    ----------
-    trigger : str
-        The event at which it is taken; it may be shared with other edges.
-    source, target : tuple of str
-        The states it leaves and enters; without a target nothing is left.
-    place : str
-        Where it is written, for messages.
-    guard : str or None
-        Its condition, if it has one.
-    also : str or None
-        A condition that holds beside whatever is given as guard.
-    missing : str
-        A condition whose text is not known.
-    actions, before, after : mapping of str to str
-        What it assigns; before anything is left, and after everything is entered.
-    stays : int or None
-        How many of the outer states it does not leave; None for those that what is active shares
-        with the target.
-    """
-
-    trigger: str
-    source: Route
-    target: Route | None
-    place: str
-    guard: str | None = None
-    also: str | None = None
-    missing: str = ""
-    actions: Assigned = field(default_factory=dict)
-    before: Assigned = field(default_factory=dict)
-    after: Assigned = field(default_factory=dict)
-    stays: int | None = None
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """What edges that are given one guard have in common."""
-        return self.target, self.guard, self.also, self.missing
-
-
-@dataclass(frozen=True)
-class FlatEdge:
-    """An edge between states without parts.
-
-    Parameters
-    ----------
-    number : int
-        Of the imported edge.
-    sources : tuple of str
-        The states it leaves.
-    target : str
-        The state it enters.
-    around : tuple of mapping
-        What is assigned when outer states are left, and when others are entered.
-    name : str
-        Of the edge.
-    """
-
-    number: int
-    sources: tuple[str, ...]
-    target: str
-    around: tuple[tuple[Assigned, ...], tuple[Assigned, ...]]
-    name: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,7 +107,7 @@ def built(
     """Return the chart, and its edges with the numbers of those they are made from."""
     texts = {
         part: _known(
-            getattr(given, part), [*map(spelled, _routes(states))], "state", f"{here}: {part}"
+            getattr(given, part), [*map(spelled, routes(states))], "state", f"{here}: {part}"
         )
         for part in ("flows", "entry", "exit", "state_outputs")
     }
@@ -187,7 +119,12 @@ def built(
         )
         for each in states
     ]
-    leaves, flat, outer = flattened(states, first, edges)
+    nested = nests(states, edges)
+    leaves, flat, outer = (
+        (states, written(edges), list[ImportedState]())
+        if nested
+        else flattened(states, first, edges)
+    )
     start = _started(outer, dict.fromkeys(given.variables, 0.0) | {**given.initial})
     names = [spelled(each.route) for each in leaves]
     used = [*given.inputs, *given.velocities, *given.variables, *given.let]
@@ -198,31 +135,22 @@ def built(
     _check_known(guards, known, "edge", f"{here}: guards")
     conditions = _guards(flat, edges, guards)
     locked = dict.fromkeys(map(str, _several(given.locked, f"{here}: locked")))
-    _check_known(locked, [*map(spelled, _routes(states))], "state", f"{here}: locked")
+    _check_known(locked, [*map(spelled, routes(states))], "state", f"{here}: locked")
     impulses = dict.fromkeys(map(str, _several(given.impulses, f"{here}: impulses")))
     _check_known(impulses, known, "edge", f"{here}: impulses")
     parts = {spelled(each.route): each for each in leaves}
+    paths = {name: ".".join(each.route) for name, each in parts.items()} if nested else {}
     chart = kind(
         given.name,
         given.inputs,
         given.variables,
         tuple(_parameter(each, here) for each in _several(given.parameters, f"{here}: parameters")),
-        tuple(
-            State(
-                name,
-                flow=_inherited(texts["flows"], each.route),
-                entry=each.entry,
-                exit=each.exit,
-                outputs=_inherited(texts["state_outputs"], each.route),
-                locked=any(spelled(outer) in locked for outer in _outwards(each.route)),
-            )
-            for name, each in parts.items()
-        ),
+        tree(states, first, (), texts, locked) if nested else flat_states(leaves, texts, locked),
         tuple(
             Transition(
                 each.name,
-                each.sources,
-                each.target,
+                [paths.get(source, source) for source in each.sources],
+                paths.get(each.target, each.target),
                 conditions[each.name],
                 _actions(each, edges[each.number], actions, parts),
                 impulse=each.name in impulses or edges[each.number].trigger in impulses,
@@ -236,7 +164,7 @@ def built(
         contact_outputs=given.contact_outputs,
         initial=start,
     )
-    for each in flat:
+    for each in [] if nested else flat:
         _check_time(chart, each, edges[each.number], parts)
     return chart, flat
 
@@ -346,84 +274,6 @@ def joined(texts: Iterable[Assigned], place: str) -> dict[str, str]:
                 )
             found[name] = text
     return found
-
-
-# --------------------------------------------------------------------------- nested states
-def spelled(route: Route) -> str:
-    """Return the name of a state in the chart."""
-    return "__".join(name for name in route if name)
-
-
-def _outwards(route: Route) -> list[Route]:
-    """Return a state and those around it, the innermost first."""
-    return [route[:k] for k in range(len(route), 0, -1)]
-
-
-def _routes(states: list[ImportedState]) -> list[Route]:
-    return [each.route for each in states]
-
-
-def _inherited(texts: Mapping[str, Assigned], route: Route) -> dict[str, str]:
-    """Return the texts of a state over those of the states around it."""
-    found: dict[str, str] = {}
-    for outer in reversed(_outwards(route)):
-        found |= texts.get(spelled(outer), {})
-    return found
-
-
-def flattened(
-    states: list[ImportedState], first: Route, edges: list[ImportedEdge]
-) -> tuple[list[ImportedState], list[FlatEdge], list[ImportedState]]:
-    """Return the states without parts, the default one first, and all edges between them.
-
-    Edges of inner states go before those of outer ones. The third list has the states around the
-    default one, which are entered when the chart starts.
-    """
-    by_route = {each.route: each for each in states}
-
-    def inside(route: Route) -> Route:
-        state = by_route[route]
-        if state.first is None:
-            return route
-        if state.first not in by_route or state.first[: len(route)] != route:
-            raise ChartError(
-                f"its initial state {spelled(state.first)!r} is not inside of it",
-                place=state.place,
-            )
-        return inside(state.first)
-
-    for edge in edges:
-        for end, route in (("source", edge.source), ("target", edge.target)):
-            if route is not None and route not in by_route:
-                raise unknown(
-                    end, spelled(route), map(spelled, by_route), ChartError, place=edge.place
-                )
-
-    default = inside(first)
-    leaves = [each for each in states if each.first is None]
-    leaves.sort(key=lambda each: each.route != default)
-    rows: list[FlatEdge] = []
-    for number, edge in sorted(enumerate(edges), key=lambda each: -len(each[1].source)):
-        for leaf in leaves:
-            if leaf.route[: len(edge.source)] != edge.source:
-                continue
-            source = leaf.route
-            target = source if edge.target is None else inside(edge.target)
-            kept = len(source) - 1
-            if edge.target is not None:
-                kept = _shared(source, edge.target) if edge.stays is None else edge.stays
-            left = [by_route[each].exit for each in _outwards(source[:-1]) if len(each) > kept]
-            entered = [by_route[each].entry for each in _outwards(target[:-1]) if len(each) > kept]
-            around = tuple(filter(None, left)), tuple(filter(None, reversed(entered)))
-            rows.append(FlatEdge(number, (spelled(source),), spelled(target), around))
-    return leaves, rows, [by_route[each] for each in reversed(_outwards(default[:-1]))]
-
-
-def _shared(source: Route, target: Route) -> int:
-    """Return how many outer states two have in common; a target that is active is entered again."""
-    same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(source, target, strict=False))
-    count = len([*same])
-    return count - 1 if count == len(target) else count
 
 
 def _started(outer: list[ImportedState], values: dict[str, float]) -> dict[str, float]:

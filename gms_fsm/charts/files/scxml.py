@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from gms_fsm.charts.nesting import written_guard
 from gms_fsm.language import ECMASCRIPT, Condition, Value, renamed, spell
 from gms_fsm.language.normal import renamed_in
 
@@ -43,10 +44,18 @@ def conditions(chart: Chart) -> dict[str, str]:
     def text(guard: Condition) -> str:
         return spell(renamed_in(guard, lets), ECMASCRIPT)
 
-    return {name: text(guard) for name, guard in chart.guards.items()}
+    written = {edge.name: edge for edge in chart.nesting.transitions}
+    return {
+        name: text(written_guard(guard, chart.nesting, written[name]))
+        for name, guard in chart.guards.items()
+        if name in written
+    }
 
 
 def assignments(chart: Chart, kind: str, owner: str) -> dict[str, str]:
     """Return what a state or an edge assigns, as expressions in ECMAScript, by name."""
     lets, trees = written_out(chart.lets), chart.assignments[kind, owner]
-    return {name: spell(renamed(tree, lets), ECMASCRIPT) for name, tree in trees.items()}
+    kept = {*chart.variables, *chart.velocities} - {*chart.nesting.histories}
+    return {
+        name: spell(renamed(tree, lets), ECMASCRIPT) for name, tree in trees.items() if name in kept
+    }

@@ -17,7 +17,6 @@ from pydantic import (
 
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.parts import NO_GUARD, State, Transition
-from gms_fsm.charts.reader import AGE
 from gms_fsm.errors import ChartError
 from gms_fsm.foundation.tables import ONE, TABLE, Table, Texts, built, read_file, write_file
 
@@ -37,7 +36,9 @@ class ParameterTable(Table):
 
 
 class StateTable(Table):
-    """A state."""
+    """A state, with those inside it."""
+
+    model_config = ConfigDict(populate_by_name=True)
 
     name: str
     flow: dict[str, str] = Field({})
@@ -45,6 +46,30 @@ class StateTable(Table):
     exit: dict[str, str] = Field({})
     outputs: dict[str, str] = Field({})
     locked: bool = False
+    initial: str = ""
+    history: bool = False
+    states: list[StateTable] = Field([], alias="state", description="the states inside it")
+
+    @model_serializer(mode="wrap")
+    def _without_nesting(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what only a composite state has."""
+        data: dict[str, Any] = write(self)
+        if not self.states:
+            for name in ("initial", "history", "states", "state"):
+                data.pop(name, None)
+        return data
+
+    @classmethod
+    def of(cls, state: State) -> StateTable:
+        """Describe a state."""
+        inside = [cls.of(each) for each in state.states]
+        initial = state.initial if inside and state.initial != inside[0].name else ""
+        return cls.model_validate({**vars(state), "states": inside, "initial": initial})
+
+    def build(self) -> State:
+        """Return the state."""
+        inside = [built(each.build, "states", i) for i, each in enumerate(self.states)]
+        return State(**{**vars(self), "states": inside})
 
 
 class EdgeTable(Table):
@@ -115,15 +140,12 @@ class ChartTable(Table):
     @classmethod
     def of(cls, chart: Chart) -> ChartTable:
         """Describe a chart."""
-        edges: dict[str, dict[str, Any]] = {}
-        for edge in chart.transitions:
-            one = {name: getattr(edge, name) for name in EdgeTable.model_fields}
-            one["emit"] = list(edge.emit)
-            one["source"] = edges[edge.name]["source"] if edge.name in edges else []
-            one["source"].append(edge.source)
-            edges[edge.name] = one
-        for one in edges.values():
-            one["source"] = one["source"] if len(one["source"]) > 1 else one["source"][0]
+        edges = [
+            {name: getattr(edge, name) for name in EdgeTable.model_fields}
+            | {"source": [*edge.sources] if len(edge.sources) > 1 else edge.source}
+            | {"emit": list(edge.emit)}
+            for edge in chart.nesting.transitions
+        ]
         return cls.model_validate(
             {
                 "name": chart.name,
@@ -131,7 +153,7 @@ class ChartTable(Table):
                 "inputs": list(chart.inputs),
                 "velocities": list(chart.velocities),
                 # The age is there because a text reads it.
-                "variables": [name for name in chart.variables if name != AGE],
+                "variables": [name for name in chart.variables if name not in chart.hidden],
                 "parameters": [
                     each.name if each == Parameter(each.name) else dict(vars(each))
                     for each in chart.parameters
@@ -140,8 +162,8 @@ class ChartTable(Table):
                 "outputs": chart.outputs,
                 "contact_outputs": chart.contact_outputs,
                 "initial": chart.initial,
-                "states": [dict(vars(state)) for state in chart.states],
-                "transitions": list(edges.values()),
+                "states": [StateTable.of(state) for state in chart.nesting.states],
+                "transitions": edges,
                 "layout": {name: list(place) for name, place in chart.layout.items()},
             }
         )
@@ -152,7 +174,7 @@ class ChartTable(Table):
             each if isinstance(each, str) else built(Parameter, "parameters", i, **vars(each))
             for i, each in enumerate(self.parameters)
         ]
-        states = [built(State, "states", i, **vars(each)) for i, each in enumerate(self.states)]
+        states = [built(each.build, "states", i) for i, each in enumerate(self.states)]
         edges = [
             built(Transition, "transitions", i, **vars(each))
             for i, each in enumerate(self.transitions)

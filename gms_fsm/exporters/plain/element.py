@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
 
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
@@ -239,8 +240,11 @@ def _names(read: Assembly, bank: Bank, words: Iterable[str], cases: bool) -> Map
     for name in chart.parameter_names:
         take("parameter", name, of(c, name))
     for full in bank.variables:
-        take("variable", full.rsplit(".", 1)[1], full)
-        take("rate", f"d{full.rsplit('.', 1)[1]}", bank.rate(full))
+        name = full.rsplit(".", 1)[1]
+        # Structured text has no names with two underscores in a row.
+        name = name if cases or name not in chart.hidden else name.replace("__", "_")
+        take("variable", name, full)
+        take("rate", f"d{name}", bank.rate(full))
     for name in chart.let:
         take("let", name, of(c, name))
     for name in chart.inputs:
@@ -262,7 +266,8 @@ def _names(read: Assembly, bank: Bank, words: Iterable[str], cases: bool) -> Map
     states: dict[str, str] = {}
     for state in chart.states:
         here = f"{place}, state {state.name!r}"
-        same = identifier(state.name if cases else state.name.upper(), (), here)
+        called = spelled(state.name)
+        same = identifier(called if cases else called.upper(), (), here)
         if same in states:
             raise ParameterError(
                 f"the format's language has one name for it and for state {states[same]!r}",
@@ -371,7 +376,7 @@ class PlanReader:
             computed = each.forces[self.force] if common is None else Computed(common)
             found.append(
                 StateParts(
-                    each.state,
+                    spelled(each.state),
                     {
                         self.names[name]: self.expression(bank.flows[each.state, name], rate)
                         for name, rate in each.rates.items()

@@ -23,7 +23,7 @@ from gms_fsm.charts.files.scxml import (
     conditions,
     written_out,
 )
-from gms_fsm.charts.reader import AGE
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._subject import Subject
@@ -73,8 +73,8 @@ def _write(subject: Subject) -> dict[str, str]:
 
 def _names(chart: Chart) -> list[str]:
     """Return the names that conditions can read."""
-    names = [*chart.inputs, *chart.velocities, *chart.variables, *chart.parameter_names]
-    return [*dict.fromkeys(names), *(state.name for state in chart.states)]
+    names = [*_outside(chart), *chart.parameter_names]
+    return [*dict.fromkeys(names), *map(spelled, chart.nesting.levels)]
 
 
 def _check_characters(chart: Chart) -> None:
@@ -102,13 +102,13 @@ def _document(name: str, chart: Chart, numbers: Mapping[str, float]) -> str:
             "version": "1.0",
             "name": name,
             "datamodel": "ecmascript",
-            "initial": chart.default_state.name,
+            "initial": spelled(chart.nesting.states[0].name),
         },
     )
     _own_parts(root, chart)
     _data(root, chart, numbers)
     write = _States(chart)
-    for state in chart.states:
+    for state in chart.nesting.states:
         write.state(root, state.name)
     ET.indent(root, "  ")
     head = f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- Written by gms-fsm {__version__}. -->\n'
@@ -118,7 +118,8 @@ def _document(name: str, chart: Chart, numbers: Mapping[str, float]) -> str:
 def _outside(chart: Chart) -> dict[str, str]:
     """Return what the host gives at every step: names, each with its kind."""
     kinds = dict.fromkeys(chart.inputs, "input") | dict.fromkeys(chart.velocities, "velocity")
-    return kinds | dict.fromkeys(chart.variables, "variable")
+    kinds |= dict.fromkeys(chart.variables, "variable")
+    return {name: kind for name, kind in kinds.items() if name not in chart.nesting.histories}
 
 
 def _own_parts(root: ET.Element, chart: Chart) -> None:
@@ -127,7 +128,7 @@ def _own_parts(root: ET.Element, chart: Chart) -> None:
     for kind, names in (
         ("input", chart.inputs),
         ("velocity", chart.velocities),
-        ("variable", [each for each in chart.variables if each != AGE]),
+        ("variable", [each for each in chart.variables if each not in chart.hidden]),
     ):
         for name in names:
             unit = chart.unit(name)
@@ -161,26 +162,38 @@ class _States:
 
     chart: Chart
 
-    def state(self, root: ET.Element, name: str) -> None:
-        """Write a state."""
-        chart = self.chart
-        given = chart.states[chart.state_index(name)]
-        own = ET.SubElement(root, "state", {"id": name})
+    def state(self, root: ET.Element, path: str) -> None:
+        """Write a state, with the states inside."""
+        chart, level = self.chart, self.chart.nesting.levels[path]
+        given, inside = level.state, level.inside()
+        own = ET.SubElement(root, "state", {"id": spelled(path)})
+        if level.chain[1:]:
+            own.set("gms:name", given.name)
+        if inside:
+            own.set("initial", level.last if given.history else spelled(inside[0]))
         for tag, texts in (("flow", given.flow), ("force", given.outputs)):
             for each, text in texts.items():
                 ET.SubElement(own, f"gms:{tag}", {"name": each, "text": text})
         for tag, kind, texts in (("onentry", "entry", given.entry), ("onexit", "exit", given.exit)):
-            if chart.assignments[kind, name]:
-                self.assign(ET.SubElement(own, tag), assignments(chart, kind, name), texts)
-        values = ET.SubElement(own, "transition", {"event": VALUES})
-        for each in _outside(chart):
-            ET.SubElement(values, "assign", {"location": each, "expr": f"_event.data.{each}"})
-        texts_of = conditions(chart)
-        for order, edge in chart.leaving(name):
-            row = {"event": STEP, "cond": texts_of[edge.name], "target": edge.target}
-            row |= {"gms:name": edge.name, "gms:order": str(order), "gms:guard": edge.guard}
-            at = ET.SubElement(own, "transition", row)
-            self.assign(at, assignments(chart, "action", edge.name), edge.actions)
+            if expressions := assignments(chart, kind, path):
+                self.assign(ET.SubElement(own, tag), expressions, texts)
+        if given.history:
+            history = ET.SubElement(own, "history", {"id": level.last, "type": "shallow"})
+            ET.SubElement(history, "transition", {"target": spelled(inside[0])})
+        for state in given.states:
+            self.state(own, f"{path}.{state.name}")
+        if not level.chain[1:]:
+            values = ET.SubElement(own, "transition", {"event": VALUES})
+            for name in _outside(chart):
+                ET.SubElement(values, "assign", {"location": name, "expr": f"_event.data.{name}"})
+        texts_of, edges = conditions(chart), chart.nesting.transitions
+        rows = [(source, edge) for edge in edges for source in edge.sources]
+        for order, (source, edge) in enumerate(rows):
+            if source == path:
+                row = {"event": STEP, "cond": texts_of[edge.name], "target": spelled(edge.target)}
+                row |= {"gms:name": edge.name, "gms:order": str(order), "gms:guard": edge.guard}
+                at = ET.SubElement(own, "transition", row)
+                self.assign(at, assignments(chart, "action", edge.name), edge.actions)
 
     def assign(self, parent: ET.Element, expressions: Pairs, texts: Pairs) -> None:
         """Write assignments; one without a text of the chart is the reset of a timer."""

@@ -142,7 +142,8 @@ class StructuredText:
         at = f"[{self.i}]" if self.i else ""
         self.now = {each.name: self.take(f"{each.name}_i") for each in element.variables if at}
         self.state = self.take("state")
-        self.states = [self.take(f"STATE_{each.name.upper()}") for each in element.states]
+        paths = [each.name.replace("__", "_").upper() for each in element.states]
+        self.states = [self.take(f"STATE_{path}") for path in paths]
         self.walker = Walker(
             FORMS,
             self.dialect,

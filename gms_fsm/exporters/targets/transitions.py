@@ -11,14 +11,14 @@ import keyword
 import math
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pprint import pformat
 from typing import Any
 
 from gms_fsm._version import __version__
-from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.charts.parameters import Parameter
-from gms_fsm.charts.reader import AGE
 from gms_fsm.coupling.steppable import other_inputs
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._subject import Subject
@@ -72,7 +72,8 @@ def _imports(source: str) -> str:
     ours = [each for each in used if each in ELEMENTARY]
     borrowed = ["sin", *(each for each in used if each not in ours and hasattr(math, each))]
     lines = ["", "import sys", f"from math import {', '.join(borrowed)}", ""]
-    lines += ["from transitions import Machine", ""]
+    nested = "NestedMachine" in source
+    lines += [f"from transitions{'.extensions.nesting' * nested} import {MACHINES[nested]}", ""]
     if "sgn" in used:
         lines += ["", bare(sgn)]
     lines += [elementary_text(ours)] if ours else []
@@ -83,34 +84,80 @@ def _imports(source: str) -> str:
 def _data(chart: Chart) -> dict[str, Any]:
     """Return the chart as what stands at the top of the file, by name."""
     edges = {edge.name: edge for edge in chart.transitions}
+    # A machine has no histories: there each edge has one of the innermost states as target.
+    levels, plain = chart.nesting.levels, not chart.nesting.histories
+    if plain:
+        edges = {edge.name: edges[edge.name] for edge in chart.nesting.transitions}
     return {
         "NAME": chart.name,
         "REFERENCE": chart.reference,
         "INPUTS": chart.inputs,
         "VELOCITIES": chart.velocities,
-        "VARIABLES": tuple(name for name in chart.variables if name != AGE),
+        "VARIABLES": tuple(name for name in chart.variables if name not in chart.hidden),
         "PARAMETERS": tuple(_parameter(each) for each in chart.parameters),
         "LET": dict(chart.let),
-        "STATES": tuple(state.name for state in chart.states),
+        "STATES": tuple(_state(state) for state in chart.nesting.states),
         "TRANSITIONS": tuple(
             {
                 "trigger": edge.name,
-                "source": edge.source if len(edge.sources) == 1 else [*edge.sources],
-                "dest": edge.target,
+                "source": _sources(chart, edge),
+                "dest": spelled(_written(chart, edge).target if plain else edge.target),
                 "conditions": f"_guard_{edge.name}",
             }
             for edge in edges.values()
         ),
-        "FLOWS": _filled({state.name: dict(state.flow) for state in chart.states}),
+        "FLOWS": _filled({name: each.state.flow for name, each in levels.items()}),
         "GUARDS": {edge.name: edge.guard for edge in edges.values()},
-        "ENTRY": _filled({state.name: dict(state.entry) for state in chart.states}),
-        "EXIT": _filled({state.name: dict(state.exit) for state in chart.states}),
+        "ENTRY": _filled({name: each.state.entry for name, each in levels.items()}),
+        "EXIT": _filled({name: each.state.exit for name, each in levels.items()}),
         "ACTIONS": _filled({edge.name: dict(edge.actions) for edge in edges.values()}),
         "OUTPUTS": dict(chart.outputs),
-        "STATE_OUTPUTS": _filled({state.name: dict(state.outputs) for state in chart.states}),
+        "STATE_OUTPUTS": _filled({name: each.state.outputs for name, each in levels.items()}),
         "CONTACT_OUTPUTS": dict(chart.contact_outputs),
         "INITIAL": dict(chart.initial),
+        **(_nested(chart) if chart.nesting.composite else {}),
     }
+
+
+def _nested(chart: Chart) -> dict[str, Any]:
+    """Return what the loop needs to know of states in states."""
+    return {
+        "DEFAULT": spelled(chart.default_state.name),
+        "START": _methods(chart.nesting.begins()),
+        "EDGES": {
+            spelled(state.name): {
+                edge.name: _methods(edge.performs) for _, edge in chart.leaving(state.name)
+            }
+            for state in chart.states
+        },
+    }
+
+
+def _methods(performed: Iterable[tuple[str, str]]) -> tuple[str, ...]:
+    return tuple(f"_{kind}_{spelled(owner)}" for kind, owner in performed)
+
+
+def _state(state: State) -> str | dict[str, Any]:
+    """Return a state as transitions takes it."""
+    if not state.states:
+        return state.name
+    inside = [_state(each) for each in state.states]
+    return {"name": state.name, "initial": state.initial, "children": inside}
+
+
+def _sources(chart: Chart, edge: Transition) -> str | list[str]:
+    """Return the states that an edge is written to leave."""
+    names = [spelled(each) for each in _written(chart, edge).sources]
+    return names[0] if len(names) == 1 else names
+
+
+def _written(chart: Chart, edge: Transition) -> Transition:
+    """Return an edge as it is written."""
+    return next(
+        each
+        for each in chart.nesting.transitions
+        if edge.name in [name for name, *_ in chart.nesting.entries(each)]
+    )
 
 
 def _parameter(given: Parameter) -> str | dict[str, Any]:
@@ -120,7 +167,7 @@ def _parameter(given: Parameter) -> str | dict[str, Any]:
 
 
 def _filled(texts: Mapping[str, Mapping[str, str]]) -> dict[str, dict[str, str]]:
-    return {name: dict(each) for name, each in texts.items() if each}
+    return {spelled(name): dict(each) for name, each in texts.items() if each}
 
 
 def _numbers(contact: Contact | None) -> dict[str, Any]:
@@ -155,7 +202,7 @@ def _program(chart: Chart, contact: Contact | None) -> Iterator[str]:
     yield from _element(chart, contact)
     yield from _inputs(chart, contact)
     yield from _total(chart, contact)
-    yield LOOP
+    yield _loop() if chart.nesting.composite else LOOP
     others = [] if contact is None else other_inputs(contact)
     if contact is None:
         others = [name for name in chart.inputs if name not in ("t", "x", "v", *chart.velocities)]
@@ -216,16 +263,16 @@ def _element(chart: Chart, contact: Contact | None) -> Iterator[str]:
         yield from text.function(f"_guard_{edge}", guard)
     for (kind, owner), assignments in chart.assignments.items():
         if assignments:
-            yield f"    def _{kind}_{owner}(self):"
+            yield f"    def _{kind}_{spelled(owner)}(self):"
             yield from (f"        self.{name} = {text(each)}" for name, each in assignments.items())
             yield ""
     for state in chart.states:
         flows = {name: chart.flows[state.name, name] for name in chart.variables}
-        yield from text.rows(f"_flow_{state.name}", flows)
+        yield from text.rows(f"_flow_{spelled(state.name)}", flows)
         rates = {f"d{name}": tree for name, tree in flows.items()}
         force = chart.forces[state.name, "F"]
         assert force is not None  # a locked state was refused
-        yield from text.function(f"_force_{state.name}", renamed(force, rates))
+        yield from text.function(f"_force_{spelled(state.name)}", renamed(force, rates))
     yield ""
 
 
@@ -344,6 +391,44 @@ def run(record, t_end, step, values=VALUES, weights=WEIGHTS, t=0.0, x=0.0, **var
         t, x = after, x + h * v
 
 '''
+MACHINES = ("Machine", "HierarchicalMachine, NestedState")
+NESTED_MACHINE = '''\
+class InnerState(NestedState):
+    """A state whose path has no dots."""
+
+    separator = "__"
+
+
+class NestedMachine(HierarchicalMachine):
+    """A machine of states in states."""
+
+    state_cls = InnerState
+
+
+'''
+NESTED_SWITCH = '''\
+def switch(machine, element):
+    """Take the first edge whose guard holds, of inner states first; return its name, or None."""
+    for edge, parts in EDGES[element.state].items():
+        if element.trigger(edge):
+            for part in parts:
+                getattr(element, part, nothing)()
+            return edge
+    return None
+'''
+
+
+def _loop() -> str:
+    """Return the loop for states in states."""
+    before, switch, after = re.split(r"(def switch.*?return None\n)", LOOP, flags=re.DOTALL)
+    assert switch
+    before = before.replace("return Machine(", "return NestedMachine(")
+    before = before.replace("initial=STATES[0]", "initial=DEFAULT")
+    entry = 'getattr(each, f"_entry_{STATES[0]}", nothing)()\n'
+    for_each = "for part in START:\n            getattr(each, part, nothing)()\n"
+    return NESTED_MACHINE + before + NESTED_SWITCH + after.replace(entry, for_each)
+
+
 DEMONSTRATION = '''\
 def record(t):
     """Return the record of the demonstration: a velocity [m/s] that turns back slowly."""
@@ -367,6 +452,22 @@ if __name__ == "__main__":
 
 
 # --------------------------------------------------------------------------- for people
+AGAIN = """\
+Build the chart again
+
+    import {name} as file
+    from gms_fsm import Chart
+    chart = Chart.from_transitions(
+        file.machine_of([]), name=file.NAME, reference=file.REFERENCE, inputs=file.INPUTS,
+        velocities=file.VELOCITIES, variables=file.VARIABLES, parameters=file.PARAMETERS,
+        let=file.LET, flows=file.FLOWS, guards=file.GUARDS, entry=file.ENTRY, exit=file.EXIT,
+        actions=file.ACTIONS, outputs=file.OUTPUTS, state_outputs=file.STATE_OUTPUTS,
+        contact_outputs=file.CONTACT_OUTPUTS, initial=file.INITIAL,
+    )
+
+"""
+
+
 def _readme(name: str, chart: Chart, contact: Contact | None) -> str:
     states = ", ".join(state.name for state in chart.states)
     numbers = (
@@ -374,6 +475,7 @@ def _readme(name: str, chart: Chart, contact: Contact | None) -> str:
         if contact is None
         else f"those of {visible(contact.title)}, {contact.n} element{'s' * (contact.n != 1)}"
     )
+    again = "" if chart.nesting.histories else AGAIN.format(name=name)
     return f"""\
 # {visible(chart.name)} as a transitions machine
 
@@ -394,19 +496,7 @@ Use it from a program
     for t, v, F, states, edges in {name}.run({name}.record, t_end=25.0, step=1e-3):
         ...
 
-Build the chart again
-
-    import {name} as file
-    from gms_fsm import Chart
-    chart = Chart.from_transitions(
-        file.machine_of([]), name=file.NAME, reference=file.REFERENCE, inputs=file.INPUTS,
-        velocities=file.VELOCITIES, variables=file.VARIABLES, parameters=file.PARAMETERS,
-        let=file.LET, flows=file.FLOWS, guards=file.GUARDS, entry=file.ENTRY, exit=file.EXIT,
-        actions=file.ACTIONS, outputs=file.OUTPUTS, state_outputs=file.STATE_OUTPUTS,
-        contact_outputs=file.CONTACT_OUTPUTS, initial=file.INITIAL,
-    )
-
-States: {states}
+{again}States: {states}
 Parameters: {", ".join(chart.parameter_names) or "none"}
 Numbers: {numbers}
 

@@ -392,12 +392,13 @@ class ProgramWriter(ABC):
             return [*self.computed(target, value, signs), *self.rounded(name)]
         if (counts := self.read.defined[name].counts) is not None:
             bank = self.read.banks[counts[0]]
-            state = self.names.states[bank.index][counts[1]]
+            mode, states = self.mode(bank.index), self.names.states[bank.index]
+            test = " or ".join(f"{mode} == {states[each]}" for each in counts[1])
             size = self.sizes[bank.index]
             return [
                 CodeLine(f"{target} = 0.0"),
                 CodeLine(f"for i in range({size}):", frozenset({f"#{size}"})),
-                CodeLine(f"    if {self.mode(bank.index)} == {state}:"),
+                CodeLine(f"    if {test}:"),
                 CodeLine(f"        {target} += 1.0"),
             ]
         if (name, "times") in self.plan.tables.shared:

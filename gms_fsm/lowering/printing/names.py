@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from gms_fsm.charts.nesting import spelled
 from gms_fsm.language import Binary, Name, Node, product_power
 from gms_fsm.lowering.layout import sizes_of
 from gms_fsm.systems.reading.assembly import Assembly, Bank
@@ -215,8 +216,7 @@ class _Choice:
 
     def constant(self, bank: Bank, name: str) -> str:
         """Return a constant for a name."""
-        found = name if self.alone else f"{bank.name}_{name}"
-        found = found.upper()
+        found = spelled(name if self.alone else f"{bank.name}_{name}").upper()
         while found in self.taken or not found.isidentifier():
             found += "_"
         self.taken.add(found)

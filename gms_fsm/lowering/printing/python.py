@@ -165,14 +165,18 @@ class _PythonPrinter(LockFunctions):
         ]
         lines, several = self.before_guards(steps), len(self.read.banks) > 1
         phases = [
-            {edge.name: self.phases(bank, edge) for edge in bank.edges} for bank in self.read.banks
+            {
+                constant: self.phases(bank, edge)
+                for edge, constant in zip(bank.edges, constants, strict=True)
+            }
+            for bank, constants in zip(self.read.banks, self.names.edges, strict=True)
         ]
         last = max((len(each) for edges in phases for each in edges.values()), default=1)
         if last > 1 or any(each[0].hits for edges in phases for each in edges.values()):
             lines += self.locks.no_impulse()
         for number in range(last):
             found = [
-                {name: each[number] for name, each in edges.items() if number < len(each)}
+                {edge: each[number] for edge, each in edges.items() if number < len(each)}
                 for edges in phases
             ]
             lines += self.dispatched(found)
@@ -192,11 +196,8 @@ class _PythonPrinter(LockFunctions):
         """Write one phase of what the edges do, by contact and edge."""
         lines, several, word = list[CodeLine](), len(self.read.banks) > 1, "if"
         for bank, found in zip(self.read.banks, phases, strict=True):
-            edges = zip(bank.edges, self.names.edges[bank.index], strict=True)
-            inner = chosen(
-                "edge",
-                [Case(k, f"== {k}", found[e.name].lines) for e, k in edges if e.name in found],
-            )
+            rows = [Case(k, f"== {k}", phase.lines) for k, phase in found.items()]
+            inner = chosen("edge", rows)
             first = self.element(bank.index, self.own(bank.index, reads_of(inner)), "live")
             body = self.outward(bank.index, [*first, *inner])
             if several and inner:

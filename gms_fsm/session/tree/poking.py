@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from gms_fsm.session.tree.branch import BranchRow
 
 
-AGE = "age"  # restarts in a state that was poked
-
-
 @dataclass(frozen=True)
 class Edits:
     """The changes made by a poke.
@@ -95,13 +92,19 @@ def pokeable(start: Problem) -> list[str]:
     moved = (name for body in system.bodies for name in (body.x, body.v))
     shared = [name for name in (*moved, *system.flow, *updated) if name in layout.y.shared]
     shared += layout.events
-    own = [bank.of(name) for bank in layout.banks for name in bank.variables if name != AGE]
+    own = [
+        bank.of(name)
+        for bank in layout.banks
+        for name in bank.variables
+        if name not in system.contact(bank.name).chart.hidden
+    ]
     return [*shared, *own]
 
 
 def _of_model(start: Problem, given: Mapping[str, Any]) -> dict[str, float | Mapping[int, float]]:
     """Return the new values of the variables of a model on a rig, checked."""
-    known = [name for name in start.model.chart.variables if name != AGE]
+    chart = start.model.chart
+    known = [name for name in chart.variables if name not in chart.hidden]
     found: dict[str, float | Mapping[int, float]] = {}
     for name, values in given.items():
         if name in parameter_names(start.model):
@@ -198,11 +201,14 @@ def initial_with(edits: Edits, start: Problem, here: BranchRow) -> dict[str, Any
     layout = start.program.layout
     poked = {machine_of(element, start): name for element, name in edits.state.items()}
     for bank in layout.banks:
-        states = enumerate(initial[f"{bank.name}.states"], start=bank.first)
-        initial[f"{bank.name}.states"] = [poked.get(i, name) for i, name in states]
-        if AGE in bank.variables:
-            ages = enumerate(initial[bank.of(AGE)], start=bank.first)
-            initial[bank.of(AGE)] = [0.0 if i in poked else age for i, age in ages]
+        key, chart = f"{bank.name}.states", start.system.contact(bank.name).chart
+        states = dict(enumerate(initial[key], start=bank.first))
+        moved = {i: (states[i], name) for i, name in poked.items() if i in states}
+        initial[key] = [*(states | {i: new for i, (_, new) in moved.items()}).values()]
+        for name in chart.hidden:
+            kept = dict(enumerate(initial[bank.of(name)], start=bank.first))
+            kept |= {i: chart.nesting.moved(name, kept[i], *ends) for i, ends in moved.items()}
+            initial[bank.of(name)] = [*kept.values()]
     for name, values in edits.variables.items():
         if isinstance(values, Mapping):
             own = name if start.what.named else layout.contact().of(name)

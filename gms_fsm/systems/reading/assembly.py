@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
 from gms_fsm.language import (
     Binary,
@@ -355,10 +355,12 @@ class SystemReader:
         """Define how many elements are in a state, and what the velocities of contacts are."""
         moved = {body.v for body in self.system.bodies}
         for index, machine in enumerate(self.system.machines):
-            for state in machine.chart.states:
+            nesting = machine.chart.nesting
+            for path in nesting.levels:
+                inside = tuple(nesting.leaves_of(path))
                 for word in COUNTS:
-                    name = f"{word}({machine.name}.{state.name})"
-                    self.definitions.append(Definition(name, None, counts=(index, state.name)))
+                    name = f"{word}({machine.name}.{path})"
+                    self.definitions.append(Definition(name, None, counts=(index, inside)))
             for text, name in zip(machine.v, machine.chart.velocities, strict=True):
                 if text in moved:
                     self.aliases[of(machine.name, name)] = Name(text)
@@ -410,11 +412,9 @@ class SystemReader:
             own_names[event] = event
             names[event] = Name(event)
 
-        def steps(*keys: tuple[str, str]) -> tuple[tuple[str, Value], ...]:
+        def steps(edge: Transition | None = None) -> tuple[tuple[str, Value], ...]:
             return tuple(
-                (own_names[name], renamed(tree, names))
-                for key in keys
-                for name, tree in chart.assignments[key].items()
+                (own_names[name], renamed(tree, names)) for name, tree in chart.assigned(edge)
             )
 
         locked = {state.name for state in chart.states if state.locked}
@@ -451,14 +451,13 @@ class SystemReader:
                     edge.source,
                     edge.target,
                     renamed_in(chart.guards[edge.name], names),
-                    # Stateflow's order: exit of the source, action, entry of the target.
-                    steps(("exit", edge.source), ("action", edge.name), ("entry", edge.target)),
+                    steps(edge),
                     edge.target in locked,
                     number in chart.arrests,
                 )
                 for number, edge in enumerate(chart.transitions)
             ),
-            start=steps(("entry", chart.default_state.name)),
+            start=steps(),
             means=names,
         )
 

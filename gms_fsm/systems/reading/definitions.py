@@ -22,15 +22,16 @@ class Definition:
         The contact whose elements have one value each; None if there is one value.
     signal : Signal or None
         The signal, where it is one.
-    counts : (int, str) or None
-        The number of elements of a machine, by its number in the system, that are in a state.
+    counts : (int, tuple of str) or None
+        The number of elements of a machine, by its number in the system, that are in one of these
+        states.
     """
 
     name: str
     tree: Value | None
     bank: int | None = None
     signal: Signal | None = None
-    counts: tuple[int, str] | None = None
+    counts: tuple[int, tuple[str, ...]] | None = None
 
 
 @dataclass(frozen=True)
