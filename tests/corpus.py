@@ -232,6 +232,42 @@ ORDER = Chart(
     outputs={"F": "z"},
 )
 
+JUMPING = Chart(
+    "functions that jump",
+    inputs=("t", "v"),
+    variables=("z", "n"),
+    parameters=("k", "T"),
+    states=(
+        State(
+            "on",
+            {
+                "z": "v + mod(t, T) + 0.1 * round(3 * z) - if(t > 2 and z < 1, 0.3, 0.1 * z)",
+                "n": "0",
+            },
+        ),
+        State("off", {"z": "0.2 * floor(2 * v) - z + 0.1 * noise(t / 0.3, 7)", "n": "0"}),
+    ),
+    transitions=(
+        Transition("rest", "on", "off", "floor(2 * z) > n", actions={"n": "mod(n + 1, 3)"}),
+        Transition(
+            "go", "off", "on", "after(0.3) and (round(n) == 1 or mod(t, 1) > if(v > 0, 0.5, 0.8))"
+        ),
+    ),
+    outputs={"F": "k * quantise(saturate(z, -1, 1), 0.25) + if(v >= 0, 0.1, -0.1)"},
+)
+WORDS = Chart(
+    "words as names",
+    inputs=("v",),
+    variables=("z",),
+    parameters=("floor", "mod", "saturate"),
+    states=(State("round", {"z": "v - mod * z"}), State("tooth", {"z": "v - floor * z"})),
+    transitions=(
+        Transition("quantise", "round", "tooth", "z > saturate and round(2 * z) >= 1"),
+        Transition("if_gt", "tooth", "round", "z < -saturate"),
+    ),
+    outputs={"F": "floor * z + mod"},
+)
+
 
 RISING = ("1 + 0.3 * t", "-1 + 0.3 * t")  # p' below and above q = 0
 FALLING = ("1 - 0.3 * t", "-1 - 0.3 * t")
@@ -442,6 +478,19 @@ OWN_RUNS: dict[str, Maker] = {
     "odd names": _on(odd_names(), Prescribed("0.3*sin(t)"), 20.0),
     "wear": _on(wear(), Prescribed("0.3*sin(2*pi*t/17)"), 40.0),
     "wear, pulled": _on(wear(1), PulledSlider(1, 2, 0.1), 40.0, method="rk4", step=7.003e-3),
+    "functions that jump": _on(
+        ChartModel(JUMPING, {"k": 1.0, "T": [0.7, 1.1]}, n=2),
+        Prescribed("0.6*cos(1.3*t) + if(mod(t, 2) < 1, 0.2, -0.1)"),
+        9.0,
+    ),
+    "functions that jump, pulled": _on(
+        ChartModel(JUMPING, {"k": 1.0, "T": 0.7}), PulledSlider(1.0, 2.0, 0.3), 9.0
+    ),
+    "words as names": _on(
+        ChartModel(WORDS, {"floor": 2.0, "mod": 0.1, "saturate": [0.3, 0.4]}, n=2),
+        Prescribed("0.5*sin(t)"),
+        20.0,
+    ),
     "order of actions": _on(
         ChartModel(ORDER, {}, n=2, stribeck=CURVE),
         Prescribed("0"),

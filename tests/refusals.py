@@ -300,7 +300,8 @@ rows = {
     "product without a sign": ("signal, column 5", ..., SIN, "0.1 sin(2 pi t)"),
     "function of a module": ("signal, column 5", ..., SIN, "0.1*math.sin(t)"),
     "letter for pi": ("signal, column 9", ..., SIN, "0.1*sin(\u03c0*t)"),
-    "case": ("signal, column 1", ..., SIN, "0 if t < 1 else 0.1"),
+    "case without a comparison": ("signal, column 4", ..., SIN, "if(t, 0, 0.1)"),
+    "case without an alternative": ("signal, column 1", ..., SIN, "if(t < 1, 0.1)"),
     "program": ("signal, column 1", ..., QUOTED, """'__import__("os").mkdir("pwned")'"""),
     "one corner": ("a.toml: rig.velocity = [[0.0, 0.1]]: signal", ..., QUOTED, "[[0.0, 0.1]]"),
     "no corner": ("a.toml: rig.velocity = []: signal", ..., QUOTED, "[]"),
@@ -1386,6 +1387,11 @@ rows = {
 group("chart", ChartError, chart, rows, "")
 rows = {
     "unknown name in a guard": ("guard, column 12", ..., edge(guard="z >= s and u > v_c")),
+    "function that is a parameter": (
+        "guard, column 1",
+        ...,
+        {"parameters": (*K, "mod"), **edge(guard="mod(z, 1) > s")},
+    ),
     "time with a unit": ("column 10", ..., edge(guard="after(2, sec)")),
     "time with a unit after a blank": ("column 10", ..., edge(guard="after(20 ms)")),
     "after without a time": ("column 1", ..., edge(guard="after()")),
@@ -1850,6 +1856,11 @@ rows = {
     "class for a rig": ("rig", Slider, lambda: simulate(GIVEN, Slider, 1.0)),
     "class for a model of a contact": ("contact 'pad': chart", GMS, lambda: Contact("pad", GMS)),
     "end under another name": ("", ..., lambda: simulate(GIVEN, Prescribed("0"), tend=1.0)),  # type: ignore[call-arg]
+    "too many jumps": (
+        "floor(t / 1e-07)",
+        ...,
+        lambda: simulate(GIVEN, Prescribed("mod(t, 1e-7)"), 1.0),
+    ),
     "text for a rig": ("rig", "0.1*t", lambda: simulate(GIVEN, "0.1*t", 1.0)),
     "argument of a session": ("", ..., lambda: Session(GIVEN, Prescribed("0"), 1.0, steps=3)),
     "elements of no class": ("element", dict, lambda: ElementMachines(GIVEN, dict)),
@@ -2748,6 +2759,7 @@ rows = {
     "locks that repeat": ("system 'one'", ..., {"contacts": TWICE}),
     "load without a curve": ("system 'one', contact 'p'", ..., {"contacts": (DAHL,)}),
     "period": ("system 'one'", ..., {"sampled": pid(u="period"), "numbers": {"period": 2.0}}),
+    "let of a name that is taken": ("", ..., {"let": {"t": "1"}}),
     "driven body alone": ("contact 'pad'", ..., {"body": {"inertia": None, "velocity": "1"}}),
     "samplers without number": (
         "",
@@ -2779,6 +2791,7 @@ group("signal", SignalError, Prescribed, rows)
 rows = {
     "force of a contact": ("body 'mass', force, column 1", ..., {"body": {"force": "F"}}),
     "force in an update": ("sampled 'pid', 'u', column 5", ..., {"sampled": pid(u="2 * F")}),
+    "let that reads a later one": ("let 'a', column 1", ..., {"let": {"a": "b", "b": "1"}}),
 }
 group("system", ExpressionError, lambda given: made(**given), rows)
 rows = {

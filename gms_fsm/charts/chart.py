@@ -32,7 +32,7 @@ from gms_fsm.errors import ChartError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.equality import by_value
-from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, Condition, Value, spell
+from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, YIELDING, Condition, Value, spell
 
 if TYPE_CHECKING:
     from gms_fsm.charts.files.imported import GivenTexts
@@ -44,7 +44,7 @@ SUPPLIED = ("t", "x", "v", "s")  # inputs that a model supplies to its chart
 RESERVED = frozenset(
     {"F", "age", "after", "index", "machine", "pow", "state", "states", "trigger"}
     | set(CONSTANTS)
-    | set(FUNCTIONS)
+    | set(FUNCTIONS) - set(YIELDING)
 )
 
 
@@ -73,8 +73,8 @@ class Chart:
     transitions : sequence of Transition
         Among the edges that leave one state, earlier ones have priority, but those of inner states
         precede those of the states around them. Guards may read ``F``, the force of the contact,
-        ``a``, its acceleration, ``age``, the time since the state that the edge leaves was entered
-        [s], and ``after(T)``, short for ``age >= T``.
+        ``a``, its acceleration, ``age``, the time since the state that the edge leaves was entered,
+        s, and ``after(T)``, short for ``age >= T``; on an edge to itself ``every(T)`` is the same.
     outputs : mapping of str to str
         ``F``, the element's force [N], in all states that give none of their own; may use
         ``d<variable>`` for a derivative.

@@ -308,4 +308,5 @@ def _awaiting(event: str, guard: Condition) -> Condition:
 
 def _age(text: object) -> list[str]:
     """Return the name of the age where a text seems to read it; else messages would offer it."""
-    return [AGE] if isinstance(text, str) and (AGE in text or "after" in text) else []
+    words = (AGE, "after", "every")
+    return [AGE] if isinstance(text, str) and any(word in text for word in words) else []

@@ -12,14 +12,14 @@ import numpy as np
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ParameterError
-from gms_fsm.language import CONSTANTS, FUNCTIONS
+from gms_fsm.language import CONSTANTS
 from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners, Function
 from gms_fsm.systems.system import Body, Contact, System
 
-WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*")  # not the exponent of a number
+WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*\b(?!\s*\()")  # no function, no exponent of a number
 GIVEN = ("t", "x", "v")  # what a contact knows by itself: x is the integral of v
 
 
@@ -140,4 +140,5 @@ def other_inputs(contact: Contact) -> list[str]:
     named = dict.fromkeys([*contact.chart.inputs, *contact.inputs])
     texts = [contact.inputs.get(name, name) for name in named if name != "s"]
     found = dict.fromkeys(name for text in texts for name in WORD.findall(str(text)))
-    return [name for name in found if name not in {*GIVEN, *FUNCTIONS, *CONSTANTS}]
+    known = {*GIVEN, *CONSTANTS, "and", "or", "not"}
+    return [name for name in found if name not in known]

@@ -8,8 +8,10 @@ the checked tree alone. Every reader of a tree is an algebra for `fold`.
 
 Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains are split),
 ``and or not``, ``abs exp log sqrt sgn min max sin cos tanh
-atan asinh``. ``==`` on floats is refused.
-``pow(a, b)``, which generated code contains for some powers, is read as ``a**b``.
+atan asinh floor round mod quantise saturate if noise``. ``==`` compares whole numbers, such as
+``round(n)``; on floats it is refused.
+``pow(a, b)`` and ``a if c else b``, which generated code contains, are read as ``a**b`` and
+``if(c, a, b)``.
 
 Nothing in this package knows about friction.
 """
@@ -38,6 +40,8 @@ from gms_fsm.language._print import EVENT, spell
 from gms_fsm.language._read import Owner, parse_condition, parse_value
 from gms_fsm.language._vectors import truths, values_of
 from gms_fsm.language.functions import (
+    ARGUMENTS,
+    CHOICES,
     COMPARISONS,
     CONSTANTS,
     ELEMENTARY,
@@ -45,6 +49,8 @@ from gms_fsm.language.functions import (
     NAMESPACE,
     OPERATIONS,
     SEVERAL,
+    SHORT,
+    YIELDING,
     sgn,
 )
 from gms_fsm.language.normal import (
@@ -53,6 +59,7 @@ from gms_fsm.language.normal import (
     Split,
     clauses,
     comparisons,
+    frozen,
     renamed,
     rough_points,
     split,
@@ -78,7 +85,9 @@ from gms_fsm.language.tree import (
 )
 
 __all__ = [
+    "ARGUMENTS",
     "C99",
+    "CHOICES",
     "COMPARISONS",
     "CONSTANTS",
     "ECMASCRIPT",
@@ -96,7 +105,9 @@ __all__ = [
     "OPERATIONS",
     "PYTHON",
     "SEVERAL",
+    "SHORT",
     "STRUCTURED_TEXT",
+    "YIELDING",
     "Algebra",
     "Binary",
     "Both",
@@ -123,6 +134,7 @@ __all__ = [
     "derivative",
     "evaluate",
     "fold",
+    "frozen",
     "integer_power",
     "latex_name",
     "names_in",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gms_fsm.language._fold import fold
-from gms_fsm.language.functions import SEVERAL
+from gms_fsm.language.functions import CHOICES, SEVERAL
 from gms_fsm.language.tree import Binary, Call, Negative, Number, Value, names_in
 
 ZERO, ONE = Number(0.0), Number(1.0)
@@ -75,6 +75,12 @@ class _Slope:
     def call(self, node: Call, parts: Iterator[Value]) -> Value:
         if self.by not in names_in(node):
             return ZERO
+        if node.function == "noise":
+            return ZERO
+        if node.function in CHOICES:
+            left, right, *_ = node.arguments
+            _, _, yes, no = parts
+            return yes if yes == no else Call(node.function, (left, right, yes, no))
         if node.function in SEVERAL:
             # On the corner itself this gives the mean of both sides.
             du, dw = parts
@@ -91,8 +97,10 @@ def _outer(call: Call) -> Value:
     match call.function:
         case "abs":
             return Call("sgn", (u,))
-        case "sgn":
+        case "sgn" | "floor" | "round":
             return ZERO
+        case "tooth":  # rises from even numbers, falls from odd ones
+            return Call("sgn", (Call("tooth", (Binary("+", u, Number(0.5)),)),))
         case "exp":
             return call
         case "log":

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from gms_fsm.language.functions import COMPARISONS, FUNCTIONS, OPERATIONS
+from gms_fsm.language.functions import CHOICES, COMPARISONS, NAMESPACE, OPERATIONS
 
 # How tightly each operator binds (its precedence).
 LEVELS = {"or": 1, "and": 2, "not": 3, "<": 4, "+": 5, "-": 5, "*": 6, "/": 6, "neg": 7, "**": 8}
@@ -236,21 +236,30 @@ def _calls(names: str, pattern: str = "{0}") -> dict[str, str]:
     return {name.lower(): pattern.format(name) + "({all})" for name in names.split()}
 
 
+def _choices(pattern: str, operators: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Return choices between two values; ``{op}`` compares ``{0}`` and ``{1}``."""
+    return {
+        name: pattern.replace("{op}", (operators or {}).get(op, op)) for name, op in CHOICES.items()
+    }
+
+
 # --------------------------------------------------------------------------- the table
-_ALL = " ".join((*FUNCTIONS, "pow"))
+_ALL = " ".join(NAMESPACE)
+_MATH = " ".join(name for name in NAMESPACE if name not in ("noise", "tooth"))
 
 # Generated code. A small integer power is a product, so that all engines round identically.
 PYTHON = Dialect(
     _ARITHMETIC | _logic(" and ", " or ", Form("not {0}", LEVELS["not"], (LEVELS["not"],))),
-    _calls(_ALL),
+    _calls(_ALL) | _choices("({2} if {0} {op} {1} else {3})"),
     true="True",
 )
 # Stateflow text, for charts.
 MATLAB_LIKE = Dialect(
     _ARITHMETIC
     | _logic(" && ", " || ", Form("!{0}", LEVELS["not"], (ATOM,)))
-    | {"**": Form("{0}^{1}", LEVELS["**"], (ATOM, ATOM))},
-    _calls(_ALL) | {"abs": "|{0}|", "after": "after({0})"},
+    | {"**": Form("{0}^{1}", LEVELS["**"], (ATOM, ATOM)), "==": _between("==")},
+    _calls(f"{_ALL} mod quantise")
+    | {"abs": "|{0}|", "after": "after({0})", "if": "if({0}, {1}, {2})"},
     _short,
 )
 # Formulas of Unicode, for charts.
@@ -263,37 +272,55 @@ MATHEMATICS = Dialect(
         "*": _infix("·", LEVELS["*"]),
         "<=": _between("≤"),
         ">=": _between("≥"),
+        "==": _between("="),
         "**": Form(_written_raised, LEVELS["**"]),
     },
-    {**MATLAB_LIKE.functions, "sqrt": "√({0})"},
+    {
+        **MATLAB_LIKE.functions,
+        "sqrt": "√({0})",
+        "floor": "⌊{0}⌋",
+    },
     _typeset,
     true="⊤",
 )
-# The data model of SCXML. Negation is written as a comparison, which Python's readers of SCXML know
-# as well; they do not know "!".
+# The data model of SCXML. Negation is written as a comparison, and a choice as a sum in which a
+# truth counts as 1: Python's readers of SCXML know these as well; they do not know "!" and "?".
 ECMASCRIPT = Dialect(
     _ARITHMETIC | _logic(" && ", " || ", Form("{0} == false", LEVELS["<"], (ATOM,))),
-    _calls(_ALL, "Math.{0}") | {"sgn": "Math.sign({0})"},
+    _calls(_MATH, "Math.{0}")
+    | _choices("(({0} {op} {1}) * ({2}) + (1.0 - ({0} {op} {1})) * ({3}))")
+    | {
+        "sgn": "Math.sign({0})",
+        "round": "(Math.floor({0}) + (({0}) - Math.floor({0}) > 0.5) + (({0}) - Math.floor({0})"
+        " == 0.5) * (Math.floor({0}) - 2.0 * Math.floor(0.5 * Math.floor({0}))))",
+    },
 )
 # The elementary functions of C are our own, with the same bits everywhere: exports name them.
 C99 = Dialect(
     _compiled(" && ", " || ", "!"),
-    {"abs": "fabs({0})", "sqrt": "sqrt({0})"},
+    {"abs": "fabs({0})", "sqrt": "sqrt({0})"} | _choices("({0} {op} {1} ? {2} : {3})"),
     _with_point,
     true="1",
 )
+# MATLAB rounds halves away from zero, and has no expression that chooses: exports define these.
 MATLAB = Dialect(
     _compiled(" && ", " || ", "~"),
     _calls("abs exp log sqrt min max sin cos tanh atan asinh")
-    | {"sgn": "sign({0})", "pow": "power({0}, {1})"},
+    | {
+        "sgn": "sign({0})",
+        "pow": "power({0}, {1})",
+    },
     _with_point,
 )
 # Corners and jumps are written as if-expressions: they make events, sign() and abs() do not. The
 # language has no asinh of its own.
 MODELICA = Dialect(
     _compiled(" and ", " or ", "not "),
-    _calls("exp log sqrt sin cos tanh atan")
+    _calls("exp log sqrt sin cos tanh atan floor")
+    | _choices("(if {0} {op} {1} then {2} else {3})")
     | {
+        "round": "(if ({0}) - floor({0}) < 0.5 then floor({0}) elseif ({0}) - floor({0}) > 0.5"
+        " then floor({0}) + 1.0 else 2.0 * floor(0.5 * floor({0}) + 0.5))",
         "abs": "(if {0} >= 0.0 then {0} else -({0}))",
         "sgn": "(if {0} > 0.0 then 1.0 elseif {0} < 0.0 then -1.0 else 0.0)",
         "min": "(if {1} < {0} then {1} else {0})",
@@ -302,13 +329,14 @@ MODELICA = Dialect(
     },
     _with_point,
 )
-# IEC 61131-3. The standard has no tanh and no asinh; exports define sgn.
+# IEC 61131-3. The standard has no tanh and no asinh; exports define sgn, floor and round.
 STRUCTURED_TEXT = Dialect(
     _compiled(" AND ", " OR ", "NOT "),
     {
         name: f"{name.upper()}({{all}})"
         for name in ["abs", "exp", "sqrt", "min", "max", "sin", "cos", "atan"]
     }
+    | _choices("SEL({0} {op} {1}, {3}, {2})")
     | {"log": "LN({0})", "pow": "EXPT({0}, {1})"},
     _with_point,
     true="TRUE",
@@ -337,6 +365,12 @@ LATEX = Dialect(
         },
         "abs": r"\left|{0}\right|",
         "sqrt": r"\sqrt{{{0}}}",
+        "floor": r"\left\lfloor {0} \right\rfloor",
+        "round": r"\mathrm{{round}}\left({0}\right)",
+        **_choices(
+            r"\left({2}\ \mathrm{{if}}\ {0} {op} {1},\ \mathrm{{else}}\ {3}\right)",
+            {"<=": r"\le", ">=": r"\ge"},
+        ),
     },
     _latex_number,
     latex_name,

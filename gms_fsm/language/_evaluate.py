@@ -7,7 +7,7 @@ from typing import Any
 
 from gms_fsm.language._fold import fold
 from gms_fsm.language._powers import product_power
-from gms_fsm.language.functions import COMPARISONS, FUNCTIONS, NAMESPACE, OPERATIONS
+from gms_fsm.language.functions import CHOICES, COMPARISONS, NAMESPACE, OPERATIONS
 from gms_fsm.language.tree import Binary, Both, Call, Either, Negative, Node, Not, Relation
 
 
@@ -66,7 +66,10 @@ class _Numbers:
         return 1.0 / product if whole < 0 else product
 
     def call(self, node: Call, parts: Iterator[float]) -> float:
-        return FUNCTIONS[node.function](*parts)
+        if node.function not in CHOICES:
+            return NAMESPACE[node.function](*parts)
+        holds = COMPARISONS[CHOICES[node.function]](next(parts), next(parts))
+        return fold(node.arguments[2 if holds else 3], self)
 
     def relation(self, node: Relation, parts: Iterator[float]) -> bool:
         result: bool = COMPARISONS[node.op](*parts)

@@ -7,7 +7,20 @@ from collections.abc import Iterator, Mapping
 from gms_fsm.language._dialects import ATOM, LEVELS, PYTHON, Dialect, Printed
 from gms_fsm.language._fold import fold
 from gms_fsm.language._powers import product_power
-from gms_fsm.language.tree import Binary, Both, Call, Either, Name, Negative, Node, Not, Relation
+from gms_fsm.language.functions import CHOICES
+from gms_fsm.language.tree import (
+    Binary,
+    Both,
+    Call,
+    Condition,
+    Either,
+    Name,
+    Negative,
+    Node,
+    Not,
+    Relation,
+    Value,
+)
 
 EVENT = "event__"  # the name of an event begins like this; it is 1 where the event has come
 
@@ -48,6 +61,40 @@ def spell(node: Node, dialect: Dialect = PYTHON, rename: Mapping[str, str] | Non
     return fold(node, _Printer(dialect, rename or {})).text
 
 
+def _short(node: Binary) -> Call | None:
+    """Return the call that was read as this, see `gms_fsm.language.functions.SHORT`."""
+    match node:
+        case Binary("-", a, Binary("*", b, Call("floor", (Binary("/", c, d),)))) if (a, b) == (
+            c,
+            d,
+        ):
+            return Call("mod", (a, b))
+        case Binary("*", q, Call("round", (Binary("/", u, p),))) if p == q:
+            return Call("quantise", (u, q))
+    return None
+
+
+def _chosen(node: Call) -> tuple[Condition, Value, Value]:
+    """Return the condition of a choice that was read one comparison at a time, and both values."""
+
+    def relation(node: Call) -> Relation:
+        return Relation(CHOICES[node.function], *node.arguments[:2])
+
+    *_, yes, no = node.arguments
+    both, either = [relation(node)], [relation(node)]
+    while isinstance(yes, Call) and yes.function in CHOICES and yes.arguments[3] == no:
+        both.append(relation(yes))
+        yes = yes.arguments[2]
+    while len(both) == 1 and isinstance(no, Call) and no.function in CHOICES:
+        if no.arguments[2] != yes:
+            break
+        either.append(relation(no))
+        no = no.arguments[3]
+    if len(either) > 1:
+        return Either(tuple(either)), yes, no
+    return Both(tuple(both)) if len(both) > 1 else both[0], yes, no
+
+
 class _Printer:
     """The algebra of printed text."""
 
@@ -79,6 +126,9 @@ class _Printer:
         return self.operator("neg", *parts)
 
     def binary(self, node: Binary, parts: Iterator[Printed]) -> Printed:
+        short = _short(node)
+        if short is not None and short.function in self.dialect.functions:
+            return self.function(short.function, (fold(each, self) for each in short.arguments))
         return self.operator(node.op, *parts)
 
     def power(self, node: Binary, parts: Iterator[Printed]) -> Printed:
@@ -99,6 +149,8 @@ class _Printer:
         return self.printed(product, LEVELS["*"])
 
     def call(self, node: Call, parts: Iterator[Printed]) -> Printed:
+        if node.function in CHOICES and "if" in self.dialect.functions:
+            return self.function("if", (fold(each, self) for each in _chosen(node)))
         return self.function(node.function, parts)
 
     def relation(self, node: Relation, parts: Iterator[Printed]) -> Printed:
@@ -118,6 +170,12 @@ class _Printer:
         return self.operator("not", *parts)
 
     def both(self, node: Both, parts: Iterator[Printed]) -> Printed:
+        match node.operands:
+            case (Relation("<=", a, b), Relation(">=", c, d)) if (a, b) == (
+                c,
+                d,
+            ) and "==" in self.dialect.operators:
+                return self.operator("==", fold(a, self), fold(b, self))
         return self.joined("and", parts) if node.operands else self.printed(self.dialect.true)
 
     def either(self, _: Either, parts: Iterator[Printed]) -> Printed:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import itertools
 import math
 import re
 import warnings
@@ -18,7 +19,15 @@ from gms_fsm.errors import ExpressionError, shown
 from gms_fsm.foundation.arguments import nearest, some_of
 from gms_fsm.foundation.parser import PARSER
 from gms_fsm.foundation.quantities import in_si
-from gms_fsm.language.functions import CONSTANTS, FUNCTIONS, NAMESPACE, SEVERAL
+from gms_fsm.language.functions import (
+    CONSTANTS,
+    FUNCTIONS,
+    NAMESPACE,
+    SEVERAL,
+    SHORT,
+    YIELDING,
+)
+from gms_fsm.language.normal import chosen, written_out
 from gms_fsm.language.tree import (
     Binary,
     Both,
@@ -32,12 +41,15 @@ from gms_fsm.language.tree import (
     Number,
     Relation,
     Value,
+    is_whole,
+    walk,
 )
 
 LONGEST_TEXT = 10_000  # characters; a chart's text is a line, not a program
 DEEPEST_TREE = 60  # levels; keeps every recursive reader far below Python's recursion limit
 MOST_ARGUMENTS = 50  # of min and max
 MOST_COMPARISONS = 100  # in one text; a guard is a line, and each comparison is watched separately
+MOST_PARTS = 2_000  # of a value that is read from short forms, in which arguments are repeated
 
 _OPERATORS: Mapping[type[ast.operator], str] = {
     ast.Add: "+",
@@ -84,6 +96,11 @@ _AFTER = re.compile(  # as in Stateflow: after(2, sec)
 )
 _QUANTITIES = {"time": "t", "position": "x", "velocity": "v", "force": "F"}  # of records, of runs
 _ALIASES: Mapping[str, str] = {
+    "quantize": "quantise",
+    "clip": "saturate",
+    "clamp": "saturate",
+    "nearest": "round",
+    "rint": "round",
     "sign": "sgn",
     "signum": "sgn",
     "fabs": "abs",
@@ -92,7 +109,12 @@ _ALIASES: Mapping[str, str] = {
     **_QUANTITIES,
     **{short: name for name, short in _QUANTITIES.items()},
 }
-_GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(FUNCTIONS) + " pi"
+_CALLED = (*FUNCTIONS, *SHORT)
+_GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(_CALLED) + " pi"
+# A call of if: nothing, an operator, a bracket, a comma or a word of conditions stands before it.
+_IF = re.compile(
+    r"(?:(?<![\w.)\]\s])|(?<=\band)|(?<=\bor)|(?<=\bnot)|(?<=\belse))(\s*)\bif(?=\s*\()"
+)
 
 
 class Owner(NamedTuple):
@@ -234,6 +256,8 @@ def _parsed(text: str) -> ast.expr:
             "after takes one time, in seconds", text, timed.start(2) + 1, f"after({seconds})"
         )
     flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay correct
+    # Python has a word if, but no function: these letters are the same name to it, and no word.
+    flat = _IF.sub(r"\1𝑖𝑓", flat)
     lead = len(flat) - len(flat.lstrip())
     if lead == len(flat):
         raise ExpressionError("the text is empty", text, 1, _GRAMMAR)
@@ -336,6 +360,8 @@ class _Reader:
             case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
                 self.known(node, function)
                 return self.call(node, function, arguments, depth)
+            case ast.IfExp(test=test, body=yes, orelse=no):
+                return self.choice(node, [test, yes, no], depth)
             case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
                 raise self.refuse("found a comparison where a number is needed", node)
         raise self.foreign(node)
@@ -353,8 +379,6 @@ class _Reader:
                 )
             case ast.Call(func=ast.Attribute(attr=function)) if function in FUNCTIONS:
                 instead = f"{function}(...), without a module before it"
-            case ast.IfExp():
-                instead = "min, max, abs, sgn; a case in a chart is a state of its own"
         return self.refuse(f"{_plain(node)} is not part of the language", node, instead)
 
     def name(self, node: ast.expr, name: str) -> Value:
@@ -362,7 +386,7 @@ class _Reader:
             return Name(name)
         if name in CONSTANTS:
             return Number(CONSTANTS[name])
-        if name in FUNCTIONS:
+        if name in _CALLED:
             raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
         raise self.refuse(
             f"unknown name {shown(name)}{_suggestion(name, [*self.names, *CONSTANTS])}",
@@ -383,11 +407,13 @@ class _Reader:
         return any("." in name for name in self.names)
 
     def known(self, node: ast.expr, function: str) -> None:
-        if function not in NAMESPACE:
+        if function in self.names and function in YIELDING:
+            raise self.refuse(f"{function!r} is a declared name here", node, "another name for it")
+        if function not in NAMESPACE and function not in SHORT:
             raise self.refuse(
-                f"unknown function {shown(function)}{_suggestion(function, FUNCTIONS)}",
+                f"unknown function {shown(function)}{_suggestion(function, _CALLED)}",
                 node,
-                "the functions " + ", ".join(FUNCTIONS),
+                "the functions " + ", ".join(_CALLED),
             )
 
     def call(self, node: ast.expr, function: str, arguments: list[ast.expr], depth: int) -> Value:
@@ -395,6 +421,14 @@ class _Reader:
             if len(arguments) != 2:
                 raise self.refuse(f"pow got {len(arguments)} arguments", node, "two arguments")
             return Binary("**", self.value(arguments[0], depth), self.value(arguments[1], depth))
+        if function in SHORT:
+            if len(arguments) != SHORT[function]:
+                wanted = "three arguments" if SHORT[function] == 3 else "two arguments"
+                raise self.refuse(f"{function} got {len(arguments)} arguments", node, wanted)
+            if function == "if":
+                return self.choice(node, arguments, depth)
+            parts = [self.value(each, depth + 2) for each in arguments]
+            return self.within(node, written_out(function, *parts))
         several = function in SEVERAL
         if (len(arguments) < 2) if several else (len(arguments) != 1):
             wanted = "two or more arguments" if several else "one argument"
@@ -413,6 +447,22 @@ class _Reader:
         for value in values[2:]:
             result = Call(function, (result, value))
         return result
+
+    def choice(self, node: ast.expr, given: list[ast.expr], depth: int) -> Value:
+        """Read a choice between two values, one comparison at a time."""
+        test, *values = given
+        levels = sum(isinstance(each, ast.cmpop) for each in ast.walk(test))
+        yes, no = (self.value(each, depth + levels) for each in values)
+        try:
+            return self.within(node, chosen(self.condition(test, depth), yes, no))
+        except TypeError as error:
+            raise self.refuse(str(error), test) from None
+
+    def within(self, node: ast.expr, value: Value) -> Value:
+        """Refuse a value whose repeated parts make it too large."""
+        if next(itertools.islice(walk(value), MOST_PARTS, None), None) is not None:
+            raise self.refuse("the value is too large", node, f"at most {MOST_PARTS} parts")
+        return value
 
     def condition(self, node: ast.expr, depth: int) -> Condition:
         depth = self.deeper(node, depth)
@@ -454,19 +504,18 @@ class _Reader:
                     )
                 parts: list[Condition] = []
                 for i, op in enumerate(ops):
-                    if type(op) not in _COMPARISONS:
+                    a, b = self.value(sides[i], depth), self.value(sides[i + 1], depth)
+                    if type(op) in _COMPARISONS:
+                        parts.append(Relation(_COMPARISONS[type(op)], a, b))
+                    elif isinstance(op, ast.Eq | ast.NotEq) and is_whole(a) and is_whole(b):
+                        equal = Both((Relation("<=", a, b), Relation(">=", a, b)))
+                        parts.append(equal if isinstance(op, ast.Eq) else Not(equal))
+                    else:
                         raise self.refuse(
                             "only < <= > >= compare floats (== and != are almost never true)",
                             sides[i + 1],
-                            "< <= > >=, for example a <= x <= b",
+                            "< <= > >=, for example a <= x <= b; whole numbers, round(x) == 2",
                         )
-                    parts.append(
-                        Relation(
-                            _COMPARISONS[type(op)],
-                            self.value(sides[i], depth),
-                            self.value(sides[i + 1], depth),
-                        )
-                    )
                 return parts[0] if len(parts) == 1 else Both(tuple(parts))
             case ast.BoolOp(op=op, values=values):
                 operands = tuple(self.condition(value, depth) for value in values)
@@ -475,9 +524,9 @@ class _Reader:
                 return Not(self.condition(operand, depth))
             case ast.Constant(value=True):
                 return Both(())
-            case ast.Call(func=ast.Name(id="after"), args=[time], keywords=[]) if (
-                "age" in self.names
-            ):
+            case ast.Call(
+                func=ast.Name(id="after" | "every" as word), args=[time], keywords=[]
+            ) if "age" in self.names and word not in self.names:
                 return Relation(">=", Name("age"), self.value(time, depth))
             case ast.Call(func=ast.Name(id="after"), args=given) if "age" in self.names:
                 wanted = "one time in seconds, for example after(0.2)"

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from gms_fsm.language._evaluate import evaluate
 from gms_fsm.language._fold import fold
 from gms_fsm.language._powers import product_power
-from gms_fsm.language.functions import COMPARISONS, FUNCTIONS, NAMESPACE, OPERATIONS
+from gms_fsm.language.functions import CHOICES, COMPARISONS, NAMESPACE, OPERATIONS
 from gms_fsm.language.tree import (
     Binary,
     Both,
@@ -140,6 +140,8 @@ class _Arrays:
         return 1.0 / product
 
     def call(self, node: Call, parts: Iterator[Any]) -> Any:
+        if node.function in CHOICES:
+            return self.choice(node, parts)
         u, *others = parts
         match node.function:
             case "abs":
@@ -153,7 +155,22 @@ class _Arrays:
                 return np.where(others[0] < u, others[0], u)
             case "max":
                 return np.where(others[0] > u, others[0], u)
-        return quick.each(FUNCTIONS[node.function], u, *others)
+            case "floor":
+                return np.floor(u)
+            case "round":
+                return np.rint(u)
+        return quick.each(NAMESPACE[node.function], u, *others)
+
+    def choice(self, node: Call, parts: Iterator[Any]) -> Any:
+        """Choose; a place is in doubt only where what is chosen there is."""
+        holds = COMPARISONS[CHOICES[node.function]](next(parts), next(parts))
+        before, found, doubts = self.doubtful, [], []
+        for part in node.arguments[2:]:
+            self.doubtful = np.zeros_like(before)
+            found.append(fold(part, self))
+            doubts.append(self.doubtful)
+        self.doubtful = before | np.where(holds, *doubts)
+        return np.where(holds, *found)
 
     def relation(self, node: Relation, parts: Iterator[Any]) -> Any:
         return COMPARISONS[node.op](*parts)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from integrators import elementary
+from integrators.machine_code import whole_numbers
 
 OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": operator.add,
@@ -50,12 +51,30 @@ FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "tanh": elementary.tanh,
     "atan": elementary.atan,
     "asinh": elementary.asinh,
+    "floor": whole_numbers.floor,
+    "round": whole_numbers.nearest,
 }
-NAMESPACE: Mapping[str, Callable[..., float]] = {**FUNCTIONS, "pow": elementary.power}
+# What generated text calls besides: powers, and a value whose sign changes where floor jumps.
+NAMESPACE: Mapping[str, Callable[..., float]] = {
+    **FUNCTIONS,
+    "pow": elementary.power,
+    "tooth": whole_numbers.tooth,
+    "noise": whole_numbers.noise,
+}
+# Functions that are read as others, or as one of whole numbers, with the number of their arguments.
+SHORT = {"mod": 2, "quantise": 2, "saturate": 3, "if": 3, "noise": 2}
+# ``if(a > b, c, d)`` is the call ``if_gt(a, b, c, d)``.
+CHOICES: Mapping[str, str] = {"if_lt": "<", "if_le": "<=", "if_gt": ">", "if_ge": ">="}
+# Words that are younger than files which use them as names: a declared name wins.
+YIELDING = ("floor", "round", *SHORT)
 CONSTANTS: Mapping[str, float] = {"pi": math.pi}
 SEVERAL = ("min", "max")  # functions of two or more arguments; the others take one
-ROUGH = ("sgn", "abs", "min", "max")  # functions whose flow has a corner or a jump
+# Functions whose flow has a corner or a jump.
+ROUGH = ("sgn", "abs", "min", "max", "floor", "round", *CHOICES)
 # Those of them that are ours.
 ELEMENTARY: Mapping[str, Callable[..., float]] = {
-    name: each for name, each in NAMESPACE.items() if each.__module__ == elementary.__name__
+    name: each
+    for name, each in NAMESPACE.items()
+    if each.__module__ in (elementary.__name__, whole_numbers.__name__)
 }
+ARGUMENTS: Mapping[str, int] = {name: 2 if name in ("pow", "noise") else 1 for name in ELEMENTARY}

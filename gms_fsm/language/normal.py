@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from gms_fsm.language._powers import integer_power
-from gms_fsm.language.functions import ROUGH
+from gms_fsm.language.functions import CHOICES, ROUGH
 from gms_fsm.language.tree import (
     Binary,
     Both,
@@ -21,6 +21,7 @@ from gms_fsm.language.tree import (
     Number,
     Relation,
     Value,
+    is_whole,
     rebuilt,
     walk,
 )
@@ -165,7 +166,8 @@ def comparisons(part: Split) -> tuple[Comparison, ...]:
 def rough_points(value: Value) -> tuple[Value, ...]:
     """Return every u whose sign decides a corner or a jump of `value`, innermost first.
 
-    ``sgn(u)`` and ``abs(u)`` turn at u = 0, ``min(a, b)`` and ``max(a, b)`` at a - b = 0.
+    ``sgn(u)`` and ``abs(u)`` turn at u = 0, ``min(a, b)``, ``max(a, b)`` and ``if(a > b, ...)`` at
+    a - b = 0, ``floor(u)`` at whole numbers, where ``tooth(u)`` is 0.
 
     Parameters
     ----------
@@ -188,7 +190,7 @@ def rough_points(value: Value) -> tuple[Value, ...]:
 
 
 def turning_inside(value: Value, new: Mapping[str, Value]) -> Value:
-    """Return a value with names replaced only inside its calls to sgn, abs, min and max.
+    """Return a value with names replaced only inside its calls that have a corner or a jump.
 
     Parameters
     ----------
@@ -214,10 +216,63 @@ def turning_inside(value: Value, new: Mapping[str, Value]) -> Value:
 
 
 def _turning(call: Call) -> Value:
-    if call.function in ("sgn", "abs"):
-        return call.arguments[0]
-    a, b = call.arguments
-    return a if b == Number(0.0) else Binary("-", a, b)
+    a, *others = call.arguments
+    match call.function:
+        case "floor":
+            return Call("tooth", (a,))
+        case "round":
+            return Call("tooth", (Binary("+", a, Number(0.5)),))
+    if not others or others[0] == Number(0.0):
+        return a
+    return Binary("-", a, others[0])
+
+
+def frozen(call: Call, sign: Value) -> Value:
+    """Return a rough call as it goes on beyond its corner or jump while a sign is held.
+
+    Parameters
+    ----------
+    call : Call
+        The call, see `rough_points`.
+    sign : Value
+        The sign that is held: 1, -1, or 0 on the corner itself.
+
+    Returns
+    -------
+    Value
+        The same as the call as long as the sign is right.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import Name, frozen, parse_value, spell
+    >>> spell(frozen(parse_value("if(v >= 1, v, 2)", ["v"]), Name("sign")))
+    '(v if sign >= 0.0 else 2.0)'
+    """
+    a, *_ = call.arguments
+    zero = Number(0.0)
+    match call.function:
+        case "sgn":
+            return sign
+        case "abs":
+            return Binary("*", sign, a)
+        case "min" | "max":
+            return Call(
+                "if_le" if call.function == "min" else "if_ge", (sign, zero, *call.arguments)
+            )
+        case "floor":
+            there = Call("if_lt", (sign, zero, _below(a, odd=True), Call("round", (a,))))
+            return Call("if_gt", (sign, zero, _below(a), there))
+        case "round":
+            u = Binary("+", a, Number(0.5))
+            return Call("if_ge", (sign, zero, _below(u), _below(u, odd=True)))
+    return Call(call.function, (sign, zero, *call.arguments[2:]))
+
+
+def _below(u: Value, odd: bool = False) -> Value:
+    """Return the even, or the odd, whole number below u, and half a number beyond the next."""
+    half = Binary("-", Binary("*", Number(0.5), u), Number(0.75 if odd else 0.25))
+    even = Binary("*", Number(2.0), Call("round", (half,)))
+    return Binary("+", even, Number(1.0)) if odd else even
 
 
 def substitute(
@@ -300,3 +355,35 @@ def renamed_in(condition: Condition, new: Mapping[str, Value]) -> Condition:
         case Either(operands):
             return Either(tuple(renamed_in(each, new) for each in operands))
     return condition
+
+
+# --------------------------------------------------------------------------- short forms
+def written_out(function: str, a: Value, b: Value, *more: Value) -> Value:
+    """Return what a function of `gms_fsm.language.functions.SHORT` other than if stands for."""
+    match function:
+        case "saturate":
+            return Call("min", (Call("max", (a, b)), *more))
+        case "noise":
+            return Call("noise", tuple(u if is_whole(u) else Call("floor", (u,)) for u in (a, b)))
+    whole = Call("floor" if function == "mod" else "round", (Binary("/", a, b),))
+    parts = Binary("*", b, whole)
+    return parts if function == "quantise" else Binary("-", a, parts)
+
+
+def chosen(condition: Condition, yes: Value, no: Value) -> Value:
+    """Return a choice between two values, one comparison at a time."""
+    match condition:
+        case Relation(op, left, right):
+            name = next(each for each, known in CHOICES.items() if known == op)
+            return Call(name, (left, right, yes, no))
+        case Not(operand):
+            return chosen(operand, no, yes)
+        case Both(operands):
+            for each in reversed(operands):
+                yes = chosen(each, yes, no)
+            return yes
+        case Either(operands):
+            for each in reversed(operands):
+                no = chosen(each, yes, no)
+            return no
+    raise TypeError("a value depends on numbers, not on states")

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
+from gms_fsm.language.functions import CHOICES
+
 
 @dataclass(frozen=True)
 class Number:
@@ -179,6 +181,20 @@ def states_in(node: Node) -> frozenset[int]:
     [2]
     """
     return frozenset(n.element for n in walk(node) if isinstance(n, InState))
+
+
+def is_whole(value: Value) -> bool:
+    """Tell whether a value is a whole number, whatever its names stand for."""
+    match value:
+        case Number(number):
+            return number.is_integer()
+        case Call("floor" | "round" | "sgn"):
+            return True
+        case Call(function, arguments) if function in CHOICES:
+            return all(map(is_whole, arguments[2:]))
+        case Negative() | Binary("+" | "-" | "*") | Call("abs" | "min" | "max"):
+            return all(map(is_whole, value.parts))
+    return False
 
 
 def rebuilt(value: Value, change: Callable[[Value], Value]) -> Value:

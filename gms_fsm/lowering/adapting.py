@@ -164,7 +164,7 @@ class _AdaptingPrinter(LockFunctions):
         y, bodies = self.layout.y, self.read.free
         scaleless = [(u.x, 2) for u in bodies] + [(u.v, 1) for u in bodies]
         places = [(y.index(name), power) for name, power in scaleless if name in y.shared]
-        lines = ["for j in range(len(atol)):", "    floor[j] = atol[j]"]
+        lines = ["for j in range(len(atol)):", "    least[j] = atol[j]"]
         if places:
             signals = self.read.system.signals.values()
             # A user's own function is not asked ahead of time.
@@ -176,11 +176,11 @@ class _AdaptingPrinter(LockFunctions):
                 body += [f"most = larger(most, abs({each}))" for each in self.accelerations()]
             for place, power in places:
                 rounded = " * ".join([f"{ROUNDED} * most", *["length"] * power])
-                body += [f"if atol[{place}] == 0.0:", f"    floor[{place}] = {rounded}"]
+                body += [f"if atol[{place}] == 0.0:", f"    least[{place}] = {rounded}"]
             lines += [f"    {each}" for each in body]
         return self.plain(
-            "raise_floor(span, y, mode, p, held, live, watch, dy, seen, atol, floor)",
-            "floor = atol; where it is 0, what rounding leaves of the largest motion there can be.",
+            "raise_floor(span, y, mode, p, held, live, watch, dy, seen, atol, least)",
+            "least = atol; where it is 0, what rounding leaves of the largest motion there can be.",
             lines,
         )
 

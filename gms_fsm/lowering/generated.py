@@ -11,6 +11,7 @@ import builtins
 import functools
 import hashlib
 import inspect
+import itertools
 import linecache
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -22,9 +23,10 @@ import numpy as np
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.parser import PARSER
 from gms_fsm.foundation.text import visible
-from gms_fsm.language import ELEMENTARY, NAMESPACE
+from gms_fsm.language import ARGUMENTS, ELEMENTARY, NAMESPACE
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 from integrators import elementary
+from integrators.machine_code import whole_numbers
 from integrators.runners import quick
 
 # What generated text calls besides the functions of the expression language.
@@ -64,7 +66,7 @@ def quickened(namespace: dict[str, Any]) -> dict[str, Any]:
         return call
 
     for name in ELEMENTARY:
-        namespace[name] = counted(name, NAMESPACE[name], 2 if name == "pow" else 1)
+        namespace[name] = counted(name, NAMESPACE[name], ARGUMENTS[name])
     return namespace
 
 
@@ -98,7 +100,8 @@ def standalone(source: str) -> str:
             case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name):
                 own.add(name)
     known: dict[str, Any] = {**NAMESPACE, **SIGNALS}
-    missing = sorted(used - own - set(dir(builtins)))
+    python = {name for name, each in vars(builtins).items() if known.get(name, each) is each}
+    missing = sorted(used - own - python)
     if foreign := [name for name in missing if name not in known]:
         raise ParameterError(
             "a Python function, which cannot be written as text",
@@ -142,7 +145,8 @@ def elementary_text(names: Iterable[str]) -> str:
 def _elementary_parts() -> list[tuple[list[str], list[str], str]]:
     """Return the names that each part of the module defines, those that it uses, and its text."""
     parts = []
-    for part in _tree(inspect.getsource(elementary)).body:
+    sources = (_tree(inspect.getsource(each)).body for each in (elementary, whole_numbers))
+    for part in itertools.chain(*sources):
         match part:
             case ast.FunctionDef(name=name):
                 given, space = [name], "\n\n"

@@ -36,7 +36,7 @@ import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError, shown
 from gms_fsm.foundation.equality import ByIdentity
-from gms_fsm.language import Binary, Requirement, Value, rough_points, spell
+from gms_fsm.language import Binary, Call, Comparison, Requirement, Value, rough_points, spell
 from gms_fsm.lowering.adapting import Adaptive, adaptive
 from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful, quickened
 from gms_fsm.lowering.layout import SystemLayout
@@ -354,16 +354,28 @@ def guarded(name: str, call: Callable[[float], float]) -> Callable[[float], floa
 def _relation_names(plan: ProgramPlan) -> list[str]:
     """Return each relation in words."""
     return [
-        spell(Requirement(relation, True).relation, rename=plan.names.plain)
-        + _of_element(plan, Binary("-", relation.left, relation.right), i)
+        _in_words(relation, plan) + _of_element(plan, Binary("-", relation.left, relation.right), i)
         for relation, i in plan.relations
     ]
+
+
+def _in_words(relation: Comparison, plan: ProgramPlan) -> str:
+    if isinstance(relation.left, Call) and relation.left.function == "tooth":
+        return f"{_zero_in_words(relation.left, plan)} = 0"
+    return spell(Requirement(relation, True).relation, rename=plan.names.plain)
+
+
+def _zero_in_words(u: Value, plan: ProgramPlan) -> str:
+    match u:
+        case Call("tooth", (inside,)):  # not a word of the language
+            return f"mod({spell(inside, rename=plan.names.plain)}, 1)"
+    return spell(u, rename=plan.names.plain)
 
 
 def _surface_names(plan: ProgramPlan) -> list[str]:
     """Return the value that is zero on each surface, in words."""
     return [
-        spell(u, rename=plan.names.plain) + _of_element(plan, u, i)
+        _zero_in_words(u, plan) + _of_element(plan, u, i)
         if not isinstance(u, Pair)
         else f"{spell(u.value, rename=plan.names.plain)} ({u.lower}, {u.upper})"
         + _of_contact(plan, u.bank, i)

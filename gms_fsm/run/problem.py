@@ -20,12 +20,13 @@ from gms_fsm.lowering.floor import floor_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.lowering.program import Program, arguments, lower
-from gms_fsm.lowering.pulses import waking_times
+from gms_fsm.lowering.pulses import step_times, waking_times
 from gms_fsm.lowering.scales import Setting, Tolerance, scales_of_system
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.ticks import clocks_of, ticks_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted, mounted
+from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
 from gms_fsm.systems.system import System
@@ -337,13 +338,17 @@ def _component(layout: SystemLayout, key: object, owner: str) -> str:
 
 
 def _with_waking_times(program: Program, system: System, t_start: float, t_end: float) -> Program:
-    """Return the program with the times at which its formulas start to change as knots."""
+    """Return the program with the times at which formulas jump or start to change as knots."""
     times = {
         time
         for signal in system.signals.values()
         if isinstance(signal, Formula)
         for time in waking_times(signal.tree, t_start, t_end)
     }
+    if program.plan.steps:
+        shared, own = numbers_of(system)
+        rows = {name: as_floats(row) for name, (_, row) in own.items()}
+        times |= step_times(program.plan.steps, shared, rows, t_start, t_end)
     return replace(program, knots=sorted({*program.knots, *times})) if times else program
 
 

@@ -15,6 +15,7 @@ from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import (
     CONSTANTS,
     FUNCTIONS,
+    YIELDING,
     Binary,
     Name,
     Negative,
@@ -76,7 +77,7 @@ def check_name(name: object, place: str, key: tuple[str | int, ...] = ()) -> Non
             advice="use letters, digits and _, not starting with a digit, and no Python keyword",
             key=key,
         )
-    if name in FUNCTIONS or name in CONSTANTS or name == "pow":
+    if name in {*FUNCTIONS, *CONSTANTS, "pow"} - {*YIELDING}:
         raise ParameterError(f"the name {name!r} is a word of the language", place=place, key=key)
 
 

@@ -102,6 +102,9 @@ class System:
         Further smooth states, each with its time derivative: a current, an integrator.
     sampled : sequence of Sampled, optional
         Controllers with ticks.
+    let : mapping of str to str, optional
+        Named expressions of the above, for all texts but those of signals and given velocities;
+        later ones can use earlier ones.
 
     Raises
     ------
@@ -138,6 +141,7 @@ class System:
     numbers: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     flow: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     sampled: tuple[Sampled, ...] = field(default=(), kw_only=True)
+    let: Mapping[str, str] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
@@ -164,6 +168,7 @@ class System:
         }
         put(self, "numbers", numbers)
         put(self, "flow", texts_of(self.flow, f"{here}: flow"))
+        put(self, "let", texts_of(self.let, f"{here}: let"))
         put(self, "signals", mapping_of(self.signals, f"{here}: signals"))
         self._check_names(here)
         signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
@@ -198,7 +203,8 @@ class System:
             if not (body.velocity == body.v and body.v in self.signals):
                 own.append((body.v, ("bodies", i, "v")))
             groups.append((f"body {body.name!r}", own))
-        for kind, attribute in (("signal", "signals"), ("number", "numbers"), ("flow", "flow")):
+        named = {"signal": "signals", "number": "numbers", "flow": "flow", "let": "let"}
+        for kind, attribute in named.items():
             groups.append((kind, [(name, (attribute, name)) for name in getattr(self, attribute)]))
         for i, each in enumerate(self.sampled):
             values: list[tuple[str, Key]] = [
@@ -274,8 +280,8 @@ class System:
             ``[[spring]]`` (name, first, second, k, d, ratio, rest), ``[[contact]]`` (name, v, n,
             inputs, period; ``chart``, a chart file next to this file, the name of an included
             chart, or a table as in a chart file, with ``values``; or ``model``, as in scenario
-            files), ``[signals]``, ``[numbers]``, ``[flow]`` and ``[[sampled]]`` (name, period,
-            updates, initial, offset).
+            files), ``[signals]``, ``[numbers]``, ``[flow]``, ``[let]`` and ``[[sampled]]`` (name,
+            period, updates, initial, offset).
 
         Returns
         -------
@@ -326,7 +332,7 @@ class System:
         given = (
             f"{each.name}.{name}" for each in self.supervisors for name in each.chart.force_names
         )
-        every = ("t", *moved, *self.flow, *updated, *self.signals, *self.numbers, *given)
+        every = ("t", *moved, *self.flow, *updated, *self.signals, *self.numbers, *self.let, *given)
         return tuple(dict.fromkeys(every))
 
     @property

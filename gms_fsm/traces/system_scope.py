@@ -20,7 +20,7 @@ from gms_fsm.errors import SignalError, UnitError, shown
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.foundation.quantities import UNITS, convert_numbers, factor
 from gms_fsm.foundation.quantities import in_si as number_in_si
-from gms_fsm.language import Owner, evaluate
+from gms_fsm.language import Name, Owner, evaluate, names_in, values_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program
@@ -165,6 +165,10 @@ class SystemScope:
             return self.system.numbers[name]
         if name in self.given:
             return self.given[name]
+        if name in self.system.let:
+            tree = self.system.assembly.expanded(Name(name))
+            found = values_of(tree, {each: self.value(each) for each in ("t", *names_in(tree))})
+            return found if found.ndim else float(found)
         if name not in self.layout.y.shared:  # an output of a supervisor
             owner, _, output = name.partition(".")
             return self.contacts[owner].seen[output]

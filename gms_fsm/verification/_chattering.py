@@ -128,7 +128,7 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
         text = f"on {place} each flow pushes into the other's guard: {follows}"
         return refuted(text, point)
     if of_guards.breaks:
-        raise Undecided("sgn jumps in a guard")
+        raise Undecided("a value jumps in a guard")
     sure = [
         formula
         for edge in (there, back)

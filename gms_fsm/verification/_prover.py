@@ -13,6 +13,7 @@ from gms_fsm.charts.nesting import AGE
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.foundation.extras import require
 from gms_fsm.language import (
+    CHOICES,
     COMPARISONS,
     LARGEST_PRODUCT_POWER,
     MATLAB_LIKE,
@@ -155,6 +156,12 @@ class _Formulas:
                 return self.least(*parts)
             case "max":
                 return -self.least(*(-part for part in parts))
+            case "floor":
+                return self.floor(*parts)
+            case "round":
+                return self.nearest(*parts)
+            case function if function in CHOICES:
+                return self.choice(COMPARISONS[CHOICES[function]], *parts)
         raise Undecided(f"{node.function} is not encoded: {shown(node)}")
 
     def absolute(self, u: Dual) -> Dual:
@@ -173,6 +180,24 @@ class _Formulas:
         corner = choose(a.slope <= b.slope, a.slope, b.slope)
         slope = choose(a.value < b.value, a.slope, choose(b.value < a.value, b.slope, corner))
         return Dual(choose(a.value <= b.value, a.value, b.value), slope)
+
+    def floor(self, u: Dual) -> Dual:
+        whole = self.z3.ToReal(self.z3.ToInt(u.value))
+        self.reading.breaks.append(u.value - whole)
+        return Dual(whole, self.zero)
+
+    def nearest(self, u: Dual) -> Dual:
+        choose, half = self.z3.If, self.z3.RealVal("1/2")
+        whole = self.floor(Dual(u.value + half, u.slope)).value
+        between = u.value + half == whole  # then the even one of two
+        even = 2 * self.z3.ToReal(self.z3.ToInt(whole / 2))
+        return Dual(choose(between, even, whole), self.zero)
+
+    def choice(self, compare: Callable[[Any, Any], Any], a: Dual, b: Dual, *of: Dual) -> Dual:
+        self.reading.breaks.append(a.value - b.value)
+        holds = compare(a.value, b.value)
+        yes, no = of
+        return Dual(self.z3.If(holds, yes.value, no.value), self.z3.If(holds, yes.slope, no.slope))
 
     def relation(self, node: Relation, parts: Iterator[Dual]) -> Any:
         _refuse_high_degree(node.left)

@@ -215,8 +215,8 @@ RESERVED = """
     INFINITY NAN NULL alignas alignof asm auto bool break callbacks case char const continue
     default do double else enum extern false float for goto if inline int long register restrict
     return short signed sizeof static struct switch true typedef union unsigned void volatile
-    while acos asin asinh atan atan2 cos cosh exp fabs gamma j0 j1 jn log main nextafter pow sin
-    sinh sqrt tan tanh y0 y1 yn abs_i div_i max_f max_i min_f min_i mod_i
+    while acos asin asinh atan atan2 cos cosh exp fabs floor gamma j0 j1 jn log main nextafter pow
+    round sin sinh sqrt tan tanh y0 y1 yn abs_i div_i max_f max_i min_f min_i mod_i
 """
 
 

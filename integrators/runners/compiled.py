@@ -23,7 +23,7 @@ import numpy as np
 from integrators import advance, crossings, elementary, loop, sliding, step_size, steps
 from integrators.loop import Buffers, Machines
 from integrators.machine_code import layout as layouts
-from integrators.machine_code import llvm, objects, records, tree
+from integrators.machine_code import llvm, objects, records, tree, whole_numbers
 from integrators.machine_code.front_end import (
     bindings,
     expressions,
@@ -65,8 +65,8 @@ __all__ = [
 
 # What is translated: the loop, and what it calls.
 LOOPS = (
-    elementary, steps, step_size, crossings, advance, sliding, sliding_bounds, jolts, loop, columns,
-    stepping, observing,
+    elementary, whole_numbers, steps, step_size, crossings, advance, sliding, sliding_bounds, jolts,
+    loop, columns, stepping, observing,
 )  # fmt: skip
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8

@@ -24,8 +24,10 @@ from gms_fsm.language import (
     fold,
     product_power,
 )
+from gms_fsm.language.functions import ROUGH
 
-EXACT = ("abs", "sqrt", "sgn", "min", "max")  # functions that round the same everywhere
+# Functions that round the same everywhere.
+EXACT = (*ROUGH, "sqrt", "tooth", "noise")
 Stored = dict[str, Value]  # by name, such as "#0"
 
 

@@ -37,6 +37,7 @@ from gms_fsm.language import (
     LEVELS,
     OPERATIONS,
     SEVERAL,
+    SHORT,
 )
 from gms_fsm.session.explain import ROUNDING
 from gms_fsm.traces.trace import Trace
@@ -315,10 +316,10 @@ def _language() -> dict[str, Any]:
     """Return the parts of the language that the page needs to parse a typed condition."""
     binary = {op: LEVELS[op] for op in ("or", "and", *OPERATIONS, "**")}
     return {
-        "levels": binary | dict.fromkeys(COMPARISONS, LEVELS["<"]),
+        "levels": binary | dict.fromkeys([*COMPARISONS, "==", "!="], LEVELS["<"]),
         "negation": LEVELS["not"],
         "sign": LEVELS["neg"],
-        "functions": {name: "several" if name in SEVERAL else "one" for name in FUNCTIONS},
+        "functions": dict.fromkeys(FUNCTIONS, 1) | dict.fromkeys(SEVERAL, None) | SHORT,
         "constants": dict(CONSTANTS),
         "units": {  # each with its factor, and the unit of SI for what it measures
             unit: [factor, next(name for name, one in units.items() if one == 1.0)]

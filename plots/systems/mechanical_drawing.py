@@ -319,6 +319,8 @@ def _sources(system: System) -> list[str]:
     flows = {name: text for name, text in system.flow.items() if name in used}
     for text in flows.values():
         used |= names_in(parse_value(text, system.readable))
+    for name, text in reversed([*system.let.items()]):  # earlier ones are used by later ones
+        used |= names_in(parse_value(text, system.readable)) if name in used else set()
     for name, signal in system.signals.items():
         if name in used:
             lines += _folded(signal_text(name, signal))
@@ -331,6 +333,8 @@ def _sources(system: System) -> list[str]:
             lines.append(f"{', '.join(map(formula, own))}: from {sampled.name}, every {every}")
     for name, text in flows.items():
         lines += _folded(f"d{name}/dt = {text}")
+    for name, text in system.let.items():
+        lines += _folded(f"{name} = {text}") if name in used else []
     return lines
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gms_fsm.language import FUNCTIONS
+from gms_fsm.language import FUNCTIONS, SHORT
 from plots.style import INK, LINE_GREY, PANEL, PAPER, RC
 from plots.style.matplotlib import (
     Artist,
@@ -36,9 +36,10 @@ LINE = 0.3  # from one line of small type to the next
 LEAD, PLATE = 1.2, 0.22  # widths of lines; half the height of a plate
 
 _TOKEN = re.compile(
-    r"(?P<power>\^-?\w[\w.]*)|(?P<name>[A-Za-z_]\w*)|(?P<number>[\d.]+(?:e[+-]?\d+)?)|."
+    r"(?P<power>\^-?\w[\w.]*)|(?P<name>[A-Za-z_]\w*)|(?P<number>[\d.]+(?:e[+-]?\d+)?)|[<>]=|."
 )
 TIMES = r"\,"  # a thin space
+_MARKS = {"*": TIMES, " ": r"\ ", "<=": r"\leq ", ">=": r"\geq "}
 _GREEK = frozenset(
     ("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu")
     + ("nu", "xi", "pi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega")
@@ -52,6 +53,8 @@ def formula(text: str) -> str:
     --------
     >>> formula("k_c * (x_2 - x_1)")
     '$k_{c}\\,(x_{2} - x_{1})$'
+    >>> formula("if(x >= 0, 1, 2)")
+    '$\\mathrm{if}(x\\ \\geq \\ 0,\\ 1,\\ 2)$'
     """
     opening = text.find("^(")
     if opening >= 0:  # an exponent in brackets
@@ -78,14 +81,14 @@ def formula(text: str) -> str:
             times = r"\cdot " if parts and parts[-1] == TIMES else ""
             parts.append(f"{times}{mantissa}{ten}")
         else:
-            parts.append({"*": TIMES, " ": r"\ "}.get(match[0], match[0]))
+            parts.append(_MARKS.get(match[0], match[0]))
     # Matplotlib spaces operators itself.
     return "$" + re.sub(r"\\ ([-+=/<>])\\ ", r" \1 ", "".join(parts)) + "$"
 
 
 def _symbol(name: str) -> str:
     head, _, index = name.partition("_")
-    if name in FUNCTIONS:
+    if name in (*FUNCTIONS, *SHORT, "and", "or", "not"):
         return rf"\mathrm{{{name}}}"
     shown = rf"\{head}" if head in _GREEK else head if len(head) == 1 else rf"\mathit{{{head}}}"
     if not index:

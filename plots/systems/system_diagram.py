@@ -49,6 +49,7 @@ LOOKS = {
     "signal": (0, "rounded,filled", PAPER, 1.1),
     "sampled": (1, "filled", PAPER, 1.1),
     "flow": (1, "filled", PAPER, 1.1),
+    "let": (1, "filled", PAPER, 1.1),
     "supervisor": (1, "rounded,filled", PAPER, 1.1),
     "body": (2, "filled", PANEL, 1.8),
     "spring": (3, "filled", PAPER, 1.8),
@@ -144,6 +145,9 @@ def _blocks(system: System) -> Iterator[DiagramBlock]:
         yield DiagramBlock(
             "flow", name, "state", (_equation(f"d{name}/dt", tree),), _read(system, [tree])
         )
+    for name, text in system.let.items():
+        tree = parse_value(text, names)
+        yield DiagramBlock("let", name, "value", (_equation(name, tree),), _read(system, [tree]))
     for body in system.bodies:
         yield _body(system, body)
     for index, spring in enumerate(system.springs):
@@ -252,6 +256,7 @@ def _owners(system: System) -> Mapping[str, str]:
     """Return for each name the id of the block that it comes from."""
     owners = {name: f"signal-{name}" for name in system.signals}
     owners |= {name: f"flow-{name}" for name in system.flow}
+    owners |= {name: f"let-{name}" for name in system.let}
     owners |= {name: f"sampled-{each.name}" for each in system.sampled for name in each.updates}
     for each in system.machines:
         block = f"{'contact' if each.v else 'supervisor'}-{each.name}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gms_fsm import ChartModel, Prescribed, simulate
+from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, simulate
 from tests.corpus import LAMP, run, trace
 
 
@@ -31,3 +31,28 @@ def test_the_age_is_a_variable_of_its_own_that_every_entry_resets() -> None:
     one = run("ages")(t_eval=[0.25, 0.35, 0.85, 0.95])
     np.testing.assert_allclose(one.variable("age")[:, 0], [0.25, 0.05, 0.55, 0.05], atol=1e-12)
     assert "age" not in {name for state in LAMP.states for name in state.flow}
+
+
+def test_an_edge_from_a_state_to_itself_counts_every_time_span() -> None:
+    chart = Chart(
+        "clock",
+        variables=("n",),
+        states=(State("on", {"n": "0"}),),
+        transitions=(Transition("tick", "on", "on", "every(0.7)", actions={"n": "n + 1"}),),
+        outputs={"F": "n"},
+    )
+    one = simulate(ChartModel(chart, {}), Prescribed("0"), 10.0)
+    np.testing.assert_allclose(one.transitions.t, 0.7 * np.arange(1, 15), rtol=1e-13)
+    assert one.F[-1] == 14.0
+
+
+def test_a_parameter_called_every_is_one() -> None:
+    (edge,) = Chart(
+        "own",
+        variables=("n",),
+        parameters=("every",),
+        states=(State("on", {"n": "1"}),),
+        transitions=(Transition("tick", "on", "on", "n > every", actions={"n": "0"}),),
+        outputs={"F": "n"},
+    ).transitions
+    assert edge.guard == "n > every"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm.language import CONSTANTS, FUNCTIONS
+from gms_fsm.language import CONSTANTS, FUNCTIONS, SHORT
 from tests.helpers import ROOT
 
 TEXTS = [
@@ -98,4 +98,4 @@ def test_the_citation_names_this_version() -> None:
 
 def test_the_language_page_has_every_function() -> None:
     page = (ROOT / "docs/concepts/chart.md").read_text(encoding="utf-8")
-    assert f"`{' '.join([*FUNCTIONS, *CONSTANTS])}`" in page
+    assert f"`{' '.join([*FUNCTIONS, *SHORT, *CONSTANTS])}`" in page

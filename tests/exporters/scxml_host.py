@@ -16,7 +16,7 @@ from gms_fsm.systems.models import Model
 __all__ = ["PythonStateMachine", "Tool", "moved_by", "run", "switches_of"]
 
 Switch = tuple[float, str, str]  # when, from which state, to which
-NAMES = ("exp", "log", "sqrt", "sin", "cos", "tanh", "atan", "asinh", "pow")
+NAMES = ("exp", "log", "sqrt", "sin", "cos", "tanh", "atan", "asinh", "pow", "floor")
 MATH = SimpleNamespace(**{name: getattr(math, name) for name in NAMES}, abs=abs, min=min, max=max)
 MATH.sign = lambda u: float((u > 0) - (u < 0))
 

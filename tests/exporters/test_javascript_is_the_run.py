@@ -28,6 +28,8 @@ from gms_fsm import (
     Transition,
     export,
 )
+from gms_fsm.systems.system import system_of
+from tests.corpus import run
 from tests.helpers import ROOT, matrix, stick_slip
 from tests.soak.platforms import (
     COMPILERS,
@@ -77,6 +79,12 @@ def test_a_scenario_has_the_same_bits_in_c_and_in_javascript(name: str) -> None:
 def test_a_random_system_has_the_same_bits(index: int, tmp_path: Path) -> None:
     """Repeat a difference with: python -m tests.soak.platforms --seed 11 --first INDEX."""
     same(random_case(SEED, index), tmp_path)
+
+
+def test_functions_that_jump_have_the_same_bits(tmp_path: Path) -> None:
+    friction, rig = run("functions that jump").subject
+    trace = same(Case("jumps", system_of(friction, rig), 9.0, {}), tmp_path)
+    assert len(trace.transitions) > 10
 
 
 def test_columns_grow(tmp_path: Path) -> None:

@@ -126,6 +126,7 @@ ROWS: list[tuple[str, Any, str, str]] = [  # formats, what is given, place, word
     ("st", model(parameters=("k__1",), outputs={"F": "k__1 * z"}), "name 'k__1'", "underscores"),
     ("st", model(flow="v - tanh(z)"), "chart 'own'", "'tanh'"),
     ("st modelica", model(flow="v - asinh(z)"), "chart 'own'", "'asinh'"),
+    ("st modelica scxml", model(guard="noise(v, 1) > z"), "chart 'own'", "'noise'"),
     ("matlab", ChartModel(EDGES, {}), "variable 'edges'", "field"),
     # numbers, first values, signals
     ("c99 fmu3 js matlab", chart(), "chart 'own'", "numbers"),

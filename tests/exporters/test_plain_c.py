@@ -28,7 +28,7 @@ from gms_fsm import (
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import plain_c
-from tests.corpus import LIGHT
+from tests.corpus import JUMPING, LIGHT
 from tests.exporters.c_programs import COMPILERS, needs_c, plain_compared, plain_step
 from tests.exporters.frictions import case, loaded
 
@@ -54,6 +54,22 @@ def test_further_inputs_position_and_time(tmp_path: Path) -> None:
     found = [step(math.cos(3 * one), 0.5, one, two - one) for one, two in itertools.pairwise(t)]
     assert found == pytest.approx(F[:-1], rel=1e-12)
     assert len(trace.transitions) > 2
+
+
+@needs_c
+@pytest.mark.slow
+def test_functions_that_jump_have_the_bits_of_the_engine(tmp_path: Path) -> None:
+    friction = ChartModel(JUMPING, {"k": 1.0, "T": [0.7, 1.1]}, n=2)
+    step = plain_step(tmp_path, Subject.of(friction, "c99", name="jumps"))
+    rig, how = Prescribed("0.6 * cos(1.3 * t)"), {"method": "euler", "step": 2.0**-6}
+    trace = simulate(friction, rig, 9.0, events="step", engine="ifelse", **how)  # type: ignore[arg-type]
+    last = np.append(np.diff(trace.t) > 0.0, True)  # of the rows at one time: after switching
+    t, v, F = (row[last].tolist() for row in (trace.t, trace.v, trace.F))
+    found = [
+        step(w, one, two - one) for (one, two), w in zip(itertools.pairwise(t), v, strict=False)
+    ]
+    assert found == F[:-1]
+    assert len(trace.transitions) > 10
 
 
 @needs_c

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gms_fsm import Chart, Prescribed, State, export, simulate
+from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, export, simulate
 from tests.exporters.charts_to_export import model
 from tests.exporters.nested_charts import made, run_of, seen_by
 from tests.exporters.scxml_host import PythonStateMachine, moved_by, run, switches_of
@@ -26,6 +26,35 @@ def test_the_gms_element(tmp_path: Path) -> None:
     )
     mine = run(PythonStateMachine(path), gms, 0, moved_by(VELOCITY), 25.0, 0.05)
     assert len(mine) == 4
+    assert mine == switches_of(trace, 0)
+
+
+@pytest.mark.slow
+def test_a_chart_with_functions_that_jump(tmp_path: Path) -> None:
+    """The tool knows neither a choice nor a function that rounds to the even number."""
+    pytest.importorskip("statemachine", reason="needs python-statemachine")
+    chart = Chart(
+        "jumps",
+        inputs=("t", "v"),
+        variables=("z", "n"),
+        states=(State("on", {"z": "v", "n": "0"}), State("off", {"z": "-0.3 * z", "n": "0"})),
+        transitions=(
+            Transition(
+                "rest",
+                "on",
+                "off",
+                "if(v > 0 and not quantise(z, 0.25) < 0.5, z, 0) > 0.5",
+                actions={"n": "mod(n + 1, 3)"},
+            ),
+            Transition("go", "off", "on", "z < 0.2 and (round(n) == 1 or mod(t, 2) > 1)"),
+        ),
+        outputs={"F": "z"},
+    )
+    friction, velocity = ChartModel(chart, {}), "0.7 * sin(t)"
+    path, *_ = export(friction, "scxml", tmp_path, name="jumps")
+    trace = simulate(friction, Prescribed(velocity), 25.0, method="euler", step=0.05, events="step")
+    mine = run(PythonStateMachine(path), friction, 0, moved_by(velocity), 25.0, 0.05)
+    assert len(mine) > 4
     assert mine == switches_of(trace, 0)
 
 

@@ -27,7 +27,7 @@ from gms_fsm import (
 from gms_fsm.charts import CHARTS, GMS_ELEMENT
 from gms_fsm.charts.nesting import spelled
 from gms_fsm.language import evaluate, parse_value
-from tests.corpus import LIGHT
+from tests.corpus import JUMPING, LIGHT
 from tests.exporters.charts_to_export import MODELS, SLOW, imported, model
 from tests.helpers import matrix, stick_slip
 
@@ -52,6 +52,7 @@ FORCE = Chart(
 SEVERAL = ChartModel(
     FORCE, {"k": [1.0, 2.0, 0.5], "mu": 0.3}, n=3, inputs={"N": "1 + 0.5 * sin(t) + v"}
 )
+JUMPS = ChartModel(JUMPING, {"k": 1.0, "T": [0.7, 1.1]}, n=2)
 LOADED = Contact("pad", FORCE, {"k": 1.0, "mu": 0.3}, inputs={"N": "2 * load"})
 PRESSED = Contact("pad", stick_slip("signed"), inputs={"N": "1 + 0.5 * sin(t)"})
 LOAD = {"load": "0.5 + 0.2 * cos(t)"}
@@ -59,6 +60,7 @@ Case = tuple[Any, dict[str, str], float, float, int]  # friction, record, end, s
 CASES: dict[str, Case] = {
     "forces in guards, inputs, several elements": (SEVERAL, {"v": "sin(2 * t)"}, 20.0, 1e-2, 20),
     "a load from outside": (LOADED, {"v": "sin(2 * t)", **LOAD}, 20.0, 1e-2, 10),
+    "functions that jump": (JUMPS, {"v": "0.6 * cos(1.3 * t)"}, 9.0, 1e-2, 10),
     "a load on the thresholds of a model": (PRESSED, {"v": SINE}, 25.0, 2e-2, 2),
     "states in states": (LIGHT, {"v": SINE}, 20.0, 3e-2, 40),
 }

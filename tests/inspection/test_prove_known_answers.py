@@ -303,7 +303,7 @@ ANSWERS: dict[str, tuple[Chart, list[str] | None, Check, str, str]] = {
     ),
     "a jump in a guard": (
         chart("sgn(z) >= 1", "sgn(z) < 1", **states("1", "-1")),
-        None, "chattering", "undecided", "sgn jumps in a guard",
+        None, "chattering", "undecided", "a value jumps in a guard",
     ),
     "z = 0 ends it": (assigned({"z": "0"}), None, "livelock", "proved", "end it"),
     "z = z does not": (assigned({"z": "z"}), None, "livelock", "refuted", "at one point"),

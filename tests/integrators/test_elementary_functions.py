@@ -14,12 +14,16 @@ import numpy as np
 import pytest
 
 from integrators import elementary
+from integrators.machine_code import whole_numbers
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.tree import Local
 from integrators.runners import quick
 
-TWO = ("atan2", "power")
+OWN = {
+    name: getattr(module, name) for module in (elementary, whole_numbers) for name in module.__all__
+}
+TWO = ("atan2", "noise", "power")
 ODD = ("asin", "asinh", "atan", "sin", "sinh", "tan", "tanh")
 SPECIAL = [
     0.0, 5e-324, 2.2250738585072014e-308, 1e-200, 0.5, math.pi / 4, 1.0, 2.0, 3.0, 709.78, 709.79,
@@ -39,7 +43,7 @@ def argument(name: str, dice: Random) -> tuple[float, ...]:
     if name == "power":
         x = 10.0 ** dice.uniform(-3, 3) if near else 10.0 ** dice.uniform(-300, 300)
         return x, dice.uniform(-300, 300) / max(abs(math.log10(x)), 3.0)
-    if name == "atan2":
+    if name in ("atan2", "noise"):
         return spread(dice, -5, 5), spread(dice, -5, 5)
     if name == "log":
         return (dice.uniform(0.5, 2.0) if near else 10.0 ** dice.uniform(-323, 308),)
@@ -87,6 +91,41 @@ def test_special_cases_are_those_of_ieee_754(name: str) -> None:
             assert abs(found - right) <= 2.0 * math.ulp(right), f"{name}{given}"
 
 
+@pytest.mark.parametrize(("name", "library"), [("floor", np.floor), ("nearest", np.rint)])
+def test_whole_numbers_are_those_of_ieee_754(name: str, library: Callable[[float], float]) -> None:
+    own, draw = OWN[name], Random(5)
+    halves = [0.5 * k for k in range(-9, 10)]
+    near = [math.nextafter(u, way) for u in halves for way in (-math.inf, math.inf)]
+    drawn = [spread(draw, -3, 17) for _ in range(1000)]
+    for x in (*SPECIAL, *halves, *near, *drawn):
+        pair = struct.pack("dd", own(x), float(library(x)))
+        assert pair[:8] == pair[8:] or math.isnan(x), f"{name}({x!r})"
+
+
+def test_a_tooth_changes_its_sign_where_floor_jumps() -> None:
+    draw = Random(6)
+    for x in (*(0.5 * k for k in range(-9, 10)), *(spread(draw, -3, 6) for _ in range(1000))):
+        whole, found = math.floor(x), whole_numbers.tooth(x)
+        assert abs(found) <= min(x - whole, whole + 1 - x) + 1e-9
+        assert (found == 0.0) == (x == whole)
+        assert found == 0.0 or (found > 0.0) == (whole % 2 == 0), x
+
+
+def test_noise_looks_like_chance() -> None:
+    """Even, without memory, and other seeds give other numbers; limits are four deviations."""
+    count = 4096
+    rows = np.array([[whole_numbers.noise(n, seed) for n in range(count)] for seed in (7.0, 8.0)])
+    assert rows.min() >= -1.0
+    assert rows.max() < 1.0
+    for row in rows:
+        cells = np.histogram(row, 64, (-1.0, 1.0))[0]
+        assert np.sum((cells - 64) ** 2 / 64) < 63 + 4 * math.sqrt(126)
+        for lag in (1, 2, 16):
+            assert abs(np.mean(row[lag:] * row[:-lag])) * 3 * math.sqrt(count) < 4
+    assert abs(np.mean(rows[0] * rows[1])) * 3 * math.sqrt(count) < 4
+    assert whole_numbers.noise(2.9, 7.9) == rows[0][2]
+
+
 @pytest.mark.parametrize("name", ODD)
 def test_odd_functions_are_exactly_odd(name: str) -> None:
     own, draw = getattr(elementary, name), Random(2)
@@ -108,11 +147,11 @@ def test_the_angle_next_to_a_quarter_turn_is_reduced_exactly() -> None:
     assert elementary.cos(6381956970095103.0 * 2.0**797) == -4.68716592425462761112e-19
 
 
-@pytest.mark.parametrize("name", elementary.__all__)
+@pytest.mark.parametrize("name", OWN)
 def test_machine_code_computes_the_same_bits(
     name: str, compiled: Callable[[str], Callable[..., float]]
 ) -> None:
-    own, made, draw = getattr(elementary, name), compiled(name), Random(4)
+    own, made, draw = OWN[name], compiled(name), Random(4)
     cases: list[Any] = [argument(name, draw) for _ in range(1000)]
     cases += [(x, y) for x in SPECIAL for y in SPECIAL] if name in TWO else [(x,) for x in SPECIAL]
     for _ in range(1000):  # any bits
@@ -132,9 +171,9 @@ def compiled() -> Callable[[str], Callable[..., float]]:
     from integrators.machine_code.objects import compiled as made
 
     translator, many = Translator(), {}
-    for name in elementary.__all__:
+    for name in OWN:
         many[name] = [NumberValue(Local("f", each)) for each in ("x", "y")[: 1 + (name in TWO)]]
-        translator.entry(f"own_{name}", getattr(elementary, name), many[name])
+        translator.entry(f"own_{name}", OWN[name], many[name])
     library = Library(made(llvm_text(translator.module)))
 
     def function(name: str) -> Callable[..., float]:

@@ -25,6 +25,10 @@ def _slope(text: str, name: str, point: dict[str, float] = POINT) -> float:
     [
         *(f"{name}(a * c)" for name in FUNCTIONS if name not in SEVERAL),
         *(f"{name}(b * a)" for name in FUNCTIONS if name not in (*SEVERAL, "sqrt", "log")),
+        "if(a > b, a * b, b)",
+        "mod(a * b, c)",
+        "saturate(a * a, b, c)",
+        "quantise(a, b) * a",
         *(f"{name}({arguments})" for name in SEVERAL for arguments in ("a, b * a", "b, a", "a, c")),
         "a + b * c",
         "a - b / c",

@@ -18,9 +18,12 @@ from hypothesis import strategies as st
 
 from gms_fsm.errors import ExpressionError
 from gms_fsm.language import (
+    CHOICES,
     ELEMENTARY,
+    FUNCTIONS,
     NAMESPACE,
     PYTHON,
+    SEVERAL,
     Binary,
     Both,
     Call,
@@ -46,6 +49,7 @@ from gms_fsm.language import (
 from gms_fsm.language._vectors import truths
 from gms_fsm.session.explain import holds
 from integrators import elementary
+from integrators.machine_code import whole_numbers
 
 NAMES = ("a", "b", "c")
 
@@ -53,7 +57,7 @@ NAMES = ("a", "b", "c")
 numbers = st.floats(min_value=0.0, allow_nan=False, allow_infinity=False).map(Number)
 simple_numbers = st.sampled_from([0.0, 0.5, 1.0, 2.0, 3.0, 1e-3, 1 / 3, 1e16, 5e-324]).map(Number)
 leaves = st.one_of(st.sampled_from(NAMES).map(Name), simple_numbers, numbers)
-ONE_ARGUMENT = ("abs", "exp", "log", "sqrt", "sgn", "sin", "cos", "tanh", "atan", "asinh")
+ONE_ARGUMENT = tuple(name for name in FUNCTIONS if name not in SEVERAL)
 
 
 def _power(base: Value, whole: int) -> Value:
@@ -67,7 +71,9 @@ def _grow(inner: st.SearchStrategy[Value]) -> st.SearchStrategy[Value]:
         st.builds(Binary, st.sampled_from("+-*/"), inner, inner),
         st.builds(_power, inner, st.sampled_from([-2, 2, 3])),
         st.builds(lambda f, u: Call(f, (u,)), st.sampled_from(ONE_ARGUMENT), inner),
-        st.builds(lambda f, u, w: Call(f, (u, w)), st.sampled_from(["min", "max"]), inner, inner),
+        st.builds(lambda f, u, w: Call(f, (u, w)), st.sampled_from(SEVERAL), inner, inner),
+        st.builds(lambda f, *u: Call(f, u), st.sampled_from([*CHOICES]), *[inner] * 4),
+        st.builds(lambda *u: Call("noise", tuple(Call("floor", (v,)) for v in u)), inner, inner),
     )
 
 
@@ -265,8 +271,10 @@ def test_functions_of_columns_are_the_elementary_ones_to_the_last_bit(name: str)
 
 def test_the_functions_of_our_own_are_those_of_elementary() -> None:
     ours = {"exp", "log", "sin", "cos", "tanh", "atan", "asinh", "pow"}
+    ours |= {"floor", "round", "tooth", "noise"}
     assert set(ELEMENTARY) == ours
-    assert all(NAMESPACE[name].__module__ == elementary.__name__ for name in ours)
+    modules = {elementary.__name__, whole_numbers.__name__}
+    assert {NAMESPACE[name].__module__ for name in ours} == modules
 
 
 def test_the_sign_of_nan_is_zero() -> None:

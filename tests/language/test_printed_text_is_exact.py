@@ -192,3 +192,16 @@ def test_a_formula_of_latex_has_pi() -> None:
 def test_a_function_that_a_dialect_does_not_have_is_named() -> None:
     with pytest.raises(KeyError, match="asinh"):
         spell(parse_value("asinh(v)", ["v"]), MODELICA)
+
+
+def test_short_forms_are_shown_as_they_were_given() -> None:
+    text = "mod(t + 1, 2) > if(v >= 0, 0.5, 0.8) && (round(n) == 1 || !(quantise(v, 0.5) < 2))"
+    asked = text.replace("&&", "and").replace("||", "or").replace("!", "not ")
+    tree = parse_condition(asked, ["t", "v", "n"])
+    assert spell(tree, MATLAB_LIKE) == text
+    assert spell(tree, MATHEMATICS).startswith("mod(t + 1, 2) > if(v ≥ 0, 0.5, 0.8)")
+    for text in ("if(v < 0 && t >= 1, 1, 2)", "if(v < 0 || t >= 1 || n > 2, if(t < 1, 1, v), 2)"):
+        asked = text.replace("&&", "and").replace("||", "or")
+        assert spell(parse_value(asked, ["t", "v", "n"]), MATLAB_LIKE) == text
+    other = parse_value("t - 2 * floor(t / 3)", ["t"])
+    assert spell(other, MATLAB_LIKE) == "t - 2 * floor(t / 3)"

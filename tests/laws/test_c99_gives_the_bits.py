@@ -17,6 +17,7 @@ TRANSLATED = (
     "pulled mass, rk4",
     "a function",
     "sliding",
+    "functions that jump",
     "system servo",
     "system puck",
     "states in states",
@@ -25,7 +26,7 @@ TRANSLATED = (
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
-@each(TRANSLATED, {*TRANSLATED} - {"system puck"})
+@each(TRANSLATED, {*TRANSLATED} - {"system puck", "functions that jump"})
 def test_a_run_in_c_is_the_run(name: str) -> None:
     with in_c("cc", "-O2", STRICT) as translated:
         found = run(name)(engine="compiled")

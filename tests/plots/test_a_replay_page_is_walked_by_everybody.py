@@ -13,7 +13,15 @@ import numpy as np
 import pytest
 
 from gms_fsm.errors import ExpressionError
-from gms_fsm.language import CONSTANTS, ELEMENTARY, FUNCTIONS, SEVERAL, evaluate, parse_condition
+from gms_fsm.language import (
+    ARGUMENTS,
+    CONSTANTS,
+    ELEMENTARY,
+    FUNCTIONS,
+    SEVERAL,
+    evaluate,
+    parse_condition,
+)
 from gms_fsm.session.session import Session
 from plots.page.replay import replay
 from tests.plots.browser import (
@@ -316,6 +324,10 @@ TEXTS = [
     "1 > 2 > not v > 0", "**v > 1", "F neg 1 > 0", "F not > 1", "F > 1; x",
     *(f"{name}({'v, z1' if name in SEVERAL else 'v'}) > 0.1" for name in FUNCTIONS),
     *(f"{name} * v > 0.1" for name in CONSTANTS),
+    "mod(t, 2) < 1", "quantise(F, 2) > 2", "saturate(v, 0, 0.1) > 0.05", "if(v > 0, F, 1 / 0) > 1",
+    "if(not v > 0 and F < 1, 1, 2) == 2", "floor(t) == 3 or round(t) != 4", "t == 3",
+    "if(v, 1, 2) > 1", "mod(t) > 1", "round(t) == 1.5", "floor(t) < 3 == 1", "min(v) > 1",
+    "if(v > 0, 1) > 0", "noise(10 * t, 3) > 0.2", "noise(t) > 0",
 ]  # fmt: skip
 
 
@@ -324,7 +336,8 @@ def test_functions_have_the_bits_of_python(open_page: Open) -> None:
     page = open_page("published")
     pairs = np.random.default_rng(0).uniform(0.1, 9.0, (2000, 2)).tolist()
     for name, function in ELEMENTARY.items():
-        own, given = ("**", pairs) if name == "pow" else (name, [pair[:1] for pair in pairs])
+        own = "**" if name == "pow" else name
+        given = [pair[: ARGUMENTS[name]] for pair in pairs]
         found = page.evaluate(
             "([name, all]) => all.map((u) => FUNCTIONS[name](...u))", [own, given]
         )

@@ -405,6 +405,14 @@ def contact(load: str) -> Contact:
     return Contact("pad", LOADED, {"k": 100.0, "mu": 0.3}, v="v_load", inputs=inputs)
 
 
+def test_functions_and_words_in_an_input_are_no_inputs() -> None:
+    chart = Chart("own", inputs=("N",), states=(State("on"),), outputs={"F": "N"})
+    given = {"N": "if(load > 1 and not mod(t, 2) >= 1, load, 0)"}
+    stepping = FrictionState(Contact("pad", chart, {}, inputs=given))
+    forces = [stepping.advance(0.0, 0.0, 0.5, load=(3.0, 3.0)) for _ in range(4)]
+    assert forces == [3.0, 0.0, 0.0, 3.0]  # at 0.5, 1, 1.5 and 2 s
+
+
 @engines
 def test_inputs_are_straight_lines_too(engine: str) -> None:
     body, loaded = Body("load", velocity="v_load", x="x_load", v="v_load"), contact("N_0 * share")

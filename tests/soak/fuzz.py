@@ -38,6 +38,7 @@ from gms_fsm.errors import (
 from gms_fsm.language import (
     FUNCTIONS,
     MATLAB_LIKE,
+    SHORT,
     Node,
     evaluate,
     names_in,
@@ -136,7 +137,7 @@ MARKS = [
 WORDS = [
     "z", "s", "v", "v_c", "t", "u", "pi", "and", "or", "not", "if", "else", "lambda", "for", "in",
     "is", "await", "None", "True", "False", "__import__", "os", "exec", "state", "stick", "slip",
-    *FUNCTIONS,
+    *FUNCTIONS, *SHORT,
 ]  # fmt: skip
 TOKENS = NUMBERS + MARKS + WORDS
 NAMES = ("z", "s", "v", "v_c")
@@ -144,7 +145,9 @@ VALID_TEXTS = [
     "z >= s and v > v_c", "abs(v) <= v_c and abs(z) < s", "sgn(v) * v_c * (1 - z / s)",
     "v**2 + 1", "min(z, max(s, v), 3) * exp(-(v / v_c)**2)", "not (z < s or v > 0) and 0 < v < 1",
     "state(1) == slip and state(2) != stick", "z", "-z**-2", "tanh(cos(sin(sqrt(abs(z)))))",
-    "0.2*sin(2*pi*v/20)", "((z**3)**4)**5 - z**0.5",
+    "0.2*sin(2*pi*v/20)", "((z**3)**4)**5 - z**0.5", "if(z < s and not v > 0, mod(z, s), v)",
+    "round(z) == 3 and floor(v) != noise(z, 2) + 1", "quantise(z, 0.5) * saturate(v, -s, s)",
+    "1 + (z if v < 0 or s < 1 else if(z > s, v, 2))",
 ]  # fmt: skip
 
 
@@ -208,7 +211,7 @@ def _grammatical(choices: Choices, depth: int, truth: bool) -> str:
             return f"state({element}) {choices.one_of(['==', '!='])} {state}"
         sides = [_grammatical(choices, max(0, depth - 1), False) for _ in range(2)]
         return f"{sides[0]} {choices.one_of(['<', '<=', '>', '>='])} {sides[1]}"
-    kind = choices.below(6) if depth else 0
+    kind = choices.below(8) if depth else 0
     if kind == 0:
         return choices.one_of([*NAMES, "pi", "0", "1", "2.5", "1e-300", "1e300", "3e-7"])
     inner = _grammatical(choices, depth - 1, False)
@@ -222,6 +225,10 @@ def _grammatical(choices: Choices, depth: int, truth: bool) -> str:
         return f"{choices.one_of(['min', 'max'])}({inner}, {other}, {inner})"
     if kind == 4:
         return f"({inner})**{choices.one_of(['2', '3', '-2', '8', '0.5', '0', '1', '-1', '9'])}"
+    if kind == 5:
+        return f"{choices.one_of(['mod', 'quantise', 'noise'])}({inner}, {other})"
+    if kind == 6:
+        return f"if({_grammatical(choices, max(0, depth - 1), True)}, {inner}, {other})"
     return f"({inner}) {choices.one_of('+-*/')} ({other})"
 
 

@@ -12,7 +12,7 @@ from gms_fsm.exporters.plain.element import NamedFriction
 from gms_fsm.exporters.plain.form import plain_form
 from gms_fsm.exporters.plain.parts import Constant
 from gms_fsm.exporters.plain.walker import Forms, Walker, indented
-from gms_fsm.language import C99, ELEMENTARY, FUNCTIONS, NAMESPACE
+from gms_fsm.language import ARGUMENTS, C99, FUNCTIONS, NAMESPACE
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
@@ -39,7 +39,6 @@ C_WORDS = frozenset(
     """,
     )
 )
-OWN = {name: 2 if name == "pow" else 1 for name in ELEMENTARY}  # arguments
 HELPERS = {
     "sgn": "(double u)\n{\n    return u > 0.0 ? 1.0 : u < 0.0 ? -1.0 : 0.0;\n}",
     "min": "(double a, double b)\n{\n    return b < a ? b : a;\n}",
@@ -110,7 +109,7 @@ class PlainC:
         self.form = plain_form(self.element)
         self.name = f"{subject.name}_plain"
         self.refuse_own_names()
-        own = {name: f"{self.name}_{name}({{all}})" for name in (*OWN, *HELPERS)}
+        own = {name: f"{self.name}_{name}({{all}})" for name in (*ARGUMENTS, *HELPERS)}
         # The machine's own names give way to those of the chart.
         element, self.me = self.element, self.element.free("friction")
         # One element needs no arrays and no loop.
@@ -202,10 +201,10 @@ class PlainC:
         ]
         if self.element.reference:
             lines.append(f"/* {FORMS.clean(self.element.reference)} */")
-        used = [name for name in OWN if f"{self.name}_{name}(" in text]
+        used = [name for name in ARGUMENTS if f"{self.name}_{name}(" in text]
         if used:
             lines.append(self.elementary(used))
-        elif any(f"{each.split('(')[0]}(" in text for each in C99.functions.values()):
+        elif "fabs(" in text or "sqrt(" in text:
             lines += ["#include <math.h>", ""]
         lines += [f'#include "{self.name}.h"']
         for name, helper in HELPERS.items():
@@ -217,7 +216,7 @@ class PlainC:
         """Return the functions that are the same on every platform."""
         translator = Translator()
         for name in names:
-            numbers = [NumberValue(Local("f", each)) for each in "xy"[: OWN[name]]]
+            numbers = [NumberValue(Local("f", each)) for each in "xy"[: ARGUMENTS[name]]]
             translator.entry(f"{self.name}_{name}", NAMESPACE[name], numbers)
         return c99_text(translator.module, [self.name, *self.element.names], hidden=True)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._c import TEMPLATES
@@ -25,7 +26,17 @@ from gms_fsm.exporters.plain.parts import Expression, Let, StateParts
 from gms_fsm.exporters.plain.walker import Forms, Walker
 from gms_fsm.formats import Format, register
 from gms_fsm.foundation.text import visible
-from gms_fsm.language import MATLAB, Binary, Comparison, Name, Relation, names_in
+from gms_fsm.language import (
+    CHOICES,
+    MATLAB,
+    Binary,
+    Call,
+    Comparison,
+    Name,
+    Relation,
+    frozen,
+    names_in,
+)
 from gms_fsm.lowering.adapting import SHARE
 from gms_fsm.lowering.printing.plan import RoughCall, both_sides
 from gms_fsm.lowering.scales import scales_of
@@ -62,6 +73,58 @@ FORMS = Forms(
     comment="% {0}",
     marks={"@": "at", "{": "(", "}": ")"},
 )
+# Functions of the file's own, in their own scope: a quantity may have the name of one they call.
+DEFINED = {
+    "floor": "function n = @_floor(u)\nn = floor(u);\nend\n",
+    "round": """\
+function n = @_round(u)
+% The nearest whole number, the even one of two.
+n = floor(u);
+rest = u - n;
+n = n + (rest > 0.5 || (rest == 0.5 && mod(n, 2) == 1));
+end
+""",
+    "tooth": """\
+function d = @_tooth(u)
+% How far u is from a whole number, negative where the one below it is odd.
+m = mod(u, 2);
+d = min(m, max(1 - m, m - 2));
+end
+""",
+    "noise": """\
+function value = @_noise(n, seed)
+% The n-th of a series of numbers that look like chance, on 32 bits.
+x = mod(floor(n), 2^32);
+key = mod(@_times(mod(floor(seed), 2^32), 2654435769) + 1640531527, 2^32);
+for part = 1:4
+    x = mod(x + key, 2^32);
+    x = @_times(x, mod(2 * x + 1, 2^32));
+    high = floor(x / 65536);
+    x = 65536 * (x - 65536 * high) + high;
+    key = mod(key + 2654435769, 2^32);
+end
+value = x / 2^31 - 1;
+end
+""",
+    "times": """\
+function value = @_times(a, b)
+high = floor(a / 65536);
+value = mod(65536 * mod(high * b, 65536) + (a - 65536 * high) * b, 2^32);
+end
+""",
+    "choose": """\
+function value = @_choose(yes, a, b)
+if yes
+    value = a;
+else
+    value = b;
+end
+end
+""",
+}
+CALLED = {name: f"@_{name}({{all}})" for name in ("floor", "round", "tooth", "noise")} | {
+    name: f"@_choose({{0}} {op} {{1}}, {{2}}, {{3}})" for name, op in CHOICES.items()
+}
 
 
 def matlab(subject: Subject) -> dict[str, str]:
@@ -101,7 +164,7 @@ class FunctionFile:
         own = [name for each in element.variables for name in (each.name, each.rate)]
         self.walker = Walker(
             FORMS,
-            MATLAB,
+            replace(MATLAB, functions={**MATLAB.functions, **CALLED}),
             texts | {name: f"{name}({self.i})" for name in own},
             [each.name for each in element.states],
             test=lambda k: f"{self.state}({self.i}) == {k + 1}",
@@ -166,6 +229,8 @@ class FunctionFile:
             self.begin(),
         ]
         text = "\n".join(parts)
+        for name, each in DEFINED.items():  # earlier ones call later ones
+            text += f"\n{each}" if f"@_{name}(" in text else ""
         suffix = max(re.findall(r"@(_\w+)", text), key=len)
         if len(self.name + suffix) > LONGEST:
             raise ParameterError(
@@ -226,16 +291,12 @@ class FunctionFile:
 
     def call(self, rough: RoughCall) -> Statement:
         """Assign a call that has a corner or a jump, with the sign that is held."""
-        (sign, _), call = self.signs[rough.turning], rough.call
-        match call.function:
-            case "sgn":
-                return Verbatim(f"{rough.name} = {sign};")
-            case "abs":
-                return Verbatim(f"{rough.name} = {sign} * ({self.spell(call.arguments[0])});")
-            case function:
-                first, other = (SetTo(rough.name, each) for each in call.arguments)
-                test = f"{sign} {'<=' if function == 'min' else '>='} 0"
-                return TwoWays(test, (first,), (other,))
+        sign, _ = self.signs[rough.turning]
+        match value := frozen(rough.call, Name(sign)):
+            case Call(function, (_, _, yes, no)):
+                first, other = SetTo(rough.name, yes), SetTo(rough.name, no)
+                return TwoWays(f"{sign} {CHOICES[function]} 0", (first,), (other,))
+        return SetTo(rough.name, value)
 
     def loop(
         self,

@@ -14,10 +14,18 @@ from xml.etree import ElementTree as ET
 
 from gms_fsm._version import __version__
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
+from gms_fsm.charts.files.scxml import (
+    OURS,
+    SCXML,
+    STEP,
+    VALUES,
+    assignments,
+    conditions,
+    written_out,
+)
 from gms_fsm.charts.nesting import spelled
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._names import identifier
+from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.alone import (
     check_moved_from_outside,
@@ -26,6 +34,7 @@ from gms_fsm.exporters.alone import (
 )
 from gms_fsm.formats import Format, register
 from gms_fsm.foundation.text import referenced, visible
+from gms_fsm.language import ECMASCRIPT, names_in
 from gms_fsm.systems.system import LEAST_LOAD, Contact, loaded
 
 __all__: list[str] = []
@@ -48,6 +57,11 @@ def _write(subject: Subject) -> dict[str, str]:
     for each in _names(chart):
         identifier(each, WORDS, f"chart {chart.name!r}, name {each!r}")
     _check_characters(chart)
+    assigned = [tree for each in chart.assignments.values() for tree in each.values()]
+    read = {name for tree in (*assigned, *chart.guards.values()) for name in names_in(tree)}
+    lets = [tree for name, tree in written_out(chart.lets).items() if name in read]
+    trees = (*chart.guards.values(), *assigned, *lets)
+    check_functions(trees, ECMASCRIPT, f"chart {chart.name!r}", "ECMAScript")
     contact = subject.numbers
     numbers = [{}] if contact is None else element_numbers(contact)
     files = {
@@ -234,7 +248,7 @@ Run in Python
     Math = SimpleNamespace(
         abs=abs, min=min, max=max, exp=math.exp, log=math.log, sqrt=math.sqrt, sin=math.sin,
         cos=math.cos, tanh=math.tanh, atan=math.atan, asinh=math.asinh, pow=math.pow,
-        sign=lambda u: float((u > 0) - (u < 0)),
+        floor=math.floor, sign=lambda u: float((u > 0) - (u < 0)),
     )
     machine = load(Path("{files[0]}"), trusted=True)(SimpleNamespace(Math=Math))
     machine.send("values", {values})
@@ -245,6 +259,7 @@ What it does not express
 - Flows, forces, units and rules are texts in the namespace {OURS}: other tools keep or
   ignore them. `gms_fsm.Chart.from_scxml("{files[0]}")` reads the whole chart from it.
 - Several transitions in a row at one time need several events "step".
+- A choice, if(c, a, b), is written as a sum: both a and b must be finite.
 - Locked contacts, impulses, forces and accelerations in guards cannot be written.{warning}
 """
 

@@ -46,21 +46,39 @@ WORDS = frozenset(
     """,
     )
 )
-SGN = """\
+FUNCTION = """\
 FUNCTION {name} : LREAL
 VAR_INPUT
     u : LREAL;
 END_VAR
-IF u > 0.0 THEN
-    {name} := 1.0;
-ELSIF u < 0.0 THEN
-    {name} := -1.0;
-ELSE
-    {name} := 0.0;
-END_IF;
+{body}
 END_FUNCTION
 
 """
+# Functions that the standard does not have; {0} is the name, {1} that of the block.
+# From 2**52 on there is nothing behind the point; below, the sum rounds to the even one of two.
+DEFINED = {
+    "sgn": """\
+IF u > 0.0 THEN
+    {0} := 1.0;
+ELSIF u < 0.0 THEN
+    {0} := -1.0;
+ELSE
+    {0} := 0.0;
+END_IF;""",
+    "floor": """\
+{0} := {1}_round(u);
+IF {1}_round(u) > u THEN
+    {0} := {1}_round(u) - 1.0;
+END_IF;""",
+    "round": """\
+{0} := u;
+IF u >= 0.0 AND u < 4503599627370496.0 THEN
+    {0} := (u + 4503599627370496.0) - 4503599627370496.0;
+ELSIF u < 0.0 AND u > -4503599627370496.0 THEN
+    {0} := 4503599627370496.0 - (4503599627370496.0 - u);
+END_IF;""",
+}
 FORMS = Forms(
     assign="{0} := {1};",
     new="{0} := {1};",
@@ -107,13 +125,15 @@ class StructuredText:
         name = subject.name
         identifier(name.upper(), WORDS, f"name {name!r}")
         self.name, element = name, NamedFriction.of(subject, WORDS, cases=False)
-        for each in (name, f"{name}_sgn"):
+        own = [f"{name}_{each}" for each in DEFINED]
+        for each in (name, *own):
             element.check_name(each, cases=False)
-        element = element.reserved(name, f"{name}_sgn")
+        element = element.reserved(name, *own)
         self.form: PlainForm = plain_form(element, "cycle")
         self.element = element.reserved(self.form.dt, self.form.part)
         self.force = self.take("force")  # F would be the same as a chart's f
-        functions = {**STRUCTURED_TEXT.functions, "sgn": f"{name}_sgn({{0}})"}
+        defined = {each: f"{name}_{each}({{0}})" for each in DEFINED}
+        functions = {**STRUCTURED_TEXT.functions, **defined}
         self.dialect = replace(STRUCTURED_TEXT, functions=functions)
         place = f"chart {subject.title!r}"
         check_functions(element.trees, self.dialect, place, "structured text")
@@ -171,7 +191,11 @@ class StructuredText:
             "END_FUNCTION_BLOCK",
         ]
         text = "\n".join(lines) + "\n"
-        return SGN.format(name=f"{name}_sgn") + text if f"{name}_sgn(" in text else text
+        for each, defined in DEFINED.items():  # later ones call earlier ones
+            if f"{name}_{each}(" in text:
+                own = f"{name}_{each}"
+                text = FUNCTION.format(name=own, body=defined.format(own, name)) + text
+        return text
 
     def constants(self) -> Iterator[str]:
         yield from map(self.constant, self.element.constants)

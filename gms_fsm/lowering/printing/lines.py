@@ -11,18 +11,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from gms_fsm.language import Binary, Call, Name, Node, Value, spell
+from gms_fsm.language import Binary, Call, Name, Node, Value, frozen, names_in, spell
+from gms_fsm.language.functions import ROUGH
 from gms_fsm.language.tree import walk
 from gms_fsm.lowering.places import Places, total
 from gms_fsm.lowering.printing.names import computed_names
-from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall
+from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall, moving
 from gms_fsm.systems.reading.assembly import of
-from integrators import LIVE
+from integrators import FOR_A_SIGN, LIVE, WAITING
 
 # Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
 # may be marked as live.
 Signs = Literal["held", "live", "given"]
-QUICK = ("abs", "min", "max", "sgn", "sqrt")  # functions that need no library
+QUICK = (*ROUGH, "sqrt")  # functions that need no library
 # A chain of elif is a tree as deep as it is long, and readers call themselves at each level.
 MOST_BRANCHES = 50
 TABLES = "the tables"  # what a signal that is a table reads
@@ -157,21 +158,25 @@ class ProgramWriter(ABC):
         held = self.plan.held
         sizes = frozenset(f"#{size}" for size in held.sizes(rough.turning))
         sign = f"held[{held.text(rough.turning)}]"
-        first = self.spell(call.arguments[0])
-        match call.function:
-            case "sgn":
-                value = sign
-            case "abs":
-                value = self.spell(Binary("*", Name(sign), call.arguments[0]))
-            case "min":
-                value = f"{first} if {sign} <= 0.0 else {self.spell(call.arguments[1])}"
-            case _:
-                value = f"{first} if {sign} >= 0.0 else {self.spell(call.arguments[1])}"
+        frame = frozen(call, Name(sign))
+        value = self.spell(frame)
+        if isinstance(frame, Call):  # a choice: without brackets around it
+            value = value[1:-1]
         if signs == "given":
             value = f"{live} if {sign} == {LIVE} else {value}"
         elif call.function == "sgn":
             return CodeLine(f"{rough.name} = {value}", sizes)
         return CodeLine(f"{rough.name} = {value}", sizes | computed_names(call))
+
+    def why(self, u: Value) -> int:
+        """Say why a sign is watched; one of the time alone changes while nothing moves.
+
+        Not the sign of a given motion: there something moves, and errors limit the steps.
+        """
+        motions = {name for body in self.read.system.bodies for name in (body.x, body.v)}
+        alone = {*moving(self.read.expanded(u), self.read)} == {"t"}
+        alone = alone and not self.read.closure(names_in(u)) & motions
+        return FOR_A_SIGN | (WAITING if alone else 0)
 
     # ------------------------------------------------------------------ what elements read first
     def element(self, bank: int, reads: frozenset[str], signs: Signs) -> list[CodeLine]:
@@ -350,7 +355,7 @@ class ProgramWriter(ABC):
         needed = self.closure(reads | reads_of(followed or ())) - self.late
         values: list[CodeLine] = []
         for name in self.read.defined:
-            if followed and "." in name:  # the first one of a contact
+            if followed and ("." in name or name in self.read.system.let):  # may read a velocity
                 values, followed = values + followed, None
             if name in needed and name not in self.read.owner:
                 values += self.defined(name, signs)

@@ -40,7 +40,7 @@ class LockFunctions(ForceWriter):
     def jolts(self) -> list[str]:
         """Return the function that marks the contacts whose velocities differ from before."""
         return self.function(
-            "jolts(t, y, mode, p, floor, mark, was, jolt)",
+            "jolts(t, y, mode, p, least, mark, was, jolt)",
             "was = velocities of contacts that lock; mark the ones that differ from it.",
             self.locks.jolts() if self.locking else [],
             "live",

@@ -512,7 +512,7 @@ class Locks:
                     size = f"{ROUNDING} * abs({self.writer.local(name)})"
                     if not self.bodies[body].driven:
                         place = self.writer.layout.y.text(name)
-                        size = f"({size} + {UNFELT} * floor[{place}])"
+                        size = f"({size} + {UNFELT} * least[{place}])"
                     if coefficient != Number(1.0):
                         size = f"abs({self.writer.spell(coefficient)}) * {size}"
                     reads = computed_names(coefficient) | {name}

@@ -17,7 +17,21 @@ TEXT = frozenset(
     {"dS", "dy", "edge", "held", "i", "j", "len", "machine", "mode", "n", "nan", "out", "own", "p"}
     | {"piecewise_linear", "piecewise_slope", "range", "shared", "surface", "tables", "watch", "y"}
     | {"abs", "exp", "log", "sqrt", "sgn", "min", "max", "sin", "cos", "tanh", "atan", "asinh"}
-    | {"pow", "pi", "F_i", "t", "floor", "jolt", "mark", "skip", "was"}
+    | {
+        "floor",
+        "round",
+        "tooth",
+        "noise",
+        "pow",
+        "pi",
+        "F_i",
+        "t",
+        "jolt",
+        "least",
+        "mark",
+        "skip",
+        "was",
+    }
 )
 
 

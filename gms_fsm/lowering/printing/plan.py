@@ -28,6 +28,7 @@ from gms_fsm.language import (
     turning_inside,
 )
 from gms_fsm.language.functions import ROUGH
+from gms_fsm.language.tree import walk
 from gms_fsm.lowering.layout import SystemLayout, sizes_of
 from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.lowering.printing.names import QuantityNames, names_of
@@ -211,6 +212,8 @@ class ProgramPlan:
         For each contact, by state, the values whose signs decide corners and jumps.
     gradients : tuple of Gradient
         One for each value on whose surface the motion can slide, in the order of `surfaces`.
+    steps : tuple of Value
+        Values that grow steadily with the time, at whole numbers of which a comparison jumps.
     """
 
     title: str
@@ -228,6 +231,7 @@ class ProgramPlan:
     always: tuple[Comparison, ...]
     rough: tuple[Mapping[str, tuple[Value, ...]], ...]
     gradients: tuple[Gradient, ...]
+    steps: tuple[Value, ...]
 
 
 def plan_of(read: Assembly) -> ProgramPlan:
@@ -263,6 +267,7 @@ def plan_of(read: Assembly) -> ProgramPlan:
     landmarks = [r for bank in read.banks if _reads_curve(bank) for r in _landmarks(bank)]
     always = [relation for u in outer for relation in both_sides(u)] + landmarks
     smoothing = _Smoothing(held, names)
+    relations = _relations(read, held, landmarks)
     charts = " and ".join(dict.fromkeys(bank.chart.name for bank in read.banks))
     return ProgramPlan(
         title=f"{charts}, {read.system.name}",
@@ -286,13 +291,14 @@ def plan_of(read: Assembly) -> ProgramPlan:
         flow={name: smoothing(tree) for name, tree in read.flow.items()},
         held=held,
         surfaces=surfaces,
-        relations=_relations(read, held, landmarks),
+        relations=relations,
         always=tuple(dict.fromkeys(always)),
         rough=rough,
         gradients=tuple(
             replace(gradient_of(u.value if isinstance(u, Pair) else u, read), surface=u)
             for u in (*surfaces.shared, *surfaces.own)
         ),
+        steps=tuple(dict.fromkeys(_steps([*relations.shared, *relations.own], read))),
     )
 
 
@@ -413,12 +419,12 @@ def _parted(found: Iterable[Value], read: Assembly) -> Places[Value]:
 def _can_be_slid_on(u: Value, read: Assembly) -> bool:
     """Tell whether u depends on the state, through quantities that have a derivative."""
     expanded = read.expanded(u)
-    moving = _moving(expanded, read)
+    names = moving(expanded, read)
     signals = read.system.signals
     return (
         not any(isinstance(signals.get(name), Function) for name in names_in(expanded))
-        and bool({*moving} - {"t", *signals})
-        and all(derivative(expanded, name) is not None for name in moving)
+        and bool({*names} - {"t", *signals})
+        and all(derivative(expanded, name) is not None for name in names)
     )
 
 
@@ -471,7 +477,7 @@ def _difference(comparison: Comparison) -> tuple[Value, Value]:
     return comparison.left, comparison.right
 
 
-def _moving(expanded: Value, read: Assembly) -> tuple[str, ...]:
+def moving(expanded: Value, read: Assembly) -> tuple[str, ...]:
     """Return the names in an expanded value that change while the motion flows."""
     system, order = read.system, dict[str, None]()
     for body in system.bodies:
@@ -523,6 +529,18 @@ def _relations(
     )
 
 
+def _steps(relations: Iterable[Comparison], read: Assembly) -> Iterator[Value]:
+    """Find floor and round of values that grow steadily with the time."""
+    numbers = {*read.shared, *read.own}
+    for side in (side for each in relations for side in (each.left, each.right)):
+        for part in walk(read.expanded(side)):
+            if isinstance(part, Call) and part.function in ("floor", "round", "tooth"):
+                (u,) = part.arguments
+                slope = derivative(u, "t")
+                if "t" in names_in(u) <= numbers | {"t"} and slope and "t" not in names_in(slope):
+                    yield Binary("+", u, Number(0.5)) if part.function == "round" else u
+
+
 # --------------------------------------------------------------------------- what is computed
 def _bank(read: Assembly, bank: Bank, smoothing: _Smoothing) -> BankPlan:
     """Plan the rates and the forces of a contact."""
@@ -570,7 +588,7 @@ def _read_elsewhere(read: Assembly) -> frozenset[str]:
 def gradient_of(u: Value, read: Assembly) -> Gradient:
     """Return the rate of a value: its slopes by what moves."""
     expanded, signals = read.expanded(u), read.system.signals
-    slopes = {name: derivative(expanded, name) for name in _moving(expanded, read)}
+    slopes = {name: derivative(expanded, name) for name in moving(expanded, read)}
     known = {name: slope for name, slope in slopes.items() if slope is not None}
     return Gradient(
         surface=u,

@@ -394,7 +394,7 @@ class _PythonPrinter(LockFunctions):
         lines = self.before_guards(
             computed_names(side) for each in watched for side in (each.left, each.right)
         )
-        lines += [self.watch(relation) for relation in self.plan.always]
+        lines += [self.watch(relation, self.why(relation.left)) for relation in self.plan.always]
         lines += [self.hold(u) for u in held.shared]
         for bank, rough in zip(self.read.banks, self.plan.rough, strict=True):
             branches = {}
@@ -403,7 +403,7 @@ class _PythonPrinter(LockFunctions):
                 for u in rough[state]:
                     if u in held.own:
                         rows.append(self.hold(u))
-                    rows += [self.watch(relation) for relation in both_sides(u)]
+                    rows += [self.watch(relation, self.why(u)) for relation in both_sides(u)]
                 for edge, _ in self.leaving(bank, state) if not bank.periodic else ():
                     rows.append(CodeLine(f"# {edge.name}: {self.spell(edge.guard)}"))
                     rows += self.witness(split(edge.guard), self.waits(bank, state, edge))

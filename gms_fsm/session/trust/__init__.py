@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from gms_fsm.errors import SignalError
 from gms_fsm.session.trust._again import again as repeated
 from gms_fsm.session.trust._meant import meant, unused
 from gms_fsm.session.trust._motion import growth, impulses, not_unique, slides
@@ -30,7 +31,10 @@ def trust_of(trace: Trace, *, again: bool = False) -> Trust:
             replace(trace, firings=trace.every or trace.firings, which="", every=None), again=again
         )
         return Trust(tuple(each for each in whole if each.contact in ("", trace.which)))
-    found = [*_findings(trace.whole(), at_times=trace.stops is not trace.rows)]
+    try:
+        found = [*_findings(trace.whole(), at_times=trace.stops is not trace.rows)]
+    except SignalError as error:  # a Python function is not in a trace file
+        return Trust((Doubt("not judged", "note", f"it cannot be judged: {error.reason}"),))
     if again:
         repeat = [*repeated(trace)]
         if all(each.severity == "note" for each in repeat):  # what was doubted holds

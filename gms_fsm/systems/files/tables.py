@@ -305,6 +305,7 @@ class SystemTable(Table):
     numbers: dict[str, float] = Field({}, description="parameters that texts name")
     signals: dict[str, SignalField] = Field({})
     flow: dict[str, Value] = Field({})
+    let: dict[str, Value] = Field({}, description="named expressions that texts can use")
     bodies: list[BodyTable] = Field([], alias="body")
     springs: list[SpringTable] = Field([], alias="spring")
     contacts: list[ContactTable] = Field([], alias="contact")
@@ -334,6 +335,7 @@ def plain(system: System) -> dict[str, Any]:
         "numbers": dict(system.numbers),
         "signals": {name: signal_table(signal) for name, signal in system.signals.items()},
         "flow": dict(system.flow),
+        "let": dict(system.let),
         "bodies": [
             BodyTable(
                 name=each.name,
@@ -389,6 +391,7 @@ def system_from(
         },
         numbers=table.numbers,
         flow=table.flow,  # type: ignore[arg-type]  # numbers become texts there
+        let=table.let,  # type: ignore[arg-type]
         sampled=tuple(
             built(Sampled, "sampled", i, **vars(each)) for i, each in enumerate(table.sampled)
         ),

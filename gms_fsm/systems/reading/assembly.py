@@ -307,6 +307,12 @@ class SystemReader:
             elif not (body.velocity == body.v and body.v in system.signals):
                 tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
                 self.definitions.append(Definition(body.v, tree))
+        lets = dict.fromkeys(system.let)
+        for name, text in system.let.items():
+            known = [each for each in system.names if each not in lets]
+            tree = self.value(text, known, self.here.of(f"let {name!r}", "let", name))
+            self.definitions.append(Definition(name, tree))
+            del lets[name]
         for name, sign, term in spring_forces(system):
             if name in forces:
                 forces[name] = added(forces[name], sign, term)
@@ -318,13 +324,9 @@ class SystemReader:
         for i, each in enumerate(system.sampled):
             own = {"period": Number(each.period)}
             owner = self.here.of(f"sampled {each.name!r}", "sampled", i)
+            known = [*self.names, "period"]
             updates[each.name] = {
-                name: renamed(
-                    self.value(
-                        text, [*self.names, "period"], owner.of(repr(name), "updates", name)
-                    ),
-                    own,
-                )
+                name: renamed(self.value(text, known, owner.of(repr(name), "updates", name)), own)
                 for name, text in each.updates.items()
             }
         banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.machines))

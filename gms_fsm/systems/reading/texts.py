@@ -43,6 +43,7 @@ def texts_of_system(system: System) -> tuple[Any, ...]:
         tuple(system.numbers),
         tuple(signals),
         tuple(system.flow.items()),
+        tuple(system.let.items()),
         tuple(sampled),
     )
 

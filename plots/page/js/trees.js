@@ -16,7 +16,7 @@ function product(u, whole) {
 }
 const divided = (a, b) => { if (b === 0) throw UNDEFINED; return a / b; };
 
-const { exp, log, sin, cos, tanh, atan, asinh, pow } = ELEMENTARY; // the bits of Python, in every browser
+const { exp, log, sin, cos, tanh, atan, asinh, pow, floor, round, tooth, noise } = ELEMENTARY; // the bits of Python, in every browser
 const FUNCTIONS = {
   "+": (a, b) => a + b, "*": (a, b) => a * b, "/": divided,
   "-": (a, b) => (b === undefined ? -a : a - b),
@@ -25,10 +25,12 @@ const FUNCTIONS = {
   abs: Math.abs, sgn: (u) => (u > 0 ? 1 : u < 0 ? -1 : 0),
   sqrt: (u) => { if (u < 0) throw UNDEFINED; return Math.sqrt(u); },
   exp: (u) => finite(exp(u), u), log: (u) => { if (u <= 0) throw UNDEFINED; return log(u); },
-  sin: (u) => finite(sin(u)), cos: (u) => finite(cos(u)), tanh, atan, asinh,
+  sin: (u) => finite(sin(u)), cos: (u) => finite(cos(u)), tanh, atan, asinh, floor, round, tooth, noise,
   min: (...all) => all.reduce((a, b) => (b < a ? b : a)), max: (...all) => all.reduce((a, b) => (b > a ? b : a)),
   product,
 };
+// Choices: only what is chosen is computed.
+const CHOICES = { if_lt: "<", if_le: "<=", if_gt: ">", if_ge: ">=" };
 
 function compiled(tree) {
   if (typeof tree === "number") return () => tree;
@@ -46,6 +48,11 @@ function compiled(tree) {
   const parts = rest.map(compiled), f = FUNCTIONS[op];
   if (op === "and") return (scope) => parts.every((part) => part(scope));
   if (op === "or") return (scope) => parts.some((part) => part(scope));
+  if (op in CHOICES) {
+    const holds = FUNCTIONS[CHOICES[op]], [a, b, yes, no] = parts;
+    return (scope) => (holds(a(scope), b(scope)) ? yes : no)(scope);
+  }
+  if (op === "if") return (scope) => (parts[0](scope) ? parts[1] : parts[2])(scope);
   if (op === "not") return (scope) => !parts[0](scope);
   if (parts.length === 1) return (scope) => f(parts[0](scope));
   if (parts.length === 2) return (scope) => f(parts[0](scope), parts[1](scope));

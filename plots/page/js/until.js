@@ -36,12 +36,12 @@ function parse(text, { levels, negation, sign, functions, constants, units }, na
     let left = prefix();
     for (;;) {
       const { word, at } = here(), own = levels[word];
-      if (word === "==" || word === "!=") fail(at, "only < <= > >= compare numbers; == is for state(1) == name");
       if (!(own >= level)) return left;
       next += 1;
       const right = expression(word === "**" ? sign : own + 1), logic = own < negation, compares = own === levels["<"];
       const chain = compares && left.last; // a < b < c is a < b and b < c
-      const b = as(logic, right), now = [word, chain ? left.last : as(logic, left), b];
+      const b = as(logic, right), a = chain ? left.last : as(logic, left);
+      const now = word === "==" || word === "!=" ? equal(a, b, word, at) : [word, a, b];
       left = { at: left.at, truth: logic || compares, tree: chain ? ["and", left.tree, now] : now, last: compares && b };
     }
   }
@@ -70,10 +70,29 @@ function parse(text, { levels, negation, sign, functions, constants, units }, na
   function call(name, at) {
     const parts = [];
     take(["("], `${name}(...)`);
-    do parts.push(as(false, expression(1))); while (take([","]));
+    do parts.push(as(name === "if" && !parts.length, expression(1))); while (take([","]));
     take([")"], "a closing bracket");
-    if ((functions[name] === "one") !== (parts.length === 1)) fail(at, `${name} got ${parts.length} arguments`);
+    const right = functions[name] ? parts.length === functions[name] : parts.length > 1; // several
+    if (!right) fail(at, `${name} got ${parts.length} arguments`);
+    const [a, b, c] = parts;
+    if (name === "mod") return { at, tree: ["-", a, ["*", b, ["floor", ["/", a, b]]]] };
+    if (name === "quantise") return { at, tree: ["*", b, ["round", ["/", a, b]]] };
+    if (name === "noise") return { at, tree: ["noise", ["floor", a], ["floor", b]] };
+    if (name === "saturate") return { at, tree: ["min", ["max", a, b], c] };
     return { at, tree: [name, ...parts] };
+  }
+
+  const whole = (tree) => {
+    if (!Array.isArray(tree)) return Number.isInteger(tree);
+    const [op, ...parts] = tree;
+    return ["floor", "round", "sgn"].includes(op)
+      || (["+", "-", "*", "abs", "min", "max", "if"].includes(op) && parts.slice(op === "if" ? 1 : 0).every(whole));
+  };
+
+  function equal(a, b, word, at) {
+    if (!whole(a) || !whole(b)) fail(at, "only < <= > >= compare numbers; == is for whole ones, as round(x) == 2, and state(1) == name");
+    const same = ["and", ["<=", a, b], [">=", a, b]];
+    return word === "==" ? same : ["not", same];
   }
 
   function inState(at, { place, n, states }) {
