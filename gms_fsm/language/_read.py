@@ -558,25 +558,14 @@ class _Reader:
         return f"state(1) == {self.own.states[-1]}"
 
     def in_state(self, whose: Owner, element: int, op: ast.cmpop, name: ast.expr) -> Condition:
-        path = _dotted(name)
-        inside = [each for each in whose.states if f"{each}.".startswith(f"{path}.")]
+        lead = f"{ast.unparse(name)}."  # of a composite state several are inside
+        inside = [InState(element, each) for each in whose.states if f"{each}.".startswith(lead)]
         if not inside:
             raise self.refuse("unknown state", name, "the states " + ", ".join(whose.states))
         if not isinstance(op, ast.Eq | ast.NotEq):
             raise self.refuse("states are compared by == or !=", name, self.compared())
-        each = tuple(InState(element, state) for state in inside)  # those in a composite state
-        found = each[0] if len(each) == 1 else Either(each)
+        found = inside[0] if len(inside) == 1 else Either(tuple(inside))
         return found if isinstance(op, ast.Eq) else Not(found)
-
-
-def _dotted(node: ast.expr) -> str:
-    """Return a name with dots as a text; empty if it is none."""
-    match node:
-        case ast.Name(id=name):
-            return name
-        case ast.Attribute(value=value, attr=name):
-            return f"{_dotted(value)}.{name}"
-    return ""
 
 
 def _plain(node: ast.expr) -> str:
@@ -585,16 +574,9 @@ def _plain(node: ast.expr) -> str:
             return f"the constant {shown(value)}"
         case ast.BinOp(op=op) | ast.UnaryOp(op=op):
             signs = {
-                "Mod": "%",
-                "FloorDiv": "//",
-                "MatMult": "@",
-                "BitAnd": "&",
-                "BitOr": "|",
-                "BitXor": "^",
-                "LShift": "<<",
-                "RShift": ">>",
-                "Invert": "~",
-            }
+                "Mod": "%", "FloorDiv": "//", "MatMult": "@", "BitAnd": "&", "BitOr": "|",
+                "BitXor": "^", "LShift": "<<", "RShift": ">>", "Invert": "~",
+            }  # fmt: skip
             return f"the operator {signs.get(type(op).__name__, type(op).__name__.lower())}"
     words = {
         ast.Attribute: "an attribute (.)",
