@@ -43,7 +43,8 @@ PICTURES = DOCS / "images" / "zoo"
 
 T_END = 12.0  # s: one cycle of stick-slip
 MOST_STEPS = 100_000  # of a run
-DRIVEN = "1e-3 * (1.5 + cos(t))"  # m/s
+# m/s: two steps, a hold at rest, and sliding again
+DRIVEN = "if(t < 2, 1e-4, if(t < 5, 1e-5, if(t < 7, 1e-4, if(t < 10, 0, 1e-4))))"
 PULLED = "0.1 * t"  # m, the end of the spring
 SWUNG = "2 * sin(0.7 * t)"  # m, for laws that differ for v < 0
 GROWING = "5e-6 * t * cos(2 * t)"  # m/s
@@ -343,13 +344,9 @@ def run_of(item: Item) -> Run:
         return Run("pulled.toml", text, simulated(text), about)
     except StepLimitError:
         text = system_file(item, DRIVEN)
-        about = (
-            f"The contact is driven at `v = {DRIVEN}`, in m/s. (A mass that is pulled makes this"
-        )
-        about += (
-            "\nmodel stiff: `dp45` would need more than a hundred thousand steps, Radau takes some"
-        )
-        about += "\nhundreds, with the tolerances given above.)"
+        about = """The contact is driven: its velocity steps down and up, it is held at rest from
+7 to 10 s, and slides again. (A mass that is pulled makes this model stiff: `dp45` would need more
+than a hundred thousand steps, Radau takes some hundreds, with the tolerances given above.)"""
         return Run("driven.toml", text, simulated(text), about)
 
 

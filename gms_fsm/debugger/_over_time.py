@@ -60,8 +60,13 @@ def ribbons(
     shown = session.tree.branch(branch)
     rows = _sampled(shown, start, end, parts)
     modes = tuple(None if row is None else shown.raw(row).mode for row in rows)
-    now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
-    return Ribbons(start, end, modes, now)
+    return Ribbons(start, end, modes, _part(session, parts, (start, end)))
+
+
+def _part(session: Session, parts: int, span: tuple[float, float]) -> int:
+    """Return the part of a time span that contains the cursor."""
+    start, end = span
+    return min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
 
 
 def _sampled(branch: Branch, start: float, end: float, parts: int) -> list[int | None]:
@@ -81,8 +86,10 @@ def curves(
     """Return velocity and force of a contact over time."""
     branch, contact = session.branch, session.start.program.layout.bank(machine).name
     found: dict[str, list[float | None]] = {"v": [], "F": []}
-    for row in _sampled(branch, *span, parts):
-        scope = None if row is None else branch.scope(branch.raw(row), contact)
+    rows = [None if row is None else branch.raw(row) for row in _sampled(branch, *span, parts)]
+    rows[_part(session, parts, span)] = branch.here  # what the other panes show
+    for row in rows:
+        scope = None if row is None else branch.scope(row, contact)
         for name, values in found.items():
             values.append(None if scope is None else getattr(scope, name))
     return {name: tuple(values) for name, values in found.items()}

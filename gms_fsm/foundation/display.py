@@ -152,7 +152,7 @@ def full_text(value: Any) -> str:
     --------
     >>> from gms_fsm import State
     >>> full_text(State("stick", flow={"z": "v"}))
-    "State('stick', {'z': 'v'}, {}, {}, {}, False)"
+    "State('stick', {'z': 'v'}, {}, {}, {}, False, (), '', False)"
     """
     parts = ", ".join(repr(getattr(value, each.name)) for each in fields(value) if each.repr)
     return f"{type(value).__name__}({parts})"

@@ -71,6 +71,16 @@ class Scale:
         """
         return f"{self.number(value, digits)} {self.unit}".rstrip()
 
+    def near(self, value: float) -> Scale:
+        """Return this unit, or for a value that is far smaller the one that suits it.
+
+        >>> Scale(-3, "mm/s").near(2e-5).unit, Scale(-3, "mm/s").near(-1e-6).unit
+        ('mm/s', 'µm/s')
+        """
+        if not 0.0 < abs(value) < 10.0 ** (self.power - 2):
+            return self
+        return scale_of(value, self.unit[1:] if self.power else self.unit)
+
 
 def scale_of(values: float | Iterable[float], unit: str, digits: int = DIGITS) -> Scale:
     """Return the scale that suits the largest of some values: one unit for all of them.

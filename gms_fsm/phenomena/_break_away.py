@@ -126,7 +126,7 @@ PHENOMENA = (
         ("force rate [N/s]", "break-away force [N]"),
         _break_away,
         log=True,
-        shows_if=f"> {percent('break-away.fall')}",
+        shows_if=f"> {percent('break-away.fall')} of that at the slowest",
     ),
     Phenomenon(
         "vibration",

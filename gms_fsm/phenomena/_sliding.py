@@ -57,7 +57,7 @@ def _lag(specimen: Specimen) -> PhenomenonResult:
         verdict, said = "shows", "there is more friction while the speed rises, more so when faster"
     else:
         verdict, said = "does not show", "friction depends on the present speed only"
-    order = (1, 0, 2)
+    order = (2, 0, 1)
     numbers = tuple(
         MeasuredNumber(f"width of the loop at {OMEGAS[k]:g} rad/s", 1e3 * widths[k], "mN")
         for k in order
@@ -165,13 +165,13 @@ PHENOMENA = (
     Phenomenon(
         "lag",
         "Frictional lag",
-        "frictional lag: width at 10 rad/s",
+        "frictional lag: width at 25 rad/s",
         "The speed is 1e-3 (1.5 + cos w t) m/s. Measured is the friction while the speed rises "
         "minus that while it falls, at the mean speed, for w = 1, 10 and 25 rad/s.",
         ("$v$ [mm/s]", "friction [N]"),
         _lag,
         decimals=1,
-        shows_if=f"> {percent('lag.width')} of $F_s$ at 25 rad/s",
+        shows_if=f"> {percent('lag.width')} of $F_s$",
     ),
     Phenomenon(
         "stribeck",
@@ -182,7 +182,7 @@ PHENOMENA = (
         ("$v$ [mm/s]", "friction [N]"),
         _stribeck,
         log=True,
-        shows_if=f"> {percent('stribeck.fall')}",
+        shows_if=f"> {percent('stribeck.fall')} of that at the lowest speed",
     ),
     Phenomenon(
         "stick-slip",

@@ -100,10 +100,11 @@ class ContactHere:
         values = {"x": self.x, "v": self.v, "F": self.F} | dict(self.more)
         # Further names are of velocities, and of forces along them (`Chart.force_names`).
         kinds = {name: "F" if name.startswith("F_") else "v" for name in self.more}
-        return ", ".join(
-            f"{name} = {trimmed(self.scales[kinds.get(name, name)].text(values[name], 6))}"
-            for name in names
-        )
+        found = []
+        for name in names:
+            scale = self.scales[kinds.get(name, name)].near(values[name])
+            found.append(f"{name} = {trimmed(scale.text(values[name], 6))}")
+        return ", ".join(found)
 
     @property
     def said(self) -> str:

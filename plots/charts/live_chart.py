@@ -298,7 +298,10 @@ class LiveChart:
         cells = []
         for name, scale in self._scales.items():
             widest = f"{WIDEST} {scale.unit}".rstrip()
-            text = trimmed(scale.text(numbers[name])).replace("-", "−") if at else widest
+            text = widest
+            if at:
+                value = numbers[name]
+                text = trimmed(scale.near(value).text(value)).replace("-", "−")
             cells.append(f"{name} = {text.ljust(len(widest))}")
         return [
             [Piece("  ".join(cells[i : i + VALUES_PER_LINE]), "value")]

@@ -193,7 +193,7 @@ def _axes(rows: float, lines: int) -> tuple[Figure, Axes, Axes]:
 
 def _title(trace: Trace, plane: Plane, title: str) -> str:
     who = f"{plane.why.contact} E{plane.why.element + 1}".lstrip()
-    place = f"t = {trace.t[plane.row]:.6g} s, row {plane.row}"
+    place = f"$t$ = {trace.t[plane.row]:.6g} s, row {plane.row}"
     return f"{head(trace, title)}\n{who} in {plane.state} at {place}"
 
 

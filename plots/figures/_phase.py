@@ -108,7 +108,7 @@ def _place(trace: Trace, row: int) -> str:
     log = trace.transitions
     fired = log[log.t == trace.t[row]]
     what = f": E{fired.element[0] + 1} {fired.edge[0]}" if fired.size == 1 else ""
-    return f"t = {trace.t[row]:.6g} s{what}"
+    return f"$t$ = {trace.t[row]:.6g} s{what}"
 
 
 def _dot(ax: Axes, here: float, values: np.ndarray, unit: str, F: float) -> None:

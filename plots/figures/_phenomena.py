@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from plots.style import (
     colour,
     compared_look,
 )
+from plots.style.mathtext import folded
 from plots.style.matplotlib import Axes, Figure, Rectangle, rc_context
 from plots.style.presets import font, inches, pt, room, settings, to_scale
 
@@ -62,7 +62,7 @@ def phenomenon_figure(table: PhenomenaTable, name: str) -> Figure | None:
             _panel(ax, model, found, phenomenon, limits)
         for ax in grid.flat[len(shown) :]:
             ax.set_axis_off()
-        below = "\n".join(wrap(_told(shown, phenomenon), int(LETTERS * room(size[0]))))
+        below = folded(_told(shown, phenomenon), int(LETTERS * room(size[0])))
         look: Any = {"family": "DejaVu Sans", "fontsize": font(9.5)}
         figure.supxlabel(f"{phenomenon.axes[0]}\n\n{below}", **look)
         figure.supylabel(phenomenon.axes[1], fontsize=font(9.5))

@@ -254,7 +254,8 @@ def state_look(mode: int) -> dict[str, Any]:
     return {
         "facecolor": STATE_FILLS[mode % len(STATE_FILLS)],
         "edgecolor": STATE_EDGES[mode % len(STATE_EDGES)],
-        "hatch": HATCHES[mode % len(HATCHES)],
+        # A fill that comes again has another hatch.
+        "hatch": HATCHES[(mode + mode // len(STATE_FILLS)) % len(HATCHES)],
         "linewidth": 0.6,
     }
 

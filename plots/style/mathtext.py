@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
+from textwrap import wrap
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.language import LATEX, Value, latex_name, spell
@@ -18,6 +20,24 @@ def formula(tree: Value, names: Mapping[str, str] | None = None) -> str:
     \left(F_{s} - F_{c}\right) \, \exp\left(-\left(\frac{v}{v_{s}}\right)^{2}\right)
     """
     return spell(tree, LATEX, names)
+
+
+def folded(text: str, letters: int) -> str:
+    r"""Return a text in lines; what stands between dollar signs is as long as it is printed.
+
+    Examples
+    --------
+    >>> print(folded(r"$\sigma_{1,i}$: damping of $z_i$, in Ns/m", 18))
+    $\sigma_{1,i}$: damping of
+    $z_i$, in Ns/m
+    """
+    formulas = re.findall(r"\$[^$]*\$", text)
+    printed = [re.sub(r"\\[A-Za-z]+", "x", each) for each in formulas]
+    printed = [re.sub(r"[${}_^\\\s]", "", each) for each in printed]
+    widths = iter("\0" * max(1, len(each)) for each in printed)
+    lines = wrap(re.sub(r"\$[^$]*\$", lambda _: next(widths), text), letters)
+    back = iter(formulas)
+    return "\n".join(re.sub("\0+", lambda _: next(back), line) for line in lines)
 
 
 class Formulas:

@@ -7,7 +7,6 @@ distance that the slider has moved relative to the rest position of the contact.
 from __future__ import annotations
 
 import math
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from plots.style import (
     element_colour,
     state_look,
 )
+from plots.style.mathtext import folded
 from plots.style.matplotlib import Artist, Axes, Figure, Rectangle, rc_context
 from plots.systems.mechanical_symbols import (
     arrow_between,
@@ -119,13 +119,13 @@ def elements_figure(trace: Trace | None, row: int, elements: int, title: str) ->
         scale = min(INCHES, TALLEST / rows)  # no taller than a page, with type of the same size
         left, right = _sides(trace)
         wide = (right - left) * scale
-        below = wrap(_caption(trace), int(LETTERS * wide))
+        below = folded(_caption(trace), int(LETTERS * wide))
         look: dict[str, Any] = {"x": 0.01, "ha": "left", "fontsize": 8}
-        figure.supxlabel("\n".join(below), **look)
-        figure.set_size_inches(wide, 0.5 + 0.15 * len(below) + scale * rows)
+        figure.supxlabel(below, **look)
+        figure.set_size_inches(wide, 0.5 + 0.15 * (below.count("\n") + 1) + scale * rows)
         parts = [title] if title else []
         if trace is not None:
-            parts += [trace.model.title, f"t = {trace.t[row]:.6g} s"]
+            parts += [trace.model.title, f"$t$ = {trace.t[row]:.6g} s"]
         if parts:
             figure.suptitle(", ".join(parts), x=0.01, ha="left")
     return figure

@@ -483,7 +483,7 @@ def test_tables_of_phenomena_without_curves_and_with_narrow_cells() -> None:
     figure = figures.phenomenon_figure(found, "lag")
     assert figure is not None
     assert len(figure.legends) == 1
-    assert "width of the loop at 10 rad/s (shows it if > 0.5 %" in figure.get_supxlabel()
+    assert "width of the loop at 25 rad/s (shows it if > 0.5 %" in figure.get_supxlabel()
 
 
 def test_what_slides_away_leaves_its_panel_on_the_scale_of_the_others() -> None:

@@ -131,7 +131,7 @@ def test_a_row_made_by_a_firing_shows_the_row_before(run: Trace) -> None:
     assert all(text[0] == "✓" for text in lanes if text.endswith(("z >= s", " v > v_c")))
     title = figures.landscape(run, 0, t=5.0).get_suptitle()  # the last row at or before a time
     row = int(np.flatnonzero(run.t <= 5.0)[-1])
-    assert title.endswith(f"t = {run.t[row]:.6g} s, row {row}")
+    assert title.endswith(f"$t$ = {run.t[row]:.6g} s, row {row}")
 
 
 @pytest.mark.slow

@@ -382,7 +382,7 @@ def test_the_dot_is_at_the_row_and_both_panels_have_one_colour_bar(once: Trace) 
             assert dot.get_xydata()[0] == pytest.approx([values[place], once.F[place]])
             if window is None:
                 assert set(ax.collections[0].get_array()) == {0, 1, 2}
-        assert f"t = {once.t[place]:.6g} s" in figure.get_suptitle()
+        assert f"$t$ = {once.t[place]:.6g} s" in figure.get_suptitle()
         assert len(figure.axes) == 3
         assert figure.axes[2].get_ylabel() == "elements in slip"
     first = once.transitions[0]
