@@ -6,7 +6,7 @@ import math
 
 from gms_fsm import Body, Chart, Contact, State, Supervisor, System, Transition
 from gms_fsm.charts import CHARTS
-from tests.systems_cases import Case
+from tests.systems_cases import STICTION, Case
 
 THERMOSTAT = Chart(
     "thermostat",
@@ -97,6 +97,82 @@ BRAKE = Chart(
     states=(State("on"),),
     outputs={"F": "mu * N * tanh(v / v_0)"},
 )
+RELAY = Chart(
+    "relay",
+    inputs=("x",),
+    velocities=(),
+    states=(State("pull", outputs={"u": "-1"}), State("push", outputs={"u": "1"})),
+    transitions=(
+        Transition("fall_below", "pull", "push", guard="x < 0"),
+        Transition("rise_above", "push", "pull", guard="x > 0"),
+    ),
+)
+VALVE = Chart(  # the stem q of He et al. (2007); r: force that is left, p: the last signal
+    "valve stiction of He",
+    inputs=("u",),
+    velocities=(),
+    variables=("r", "p", "q"),
+    parameters=("f_s", "f_d"),
+    states=(State("valve", outputs={"y": "q"}),),
+    transitions=(
+        Transition(
+            "jump",
+            "valve",
+            "valve",
+            guard="abs(r + u - p) > f_s",
+            actions={
+                "q": "u - sgn(r + u - p) * f_d",
+                "r": "sgn(r + u - p) * f_d",
+                "p": "u",
+            },
+        ),
+        Transition(
+            "stay", "valve", "valve", guard="u < p or u > p", actions={"r": "r + u - p", "p": "u"}
+        ),
+    ),
+)
+CALM = Chart(
+    "anti-hunting",
+    inputs=("e", "rests"),
+    velocities=(),
+    parameters=("band",),
+    states=(State("integrate", outputs={"k": "1"}), State("hold", outputs={"k": "0"})),
+    transitions=(
+        Transition("freeze", "integrate", "hold", guard="rests > 0.5 and abs(e) < band"),
+        Transition("resume", "hold", "integrate", guard="rests < 0.5"),
+    ),
+)
+LIFT = Chart(
+    "lift",
+    inputs=("x", "u"),
+    velocities=(),
+    parameters=("load", "h"),
+    states=(
+        State("parked", outputs={"N": "40", "run": "1"}),
+        State("lifting", outputs={"N": "0", "run": "1"}),
+        State("arrived", outputs={"N": "40", "run": "0"}),
+    ),
+    transitions=(
+        Transition("ease", "parked", "lifting", guard="u >= load"),
+        Transition("apply", "lifting", "arrived", guard="x >= h"),
+    ),
+)
+PARKING = Chart(
+    "parking brake",
+    inputs=("v", "N"),
+    parameters=("mu",),
+    states=(
+        State("stuck", locked=True),
+        State("up", outputs={"F": "mu * N"}),
+        State("down", outputs={"F": "-mu * N"}),
+    ),
+    transitions=(
+        Transition("release_up", "stuck", "up", guard="F > mu * N"),
+        Transition("release_down", "stuck", "down", guard="F < -mu * N"),
+        Transition("arrest_up", "up", "stuck", guard="v < 0"),
+        Transition("arrest_down", "down", "stuck", guard="v > 0"),
+    ),
+)
 
 
 def thermostat() -> Case:
@@ -152,7 +228,67 @@ def hot_brake() -> Case:
     )
 
 
-CASES = (thermostat, crossing, gear_shift, intermittent_drive, hot_brake)
+def relay() -> Case:
+    """A mass of 1 kg with friction of 0.5 N, drawn to x = 0 by the 1 N of a relay."""
+    return Case(
+        System(
+            "relay",
+            bodies=(Body("mass", inertia=1.0, force="relay.u"),),
+            contacts=(Contact("pad", STICTION, {"F_c": 0.5, "F_s": 0.5, "b": 0.0}),),
+            supervisors=(Supervisor("relay", RELAY, inputs={"x": "x"}),),
+        ),
+        3.5,
+        initial={"mass.x": 1.0},
+    )
+
+
+def valve() -> Case:
+    """A sticking valve, asked once a second."""
+    inputs = {"u": "sin(0.25 * t)"}
+    stem = Supervisor("valve", VALVE, {"f_s": 0.3, "f_d": 0.2}, inputs=inputs, period=1.0)
+    return Case(System("valve", supervisors=(stem,)), 60.0)
+
+
+def hunting(band: float = 0.05) -> Case:
+    """A servo with stiction, whose integral is frozen while the mass rests near its aim."""
+    inputs = {"e": "1 - x", "rests": "is_in(pad.stuck)"}
+    return Case(
+        System(
+            "hunting",
+            bodies=(Body("mass", inertia=1.0, force="20 * (1 - x) + 40 * i - 3 * v"),),
+            contacts=(Contact("pad", STICTION, {"F_c": 1.0, "F_s": 1.5, "b": 0.0}),),
+            supervisors=(Supervisor("calm", CALM, {"band": band}, inputs=inputs),),
+            flow={"i": "calm.k * (1 - x)"},
+        ),
+        20.0,
+    )
+
+
+def lift() -> Case:
+    """A cage of 2 kg whose brake is eased when the motor, 4 N/s, carries its 20 N."""
+    inputs = {"x": "x", "u": "4 * t"}
+    return Case(
+        System(
+            "lift",
+            bodies=(Body("cage", inertia=2.0, force="control.run * 4 * t - 20"),),
+            contacts=(Contact("brake", PARKING, {"mu": 0.75}, inputs={"N": "control.N"}),),
+            supervisors=(Supervisor("control", LIFT, {"load": 20.0, "h": 1.0}, inputs=inputs),),
+        ),
+        8.0,
+    )
+
+
+CASES = (
+    thermostat,
+    crossing,
+    gear_shift,
+    intermittent_drive,
+    hot_brake,
+    relay,
+    valve,
+    hunting,
+    lift,
+)
 HEATING = (
     math.log(30.0 / 9.0),  # from 0 to 21 degrees
     math.log(21.0 / 19.0),  # cooling

@@ -193,6 +193,8 @@ def _reported(
 
 def _figure_files(loaded: Loaded, contact: str = "") -> list[str]:
     """Return the file names of the overview figures, of all contacts or of one of several."""
+    if loaded.system is not None and not loaded.system.contacts:
+        return []  # a supervisor has no force to draw
     if loaded.contacts and not contact:
         return [name for each in loaded.contacts for name in _figure_files(loaded, each)]
     stem = f"overview-{contact}".removesuffix("-")

@@ -104,9 +104,10 @@ class Loaded:
 
     @property
     def contacts(self) -> tuple[str, ...]:
-        """The names of the contacts, if there are several."""
-        names = () if self.system is None else tuple(each.name for each in self.system.contacts)
-        return names if len(names) > 1 else ()
+        """The names of the contacts, unless a single one is all that switches."""
+        if self.system is None or len(self.system.machines) == 1:
+            return ()
+        return tuple(each.name for each in self.system.contacts)
 
     def simulate(self, **options: Any) -> Trace:
         """Run it.

@@ -322,10 +322,13 @@ def _end_of_contacts(
         found["z"] += own
     places = [
         {"x": bank.position, "v": bank.of(bank.velocity), "F": bank.of("F")}
+        if bank.velocity
+        else {}
         for bank in layout.banks
     ]
     for name in ("x", "v", "F"):
-        values = [seen[place[name]] for place in places]
+        # A supervisor has none of them.
+        values = [seen[place[name]] if place else np.nan for place in places]
         found[name] = values if len(values) > 1 else values[0]
     return found
 
@@ -340,10 +343,11 @@ def _log_of(firings: Firings) -> NDArray[Any]:
 
 def _of_contacts(trace: Trace) -> dict[str, FloatArray]:
     """Return the columns of the contacts side by side; x, v and F of a single one as they are."""
-    parts = [trace.contact(name) for name in trace.contacts]
-    found = {}
+    parts = [trace.contact(each.name) for each in trace.what.system.machines]
+    none, found = np.full(len(trace.t), np.nan), {}
     for name in ("x", "v", "F"):
-        columns = np.stack([getattr(part, name) for part in parts], axis=1)
+        own = [getattr(part, name) if part.model.chart.velocities else none for part in parts]
+        columns = np.stack(own, axis=1)
         found[name] = columns[:, 0] if len(parts) == 1 else columns
     return found | {"z": np.concatenate([part.z for part in parts], axis=1)}
 

@@ -104,20 +104,23 @@ def varied(what: Mounted, values: Mapping[str, ArrayLike]) -> Mounted:
     for name, given in values.items():
         owner, own = _owner(what, name)
         groups.setdefault(owner, {})[own] = given
-    contacts = tuple(
+    machines = tuple(
         each.with_values(groups[each.name]) if each.name in groups else each
         for each in what.system.machines
     )
-    return _remade(what, contacts, groups.get(NUMBERS, {}))
+    return _remade(what, machines, groups.get(NUMBERS, {}))
 
 
 def _remade(
-    what: Mounted, contacts: tuple[Contact, ...], numbers: Mapping[str, ArrayLike]
+    what: Mounted, machines: tuple[Contact, ...], numbers: Mapping[str, ArrayLike]
 ) -> Mounted:
-    """Return the same with other contacts, and some other numbers beside theirs."""
+    """Return the same with other contacts and supervisors, and some other numbers."""
+    count = len(what.system.contacts)
+    contacts, supervisors = machines[:count], machines[count:]
     if what.named:
         every: Any = {**what.system.numbers, **numbers}
-        return mounted(replace(what.system, contacts=contacts, numbers=every))
+        parts: Any = {"contacts": contacts, "supervisors": supervisors, "numbers": every}
+        return mounted(replace(what.system, **parts))
     model = contacts[0].model
     assert model is not None
     return mounted(model, with_numbers_of_rig(what.rig, numbers), contacts[0].period)

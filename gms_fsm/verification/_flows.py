@@ -64,7 +64,7 @@ def bend_apart(
 
 def _velocity(subject: ChartSubject) -> str:
     """Return the name of the rate of x; empty if the chart has none."""
-    v = subject.chart.velocities[0]
+    v = next(iter(subject.chart.velocities), "")
     return v if v in (*subject.inputs, *subject.variables) else ""
 
 

@@ -112,7 +112,7 @@ class _Formulas:
 
     def name(self, name: str) -> Dual:
         if name not in self.names:
-            raise Undecided(f"{name} is not encoded for a contact with several velocities")
+            raise Undecided(f"{name} is not encoded")
         return self.names[name]
 
     def negative(self, _: Negative, parts: Iterator[Dual]) -> Dual:

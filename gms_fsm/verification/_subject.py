@@ -132,7 +132,7 @@ class ChartSubject:
     @property
     def about(self) -> tuple[str, ...]:
         """What the statements are about, line by line."""
-        facts, v, H, W = self.facts, self.chart.velocities[0], self.load, self.mobility
+        facts, v, H, W = self.facts, next(iter(self.chart.velocities), ""), self.load, self.mobility
         lines = [
             "over the reals, not floats; over points, not trajectories",
             "inputs and their rates (ds/dt, dv/dt) are free, but equal in both states of a switch",

@@ -1,6 +1,7 @@
 """Machines that are no contacts switch when they should, see others, and hear events."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,18 +21,26 @@ from gms_fsm import (
     System,
     Trace,
     Transition,
+    prove,
     simulate,
+    sweep,
 )
+from tests.scenario_files import CommandLine
 from tests.supervisor_cases import (
     BRAKE,
     HEATING,
+    LIGHT,
     SIDE,
     THERMOSTAT,
     crossing,
     gear_shift,
     hot_brake,
+    hunting,
     intermittent_drive,
+    lift,
+    relay,
     thermostat,
+    valve,
 )
 
 
@@ -101,6 +110,119 @@ def test_the_heat_of_a_brake_eases_it_as_scipy_says():
             N = 3.0 if N == 30.0 else 30.0
     assert len(found) >= 2
     assert trace.transitions.t.tolist() == pytest.approx(found, rel=1e-7)
+
+
+def test_a_relay_draws_a_mass_to_rest_by_thirds():
+    """Inwards it is pushed with 1 - 0.5 N, outwards held back with 1 + 0.5 N."""
+    trace = relay().run()
+    assert times(trace, "fall_below") == pytest.approx([2.0], rel=1e-9)
+    assert times(trace, "arrest_backward") == pytest.approx([8.0 / 3.0], rel=1e-9)
+    since = 3.5 - 8.0 / 3.0  # from rest at x = -1/3 m
+    assert trace.body("mass").x[-1] == pytest.approx(-1.0 / 3.0 + 0.25 * since**2, rel=1e-9)
+
+
+def test_a_valve_sticks_and_jumps_as_the_published_rule_says():
+    """Q. P. He et al., Industrial & Engineering Chemistry Research 46(4), 2007."""
+    case = valve()
+    ticks = np.arange(60.0)
+    left = before = stem = 0.0
+    expected = []
+    for u in np.sin(0.25 * ticks).tolist():
+        force = left + u - before
+        if abs(force) > 0.3:
+            left = math.copysign(0.2, force)
+            stem = u - left
+        else:
+            left = force
+        before = u
+        expected.append(stem)
+    trace = simulate(case.system, case.t_end, t_eval=ticks + 0.5).sample(ticks + 0.5)
+    assert trace.value("valve.y").tolist() == expected
+    assert 20 < len(set(expected)) < 60
+
+
+@pytest.mark.parametrize("band", [1e-9, 0.05])
+def test_a_supervisor_ends_the_hunting_of_a_servo(band: float):
+    trace, expected = hunting(band).run(), servo_by_hand(band)
+    arrests = trace.contact("pad").transitions.t
+    assert arrests.tolist() == pytest.approx(expected, rel=1e-7, abs=1e-9)
+    frozen = times(trace, "freeze")
+    assert frozen == ([pytest.approx(expected[-1])] if band > 0.01 else [])
+    assert len(expected) == (10 if band > 0.01 else 20)
+
+
+def servo_by_hand(band: float) -> list[float]:
+    """Return when the servo of `hunting` breaks away and stops."""
+    t, y, found = 0.0, np.zeros(3), []
+    while abs(1.0 - y[0]) >= band:
+        e, pull = 1.0 - y[0], 20.0 * (1.0 - y[0]) + 40.0 * y[2]
+        if abs(pull) <= 1.5:  # at rest the integral grows by e
+            wait = (math.copysign(1.5, e) - pull) / (40.0 * e)
+            t, y = t + wait, y + [0.0, 0.0, e * wait]
+        if t > 20.0:
+            break
+        side = math.copysign(1.0, 20.0 * (1.0 - y[0]) + 40.0 * y[2])
+
+        def flow(_: float, y: np.ndarray, side: float = side) -> list[float]:
+            force = 20.0 * (1.0 - y[0]) + 40.0 * y[2] - 3.0 * y[1]
+            return [y[1], force - side, 1.0 - y[0]]
+
+        def stops(_: float, y: np.ndarray) -> float:
+            return y[1]
+
+        stops.terminal, stops.direction = True, -side
+        found.append(t)
+        done = solve_ivp(flow, (t, 20.0), y, events=stops, rtol=1e-12, atol=1e-14)
+        t, y = done.t[-1], done.y[:, -1] * [1.0, 0.0, 1.0]
+        if done.status == 0:
+            break
+        found.append(t)
+    return found
+
+
+def test_a_lift_is_eased_when_the_motor_carries_it_and_stops_above_its_floor():
+    trace = lift().run()
+    rise = 3.0 ** (1.0 / 3.0)  # 2 x'' = 4 (t - 5): x = (t - 5)^3 / 3 reaches 1 m
+    v = rise**2
+    assert times(trace, "ease") == pytest.approx([5.0], rel=1e-9)
+    assert times(trace, "apply") == pytest.approx([5.0 + rise], rel=1e-9)
+    assert times(trace, "arrest_up") == pytest.approx([5.0 + rise + v / 25.0], rel=1e-9)
+    assert trace.body("cage").x[-1] == pytest.approx(1.0 + v**2 / 50.0, rel=1e-9)
+
+
+def test_each_supervisor_can_be_proved_alone_and_in_its_system():
+    pytest.importorskip("z3", reason="proofs need z3")
+    assert not prove(LIGHT).refuted
+    found = prove(thermostat().system, contact="heater").refuted
+    assert [each.check for each in found] == ["livelock"]  # low > high is not excluded
+
+
+def test_a_sweep_varies_a_system_with_supervisors():
+    case = hot_brake()
+    result = sweep(case.system, case.t_end, {"pad.mu": [0.3, 0.4]}, rtol=1e-10)
+    assert result.outcome.tolist() == ["ok", "ok"]
+    alone = case.run()
+    assert result.contact("pad").F[1] == alone.contact("pad").F[-1]
+    assert np.isnan(result.contact("mode").F).all()
+
+
+def test_an_input_that_reads_the_force_that_it_makes_is_refused():
+    pad = Contact("pad", BRAKE, {"mu": 0.4, "v_0": 0.1}, inputs={"N": "30 + pad.F"})
+    with pytest.raises(ParameterError, match=r"an input of pad reads pad\.F"):
+        simulate(
+            System("loop", bodies=(Body("disc", inertia=2.0, force="20"),), contacts=(pad,)), 1.0
+        )
+
+
+@pytest.mark.parametrize("make", [hot_brake, thermostat])
+def test_the_command_line_runs_checks_and_exports_supervisors(gms_fsm: CommandLine, make):
+    make().system.save("one.toml")
+    assert gms_fsm("run", "one.toml", "--set", "run.t_end=2", "-o", "out").code == 0
+    drawn = {each.name for each in Path("out").glob("overview*.svg")}
+    assert drawn == ({"overview-pad.svg"} if make is hot_brake else set())
+    assert gms_fsm("check", "one.toml").code in (0, 1)  # 1: something is refuted
+    done = gms_fsm("export", "one.toml", "--to", "scxml", "-o", "out")
+    assert "takes friction only, and one.toml has the supervisors" in done.err
 
 
 def test_the_flow_of_a_variable_reads_the_force_of_its_own_element_and_contact():

@@ -61,7 +61,16 @@ def export_command(
         )
     given, default, more = _given(name, law, contact)
     contacts: tuple[Contact, ...] = getattr(given, "contacts", ())
-    if to in known and "settings" not in known[to].takes and len(contacts) == 1:
+    whole = [each.name for each in known.values() if "settings" in each.takes]
+    supervisors: tuple[Contact, ...] = getattr(given, "supervisors", ())
+    if to in known and to not in whole and supervisors:
+        raise ParameterError(
+            f"{to} takes friction only, and {name} has the supervisors "
+            f"{', '.join(repr(each.name) for each in supervisors)}",
+            place="--to",
+            advice=f"give one of {', '.join(whole)}, or the chart file of one of them",
+        )
+    if to in known and to not in whole and len(contacts) == 1:
         # Only formats that contain the engine take the bodies, too.
         given, _, more = _given(name, law, contacts[0].name)
         note(f"{to} takes friction only: written is that of {name}, with its velocity as an input")

@@ -197,6 +197,8 @@ def sweep_command(
     for run, message in failures(result, most=1):
         say(f"first failure: run {run}: {message}")
     say(f"start with {files[0]}")
+    if bad == len(result):
+        raise typer.Exit(1)
 
 
 def phenomena_command(

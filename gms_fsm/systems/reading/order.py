@@ -23,11 +23,8 @@ def order_of(read: Assembly) -> tuple[Bank, ...]:
         if not ready:
             names = ", ".join(each.name for each in waiting)
             closing = " and ".join(sorted(read_by(read, waiting[0]) & given))
-            raise ParameterError(
-                f"the outputs of {names} follow from each other: {closing} closes the loop (an "
-                "algebraic loop)",
-                place=f"system {read.system.name!r}",
-                advice="put a further state between them, or give one of them a period",
+            raise _loop(
+                read, f"the outputs of {names} follow from each other: {closing} closes the loop"
             )
         found += ready[:1]
         waiting.remove(ready[0])
@@ -35,20 +32,40 @@ def order_of(read: Assembly) -> tuple[Bank, ...]:
 
 
 def check_loops(read: Assembly) -> None:
-    """Refuse machines whose outputs follow from each other."""
+    """Refuse machines whose outputs follow from each other, or from themselves by an input."""
     order_of(read)
+    for bank in read.banks:
+        own = {*bank.forces, *bank.rates}
+        closing = read.closure(_trees_read(read, bank) - own) & {*bank.forces}
+        if closing:
+            raise _loop(
+                read, f"an input of {bank.name} reads {min(closing)}, which follows from it"
+            )
+
+
+def _loop(read: Assembly, found: str) -> ParameterError:
+    return ParameterError(
+        f"{found} (an algebraic loop)",
+        place=f"system {read.system.name!r}",
+        advice="put a further state between them, or give one of them a period",
+    )
 
 
 def read_by(read: Assembly, bank: Bank) -> frozenset[str]:
     """Return what the outputs of a machine are computed from, but for its own."""
+    return read.closure(_trees_read(read, bank)) - {*bank.forces, *bank.rates}
+
+
+def _trees_read(read: Assembly, bank: Bank) -> frozenset[str]:
+    """Return the names that the outputs of a machine read, and the rates that these read."""
     if bank.periodic:  # what it gives out is held
         return frozenset()
     given = (each for each in bank.outputs.values() if each is not None)
     trees = [*given, *bank.totals.values()]
-    names = read.closure(name for tree in trees for name in names_in(tree))
-    rates = [tree for (_, name), tree in bank.flows.items() if bank.rate(name) in names]
-    names |= read.closure(name for tree in rates for name in names_in(tree))
-    return names - {*bank.forces, *bank.rates}
+    names = frozenset(name for tree in trees for name in names_in(tree))
+    closed = read.closure(names)
+    rates = [tree for (_, name), tree in bank.flows.items() if bank.rate(name) in closed]
+    return names | {name for tree in rates for name in names_in(tree)}
 
 
 def is_deferred(read: Assembly, bank: Bank) -> bool:
