@@ -370,10 +370,18 @@ class SystemReader:
         """All names that a text of the system can use."""
         return self.system.readable
 
+    def machine(self, index: int, contact: Contact) -> Part:
+        """Return how a contact, or a supervisor, is named in errors."""
+        before = len(self.system.contacts)
+        kind, key, i = "contact", "contacts", index
+        if index >= before:  # supervisors follow the contacts
+            kind, key, i = "supervisor", "supervisors", index - before
+        return self.here.of(f"{kind} {contact.name!r}", key, i)
+
     def bank(self, index: int, contact: Contact) -> Bank:
         """Return a contact with the texts of its chart read."""
         chart, model, c = contact.chart, contact.model, contact.name
-        owner = self.here.of(f"contact {c!r}", "contacts", index)
+        owner = self.machine(index, contact)
         names: dict[str, Value] = {"t": Name("t")}
         names |= {name: Name(of(c, name)) for name in contact.values}
         self.check_inputs(index, contact)
@@ -465,11 +473,12 @@ class SystemReader:
         """Refuse inputs that the chart does not read."""
         for name in contact.inputs:
             if name not in contact.chart.inputs and (name != LOAD or contact.load is None):
+                owner = self.machine(index, contact)
                 raise ParameterError(
                     f"inputs has {shown(name)}, which its chart does not read",
-                    place=f"{self.here.words}, contact {contact.name!r}",
+                    place=owner.words,
                     advice=f"the chart's inputs are {', '.join(contact.chart.inputs) or 'none'}",
-                    key=("contacts", index, "inputs", name),
+                    key=(*owner.key, "inputs", name),
                 )
 
     def check_inertias(self, inertias: Mapping[str, Value]) -> None:
