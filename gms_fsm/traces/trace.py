@@ -23,6 +23,7 @@ from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import require
 from gms_fsm.foundation.text import visible
+from gms_fsm.language import EVENT
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
@@ -259,8 +260,10 @@ class Trace:
         names = {} if bank is None else bank.plain({each: each for each in layout.observed.shared})
         if isinstance(name, str) and name in names:
             return self.seen[names[name]]
-        known = [*layout.y.shared, *(each for each in names if " " not in each)]
-        raise unknown("value", name, known)
+        outputs = (each for each in self.what.system.names if each in self.seen)
+        plain = (each for each in names if " " not in each)
+        known = (*layout.y.shared, *outputs, *plain)
+        raise unknown("value", name, (each for each in known if not each.startswith(EVENT)))
 
     @property
     def x(self) -> FloatArray:
