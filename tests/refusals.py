@@ -1317,6 +1317,7 @@ rows = {
     "entry of no variable": ("chart 'rubber', state 'slip', entry", ..., state(entry={"w": "1"})),
     "action of no variable": ("chart 'rubber', edge 'go', action", ..., edge(actions={"s": "0"})),
     "no outputs": ("chart 'rubber', state 'stick'", ..., {"outputs": {}}),
+    "text for the outputs": ("chart 'rubber': outputs", "k * z", {"outputs": "k * z"}),
     "unknown output": ("chart 'rubber', outputs", ..., {"outputs": {"G": "k"}}),
     "unknown output of a state": ("state 'slip', outputs", ..., state(outputs={"G": "k"})),
     "force of a locked state": ("state 'slip'", ..., state(locked=True, outputs={"F": "k"})),
@@ -1351,7 +1352,6 @@ rows = {
 group("chart", ChartError, chart, rows)
 rows = {
     "no states": ({"states": (), "transitions": ()},),
-    "text for the outputs": ({"outputs": "k * z"},),
     "outputs by state": ({"outputs": {"F": {"stick": "k * z"}}},),
     "let and parameter": ({"let": {"k": "1"}},),
     "force and parameter": ({"velocities": ("v", "w"), "parameters": (*K, "F_w")},),

@@ -23,7 +23,6 @@ from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import require
 from gms_fsm.foundation.text import visible
-from gms_fsm.language import EVENT
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
@@ -254,16 +253,14 @@ class Trace:
         layout = self.program.layout
         if name in layout.y.shared:
             return self._named(name)
-        if name in self.what.system.names and name in self.seen:
-            return self.seen[name]  # an output of a supervisor
         bank = self.places if self.which or len(layout.banks) == 1 else None
         names = {} if bank is None else bank.plain({each: each for each in layout.observed.shared})
+        outputs = {each: each for each in self.what.system.names if each in self.seen}
+        names = {**names, **outputs}  # those of supervisors
         if isinstance(name, str) and name in names:
             return self.seen[names[name]]
-        outputs = (each for each in self.what.system.names if each in self.seen)
-        plain = (each for each in names if " " not in each)
-        known = (*layout.y.shared, *outputs, *plain)
-        raise unknown("value", name, (each for each in known if not each.startswith(EVENT)))
+        known = [*layout.y.shared, *(each for each in names if " " not in each)]
+        raise unknown("value", name, (u for u in known if u not in self.what.system.events))
 
     @property
     def x(self) -> FloatArray:

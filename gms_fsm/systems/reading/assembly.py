@@ -370,29 +370,21 @@ class SystemReader:
         """All names that a text of the system can use."""
         return self.system.readable
 
-    def machine(self, index: int, contact: Contact) -> Part:
-        """Return how a contact, or a supervisor, is named in errors."""
-        before = len(self.system.contacts)
-        kind, key, i = "contact", "contacts", index
-        if index >= before:  # supervisors follow the contacts
-            kind, key, i = "supervisor", "supervisors", index - before
-        return self.here.of(f"{kind} {contact.name!r}", key, i)
-
     def bank(self, index: int, contact: Contact) -> Bank:
         """Return a contact with the texts of its chart read."""
         chart, model, c = contact.chart, contact.model, contact.name
-        owner = self.machine(index, contact)
-        names: dict[str, Value] = {"t": Name("t")}
-        names |= {name: Name(of(c, name)) for name in contact.values}
-        self.check_inputs(index, contact)
+        i = index - len(self.system.contacts)  # below 0 but for supervisors
+        kind, i = ("contact", index) if i < 0 else ("supervisor", i)
+        owner = self.here.of(f"{kind} {c!r}", f"{kind}s", i)
+        names: dict[str, Value] = {"t": Name("t"), **{u: Name(of(c, u)) for u in contact.values}}
+        self.check_inputs(contact, owner)
         own_names: dict[str, str] = {}  # of what an action can set
         # Velocities and the position, those of a body where they are just that.
         jacobian, moved = [], {body.v: body for body in self.system.bodies}
         velocities, at = [], ""
         for text, name in zip(contact.v, chart.velocities, strict=True):
             tree = self.value(text, [*moved, *self.system.numbers], owner.of("v", "v"))
-            row = self.coefficients(tree, moved, text, owner)
-            jacobian.append(row)
+            jacobian.append(self.coefficients(tree, moved, text, owner))
             known = self.defined(of(c, name), tree)
             names[name], own_names[name] = known, known.id
             velocities.append(known.id)
@@ -469,11 +461,10 @@ class SystemReader:
             means=names,
         )
 
-    def check_inputs(self, index: int, contact: Contact) -> None:
+    def check_inputs(self, contact: Contact, owner: Part) -> None:
         """Refuse inputs that the chart does not read."""
         for name in contact.inputs:
             if name not in contact.chart.inputs and (name != LOAD or contact.load is None):
-                owner = self.machine(index, contact)
                 raise ParameterError(
                     f"inputs has {shown(name)}, which its chart does not read",
                     place=owner.words,
