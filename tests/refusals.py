@@ -53,6 +53,7 @@ from gms_fsm import (
     Spring,
     State,
     Stribeck,
+    Supervisor,
     System,
     Trace,
     Transition,
@@ -363,6 +364,7 @@ rows = {
     "path of Windows in double quotes": (QUOTED, SIGNAL % "C:\\Users\\me\\x.csv"),
     "braces over two lines": ("stribeck = {", "stribeck = {\n"),
     "table twice": ("[run]", "[rig]\n[run]"),
+    "braces without a comma": ("F_c = 1.0, F_s", "F_c = 1.0 F_s"),
 }
 group("line that is no TOML", ScenarioError, edited, rows, "a.toml")
 rows = {
@@ -1159,6 +1161,11 @@ group("chart file", ChartError, chart_file, rows)
 rows = {
     "unknown key": ("guard", "gard"),
     "wrong type": ("locked = true", "locked = 1"),
+    "word for true": ("locked = true", 'locked = "yes"'),
+    "number for a text": ('outputs.F = "level"', "outputs.F = 1"),
+    "output outside outputs": ('outputs.F = "level"', 'F = "level"'),
+    "name of another program": ("[[edge]]", "[[transition]]"),
+    "single brackets": ("[[edge]]", "[edge]"),
     "missing key": ('to = "slip"\n', ""),
     "unknown table": ("[[state]]", "[[stat]]"),
     "both kinds of parameters": (PLAIN, PLAIN + "\n[[parameter]]\nname = 'k'"),
@@ -1310,6 +1317,7 @@ rows = {
     "entry of no variable": ("chart 'rubber', state 'slip', entry", ..., state(entry={"w": "1"})),
     "action of no variable": ("chart 'rubber', edge 'go', action", ..., edge(actions={"s": "0"})),
     "no outputs": ("chart 'rubber', state 'stick'", ..., {"outputs": {}}),
+    "text for the outputs": ("chart 'rubber': outputs", "k * z", {"outputs": "k * z"}),
     "unknown output": ("chart 'rubber', outputs", ..., {"outputs": {"G": "k"}}),
     "unknown output of a state": ("state 'slip', outputs", ..., state(outputs={"G": "k"})),
     "force of a locked state": ("state 'slip'", ..., state(locked=True, outputs={"F": "k"})),
@@ -1385,6 +1393,8 @@ rows = {
     "a state for states": ({"states": STICK},),
 }
 group("chart", ChartError, chart, rows, "")
+rows = {"states inside without a name": (State("stick"), State("slip"))}
+group("state", ChartError, lambda *inside: State("on", *inside), rows, "state 'on'")
 rows = {
     "unknown name in a guard": ("guard, column 12", ..., edge(guard="z >= s and u > v_c")),
     "function that is a parameter": (
@@ -1849,10 +1859,27 @@ class Equal(Element):
     hits: int = 0
 
 
+SEEN = Chart(
+    "seen",
+    inputs=("P",),
+    velocities=(),
+    states=(State("on", outputs={"N": "P"}),),
+    transitions=(Transition("again", "on", "on", event="again"),),
+)
+STILL = Prescribed("0")
+ROOM = System("room", supervisors=(Supervisor("mode", SEEN, inputs={"P": 1.0}),), flow={"T": "1"})
 KICKED = Chart("kick", states=(State("on", entry={"v": "1"}, outputs={"F": "0"}),))
 rows = {
     "text for a model": ("model", "GMS", lambda: simulate("GMS", Prescribed("0"), 1.0)),
     "class for a model": ("model", GMS, lambda: simulate(GMS, Prescribed("0"), 1.0)),
+    "rig before model": ("model", STILL, lambda: simulate(STILL, GIVEN, 1.0)),  # type: ignore[arg-type]
+    "supervisor as a contact": ("contact 'm'", ..., lambda: Contact("m", SEEN, {"mu": 0.4})),
+    "input of a supervisor": (
+        "supervisor 'mode'",
+        ...,
+        lambda: System("room", supervisors=(Supervisor("mode", SEEN),)),
+    ),
+    "value of a system": ("", ..., lambda: simulate(ROOM, 1.0).value("mode.Y")),
     "class for a rig": ("rig", Slider, lambda: simulate(GIVEN, Slider, 1.0)),
     "class for a model of a contact": ("contact 'pad': chart", GMS, lambda: Contact("pad", GMS)),
     "end under another name": ("", ..., lambda: simulate(GIVEN, Prescribed("0"), tend=1.0)),  # type: ignore[call-arg]
@@ -1887,8 +1914,6 @@ rows = {
     "no runs": ({"F_s": []},),
     "no runs, wide": ({"k": np.empty((0, 4))},),
     "different lengths": ({"F_s": [1, 2], "k": np.ones((3, 4))},),
-    "one number": ({"F_s": 1.5},),
-    "one number, wide": ({"k": 1.5},),
     "too many elements": ({"k": np.ones((2, 5))},),
     "too deep": ({"k": np.ones((2, 4, 1))},),
     "wide where one is meant": ({"v_c": np.ones((2, 4))},),
@@ -1897,6 +1922,11 @@ rows = {
     "nothing": ({"F_s": None},),
 }
 group("parameters of a sweep", ParameterError, sweeping, rows, "")
+rows = {
+    "one number": ("parameters['F_s']", 1.5, {"F_s": 1.5}),
+    "one number, wide": ("parameters['k']", 1.5, {"k": 1.5}),
+}
+group("parameters of a sweep", ParameterError, sweeping, rows)
 rows = {
     "all rows": ("", ..., {"output": "all"}),
     "times that are missing": ("", ..., {"output": "t_eval"}),

@@ -62,6 +62,7 @@ _MEANT = {
     "step": "debug",
     "identify": "fit",
     "teach": "lesson",
+    "trust": "run --trust",
     "list": "run --list",
     "scenarios": "run --list",
 }
@@ -124,8 +125,13 @@ class _Verb(TyperCommand):
         extra = re.search(r"unexpected extra argument.*\(([^\s=]+[./\\][^\s=]*)\)", message)
         if parted:
             yield f"A key is changed without blanks: --set {parted[1]}={parted[2]}"
+        elif "-out" in args and "--output" in known:
+            folder = dict(itertools.pairwise(args)).get("-out", "...")
+            yield f"What is written is named by -o {folder}"
         elif extra and "--output" in known:
             yield f"What is written is named by -o {extra[1]}"
+        elif surplus := re.search(r"unexpected extra argument.*\(([^\s)]+)", message):
+            yield from self._one_alone(args, surplus[1])
         option = re.match(r"No such option:? '?(-+([\w-]+))", message)
         name = option[2].replace("-", "_") if option else ""
         keys = [each for each in RunTable.model_fields if name and each.startswith(name)]
@@ -134,6 +140,17 @@ class _Verb(TyperCommand):
             yield f"A key of the run is changed by --set run.{keys[0]}={value}"
         if {"-o", "--output"} & {*args} and "--output" not in known:
             yield f"It prints: gms-fsm {self.name} ... > FILE"
+
+    def _one_alone(self, args: list[str], surplus: str) -> Iterator[str]:
+        """Yield what is meant by an argument after the last one that is taken."""
+        flags = [
+            each for param in self.params if getattr(param, "is_flag", 0) for each in param.opts
+        ]
+        before = dict(zip(args[1:], args, strict=False)).get(surplus, "")
+        if before in flags:
+            yield f"{before} takes no value: leave {surplus} out"
+        elif self.name == "run":
+            yield f"It runs one scenario at a time: gms-fsm run {surplus} is another call"
 
 
 class _Drawing(_Verb):

@@ -88,7 +88,14 @@ class State:
         here = f"state {shown(self.name)}"
         for each in ("flow", "entry", "exit", "outputs"):
             # Copies: nobody else can change a frozen chart.
-            object.__setattr__(self, each, texts_of(getattr(self, each), f"{here}: {each}"))
+            given = getattr(self, each)
+            if isinstance(given, State):
+                raise ChartError(
+                    f"{each} is a state",
+                    place=here,
+                    advice=f"those inside are states=(State({given.name!r}, ...), ...)",
+                )
+            object.__setattr__(self, each, texts_of(given, f"{here}: {each}"))
         for each in ("locked", "history"):
             given = getattr(self, each)
             if not isinstance(given, bool):
@@ -276,8 +283,11 @@ def check_parts(states: Sequence[object], transitions: Sequence[object], here: s
 def texts_of(given: object, owner: str) -> dict[str, str]:
     """Return a copy of a mapping of names to texts."""
     if not isinstance(given, Mapping):
+        example = "{'F': 'k * z'}" if owner.endswith("outputs") else "{'z': 'v'}"
+        if owner.endswith("outputs") and isinstance(given, str) and "'" not in given:
+            example = f"{{'F': {shown(given)}}}"
         raise ChartError(
-            "it gives a text for each name, for example {'z': 'v'}", place=owner, value=given
+            f"it gives a text for each name, for example {example}", place=owner, value=given
         )
     return dict(given)
 

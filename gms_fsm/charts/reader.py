@@ -282,10 +282,15 @@ class ChartReader:
         """Refuse forces that the chart does not have."""
         for name, text in texts.items():
             if name not in self.chart.force_names:
+                forces = ", ".join(map(repr, self.chart.force_names))
+                hint = (
+                    "; the chart of a Supervisor, whose outputs have any names, has "
+                    "velocities=(), in a file velocities = []"
+                )
                 raise ChartError(
                     f"it has {name!r}",
                     place=owner.words,
-                    advice=f"its forces are {', '.join(map(repr, self.chart.force_names))}",
+                    advice=f"its forces are {forces}{hint * (len(self.chart.velocities) == 1)}",
                     key=(*owner.key, name),
                 )
             if hasattr(text, "keys"):

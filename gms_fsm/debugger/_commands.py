@@ -87,7 +87,9 @@ class Commands:
     def answer(self, name: str, arg: str) -> Iterator[str]:
         """Execute a command."""
         if name not in COMMANDS:
-            hint = f"{meant(name, COMMANDS)}help lists all commands"
+            near = _MEANT.get(name.removesuffix("()"), "")
+            hint = f"did you mean {near!r}? " if near else meant(name, COMMANDS)
+            hint += "help lists all commands"
             raise SessionError(f"there is no command {name!r}", advice=hint)
         yield from getattr(self, f"do_{name}")(arg)
         fired = self.session.here.fired
@@ -223,6 +225,11 @@ class Commands:
         except KeyboardInterrupt:
             self.session.goto(self.session.branch.last.t)
             raise
+        if t > self.session.t_end:
+            yield (
+                f"the run ends at {self.session.t_end:g} s; of a scenario, "
+                f"--set run.t_end={t:g} makes it longer"
+            )
         yield from self.here()
 
     def do_until(self, arg: str) -> Iterator[str]:
@@ -450,6 +457,8 @@ class Commands:
         events = [name.removeprefix(EVENT) for name in self.session.system.events]
         if not events:
             yield "no machine here waits for events"
+        elif not arg:
+            raise SessionError("the name of an event is missing", advice=self._usage("send"))
         elif arg not in events:
             raise SessionError(f"there is no event {arg!r}", advice=there_are(arg, events))
         else:
@@ -514,6 +523,7 @@ class Commands:
         yield from ()
 
 
+_MEANT = {"delete": "clear", "switch": "branch", "exit": "quit", "quit": "quit", "help": "help"}
 _BACKWARD = {"step": "back", "back": "step"}
 
 

@@ -47,6 +47,8 @@ Value = Annotated[Annotated[str, Tag(TEXT)] | Annotated[float, Tag(ONE)], Discri
 
 NUMBER = r"(?:(?<![\d.])[+-])?(?:\d+(?:\.(?!\.)\d*)?|(?<!\.)\.\d+)(?:[eE][+-]?\d+)?"
 
+ALSO = {"transition": "edge", "transitions": "edge"}  # what other programs call a key
+
 Kind = TypeVar("Kind", bound=BaseModel)
 Made = TypeVar("Made")
 
@@ -219,6 +221,15 @@ def _other_form(kind: str, value: object, elements: int) -> str:
         number = in_si(text)
         form = "it must be a number in SI units, without quotes, unit or formula"
         return f"{form}: {number}" if number else form
+    if kind in ("bool_type", "bool_parsing"):
+        known = {"yes": "true", "on": "true", "no": "false", "off": "false"}
+        form = known.get(text.casefold(), text.casefold())
+        alone = f": {form}" if form in ("true", "false") else ""
+        return f"it must be true or false{', without quotes' * bool(text)}{alone}"
+    if kind == "string_type" and isinstance(value, int | float):
+        return f'it must be a text, in quotes: "{str(value).lower()}"'
+    if kind == "string_type":
+        return "it must be a text, in quotes"
     if kind == "list_type" and 0 < len(text) <= LONGEST_SHOWN:
         return f"it must be a list: {_as_list(text)}"
     if kind == "list_type" and isinstance(value, int | float) and not isinstance(value, bool):
@@ -329,6 +340,8 @@ def _instead(
     ]
     places = {name: f"{each}.{name}" for each in tables for name in _fields_at((each,), data, root)}
     found = (
+        ALSO.get(key) if ALSO.get(key) in valid else "",
+        f"outputs.{key}" if "outputs" in valid and re.fullmatch("F(_.+)?", key) else "",
         inner.get(key),
         places.get(key),
         described[0] if len(described) == 1 else "",

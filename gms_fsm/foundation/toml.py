@@ -19,6 +19,7 @@ LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 2000  # characters that are searched for what is usual, in quadratic time
 MOST_PREFIXES = 60  # that are read to find a line
 DEEPEST_KEY = 6  # parts
+SEVERAL = ("state", "edge", "parameter", "body", "spring", "contact", "supervisor", "sampled")
 # tomllib takes quadratic time in the number of parts of a key, which can be hours.
 _ENDLESS_KEY = re.compile(
     r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}"""
@@ -84,6 +85,10 @@ _USUAL: Sequence[tuple[str, str | Callable[[re.Match[str]], str]]] = (
     (r"^[\w.]+\s*=\s*(?:\"[^\"]*|'[^']*)$", "the closing quote is missing"),
     (r"^[\w.]+\s*=\s*(?:\"[^\"]*\"|'[^']*')\s*\S", "the line ends after the closing quote"),
     (r"\{[^}]*$", "a table in braces stands on one line"),
+    (
+        rf"\{{[^}}]*?=\s*({_VALUE})\s+([\w.]+)\s*=",
+        "write a comma between the keys of a table in braces: {1}, {2} = ...",
+    ),
     (
         r"^\[[^\]]*$|^\[\[[^\]]*\]$",
         "write the head of a table as [run], or [[body]] where there may be several",
@@ -184,6 +189,9 @@ def _twice(lines: Sequence[str]) -> str:
                 )
             if before.lstrip().startswith("["):
                 break
+    head = re.match(r"\s*\[+([\w.-]+)\]", lines[-1])
+    if head and head[1].rpartition(".")[2] in SEVERAL:
+        return f"there may be several of it: write each head as [[{head[1]}]]"
     return "the key, or its table, is given twice: join them"
 
 

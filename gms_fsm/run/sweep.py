@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, Parameter
-from gms_fsm.errors import GMSError, ParameterError, cut
+from gms_fsm.errors import GMSError, ParameterError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, meant, unknown
 from gms_fsm.foundation.display import Log
 from gms_fsm.lowering.compiling import check_llvmlite
@@ -175,6 +175,13 @@ def _values(
             raise ParameterError(f"parameters[{name!r}] is not an array of numbers") from None
         _, n = names[name]
         if array.shape[1:] not in (((), (n,)) if n else ((),)) or array.ndim == 0:
+            if array.ndim == 0 and value is not None:
+                raise ParameterError(
+                    "it must be a list, one value for each run",
+                    place=f"parameters[{name!r}]",
+                    value=value,
+                    advice=f"write [{shown(value)}]",
+                )
             wanted = f"(runs,) or (runs, {n})" if n else "(runs,)"
             raise ParameterError(
                 f"parameters[{name!r}] has shape {array.shape}", advice=f"it must be {wanted}"

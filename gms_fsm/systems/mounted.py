@@ -178,6 +178,13 @@ def mounted(model: Model | System, rig: Rig | None = None, period: float | None 
     if isinstance(model, System):
         single: Any = model.machines[0] if len(model.machines) == 1 else Several(model)
         return Mounted(model, single, Mounting(model), named=True)
+    if hasattr(model, "signals") and hasattr(rig, "chart"):
+        raise ParameterError(
+            "it is a rig, and the rig is a model: the two are swapped",
+            place="model",
+            value=model,
+            advice="give the model first, then the rig",
+        )
     for what, given, mark, example in (
         ("model", model, "chart", "GMS(parameters, law='signed')"),
         ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),

@@ -164,7 +164,7 @@ class Contact:
         here = f"contact {shown(name)}"
         model = None
         if isinstance(chart, Chart):
-            values = checked_numbers(chart, {} if values is None else values, n, here)
+            values = {} if values is None else values
         elif is_model(chart):
             model = chart
             if values is not None or n != 1:
@@ -183,8 +183,11 @@ class Contact:
             raise ParameterError(
                 f"chart {chart.name!r} has no velocity",
                 place=here,
-                advice="it is the chart of a Supervisor: supervisors=(Supervisor(...),)",
+                advice="it is the chart of a Supervisor: supervisors=(Supervisor(...),), in a "
+                "file [[supervisor]]",
             )
+        if model is None:
+            values = checked_numbers(chart, values, n, here)
         check_bank(chart, n, here)
         velocities = several(v, str, f"{here}: v")
         if len(velocities) != len(chart.velocities):

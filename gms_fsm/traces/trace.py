@@ -253,14 +253,14 @@ class Trace:
         layout = self.program.layout
         if name in layout.y.shared:
             return self._named(name)
-        if name in self.what.system.names and name in self.seen:
-            return self.seen[name]  # an output of a supervisor
         bank = self.places if self.which or len(layout.banks) == 1 else None
         names = {} if bank is None else bank.plain({each: each for each in layout.observed.shared})
+        outputs = {each: each for each in self.what.system.names if each in self.seen}
+        names = {**names, **outputs}  # those of supervisors
         if isinstance(name, str) and name in names:
             return self.seen[names[name]]
         known = [*layout.y.shared, *(each for each in names if " " not in each)]
-        raise unknown("value", name, known)
+        raise unknown("value", name, (u for u in known if u not in self.what.system.events))
 
     @property
     def x(self) -> FloatArray:

@@ -42,7 +42,13 @@ def test_the_formats_are_named_from_one_table(tmp_path: Path, gms_fsm: CommandLi
     [
         ("simulate a.toml", "Did you mean 'run'?"),
         ("list", "Did you mean 'run --list'?"),
+        ("trust a.toml", "Did you mean 'run --trust'?"),
         ("copy servo my.toml", "-o my.toml"),
+        ("run servo -out res", "named by -o res"),
+        ("run servo own", "It runs one scenario at a time: gms-fsm run own"),
+        ("run servo --trust 5", "--trust takes no value: leave 5 out"),
+        ("check servo.tml", "did you mean the file 'servo.toml'?"),
+        ("check pulled", "did you mean the file 'pulled.toml'?"),
         ("run a.toml --set rig.mass = 2", "without blanks: --set rig.mass=2"),
         ("run a.toml -t 2", "--set run.t_end=2"),
         ("run a.toml t_end=10", "changed by --set t_end=10"),
@@ -54,9 +60,11 @@ def test_the_formats_are_named_from_one_table(tmp_path: Path, gms_fsm: CommandLi
 def test_arguments_that_are_not_taken_are_answered_with_what_is_meant(
     arguments: str, cure: str, gms_fsm: CommandLine
 ) -> None:
+    for name in ("servo.toml", "pulled.toml"):
+        Path(name).touch()
     done = gms_fsm(*arguments.split())
     assert done.code == 2
-    assert cure in done.err
+    assert cure in " ".join(done.err.replace("│", " ").split())
 
 
 @pytest.mark.parametrize(

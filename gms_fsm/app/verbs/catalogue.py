@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
+from pathlib import Path
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.gms import LAWS, WHICH_LAW
 from gms_fsm.charts.registry import Entry, entry, registered
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import nearest
 
 WIDTH = 78
 OWN = "gms-fsm chart --list shows all; a chart of your own is named by its file, own.toml"
@@ -19,7 +21,9 @@ def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
     try:
         found = entry(name)
     except ParameterError as error:
-        raise error.replaced(advice=f"{error.advice}; {OWN}") from None
+        near = nearest(name, [each.name for each in Path().glob("*.toml")], 0.75)
+        file = f"did you mean the file {near!r}? " if near else ""
+        raise error.replaced(advice=f"{file}{error.advice}; {OWN}") from None
     options = " or ".join(f"--law {each}" for each in found.laws)
     if law and not options:
         others = [each.name for each in registered().values() if each.laws]

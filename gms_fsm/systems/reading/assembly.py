@@ -373,18 +373,18 @@ class SystemReader:
     def bank(self, index: int, contact: Contact) -> Bank:
         """Return a contact with the texts of its chart read."""
         chart, model, c = contact.chart, contact.model, contact.name
-        owner = self.here.of(f"contact {c!r}", "contacts", index)
-        names: dict[str, Value] = {"t": Name("t")}
-        names |= {name: Name(of(c, name)) for name in contact.values}
-        self.check_inputs(index, contact)
+        i = index - len(self.system.contacts)  # below 0 but for supervisors
+        kind, i = ("contact", index) if i < 0 else ("supervisor", i)
+        owner = self.here.of(f"{kind} {c!r}", f"{kind}s", i)
+        names: dict[str, Value] = {"t": Name("t"), **{u: Name(of(c, u)) for u in contact.values}}
+        self.check_inputs(contact, owner)
         own_names: dict[str, str] = {}  # of what an action can set
         # Velocities and the position, those of a body where they are just that.
         jacobian, moved = [], {body.v: body for body in self.system.bodies}
         velocities, at = [], ""
         for text, name in zip(contact.v, chart.velocities, strict=True):
             tree = self.value(text, [*moved, *self.system.numbers], owner.of("v", "v"))
-            row = self.coefficients(tree, moved, text, owner)
-            jacobian.append(row)
+            jacobian.append(self.coefficients(tree, moved, text, owner))
             known = self.defined(of(c, name), tree)
             names[name], own_names[name] = known, known.id
             velocities.append(known.id)
@@ -461,15 +461,15 @@ class SystemReader:
             means=names,
         )
 
-    def check_inputs(self, index: int, contact: Contact) -> None:
+    def check_inputs(self, contact: Contact, owner: Part) -> None:
         """Refuse inputs that the chart does not read."""
         for name in contact.inputs:
             if name not in contact.chart.inputs and (name != LOAD or contact.load is None):
                 raise ParameterError(
                     f"inputs has {shown(name)}, which its chart does not read",
-                    place=f"{self.here.words}, contact {contact.name!r}",
+                    place=owner.words,
                     advice=f"the chart's inputs are {', '.join(contact.chart.inputs) or 'none'}",
-                    key=("contacts", index, "inputs", name),
+                    key=(*owner.key, "inputs", name),
                 )
 
     def check_inertias(self, inertias: Mapping[str, Value]) -> None:
