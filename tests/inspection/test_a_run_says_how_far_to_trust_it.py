@@ -29,6 +29,7 @@ from gms_fsm.charts.registry import registered
 from gms_fsm.traces.failures import NotFiniteError
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import KINDS
+from tests.corpus import ENGINES
 from tests.helpers import ROOT, open_loop, pulled_mass, stick_slip
 from tests.soak.doubts import PLANTED, TOUCH, clean, extreme, fault_of, grazing, tie
 
@@ -263,7 +264,7 @@ def test_no_row_is_not_finite_without_an_error_or_a_finding():
         assert trace is None or not fault_of(trace), f"seed {seed}, {name}"
 
 
-@pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("F", ["exp(a)*v", "-exp(a)*v"])
 def test_a_guard_that_reads_an_infinite_force_ends_the_run_and_names_it(engine: str, F: str):
     chart = Chart(

@@ -25,6 +25,7 @@ from gms_fsm import (
     simulate,
     sweep,
 )
+from tests.helpers import FASTEST
 from tests.scenario_files import CommandLine
 from tests.supervisor_cases import (
     BRAKE,
@@ -199,7 +200,7 @@ def test_each_supervisor_can_be_proved_alone_and_in_its_system():
 
 def test_a_sweep_varies_a_system_with_supervisors():
     case = hot_brake()
-    result = sweep(case.system, case.t_end, {"pad.mu": [0.3, 0.4]}, rtol=1e-10)
+    result = sweep(case.system, case.t_end, {"pad.mu": [0.3, 0.4]}, engine=FASTEST, rtol=1e-10)
     assert result.outcome.tolist() == ["ok", "ok"]
     alone = case.run()
     assert result.contact("pad").F[1] == alone.contact("pad").F[-1]
@@ -216,6 +217,8 @@ def test_an_input_that_reads_the_force_that_it_makes_is_refused():
 
 @pytest.mark.parametrize("make", [hot_brake, thermostat])
 def test_the_command_line_runs_checks_and_exports_supervisors(gms_fsm: CommandLine, make):
+    for module in ("z3", "matplotlib"):
+        pytest.importorskip(module, reason="check and figures need the extras")
     make().system.save("one.toml")
     assert gms_fsm("run", "one.toml", "--set", "run.t_end=2", "-o", "out").code == 0
     drawn = {each.name for each in Path("out").glob("overview*.svg")}
