@@ -220,7 +220,8 @@ def test_a_mistake_is_one_message_before_anything_runs(
 def test_without_the_extras_there_is_the_text_and_a_note(
     ran: Ran, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Lesson, "run", lambda _: ran(1))
+    result = ran(1)  # before `run` is replaced, as it runs only once
+    monkeypatch.setattr(Lesson, "run", lambda _: result)
 
     def missing(*_: object) -> list[Path]:
         raise MissingExtraError("needs an extra")
