@@ -15,6 +15,7 @@ from gms_fsm.foundation.extras import require
 from gms_fsm.language import (
     CHOICES,
     COMPARISONS,
+    EVENT,
     LARGEST_PRODUCT_POWER,
     MATLAB_LIKE,
     Binary,
@@ -112,7 +113,9 @@ class _Formulas:
 
     def name(self, name: str) -> Dual:
         if name not in self.names:
-            raise Undecided(f"{name} is not encoded")
+            if name.startswith(EVENT):
+                raise Undecided(f"the event {name.removeprefix(EVENT)} is not encoded")
+            raise Undecided(f"{name} is not encoded for a contact with several velocities")
         return self.names[name]
 
     def negative(self, _: Negative, parts: Iterator[Dual]) -> Dual:
