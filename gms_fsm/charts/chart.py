@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from gms_fsm.charts.nesting import Nesting, check_ends, check_paths
+from gms_fsm.charts.nesting import Nesting, check_ends, check_paths, take_name
 from gms_fsm.charts.parameters import QUANTITIES, Parameter, check_rules
 from gms_fsm.charts.parts import (
     State,
@@ -220,14 +220,7 @@ class Chart:
                         advice="t, x, v and s can only be inputs",
                         key=key,
                     )
-                if name in owner:
-                    raise ChartError(
-                        f"the name {name!r} is used twice ({owner[name]} and {kind})",
-                        place=here,
-                        advice="every name must be unique",
-                        key=key,
-                    )
-                owner[name] = kind
+                take_name(name, owner, kind, here, key)
         for level in self.nesting.levels.values():
             _check_name(level.state.name, "state", here, (*level.key, "name"))
         check_paths(self.nesting, owner, here)

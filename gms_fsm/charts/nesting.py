@@ -266,12 +266,13 @@ def check_paths(nesting: Nesting, owner: dict[str, str], here: str) -> None:
     for level in nesting.levels.values():
         own = [spelled(level.path)] if len(level.chain) > 1 else []
         for name in (*own, *((level.age, level.last) if level.state.states else ())):
-            _take(name, owner, f"state {level.path!r}", here, level.key)
+            take_name(name, owner, f"state {level.path!r}", here, level.key)
 
 
-def _take(
+def take_name(
     name: str, owner: dict[str, str], what: str, here: str, key: tuple[str | int, ...]
 ) -> None:
+    """Note what has a name; refuse one that something else has."""
     if name in owner:
         raise ChartError(
             f"the name {name!r} is used twice ({owner[name]} and {what})",
@@ -298,7 +299,7 @@ def check_ends(nesting: Nesting, owner: dict[str, str], here: str) -> None:
                     key=("transitions", i, end),
                 )
         for name, *_ in nesting.entries(edge)[1:]:  # one for each state that a history enters
-            _take(name, owner, f"edge {edge.name!r}", here, ("transitions", i, "name"))
+            take_name(name, owner, f"edge {edge.name!r}", here, ("transitions", i, "name"))
     leaves = nesting.leaves()
     rows = (
         len(nesting.leaves_of(source)) * len(nesting.ways(edge.target))

@@ -210,10 +210,9 @@ def _caption(trace: Trace, plane: Plane, speeds: Scale) -> list[str]:
         f"{name} = {with_unit(chart, name, value)}" for name, value in plane.held.items()
     )
     again = [f"{name}({plane.names[0]})" if name == "s" else name for name in plane.again]
-    lines.append(
-        f"Held as at the row: {held or 'nothing'}."
-        + (f" Computed at every point: {', '.join(again)}." if again else "")
-    )
+    said = [f"Held as at the row: {held}."] if held else []
+    said += [f"Computed at every point: {', '.join(again)}."] if again else []
+    lines += [" ".join(said)] if said else []
     dv = acceleration(trace, plane.row)
     second = plane.names[1]
     if (plane.state, second) not in chart.flows:

@@ -72,7 +72,7 @@ def overview(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
 ) -> Figure:
-    """Draw an overview of a run: motion, force, states, hysteresis, friction against velocity.
+    """Draw an overview of a run: motion, force, states, friction over position and velocity.
 
     Parameters
     ----------
@@ -117,7 +117,9 @@ def overview(
             ax.set_xlabel("")
         names = ["velocity", "friction", "active states"]
         names[2:2] = ["how many slip"] if count > MANY else []
-        letter_panels([*time, loop, portrait], [*names, "hysteresis", "friction against velocity"])
+        letter_panels(
+            [*time, loop, portrait], [*names, "friction over position", "friction over velocity"]
+        )
         for ax in (loop, portrait):  # narrow, and labels such as -0.35 are wide
             ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
         figure.suptitle(f"{head(trace, title)}{_left_out(trace, window)}", x=0.01, ha="left")
@@ -240,7 +242,7 @@ def ribbons_figure(
             panels.hysteresis(right[1], trace, window=limits, elements=elements, slipping=True)
             assert isinstance(lines, LineCollection)
             panels.slip_bar(lines, trace, right)
-            names += ["friction against velocity", "hysteresis"]
+            names += ["friction over velocity", "friction over position"]
         letter_panels([*left, *middle, *right], names)
         figure.align_ylabels(left)
         figure.suptitle(f"{head(trace, title)}{_left_out(trace, limits)}", x=0.01, ha="left")

@@ -157,7 +157,7 @@ def test_the_tribometer_explains_the_measurement_and_shows_its_loops(
     times, force = measured_force(loaded.record)
     measured = figures.Measured(times, loaded.motion.position[loaded.record.chosen], force)
     first, *axes = figures.overview(trace, measured).axes
-    (panel,) = [ax for ax in axes if ax.get_title("left") == "hysteresis"]
+    (panel,) = [ax for ax in axes if ax.get_title("left") == "friction over position"]
     model, data = panel.lines
     begin, end = first.get_xlim()
     assert len(data.get_xdata()) == ((times >= begin) & (times <= end)).sum() > 2000

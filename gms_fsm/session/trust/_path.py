@@ -15,8 +15,7 @@ from gms_fsm.lowering.observing import armed, rate
 from gms_fsm.lowering.program import Program
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
-
-FOR_A_GUARD = 2  # as a bit of what `arm` marks
+from integrators import FOR_A_GUARD
 
 
 @dataclass(frozen=True)
