@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from gms_fsm.charts.nesting import AGE, Level, joined
@@ -69,9 +69,10 @@ class ChartReader:
             for kind, texts in (("entry", level.state.entry), ("exit", level.state.exit)):
                 found = self.assignments(texts, owner.of(kind, kind), level.age)
                 assignments[kind, level.path] = found
+        readable = {variable: self.forces_for(variable) for variable in chart.variables}
         for state in chart.states:
-            for variable in chart.variables:
-                flows[state.name, variable] = self.flow(state, variable)
+            for variable, names in readable.items():
+                flows[state.name, variable] = self.flow(state, variable, names)
             for force in chart.force_names:
                 forces[state.name, force] = self.force(state, force)
         guards: dict[str, Condition] = {}
@@ -146,14 +147,13 @@ class ChartReader:
         """Return what errors call a state."""
         return self.here.of(f"state {level.path!r}", *level.key)
 
-    def flow(self, state: State, variable: str) -> Value:
-        """Read a flow in a state."""
+    def flow(self, state: State, variable: str, forces: Sequence[str]) -> Value:
+        """Read a flow in a state, which can read some forces."""
         level = self.chart.nesting.giver("flow", state.name, variable)
         if level is None:
             return Number(0.0)
         part = self.state(level).of(f"flow of {variable!r}", "flow", variable)
-        names = [*self.known_now, *self.forces_for(variable)]
-        return self.value(level.state.flow[variable], names, part, level.age)
+        return self.value(level.state.flow[variable], [*self.known_now, *forces], part, level.age)
 
     def force(self, state: State, force: str) -> Value | None:
         """Read a force in a state; None where the state is locked."""

@@ -283,12 +283,13 @@ MATHEMATICS = Dialect(
     _typeset,
     true="⊤",
 )
-# The data model of SCXML. Negation is written as a comparison, and a choice as a sum in which a
-# truth counts as 1: Python's readers of SCXML know these as well; they do not know "!" and "?".
+# The data model of SCXML. Negation is written as a comparison, and a choice as one of a list, of
+# which a truth is the number: Python's readers of SCXML know these as well; they do not know "!"
+# and "?".
 ECMASCRIPT = Dialect(
     _ARITHMETIC | _logic(" && ", " || ", Form("{0} == false", LEVELS["<"], (ATOM,))),
     _calls(_MATH, "Math.{0}")
-    | _choices("(({0} {op} {1}) * ({2}) + (1.0 - ({0} {op} {1})) * ({3}))")
+    | _choices("[{3}, {2}][+({0} {op} {1})]")
     | {
         "sgn": "Math.sign({0})",
         "round": "(Math.floor({0}) + (({0}) - Math.floor({0}) > 0.5) + (({0}) - Math.floor({0})"

@@ -245,15 +245,15 @@ class SystemLayout:
         seen: list[list[int]] = []
         for bank in self.banks:
             for i in range(bank.n):
-                none = self.observed.index(bank.of("s"), i)  # NaN where there is no curve
+                s = self.observed.index(bank.of("s"), i)  # NaN where there is no curve
                 shared = self.observed.shared
                 v, F = (
-                    shared.index(name) if name in shared else none
+                    shared.index(name) if name in shared else s
                     for name in (bank.of(bank.velocity), bank.of("F"))
                 )
                 first = bank.variables[:1]
                 own += [self.y.index(bank.of(name), i) for name in first] or [-1]
-                seen.append([v, self.observed.index(bank.of("s"), i), F])
+                seen.append([v, s, F])
         return own, seen
 
     # ------------------------------------------------------------------ modes

@@ -12,8 +12,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.arguments import checked_path
-from gms_fsm.foundation.files import output_folder, write_whole
-from gms_fsm.foundation.text import encoded
+from gms_fsm.foundation.files import output_folder, write_text
 
 # With the unit, as `Record.from_csv` names them in its examples.
 HEADINGS = {
@@ -36,4 +35,4 @@ def write_csv(columns: Mapping[str, FloatArray], path: str | os.PathLike[str]) -
     # The repr of a float reads back equal.
     table.writerows(["" if cell != cell else repr(cell) for cell in row] for row in cells)
     output_folder(place.parent, [place.name])
-    return write_whole(place, lambda file: file.write(encoded(text.getvalue())))
+    return write_text(place, text.getvalue())

@@ -13,8 +13,7 @@ import numpy as np
 
 from gms_fsm.errors import SessionError, TraceFileError, why
 from gms_fsm.foundation.arguments import no_file
-from gms_fsm.foundation.files import write_whole
-from gms_fsm.foundation.text import encoded
+from gms_fsm.foundation.files import write_text
 from gms_fsm.run.settings import Settings
 from gms_fsm.session._breakpoints import Breakpoint
 from gms_fsm.session.tree import walker
@@ -71,8 +70,7 @@ def write(path: Path, session: Session) -> Path:
         "breakpoints": [asdict(point) for point in session.breakpoints],
         "watches": session.watches,
     }
-    text = encoded(json.dumps(data, indent=1))
-    return write_whole(path, lambda file: file.write(text))
+    return write_text(path, json.dumps(data, indent=1))
 
 
 def _written(fork: Fork, branch: Branch, parent: int | None) -> dict[str, Any]:

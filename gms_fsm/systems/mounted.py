@@ -70,16 +70,27 @@ class Several:
         self._system = system
 
     def __repr__(self) -> str:
-        return f"<{len(self._system.machines)} contacts of {self._system!r}>"
+        system = self._system
+        others = f" and {len(system.supervisors)} supervisors" if system.supervisors else ""
+        return f"<{len(system.contacts)} contacts{others} of {system!r}>"
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
-        known = ", ".join(repr(each.name) for each in self._system.machines)
         raise ParameterError(
-            f"system {self._system.name!r} has the contacts {known}",
+            f"system {self._system.name!r} has {told_parts(self._system)}",
             advice=f"say which one: trace.contact({self._system.machines[0].name!r})",
         )
+
+
+def told_parts(system: System) -> str:
+    """Return the names of contacts and supervisors as text."""
+    groups = {"contact": system.contacts, "supervisor": system.supervisors}
+    return " and ".join(
+        f"the {kind}{'s' * (len(parts) > 1)} {', '.join(repr(each.name) for each in parts)}"
+        for kind, parts in groups.items()
+        if parts
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +135,8 @@ class Mounted:
         return self.system.name if self.named else self.model.title
 
     @property
-    def contacts(self) -> tuple[str, ...]:
-        """The names of contacts that the user can say."""
+    def machines(self) -> tuple[str, ...]:
+        """The names of contacts and supervisors that the user can say."""
         return tuple(each.name for each in self.system.machines) if self.named else ()
 
     @property
@@ -213,10 +224,10 @@ def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
 def contact_of(what: object, name: str) -> tuple[Contact, Assembly | None]:
     """Return a contact of a system, with the system read; or a model as a contact of its own."""
     if isinstance(what, System):
-        known = [each.name for each in what.contacts]
+        known = [each.name for each in what.machines]
         if not name and len(known) > 1:
             raise ParameterError(
-                f"system {what.name!r} has the contacts {', '.join(map(repr, known))}",
+                f"system {what.name!r} has {told_parts(what)}",
                 place="contact",
                 advice=f"say which one: contact={known[0]!r}",
             )

@@ -176,10 +176,13 @@ class System:
         self._read()
 
     def __repr__(self) -> str:
-        bodies, contacts = (
-            cut(", ".join(each.name for each in parts)) for parts in (self.bodies, self.contacts)
+        named = {each: getattr(self, each) for each in ("bodies", "contacts", "supervisors")}
+        told = (
+            f"{kind} {cut(', '.join(each.name for each in parts))}"
+            for kind, parts in named.items()
+            if parts
         )
-        return f"<System {cut(self.name)!r}: bodies {bodies}; contacts {contacts}>"
+        return f"<System {cut(self.name)!r}: {'; '.join(told)}>"
 
     def _signal(self, name: str, given: Any, here: str) -> Signal | str:
         """Return a signal; one whose text names numbers stays a text."""

@@ -113,7 +113,7 @@ class Trace:
         """What ran: model and rig, or a system and its contacts."""
         if not self.subject.named:
             return f"{self.model.title}; {self.rig.title}"
-        return f"{self.what.title}; {', '.join(self.what.contacts)}"
+        return f"{self.what.title}; {', '.join(self.what.machines)}"
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -497,8 +497,9 @@ class Trace:
         """
         key, find = f"trust, again {again}", asked("trust")
         assert find is not None  # this package declares it
-        vars(self)[key] = found = vars(self).get(key) or find(self, again=again)
-        return found  # type: ignore[no-any-return]
+        if key not in vars(self):
+            vars(self)[key] = find(self, again=again)
+        return vars(self)[key]  # type: ignore[no-any-return]
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:

@@ -11,10 +11,10 @@ from gms_fsm.language import Condition, Requirement, evaluate, names_in, split
 from gms_fsm.verification._flows import (
     bend_apart,
     bent,
+    holding,
     moving,
     moving_names,
     passed_over,
-    rests,
     rivals,
     ways,
 )
@@ -73,7 +73,7 @@ def _pushed_by_others(prover: Prover, pairs: Sequence[tuple[Transition, Transiti
             loose = []
             for way in ways(split(prover.subject.guard(edge))):
                 margins = [reading.margin(part, moved) for part in way]
-                loose.append(z3.And([z3.Or(m.value > 0, rests(z3, m)) for m in margins]))
+                loose.append(z3.And([holding(z3, m) for m in margins]))
                 touched += [m.value == 0 for m in margins]
             prover.defined(reading)
             jumps = [u == 0 for u in reading.breaks]
@@ -177,7 +177,7 @@ def _meetings(
                 z3.Or([z3.And(m.value == 0, m.slope == 0, n == 0, u) for m, n, u in turning])
             )
             growing += [z3.Or(m.value > 0, z3.And(m.value == 0, m.slope > 0)) for m in here]
-            not_falling += [z3.Or(m.value > 0, z3.And(m.value == 0, m.slope >= 0)) for m in here]
+            not_falling += [holding(z3, m) for m in here]
             reached += [m.value >= 0 for m in here]
         strict.append(z3.And(*crossed, *growing))
         loose += [z3.And(*crossed, *not_falling), z3.And(at_break, *touched, *reached)]

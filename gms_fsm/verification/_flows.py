@@ -93,9 +93,9 @@ def ways(parts: Split) -> Ways:
     return [tuple(part for way in some for part in way) for some in product(*found)]
 
 
-def rests(z3: Any, margin: Dual) -> Any:
-    """Return the formula that a margin is zero and does not fall."""
-    return z3.And(margin.value == 0, margin.slope >= 0)
+def holding(z3: Any, margin: Dual) -> Any:
+    """Return the formula that a margin is positive, or zero and does not fall."""
+    return z3.Or(margin.value > 0, z3.And(margin.value == 0, margin.slope >= 0))
 
 
 def inclusive(part: Requirement) -> bool:

@@ -8,11 +8,11 @@ from typing import Any
 from gms_fsm.charts.chart import Transition
 from gms_fsm.language import split
 from gms_fsm.verification._flows import (
+    holding,
     inclusive,
     moving,
     moving_names,
     passed_over,
-    rests,
     rivals,
     ways,
 )
@@ -75,7 +75,7 @@ def _pushed_back_by_others(
         loose = []
         for way in ways(split(prover.subject.guard(back))):
             margins = [reading.margin(part, moved) for part in way]
-            loose.append(z3.And([z3.Or(m.value > 0, rests(z3, m)) for m in margins]))
+            loose.append(z3.And([holding(z3, m) for m in margins]))
         for each in (of_edge, reading):
             prover.defined(each)
         if prover.find(*formulas, z3.Or(*loose, *(u == 0 for u in reading.breaks))) is not None:
@@ -121,7 +121,7 @@ def _pushed_back(prover: Prover, edge: Transition, back: Transition) -> Answer:
                 ]
             )
         )
-        loose.append(z3.And([z3.Or(m.value > 0, rests(z3, m)) for _, m in here]))
+        loose.append(z3.And([holding(z3, m) for _, m in here]))
         reached.append(z3.And([m.value >= 0 for _, m in here]))
     breaks: list[Any] = [*of_flow.breaks, *of_guard.breaks]
     for reading in (of_edge, of_flow, of_guard):

@@ -119,8 +119,8 @@ class ChartSubject:
 
     def arrests(self, edge: Transition) -> bool:
         """Return whether an edge locks the contact where its velocity passes 0."""
-        chart = self.chart
-        return any(chart.transitions[number].name == edge.name for number in chart.arrests)
+        edges = (self.chart.transitions[number] for number in self.chart.arrests)
+        return any((each.source, each.name) == (edge.source, edge.name) for each in edges)
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -183,7 +183,7 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
     load, mobility = _fresh("H", declared), _fresh("W", declared)
     flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
     rest = {
-        force: _fresh(_called("R", chart, force), declared)
+        force: _fresh(force_name("R", chart, force), declared)
         for force in chart.force_names
         if moves and facts.n > 1
     }
@@ -210,7 +210,7 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
             values[state.name] |= dict.fromkeys(chart.rate_names, *rates.values())
     inputs = [name for name in chart.inputs if not (moves and name in chart.velocities)]
     if moves:
-        loads = [_called(load, chart, force) for force in chart.force_names]
+        loads = [force_name(load, chart, force) for force in chart.force_names]
         inputs += [*loads, mobility, *rest.values(), *([viscous] if viscous else [])]
     else:
         named = read | _names(flows.values())
@@ -272,7 +272,7 @@ def _total(
     """
     load, rest, viscous = called
     if own is None:
-        return Name(_called(load, chart, force))
+        return Name(force_name(load, chart, force))
     total = Binary("+", own, Name(rest[force])) if rest else own
     if force in chart.totals:
         total = renamed(chart.totals[force], {**inside, force: total})
@@ -303,7 +303,7 @@ def _fresh(name: str, taken: set[str]) -> str:
     return name
 
 
-def _called(name: str, chart: Chart, force: str) -> str:
+def force_name(name: str, chart: Chart, force: str) -> str:
     """Return a name for a force as F is named for it: H_w, as F_w is."""
     return name + force.removeprefix(chart.force_names[0])
 

@@ -24,7 +24,7 @@ from gms_fsm.verification._prover import (
     names_of,
     refuted,
 )
-from gms_fsm.verification._subject import ChartSubject
+from gms_fsm.verification._subject import ChartSubject, force_name
 
 MOST_QUESTIONS = 400  # to z3, about one instant
 MOST_ROUNDS = 12
@@ -159,7 +159,7 @@ def may_change(prover: Prover) -> frozenset[str]:
     subject, facts, chart = prover.subject, prover.subject.facts, prover.chart
     found = {*subject.rest.values(), *facts.jumping}
     if facts.pulled and subject.moves:
-        loads = (subject.load + force.removeprefix("F") for force in chart.force_names)
+        loads = (force_name(subject.load, chart, force) for force in chart.force_names)
         found |= {*loads, subject.mobility}
     if facts.struck or (facts.n > 1 and chart.sets_velocity):
         found |= {*chart.velocities}

@@ -59,8 +59,7 @@ def facts_of(what: Any, contact: str = "") -> ContactFacts:
 
 def _of_contact(contact: Contact, **beside: Any) -> ContactFacts:
     chart, curved = contact.chart, contact.stribeck is not None
-    strikes = chart.sets_velocity or any(edge.impulse for edge in chart.transitions)
-    jumping = ("s",) if curved and strikes else ()
+    jumping = ("s",) if curved and _strikes(chart) else ()
     return ContactFacts(
         chart,
         contact.n,
@@ -73,14 +72,14 @@ def _of_contact(contact: Contact, **beside: Any) -> ContactFacts:
 
 def _in_system(read: Assembly, bank: Bank) -> ContactFacts:
     others = [other for other in _coupled(read, bank) if other.edges]
-    struck = any(map(_strikes, others))
+    struck = any(_strikes(each.chart) for each in others)
     moved = {body.name: body.v for body in read.free}
     free = {*moved} & {body for row in bank.jacobian for body in row}
     jumping = [
         name
         for name in bank.chart.inputs
         if name not in ("t", "x", *bank.chart.velocities)
-        and any(map(_strikes, read.banks))
+        and any(_strikes(each.chart) for each in read.banks)
         and read.closure(names_in(bank.means[name])) & {*moved.values()}
     ]
     return _of_contact(
@@ -88,9 +87,12 @@ def _in_system(read: Assembly, bank: Bank) -> ContactFacts:
     )
 
 
-def _strikes(bank: Bank) -> bool:
+def _strikes(chart: Chart) -> bool:
     """Return whether a contact changes velocities by impulses."""
-    return any(map(bank.is_impulse, bank.edges))
+    locked = {each.name for each in chart.states if each.locked}
+    return chart.sets_velocity or any(
+        edge.impulse and edge.source not in locked for edge in chart.transitions
+    )
 
 
 def _coupled(read: Assembly, bank: Bank) -> list[Bank]:

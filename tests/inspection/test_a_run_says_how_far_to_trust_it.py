@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import RK45
 
 from gms_fsm import (
     GMS,
@@ -21,10 +22,12 @@ from gms_fsm import (
     Slider,
     State,
     Stribeck,
+    Supervisor,
     System,
     Transition,
     simulate,
 )
+from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts.registry import registered
 from gms_fsm.traces.failures import NotFiniteError
 from gms_fsm.traces.trace import Trace
@@ -235,10 +238,52 @@ def test_a_value_outside_the_domain_that_proofs_assume_is_named():
     assert "s > sigma_0 * z_ba does not hold" in found.text
 
 
-def test_trust_of_one_contact_is_its_part_of_the_whole():
+def test_a_run_that_was_pickled_says_the_same():
     trace = tie(random.Random(1))
     assert trace.trust().findings == Trace.trust(pickle.loads(pickle.dumps(trace))).findings
     assert {each.kind for each in trace.trust()} <= {*KINDS}
+
+
+def test_trust_of_one_contact_is_its_part_of_the_whole():
+    trace = load_scenario("ball_screw_table").simulate()
+    whole = trace.trust()
+    named = {each.contact for each in whole} - {""}
+    assert named >= {"left_stop", "right_stop"}
+    for name in trace.contacts:
+        part = trace.contact(name).trust().findings
+        assert part == tuple(each for each in whole if each.contact in ("", name))
+
+
+def test_what_is_found_is_kept_also_where_nothing_is_found():
+    trace = simulate(stick_slip("signed"), Prescribed("0.2"), 1.0)
+    assert not len(trace.trust())
+    assert trace.trust() is trace.trust()
+
+
+def test_a_run_by_a_solver_of_its_users_own_is_not_repeated():
+    class Mine(RK45):
+        pass
+
+    model, rig = pulled_mass()
+    trace = simulate(model, rig, 5.0, method=Mine, engine="ifelse")
+    (found,) = trace.trust(again=True).of("not judged")
+    assert found.text == "the run is not repeated: its solver Mine is not in the trace"
+
+
+def test_an_output_of_a_supervisor_that_is_not_finite_is_a_finding():
+    chart = Chart(
+        "ratio",
+        inputs=("T",),
+        velocities=(),
+        states=(State("off", outputs={"u": "0 * T"}), State("on", outputs={"u": "1 / (T - T)"})),
+        transitions=(Transition("start", "off", "on", guard="T > 0.5"),),
+    )
+    ratio = Supervisor("ratio", chart, inputs={"T": "T"})
+    trace = simulate(System("room", supervisors=(ratio,), flow={"T": "1 - T"}), 2.0)
+    (found,) = trace.trust().of("not finite")
+    assert found.text.startswith("ratio.u is not finite in ")
+    assert found.text.endswith("look at the parameters in [1 / (T - T)]")
+    assert found.times[0] == pytest.approx(np.log(2.0))
 
 
 def test_a_switch_explains_the_doubt_about_it():

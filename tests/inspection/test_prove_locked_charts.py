@@ -246,3 +246,28 @@ def test_several_velocities_leave_the_acceleration_undecided() -> None:
     assert report.refuted == ()
     assert "several velocities" in report.of("release")[0].text
     assert {f.status for f in report.findings if f.where == ("go",)} == {"proved"}
+
+
+def test_an_edge_that_locks_from_one_state_is_no_arrest_from_another() -> None:
+    """From `a`, which is locked, `lock` hides `hidden`: no velocity passes 0 there."""
+    chart = Chart(
+        "two locks",
+        inputs=("v",),
+        parameters=("F_c",),
+        states=(
+            State("a", locked=True),
+            State("b", locked=True),
+            State("slip", outputs={"F": "F_c"}),
+        ),
+            State("a", locked=True),
+            State("b", locked=True),
+            State("slip", outputs={"F": "F_c"}),
+        ),
+        transitions=(
+            Transition("lock", ("slip", "a"), "b", "v >= 0"),
+            Transition("hidden", "a", "slip", "v >= 0"),
+        ),
+    )
+    (found,) = (each for each in prove(chart).of("reachability") if each.where == ("hidden",))
+    assert found.status == "refuted"
+    assert "(lock)" in found.text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -187,6 +188,12 @@ def test_a_formula_of_latex() -> None:
 
 def test_a_formula_of_latex_has_pi() -> None:
     assert spell(parse_value("pi * v", ["v"]), LATEX) == r"\pi \, v"
+
+
+def test_a_choice_of_scxml_does_not_see_the_value_that_is_not_chosen() -> None:
+    text = spell(parse_value("if(z > 0, if(z > 1, 2, 3), w)", "zw"), ECMASCRIPT)
+    for z, w, value in ((2.0, math.inf, 2.0), (0.5, math.nan, 3.0), (-1.0, 4.0, 4.0)):
+        assert eval(text, {"z": z, "w": w}) == value
 
 
 def test_a_function_that_a_dialect_does_not_have_is_named() -> None:

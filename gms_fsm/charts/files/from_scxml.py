@@ -22,7 +22,7 @@ from gms_fsm.charts.files.routes import (
 )
 from gms_fsm.charts.files.scxml import OURS, SCXML, STEP, VALUES, assignments, conditions
 from gms_fsm.charts.nesting import AGE, is_age
-from gms_fsm.charts.parts import check_size
+from gms_fsm.charts.parts import DEEPEST_STATE, check_size
 from gms_fsm.errors import ChartError, ExpressionError, Part, why
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.language import ECMASCRIPT, names_in, parse_value
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
 
 LARGEST = 10_000_000  # bytes: no chart needs as many
-DEEPEST = 8  # levels of states: deeper ones nobody could read
 AT_TOP = ("datamodel", "state", "final")
 IN_STATE = ("onentry", "onexit", "transition", "datamodel", "initial", "history", "state", "final")
 WORDS = {
@@ -210,8 +209,8 @@ class _Document:
             raise ChartError(f"a <{_tag(element)}> has no id", place=self.here)
         local = _own(element, "name") or name.removeprefix(f"{outer}.").removeprefix(f"{outer}__")
         route = (*around, _plain(local))
-        if len(route) > DEEPEST:
-            raise ChartError(f"it has states on more than {DEEPEST} levels", place=self.here)
+        if len(route) > DEEPEST_STATE:
+            raise ChartError(f"it has states on more than {DEEPEST_STATE} levels", place=self.here)
         if name in self.routes or spelled(route) in self.spelled:
             raise ChartError(
                 f"its state {name!r} is there twice, or is spelled {spelled(route)!r} as another",
@@ -349,8 +348,8 @@ class _Document:
             actions=_texts(assigned),
             stays=stays,
         )
-        number_of = int(order) if order is not None and order.isdecimal() else None
-        return ScxmlTransition(edge, cond, guard, assigned, number_of)
+        place_in_order = int(order) if order is not None and order.isdecimal() else None
+        return ScxmlTransition(edge, cond, guard, assigned, place_in_order)
 
     def _end(self, source: Route, name: str, cond: str | None, place: str) -> Route:
         """Return the final state that is meant by the event that a state is done."""

@@ -254,16 +254,9 @@ def flattened(
             target = source if edge.target is None else inside(edge.target)
             kept = len(source) - 1
             if edge.target is not None:
-                kept = _shared(source, edge.target) if edge.stays is None else edge.stays
+                kept = outside(source, edge.target) if edge.stays is None else edge.stays
             left = [by_route[each].exit for each in outwards(source[:-1]) if len(each) > kept]
             entered = [by_route[each].entry for each in outwards(target[:-1]) if len(each) > kept]
             around = tuple(filter(None, left)), tuple(filter(None, reversed(entered)))
             rows.append(FlatEdge(number, (spelled(source),), spelled(target), around))
     return leaves, rows, [by_route[each] for each in reversed(outwards(default[:-1]))]
-
-
-def _shared(source: Route, target: Route) -> int:
-    """Return how many outer states two have in common; a target that is active is entered again."""
-    same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(source, target, strict=False))
-    count = len([*same])
-    return count - 1 if count == len(target) else count

@@ -74,7 +74,8 @@ class ComparedColumn:
     @classmethod
     def of(cls, text: Any, subject: Mounted) -> ComparedColumn:
         """Read what is measured; a `ParameterError` if the subject has no such thing."""
-        contacts, bodies = subject.contacts, subject.bodies
+        contacts = [each.name for each in subject.system.contacts] if subject.named else []
+        bodies = subject.bodies
         owner, _, which = text.rpartition(".") if isinstance(text, str) else ("", "", "")
         if which == "F":
             if not owner and len(contacts) <= 1:

@@ -84,7 +84,7 @@ def _contacts(start: Problem, error: HybridError) -> Iterator[str]:
 
 def _infinite_force(chart: Chart, state: State, F: float, values: Mapping[str, float]) -> str:
     """Say which text of a force is not finite, with the numbers that it reads."""
-    text, tree = state.outputs.get("F") or chart.outputs.get("F", ""), chart.forces[state.name, "F"]
+    text, tree = chart.output_text(state.name, "F"), chart.forces[state.name, "F"]
     read = names_in(tree) & values.keys() if tree is not None else ()
     numbers = named_numbers({name: values[name] for name in sorted(read)})
     known = f"({F:g}{f', with {numbers}' if numbers else ''})"

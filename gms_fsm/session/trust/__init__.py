@@ -27,9 +27,9 @@ TRIED = ("grazing", "close call")  # what a repeated run decides
 def trust_of(trace: Trace, *, again: bool = False) -> Trust:
     """Return the findings about a run; see `gms_fsm.Trace.trust`."""
     if trace.which:
-        whole = trust_of(
-            replace(trace, firings=trace.every or trace.firings, which="", every=None), again=again
-        )
+        run = replace(trace, firings=trace.every or trace.firings, which="", every=None)
+        vars(run).update({k: u for k, u in vars(trace).items() if k in ("program", "seen")})
+        whole = trust_of(run, again=again)
         return Trust(tuple(each for each in whole if each.contact in ("", trace.which)))
     try:
         found = [*_findings(trace.whole(), at_times=trace.stops is not trace.rows)]
@@ -58,7 +58,7 @@ def _findings(trace: Trace, *, at_times: bool) -> Iterator[Doubt]:
         text = "from the end of a run alone, switches and slides cannot be judged"
         yield Doubt("not judged", "note", text)
     yield from unused(trace)
-    for name in trace.contacts:
-        one = trace.contact(name)
-        for find in (not_finite, outside, growth, meant):
+    for each in trace.what.system.machines:
+        one = trace.contact(each.name)
+        for find in (not_finite, outside, growth, *((meant,) if each.chart.velocities else ())):
             yield from find(one)

@@ -22,6 +22,10 @@ FINE = f"with tolerances {FINER:g} times finer"
 
 def again(trace: Trace) -> Iterator[Doubt]:
     """Yield whether the sequence of switches holds, and how far times and the end state move."""
+    if _method(str(trace.settings["method"])) is None:
+        text = f"the run is not repeated: its solver {trace.settings['method']} is not in the trace"
+        yield Doubt("not judged", "note", text)
+        return
     try:
         finer = _repeated(trace)
     except GMSError as error:
@@ -79,9 +83,12 @@ def _repeated(trace: Trace) -> Trace:
         atol = {name: _part(value) for name, value in atol.items() if np.min(value) > 0.0}
     elif atol is not None:
         atol = atol / FINER
+    step = given["step"]
+    if step is not None and given["events"] != "held":  # then the step belongs to the model
+        step /= 2.0
     chosen = Settings(
         method=_method(given["method"]),
-        step=None if given["step"] is None else given["step"] / 2.0,
+        step=step,
         rtol=rtol,
         atol=atol,
         max_step=given["max_step"] or np.inf,
@@ -89,8 +96,6 @@ def _repeated(trace: Trace) -> Trace:
         events=given["events"],
         engine=given["engine"],
     )
-    if given["events"] == "held":  # the step belongs to the model
-        chosen = Settings(**{**_fields(chosen), "step": given["step"]})
     initial = _beginning(trace) if trace.initial is None else trace.initial
     times: dict[str, Any] = {"t_start": given["t_start"], "initial": initial}
     if trace.what.named:
@@ -119,16 +124,13 @@ def _beginning(trace: Trace) -> dict[str, Any]:
     return initial
 
 
-def _fields(chosen: Settings) -> dict[str, Any]:
-    return {name: value for name, value in vars(chosen).items() if name != "t_eval"}
-
-
 def _method(name: str) -> Any:
+    """Return a method as `Settings` takes it; None for a solver of the user's own."""
     if name in METHODS:
         return name
     import scipy.integrate
 
-    return getattr(scipy.integrate, name)
+    return getattr(scipy.integrate, name, None)
 
 
 def _part(value: Any) -> Any:

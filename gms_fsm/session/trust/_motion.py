@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.quantities import in_words
 from gms_fsm.language import derivative, names_in, values_of
@@ -18,6 +19,7 @@ from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import Doubt
 from integrators import slope_on
 
+CURE = "; with the signed law it does not"  # of the published one
 CLEARLY = 1e-9  # not just by rounding
 GROWN, MUCH = 1.1, 2.0  # times: an error that grows by more is worth a note, a warning
 
@@ -140,13 +142,8 @@ def _grown(trace: Trace, name: str, i: int, rate: np.ndarray) -> Iterator[Doubt]
         f"in {state} an error in {name} of {trace.subject.element(trace.places.name, i)} grows by "
         f"itself, {often}first from t = {t[first]:.6g} s on, by up to "
         f"{math.exp(min(most[0], 700.0)):.3g} times (t = {t[most[1]]:.6g} to {t[most[2]]:.6g} s)"
-        f"{_cure(trace)}",
+        f"{CURE if trace.model.chart == GMS_ELEMENT['published'] else ''}",
         tuple(float(t[a]) for _, a, _ in grown),
         whose,
         i,
     )
-
-
-def _cure(trace: Trace) -> str:
-    title = trace.model.title
-    return "; with the signed law it does not" if "published" in title else ""

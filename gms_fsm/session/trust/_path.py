@@ -130,6 +130,10 @@ class Track:
         bank, i = self.bank(machine)
         return self.trace.what.element(bank.name, i)
 
+    def edge(self, number: int) -> str:
+        """Return the name of an edge by its number among those of all contacts."""
+        return self.program.layout.edges[number][0]
+
     def whose(self, machine: int) -> str:
         """Return the contact of a machine if its user named it, else an empty text."""
         return self.trace.what.whose(self.program.layout.bank(machine).name)

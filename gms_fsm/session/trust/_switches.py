@@ -112,9 +112,6 @@ def _judge_crossing(path: Track, row: int, found: Gathering) -> None:
         return
     i = machines[0]
     bank, element = path.bank(i)
-    chart = path.trace.what.system.contact(bank.name).chart
-    edge = chart.transitions[edges[i] - bank.first_edge].name
-    where = {"contact": path.whose(i), "element": element}
     m, rate, bend = _shape(path, row, crossed, step)
     doubt = path.uncertainty(row, crossed)
     longest = 0.0
@@ -123,9 +120,10 @@ def _judge_crossing(path: Track, row: int, found: Gathering) -> None:
             name = path.program.relations[r]
             text = (
                 f"{path.whose(i) or 'an element'} switches where {name} is reached by less than "
-                f"the tolerances, {{when}} ({edge} of {path.who(i)}): an error of that size would "
-                "leave the switch out; a smaller rtol tells"
+                f"the tolerances, {{when}} ({path.edge(edges[i])} of {path.who(i)}): an error of "
+                "that size would leave the switch out; a smaller rtol tells"
             )
+            where = {"contact": path.whose(i), "element": element}
             found.add("grazing", bank.name, t, text, **where)  # type: ignore[arg-type]
             return
         if rate[k] != 0.0:
@@ -136,9 +134,10 @@ def _judge_crossing(path: Track, row: int, found: Gathering) -> None:
     for j in machines:
         if later[j] != edges[j]:
             text = (
-                f"{edge} of {path.who(j)} fires {{when}}, but its guard holds for less time than "
-                f"the tolerances resolve ({longest:.2g} s)"
+                f"{path.edge(edges[j])} of {path.who(j)} fires {{when}}, but its guard holds for "
+                f"less time than the tolerances resolve ({longest:.2g} s)"
             )
+            where = {"contact": path.whose(j), "element": path.bank(j)[1]}
             found.add("close call", path.whose(j), t, text, **where)  # type: ignore[arg-type]
     others = [j for j, each in enumerate(later) if each >= 0 and edges[j] < 0]
     if others:
@@ -231,11 +230,9 @@ def _add_miss(
     path: Track, i: int, number: int, t: float, found: Gathering, kind: str, name: str
 ) -> None:
     bank, element = path.bank(i)
-    chart = path.trace.what.system.contact(bank.name).chart
-    edge = chart.transitions[number - bank.first_edge].name
     text = (
-        f"{edge} of {path.who(i)} does not fire {{when}}, by less than the tolerances ({name}): "
-        "an error of that size would take it"
+        f"{path.edge(number)} of {path.who(i)} does not fire {{when}}, by less than the "
+        f"tolerances ({name}): an error of that size would take it"
     )
     found.add(kind, (bank.name, "miss"), t, text, contact=path.whose(i), element=element)  # type: ignore[arg-type]
 

@@ -15,8 +15,8 @@ from gms_fsm.systems.signals import Function
 from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import Doubt
+from integrators import DP45, METHODS
 
-STAGES = np.array([0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0])  # where a step of dp45 calls a function
 PER_STEP, IN_ALL = 12, 20_000  # times at which a function is looked at
 MISSED = 1e-5  # of span and duration: a larger integral of what no step has seen is worth a warning
 NOTICED = 1e-2  # of the span
@@ -26,6 +26,8 @@ def not_finite(trace: Trace) -> Iterator[Doubt]:
     """Yield the outputs of one contact that are not finite somewhere."""
     names = (*trace.model.chart.force_names, "F_elements")
     for name in names:
+        if trace.places.of(name) not in trace.seen:
+            continue
         wrong = ~np.isfinite(trace.seen[trace.places.of(name)])
         rows = np.flatnonzero(wrong if wrong.ndim == 1 else wrong.any(axis=1))
         if not rows.size:
@@ -34,12 +36,12 @@ def not_finite(trace: Trace) -> Iterator[Doubt]:
         if wrong.ndim == 2:
             element = int(np.flatnonzero(wrong[rows[0]])[0])
         who = name if element is None else f"F of element {element + 1}"
-        whose = trace.which
+        whose, text = trace.which, _force_text(trace, name, int(rows[0]), element)
         yield Doubt(
             "not finite",
             "warning",
             f"{f'{whose}.' * bool(whose)}{who} is not finite in {rows.size} of {len(trace)} rows, "
-            f"first at t = {t:.9g} s: look at the parameters in [{_force_text(trace)}]",
+            f"first at t = {t:.9g} s: look at the parameters in [{text}]",
             (t,),
             whose,
             element,
@@ -47,10 +49,13 @@ def not_finite(trace: Trace) -> Iterator[Doubt]:
         return
 
 
-def _force_text(trace: Trace) -> str:
-    chart = trace.model.chart
-    state = chart.states[int(trace.modes[0, 0])]
-    return state.outputs.get("F") or chart.outputs.get("F") or chart.contact_outputs.get("F", "F")
+def _force_text(trace: Trace, name: str, row: int, element: int | None) -> str:
+    """Return the text of what is not finite, of an element or summed over them."""
+    chart, name = trace.model.chart, "F" if name == "F_elements" else name
+    if element is None and name in chart.contact_outputs:
+        return chart.contact_outputs[name]
+    state = chart.states[int(trace.modes[row, element or 0])]
+    return chart.output_text(state.name, name) or name
 
 
 def outside(trace: Trace) -> Iterator[Doubt]:
@@ -100,7 +105,10 @@ def sampling(path: Track, *, steps: bool) -> Iterator[Doubt]:
             )
             continue
         t = np.unique(path.rows.t)
-        if (missed := _missed(signal.call, t)) is not None:
+        # A foreign method looks about as often.
+        method = METHODS.get(str(path.trace.settings["method"]), DP45)
+        stages = np.unique([0.0, *method.C, 1.0])
+        if (missed := _missed(signal.call, t, stages)) is not None:
             at, value, seen = missed
             yield Doubt(
                 "sampling",
@@ -112,18 +120,20 @@ def sampling(path: Track, *, steps: bool) -> Iterator[Doubt]:
             )
 
 
-def _missed(call: Callable[[float], float], t: FloatArray) -> tuple[float, float, float] | None:
-    """Return where a function differs most from what the steps have seen of it, and both values."""
+def _missed(
+    call: Callable[[float], float], t: FloatArray, stages: FloatArray
+) -> tuple[float, float, float] | None:
+    """Return where a function differs most from what the stages of steps have seen of it."""
     span = np.diff(t)
     if not span.size:
         return None
     try:
-        seen = np.array([_called(call, a, h, STAGES) for a, h in zip(t, span, strict=False)])
+        seen = np.array([_called(call, a, h, stages) for a, h in zip(t, span, strict=False)])
         counts = np.maximum(PER_STEP, np.ceil(IN_ALL * span / span.sum())).astype(int)
         worst, found = MISSED, None
         for k, count in enumerate(counts.tolist()):
             theta = (np.arange(count) + 0.5) / count
-            values, expected = _called(call, t[k], span[k], theta), _through(seen[k], theta)
+            values, expected = _called(call, t[k], span[k], theta), _through(stages, seen[k], theta)
             rest = np.abs(values - expected)
             scale = max(seen.max(), values.max()) - min(seen.min(), values.min())
             if not scale > 0.0 or rest.max() < NOTICED * scale:
@@ -144,9 +154,9 @@ def _called(
     return np.array([float(call(start + part * span)) for part in at.tolist()])
 
 
-def _through(values: FloatArray, theta: FloatArray) -> FloatArray:
+def _through(stages: FloatArray, values: FloatArray, theta: FloatArray) -> FloatArray:
     """Return the polynomial through what the stages of a step have seen."""
     if np.ptp(values) == 0.0:
         return np.full(theta.shape, values[0])
-    fitted = np.polynomial.Polynomial.fit(STAGES, values, len(STAGES) - 1)
+    fitted = np.polynomial.Polynomial.fit(stages, values, len(stages) - 1)
     return np.asarray(fitted(theta), dtype=np.float64)

@@ -35,7 +35,7 @@ def columns_of(trace: Trace) -> dict[str, NDArray[Any]]:
     table |= {name: trace.rows.y[:, layout.y.index(name)] for name in layout.y.shared}
     table |= {body.v: trace.body(body.name).v for body in system.bodies if body.driven}
     table |= slides
-    for name in trace.what.contacts:
+    for name in trace.what.machines:
         for part in _of_contact(trace.contact(name)):
             table |= {f"{name}.{title}": column for title, column in part.items()}
     return table

@@ -68,7 +68,7 @@ def checked(
     )
     found: dict[str, Monitor] = {}
     for each in given:
-        for monitor in _monitors(each, what.contacts):
+        for monitor in _monitors(each, what.machines):
             if monitor.name in found:
                 raise ParameterError(
                     f"monitors contains {shown(monitor.name)} twice", advice="give it once"
