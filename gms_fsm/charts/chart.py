@@ -248,11 +248,6 @@ class Chart:
         """Name of the acceleration along each velocity: ``a``, then ``a_<velocity>``."""
         return ("a", *(f"a_{each}" for each in self.velocities[1:]))[: len(self.velocities)]
 
-    def output_text(self, state: str, name: str) -> str:
-        """Return the text of a force or output in a state, as it is written; empty if locked."""
-        level = self.nesting.giver("outputs", state, name)
-        return self.outputs.get(name, "") if level is None else level.state.outputs[name]
-
     @property
     def locks(self) -> bool:
         """Whether there is a state that locks the contact."""

@@ -261,6 +261,12 @@ def written_guard(guard: Condition, nesting: Nesting, edge: Transition) -> Condi
     return own[0] if len(own) == 1 else Both(own)
 
 
+def output_text(nesting: Nesting, outputs: Mapping[str, str], state: str, name: str) -> str:
+    """Return the text of an output in a state: of the state, of one around it, or of the chart."""
+    level = nesting.giver("outputs", state, name)
+    return outputs.get(name, "") if level is None else level.state.outputs[name]
+
+
 def check_paths(nesting: Nesting, owner: dict[str, str], here: str) -> None:
     """Refuse states whose names, or those of their hidden variables, something else has."""
     for level in nesting.levels.values():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import keyword
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -140,5 +141,5 @@ def other_inputs(contact: Contact) -> list[str]:
     named = dict.fromkeys([*contact.chart.inputs, *contact.inputs])
     texts = [contact.inputs.get(name, name) for name in named if name != "s"]
     found = dict.fromkeys(name for text in texts for name in WORD.findall(str(text)))
-    known = {*GIVEN, *CONSTANTS, "and", "or", "not"}
+    known = {*GIVEN, *CONSTANTS, *keyword.kwlist}
     return [name for name in found if name not in known]

@@ -127,8 +127,8 @@ def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
     for (edge, _), box, link, at, line in zip(
         edges, boxes, links, laid.labels, laid.lines, strict=True
     ):
-        guard = edge_id(chart, element, "guard", edge)
-        name = edge_id(chart, element, "edge", edge)
+        guard = edge_id(element, "guard", edge)
+        name = edge_id(element, "edge", edge)
         look, marked = edge_look(sheet, number, edge), edge.name in sheet.marked
         nodes.append(Node(guard, "guard marked" if marked else "guard", at, box))
         ends = names[link.source], names[link.target]

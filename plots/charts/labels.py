@@ -8,7 +8,7 @@ import warnings
 from collections import Counter
 from dataclasses import dataclass, replace
 
-from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.charts.chart import Transition
 from gms_fsm.charts.nesting import spelled
 from gms_fsm.foundation.text import visible
 from gms_fsm.traces.trace import Trace, dwell_times
@@ -209,8 +209,7 @@ def part_id(element: str, kind: str, name: str) -> str:
     return f"{element}-{kind}-" + re.sub(r"\W", "_", spelled(name))
 
 
-def edge_id(chart: Chart, element: str, kind: str, edge: Transition) -> str:
+def edge_id(element: str, kind: str, edge: Transition) -> str:
     """Return the id of an edge or its guard; one that leaves several states has one per source."""
-    alone = sum(each.name == edge.name for each in chart.transitions) == 1
     name = part_id(element, kind, edge.name)
-    return name if alone else part_id(name, "from", edge.source)
+    return name if len(edge.sources) == 1 else part_id(name, "from", edge.source)

@@ -456,8 +456,8 @@ class ElementParts:
             texts = _paired(sheet.state_rows(state, number), group.findall("text"))
             self.states[state.name] = (group, texts)
             for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-                line = groups[edge_id(chart, element, "edge", edge)]
-                guard = groups[edge_id(chart, element, "guard", edge)]
+                line = groups[edge_id(element, "edge", edge)]
+                guard = groups[edge_id(element, "guard", edge)]
                 texts = _paired(sheet.guard_rows(edge, priority, number), guard.findall("text"))
                 self.edges[edge.name, edge.source] = guard, texts, line
 

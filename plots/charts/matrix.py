@@ -71,7 +71,7 @@ def _entries(sheet: ChartSheet, number: int) -> Entries:
         place = chart.state_index(edge.source), chart.state_index(edge.target)
         marked = edge.name in sheet.marked
         label = sheet.cells.guard(sheet.guard_rows(edge, priority, number), marked)
-        name = edge_id(chart, element_id(number), "guard", edge)
+        name = edge_id(element_id(number), "guard", edge)
         entries.setdefault(place, []).append((name, "guard marked" if marked else "guard", label))
     return entries
 

@@ -15,7 +15,7 @@ from gms_fsm.charts.chart import Transition
 from gms_fsm.charts.nesting import Level
 from plots.charts.contents import written_edges
 from plots.charts.drawing import Drawing, DrawnLine, Node, default_line, edge_look
-from plots.charts.labels import element_id, part_id
+from plots.charts.labels import edge_id, element_id, part_id
 from plots.charts.layout.layers import CORNER, LayerEdge, Point, Size, layered, straight
 from plots.charts.layout.placed import placed, ring
 
@@ -112,7 +112,7 @@ def _inside(sheet: ChartSheet, number: int, path: str) -> _Drawn:
         default_line(*ends, laid.dot, laid.states[0], laid.sizes[0], sheet.direction)
     )
     for (_, edge), label, at, line in zip(edges, labels, laid.labels, laid.lines, strict=True):
-        guard, name = (_edge_id(element, kind, edge) for kind in ("guard", "edge"))
+        guard, name = (edge_id(element, kind, edge) for kind in ("guard", "edge"))
         marked = edge.name in sheet.marked
         drawn.nodes.append(Node(guard, "guard marked" if marked else "guard", at, label))
         points = list(line)
@@ -150,11 +150,6 @@ def _blocks(drawn: _Drawn, around: list[str]) -> list[Box]:
         for node in drawn.nodes
         if node.label is not None and node.name not in around
     ]
-
-
-def _edge_id(element: str, kind: str, edge: Transition) -> str:
-    name = part_id(element, kind, edge.name)
-    return name if len(edge.sources) == 1 else part_id(name, "from", edge.source)
 
 
 def _scope(levels: dict[str, Level], edge: Transition) -> str:

@@ -24,6 +24,7 @@ from plots.style.presets import font, inches, pt, room, settings, to_scale
 
 COLUMNS, PANEL, NARROWEST = 3, (2.7, 2.15), 1.9  # in
 LETTERS = 12.5  # per inch, of the text under the panels
+WORDS = 14  # letters of a heading, in a line
 CELL, NAME = 1.06, 0.087  # in: width of a cell, of a letter of a model's name
 TOO_LARGE = 4.0  # times the median range: such a panel has its own axis
 # Verdicts differ by shape; the grounds only help to find them.
@@ -172,8 +173,8 @@ def phenomena_matrix(
     wide, high = (size - left - 0.2) / len(table.phenomena), 0.46  # in, of a cell
     brief = wide < 0.95 * CELL
     under_heads = [*notes] or ["shows it if", *(each.shows_if for each in table.phenomena)]
-    under_heads = [] if brief else [_folded(note) for note in under_heads]
-    heads = [each.short if brief else _folded(each.short) for each in table.phenomena]
+    under_heads = [] if brief else [folded(note, WORDS) for note in under_heads]
+    heads = [each.short if brief else folded(each.short, WORDS) for each in table.phenomena]
     above = 0.25 + 0.14 * max(head.count("\n") + 1 for head in heads)
     if brief:
         high, above = 0.3, 0.25 + 0.064 * max(map(len, heads))
@@ -254,13 +255,3 @@ def _symbol(ax: Axes, x: float, y: float, verdict: str) -> None:
         ax.plot([x - 0.06, x + 0.06], [y, y], color=LINE_GREY, linewidth=pt(1.4))
     else:
         ax.text(x, y, "?", ha="center", va="center", color=INK, fontsize=font(10))
-
-
-def _folded(text: str) -> str:
-    """Break a heading into lines of at most 14 characters, if its words are not longer."""
-    lines = [""]
-    for word in text.split():
-        if lines[-1] and len(lines[-1]) + len(word) >= 14:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return "\n".join(lines)

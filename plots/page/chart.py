@@ -41,8 +41,8 @@ def chart_svg(chart: Chart, n: int) -> str:
             group.attrib |= {"data-slot": str(number), "data-state": str(k)}
             _name_texts(group, sheet.state_rows(state, number))
             for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-                guard = groups[edge_id(chart, element, "guard", edge)]
-                for part in (guard, groups[edge_id(chart, element, "edge", edge)]):
+                guard = groups[edge_id(element, "guard", edge)]
+                for part in (guard, groups[edge_id(element, "edge", edge)]):
                     part.attrib |= {"data-slot": str(number), "data-edge": str(edges)}
                 _name_texts(guard, sheet.guard_rows(edge, priority, number))
                 _make_button(guard)

@@ -35,7 +35,8 @@ def folded(text: str, letters: int) -> str:
     printed = [re.sub(r"\\[A-Za-z]+", "x", each) for each in formulas]
     printed = [re.sub(r"[${}_^\\\s]", "", each) for each in printed]
     widths = iter("\0" * max(1, len(each)) for each in printed)
-    lines = wrap(re.sub(r"\$[^$]*\$", lambda _: next(widths), text), letters)
+    plain = re.sub(r"\$[^$]*\$", lambda _: next(widths), text)
+    lines = wrap(plain, letters, break_long_words=False, break_on_hyphens=False)
     back = iter(formulas)
     return "\n".join(re.sub("\0+", lambda _: next(back), line) for line in lines)
 

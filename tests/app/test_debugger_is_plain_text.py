@@ -154,7 +154,6 @@ def _piped(script: str, **environment: str) -> subprocess.CompletedProcess[bytes
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("script", "code"),
     [("next\nquit\n", 0), ("nxt\nquit\n", 1), ("goto 0,15\nnext\n", 1), ("# a remark\n\n", 0)],
@@ -168,6 +167,7 @@ def test_a_script_with_a_mistake_ends_with_exit_code_1(script: str, code: int) -
     assert made.run() == 0
 
 
+@pytest.mark.slow
 def test_a_pipe_gets_plain_text_and_an_exit_code() -> None:
     """Also where it cannot carry a character that was typed; here a command that there is not."""
     done = _piped("goto 25\nwhy 1\nfrage nach ß und →\nq", PYTHONIOENCODING="ascii:surrogateescape")

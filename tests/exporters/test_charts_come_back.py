@@ -180,6 +180,18 @@ ORDINARY = """\
 """
 
 
+def test_a_log_is_named_once_and_names_may_come_from_a_generator(tmp_path: Path) -> None:
+    inside = '<state id="held"><onentry><log/></onentry></state>'
+    text = (
+        f'<scxml xmlns="http://www.w3.org/2005/07/scxml"><state id="out">{inside}</state></scxml>'
+    )
+    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
+    given = {"inputs": iter("v"), "parameters": iter("k"), "outputs": {"F": "k * v"}}
+    with pytest.warns(UserWarning, match="a chart writes nothing: state 'held', onentry$"):
+        chart = Chart.from_scxml(tmp_path / "own.scxml", **given)  # type: ignore[arg-type]
+    assert (chart.inputs, chart.parameter_names) == (("v",), ("k",))
+
+
 def test_an_ordinary_document(tmp_path: Path) -> None:
     """Several events, dotted names, data, a final state, a log, a transition without target."""
     (tmp_path / "own.scxml").write_text(ORDINARY, encoding="utf-8")

@@ -259,10 +259,6 @@ def test_an_edge_that_locks_from_one_state_is_no_arrest_from_another() -> None:
             State("b", locked=True),
             State("slip", outputs={"F": "F_c"}),
         ),
-            State("a", locked=True),
-            State("b", locked=True),
-            State("slip", outputs={"F": "F_c"}),
-        ),
         transitions=(
             Transition("lock", ("slip", "a"), "b", "v >= 0"),
             Transition("hidden", "a", "slip", "v >= 0"),

@@ -405,10 +405,16 @@ def contact(load: str) -> Contact:
     return Contact("pad", LOADED, {"k": 100.0, "mu": 0.3}, v="v_load", inputs=inputs)
 
 
-def test_functions_and_words_in_an_input_are_no_inputs() -> None:
+@pytest.mark.parametrize(
+    "text",
+    [
+        "if(load > 1 and not mod(t, 2) >= 1, load, 0)",
+        "load if load > 1 and not mod(t, 2) >= 1 else 0",
+    ],
+)
+def test_functions_and_words_in_an_input_are_no_inputs(text: str) -> None:
     chart = Chart("own", inputs=("N",), states=(State("on"),), outputs={"F": "N"})
-    given = {"N": "if(load > 1 and not mod(t, 2) >= 1, load, 0)"}
-    stepping = FrictionState(Contact("pad", chart, {}, inputs=given))
+    stepping = FrictionState(Contact("pad", chart, {}, inputs={"N": text}))
     forces = [stepping.advance(0.0, 0.0, 0.5, load=(3.0, 3.0)) for _ in range(4)]
     assert forces == [3.0, 0.0, 0.0, 3.0]  # at 0.5, 1, 1.5 and 2 s
 

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 from xml.etree import ElementTree as ET
 
 from gms_fsm.charts.files.imported import Texts, built, number_of
@@ -39,6 +39,7 @@ WORDS = {
 }  # fmt: skip
 # Longer signs first: "!=" is left, and refused by the expression language.
 TOKEN = re.compile(r"[!=]=+|&&|\|\||!|\bMath\.\w+|\btrue\b")
+AssignedTexts: TypeAlias = dict[str, tuple[str, str | None]]  # expression, and the chart's text
 DONE = "done.state."  # the event that a state with parts has reached a final one
 
 
@@ -49,7 +50,7 @@ class ScxmlTransition:
     edge: ImportedEdge
     cond: str | None
     guard: str | None
-    assigned: dict[str, tuple[str, str | None]]  # by name: expression, and the chart's text
+    assigned: AssignedTexts  # by name: expression, and the chart's text
     order: int | None
 
 
@@ -74,7 +75,7 @@ def load(kind: type[Chart], path: Path, texts: Mapping[str, Any]) -> Chart:
             for route, each in document.elements.items()
             if (pairs := _pairs(each, tag))
         }
-    merged = {**found, **texts}
+    merged = found | {name: getattr(given, name) for name in texts}
     for part in ("flows", "state_outputs"):
         beside = getattr(given, part)
         if isinstance(beside, Mapping):
@@ -199,6 +200,7 @@ class _Document:
         self.timed: set[ET.Element] = set()  # <send> and <cancel> that they stand for
         for route, each in self.elements.items():
             self._find_timers(route, each)
+        self.kept: dict[Route, dict[str, AssignedTexts]] = {}
         self.states = [self._state(*each) for each in self.elements.items()]
         self.rows = [row for each in self.elements.items() for row in self._rows(*each)]
 
@@ -268,11 +270,15 @@ class _Document:
     def _state(self, route: Route, element: ET.Element) -> ImportedState:
         place = f"{self.here}, state {element.get('id')!r}"
         parts = [each for tag in ("state", "final") for each in _all(element, tag)]
+        kept = self.kept[route] = {
+            tag: self.assigned(_all(element, tag), f"{place}, {tag}")
+            for tag in ("onentry", "onexit")
+        }
         return ImportedState(
             route,
             place,
-            _texts(self.assigned(_all(element, "onentry"), f"{place}, onentry")),
-            _texts(self.assigned(_all(element, "onexit"), f"{place}, onexit")),
+            _texts(kept["onentry"]),
+            _texts(kept["onexit"]),
             self._first(element, place) if parts else None,
             bool(self._history(element, place)),
         )
@@ -348,8 +354,8 @@ class _Document:
             actions=_texts(assigned),
             stays=stays,
         )
-        place_in_order = int(order) if order is not None and order.isdecimal() else None
-        return ScxmlTransition(edge, cond, guard, assigned, place_in_order)
+        at_place = int(order) if order is not None and order.isdecimal() else None
+        return ScxmlTransition(edge, cond, guard, assigned, at_place)
 
     def _end(self, source: Route, name: str, cond: str | None, place: str) -> Route:
         """Return the final state that is meant by the event that a state is done."""
@@ -367,11 +373,9 @@ class _Document:
             )
         return ends[0]
 
-    def assigned(
-        self, parents: Iterable[ET.Element], place: str
-    ) -> dict[str, tuple[str, str | None]]:
+    def assigned(self, parents: Iterable[ET.Element], place: str) -> AssignedTexts:
         """Return assignments in their order."""
-        found: dict[str, tuple[str, str | None]] = {}
+        found: AssignedTexts = {}
         for parent in parents:
             for each in parent:
                 if str(each.tag).startswith("{") and _tag(each) == each.tag:
@@ -441,7 +445,7 @@ def _read_back(text: str | None) -> str:
     return " ".join(said.split())
 
 
-def _texts(assigned: Mapping[str, tuple[str, str | None]]) -> dict[str, str]:
+def _texts(assigned: AssignedTexts) -> dict[str, str]:
     """Return the texts of assignments; without those that a chart makes by itself."""
     ours = any(text is not None for _, text in assigned.values())
     return {
@@ -571,18 +575,15 @@ def _check_kept(
         if not names & {*given.actions}:
             _check_assigned(row.assigned, assignments(chart, "action", each.name), place)
     for kind, tag, beside in (("entry", "onentry", given.entry), ("exit", "onexit", given.exit)):
-        for route, element in document.elements.items():
+        for route, kept in document.kept.items():
             name = spelled(route)
             place = f"{document.here}, state {name!r}, {tag}"
             (owner,) = {name, ".".join(route)} & {*chart.nesting.levels} or {""}
             if name not in beside and owner:
-                found = document.assigned(_all(element, tag), place)
-                _check_assigned(found, assignments(chart, kind, owner), place)
+                _check_assigned(kept[tag], assignments(chart, kind, owner), place)
 
 
-def _check_assigned(
-    found: Mapping[str, tuple[str, str | None]], meant: Mapping[str, str], place: str
-) -> None:
+def _check_assigned(found: AssignedTexts, meant: Mapping[str, str], place: str) -> None:
     for name, (expression, text) in found.items():
         if text is not None and expression != meant.get(name):
             _refuse_changed(

@@ -64,8 +64,10 @@ class Texts:
         for name in given:
             if name not in known:
                 raise unknown("argument", name, known, ChartError, place=here)
-        for name in given.keys() & {"inputs", "velocities", "variables", "parameters"}:
-            _several(given[name], f"{here}: {name}")
+        several = {"inputs", "velocities", "variables", "parameters", "locked", "impulses"}
+        given = {**given} | {
+            name: _several(given[name], f"{here}: {name}") for name in given.keys() & several
+        }
         for name in given.keys() & {"let", "initial"}:
             texts_of(given[name], f"{here}: {name}")
         return cls(**given)
@@ -134,9 +136,9 @@ def built(
     guards = texts_of(given.guards, f"{here}: guards")
     _check_known(guards, known, "edge", f"{here}: guards")
     conditions = _guards(flat, edges, guards)
-    locked = dict.fromkeys(map(str, _several(given.locked, f"{here}: locked")))
+    locked = dict.fromkeys(map(str, given.locked))
     _check_known(locked, [*map(spelled, routes(states))], "state", f"{here}: locked")
-    impulses = dict.fromkeys(map(str, _several(given.impulses, f"{here}: impulses")))
+    impulses = dict.fromkeys(map(str, given.impulses))
     _check_known(impulses, known, "edge", f"{here}: impulses")
     parts = {spelled(each.route): each for each in leaves}
     paths = {name: ".".join(each.route) for name, each in parts.items()} if nested else {}
@@ -144,7 +146,7 @@ def built(
         given.name,
         given.inputs,
         given.variables,
-        tuple(_parameter(each, here) for each in _several(given.parameters, f"{here}: parameters")),
+        tuple(_parameter(each, here) for each in given.parameters),
         tree(states, first, (), texts, locked) if nested else flat_states(leaves, texts, locked),
         tuple(
             Transition(
@@ -374,10 +376,10 @@ def _check_known(given: Mapping[str, object], names: list[str], kind: str, place
             raise unknown(kind, name, names, ChartError, place=place)
 
 
-def _several(given: object, place: str) -> Iterable[Any]:
+def _several(given: object, place: str) -> tuple[Any, ...]:
     if isinstance(given, str | Mapping) or not isinstance(given, Iterable):
         raise ChartError("give a tuple", place=place, value=given)
-    return given
+    return tuple(given)
 
 
 def _parameter(given: object, here: str) -> Any:

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from xml.etree import ElementTree as ET
 
 from gms_fsm._version import __version__
-from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.files.scxml import (
     OURS,
     SCXML,
@@ -162,6 +163,21 @@ class _States:
 
     chart: Chart
 
+    @cached_property
+    def texts(self) -> Mapping[str, str]:
+        """The guards as conditions, by edge."""
+        return conditions(self.chart)
+
+    @cached_property
+    def leaving(self) -> Mapping[str, list[tuple[int, Transition]]]:
+        """The edges by the state that they are written to leave, with their places in order."""
+        edges = self.chart.nesting.transitions
+        found: dict[str, list[tuple[int, Transition]]] = {}
+        rows = ((source, edge) for edge in edges for source in edge.sources)
+        for order, (source, edge) in enumerate(rows):
+            found.setdefault(source, []).append((order, edge))
+        return found
+
     def state(self, root: ET.Element, path: str) -> None:
         """Write a state, with the states inside."""
         chart, level = self.chart, self.chart.nesting.levels[path]
@@ -186,14 +202,11 @@ class _States:
             values = ET.SubElement(own, "transition", {"event": VALUES})
             for name in _outside(chart):
                 ET.SubElement(values, "assign", {"location": name, "expr": f"_event.data.{name}"})
-        texts_of, edges = conditions(chart), chart.nesting.transitions
-        rows = [(source, edge) for edge in edges for source in edge.sources]
-        for order, (source, edge) in enumerate(rows):
-            if source == path:
-                row = {"event": STEP, "cond": texts_of[edge.name], "target": spelled(edge.target)}
-                row |= {"gms:name": edge.name, "gms:order": str(order), "gms:guard": edge.guard}
-                at = ET.SubElement(own, "transition", row)
-                self.assign(at, assignments(chart, "action", edge.name), edge.actions)
+        for order, edge in self.leaving.get(path, ()):
+            row = {"event": STEP, "cond": self.texts[edge.name], "target": spelled(edge.target)}
+            row |= {"gms:name": edge.name, "gms:order": str(order), "gms:guard": edge.guard}
+            at = ET.SubElement(own, "transition", row)
+            self.assign(at, assignments(chart, "action", edge.name), edge.actions)
 
     def assign(self, parent: ET.Element, expressions: Pairs, texts: Pairs) -> None:
         """Write assignments; one without a text of the chart is the reset of a timer."""

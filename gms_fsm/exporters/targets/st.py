@@ -240,11 +240,13 @@ class StructuredText:
     def readme(self) -> str:
         name, element = self.name, self.element
         inputs = "".join(f", {each} := ..." for each, _ in element.inputs[1:])
-        sgn = f" and the function {name}_sgn" if f"{name}_sgn(" in self.text() else ""
+        text = self.text()
+        own = [f"{name}_{each}" for each in DEFINED if f"{name}_{each}(" in text]
+        functions = f", and the function{'s' * (len(own) > 1)} {', '.join(own)}" if own else ""
         return f"""\
 # {visible(element.title)} as structured text (IEC 61131-3)
 
-- {name}.st: the function block {name}{sgn}
+- {name}.st: the function block {name}{functions}
 
 ## How to run it
 

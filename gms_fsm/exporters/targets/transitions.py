@@ -153,11 +153,8 @@ def _sources(chart: Chart, edge: Transition) -> str | list[str]:
 
 def _written(chart: Chart, edge: Transition) -> Transition:
     """Return an edge as it is written."""
-    return next(
-        each
-        for each in chart.nesting.transitions
-        if edge.name in [name for name, *_ in chart.nesting.entries(each)]
-    )
+    name = dict(edge.performs)["action"]
+    return next(each for each in chart.nesting.transitions if each.name == name)
 
 
 def _parameter(given: Parameter) -> str | dict[str, Any]:

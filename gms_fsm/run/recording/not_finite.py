@@ -9,6 +9,7 @@ from itertools import chain
 import numpy as np
 
 from gms_fsm.charts.chart import Chart, State
+from gms_fsm.charts.nesting import output_text
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.arguments import some_of
 from gms_fsm.foundation.quantities import named_numbers
@@ -84,7 +85,8 @@ def _contacts(start: Problem, error: HybridError) -> Iterator[str]:
 
 def _infinite_force(chart: Chart, state: State, F: float, values: Mapping[str, float]) -> str:
     """Say which text of a force is not finite, with the numbers that it reads."""
-    text, tree = chart.output_text(state.name, "F"), chart.forces[state.name, "F"]
+    text = output_text(chart.nesting, chart.outputs, state.name, "F")
+    tree = chart.forces[state.name, "F"]
     read = names_in(tree) & values.keys() if tree is not None else ()
     numbers = named_numbers({name: values[name] for name in sorted(read)})
     known = f"({F:g}{f', with {numbers}' if numbers else ''})"

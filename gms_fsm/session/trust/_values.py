@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from gms_fsm.charts.nesting import output_text
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.charts.registry import domain_of
 from gms_fsm.errors import GMSError
@@ -55,7 +56,7 @@ def _force_text(trace: Trace, name: str, row: int, element: int | None) -> str:
     if element is None and name in chart.contact_outputs:
         return chart.contact_outputs[name]
     state = chart.states[int(trace.modes[row, element or 0])]
-    return chart.output_text(state.name, name) or name
+    return output_text(chart.nesting, chart.outputs, state.name, name) or name
 
 
 def outside(trace: Trace) -> Iterator[Doubt]:
