@@ -79,6 +79,7 @@ class RunPlan(NamedTuple):
     impulses: list[int]  # for each edge: 1 if it is an impulse, 2 if it changes forces at once
     leaps: bool  # whether velocities that are given may jump at a crossing
     events: int  # the bit with which events are forgotten once all machines were asked; or 0
+    lasting: int  # that with which, before they are, times of conditions that ceased end; or 0
 
 
 @dataclass(slots=True, eq=False)

@@ -137,6 +137,9 @@ class Equations:
         Whether these may jump at a crossing, without an edge.
     events : int
         The bit with which a tick forgets events, once all machines were asked; 0 if there are none.
+    lasting : int
+        The bit with which a tick, before machines are asked, sets times of conditions to 0 that do
+        not hold; 0 if there are none.
     """
 
     flow: Flow
@@ -159,6 +162,7 @@ class Equations:
     velocities: int = 0
     leaps: bool = False
     events: int = 0
+    lasting: int = 0
 
     def functions(self, located: bool) -> Functions:
         """Return the functions for a run with or without located crossings."""
@@ -498,6 +502,7 @@ def plan_of(
         impulses=equations.impulses,
         leaps=equations.leaps,
         events=equations.events,
+        lasting=equations.lasting,
         discrete=equations.discrete or [0] * machines,
         knots=equations.knots if options.located else [],
         relaxing=relaxation_times(options),

@@ -130,6 +130,8 @@ def run_to_event(
             return ROWS
         phase, event = memory.phase, NOTHING
         if phase == ASK:
+            if plan.lasting > 0:
+                switch.tick(plan.lasting, now.t, now.y, now.mode, p)
             left = _ask(switch, now, memory, sliding, p)
             if left >= 0:  # an edge of the other mode is enabled: go there first
                 leave(on, now, relations, left)

@@ -32,13 +32,14 @@ from gms_fsm import (
     Slider,
     State,
     Stribeck,
+    Supervisor,
     System,
     Trace,
     Transition,
     simulate,
 )
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.charts import CHARTS, gms_element
+from gms_fsm.charts import CHARTS, gms_element, timetable
 from gms_fsm.charts.registry import entry
 from gms_fsm.errors import GMSError
 from gms_fsm.systems.models import demonstration
@@ -472,7 +473,32 @@ LIGHT = ChartModel(
     {"T": 0.3},
 )
 
+# Held after a slow while, released after a push that lasted: conditions that have to go on.
+HEALS = ChartModel(
+    Chart(
+        "heals",
+        variables=("z",),
+        parameters=("k", "z_s", "T"),
+        states=(
+            State("stick", flow={"z": "v"}),
+            State("slip", flow={"z": "0"}),
+            State("held", flow={"z": "v"}),
+        ),
+        outputs={"F": "k * z"},
+        transitions=(
+            Transition("break_away", "stick", "slip", guard="abs(z) > z_s"),
+            Transition("heal", ("slip", "stick"), "held", guard="duration(abs(v) < 0.3) >= T"),
+            Transition(
+                "tear", "held", "slip", guard="abs(z) > 2 * z_s and duration(v > 0) > T / 2"
+            ),
+        ),
+    ),
+    {"k": [1.0, 2.0], "z_s": [0.05, 0.1], "T": [0.1, 0.15]},
+    n=2,
+)
+
 OWN_RUNS: dict[str, Maker] = {
+    "conditions that last": _on(HEALS, Prescribed("sin(2 * t)"), 6.0),
     "states in states": _on(LIGHT, Prescribed("0.2 * sin(t)"), 6.0),
     "ages": _on(ChartModel(LAMP, {"T": 0.3}), Prescribed("0"), 5.0),
     "odd names": _on(odd_names(), Prescribed("0.3*sin(t)"), 20.0),
@@ -573,6 +599,36 @@ def loaded() -> System:
     )
 
 
+def switched() -> System:
+    """A pad that is oiled at given times, and a sampler that sees its force late."""
+    pad = Chart(
+        "pad",
+        parameters=("F_c", "b"),
+        variables=("k",),
+        states=(
+            State("dry", outputs={"F": "F_c * tanh(v / 0.01) + k"}, entry={"k": "k + v"}),
+            State("oiled", outputs={"F": "b * v"}),
+        ),
+        transitions=(
+            Transition("oil", "dry", "oiled", event="oil"),
+            Transition("dry_up", "oiled", "dry", guard="after(0.25)"),
+        ),
+    )
+    return System(
+        "oiled by hand",
+        bodies=(Body("slide", velocity="v"),),
+        contacts=(Contact("pad", pad, {"F_c": 2.0, "b": 1.0}),),
+        supervisors=(Supervisor("hand", timetable({"oil": OILED})),),
+        signals={"v": "0.3 * sin(7 * t)"},
+        sampled=(
+            Sampled("late", period=0.01, updates={"F": "pad.F", "u": "delay(F, 3) + delay(x, 1)"}),
+        ),
+    )
+
+
+OILED = (0.0, 0.2, 1.0, 4 / 3)
+
+
 def belt(speed: Any = "0.1") -> System:
     """Two blocks on a belt, with a contact of each kind: locked, a bank, in the plane."""
     stiction = {"F_c": 1.0, "F_s": 1.5, "b": 0.0}
@@ -622,6 +678,7 @@ SYSTEM_RUNS: dict[str, Maker] = {
     },
     "several rates": lambda: Run((rates(),), 0.16, {"t_start": 0.1}),
     "loads": lambda: Run((loaded(),), 8.0),
+    "events at given times": lambda: Run((switched(),), 2.0),
     "every kind of contact": lambda: Run(
         (belt(),), 12.0, {"initial": {"q2": 0.2, "pad.states": ["backward"]}}
     ),

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from gms_fsm.charts.gms import GMS_ELEMENT, LAWS, SLIP_LAWS, gms_element
+from gms_fsm.charts.timetable import timetable
 from gms_fsm.charts.zoo.bristles.lugre import LUGRE
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     CHARTS: Mapping[str, Chart]
 
-__all__ = ["CHARTS", "GMS_ELEMENT", "LAWS", "LUGRE", "SLIP_LAWS", "gms_element"]
+__all__ = ["CHARTS", "GMS_ELEMENT", "LAWS", "LUGRE", "SLIP_LAWS", "gms_element", "timetable"]
 
 
 def __getattr__(name: str) -> Any:

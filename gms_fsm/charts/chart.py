@@ -27,12 +27,13 @@ from gms_fsm.charts.parts import (
     tuple_of,
     values_of,
 )
-from gms_fsm.charts.reader import ChartReader
+from gms_fsm.charts.reader import ChartReader, called
 from gms_fsm.errors import ChartError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, YIELDING, Condition, Value, spell
+from gms_fsm.language.normal import renamed_in
 
 if TYPE_CHECKING:
     from gms_fsm.charts.files.imported import GivenTexts
@@ -75,6 +76,7 @@ class Chart:
         precede those of the states around them. Guards may read ``F``, the force of the contact,
         ``a``, its acceleration, ``age``, the time since the state that the edge leaves was entered,
         s, and ``after(T)``, short for ``age >= T``; on an edge to itself ``every(T)`` is the same.
+        ``duration(abs(v) < v_c)`` is how long a condition has held there without a break, s.
     outputs : mapping of str to str
         ``F``, the element's force [N], in all states that give none of their own; may use
         ``d<variable>`` for a derivative.
@@ -134,6 +136,8 @@ class Chart:
     lets: Mapping[str, Value] = field(init=False, repr=False, compare=False)
     # Variables that no text declares: times in states, and histories.
     hidden: tuple[str, ...] = field(init=False, repr=False, compare=False)
+    # How long conditions have held: of each hidden variable that is such a time its condition.
+    durations: Mapping[str, Condition] = field(init=False, repr=False, compare=False)
     # As written; `states` and `transitions` are the innermost states and the edges between them.
     nesting: Nesting = field(init=False, repr=False)
     totals: Mapping[str, Value] = field(init=False, repr=False, compare=False)
@@ -564,7 +568,7 @@ class Chart:
                 f"chart {self.name!r} has no edge {shown(edge)}",
                 advice=f"its edges are {', '.join(map(repr, self.guards)) or 'none'}",
             )
-        return spell(self.guards[edge], MATLAB_LIKE)
+        return spell(renamed_in(self.guards[edge], called(self.durations)), MATLAB_LIKE)
 
 
 def _check_name(name: str, kind: str, here: str, key: tuple[str | int, ...]) -> None:

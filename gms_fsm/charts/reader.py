@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,8 @@ from gms_fsm.charts.nesting import AGE, Level, joined
 from gms_fsm.charts.parts import event_name
 from gms_fsm.errors import ChartError, ExpressionError, Part
 from gms_fsm.language import (
+    LASTING,
+    MATLAB_LIKE,
     Both,
     Condition,
     Name,
@@ -20,8 +23,9 @@ from gms_fsm.language import (
     parse_condition,
     parse_value,
     renamed,
+    spell,
 )
-from gms_fsm.language.normal import renamed_in
+from gms_fsm.language.normal import chosen, renamed_in
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart
@@ -48,7 +52,11 @@ class ChartReader:
         self.late = [
             each for each in (*chart.force_names, *chart.rate_names) if each not in declared
         ]
+        self.taken = declared | {each.name for each in chart.states}
+        self.taken |= {each.name for each in chart.transitions}
         self.ages: set[str] = set()  # the variables that texts read
+        # By age and text the variable that is how long a condition has held, and the condition.
+        self.lasting: dict[tuple[str, str], tuple[str, Condition]] = {}
 
     def trees(self) -> dict[str, Any]:
         """Return what the chart keeps, by its name."""
@@ -96,6 +104,7 @@ class ChartReader:
         return {
             "variables": (*chart.variables, *hidden),
             "hidden": hidden,
+            "durations": dict(self.lasting.values()),
             "lets": self.lets,
             "flows": flows,
             "forces": forces,
@@ -136,12 +145,19 @@ class ChartReader:
                 found[level.last] = None
                 for number, inside in enumerate(level.inside()):
                     assignments["entry", inside][level.last] = Number(float(number))
+        for (age, _), (name, _) in self.lasting.items():
+            for level in levels:
+                if level.age == age:
+                    assignments["entry", level.path][name] = Number(0.0)
         for state in self.chart.states:
             chain = self.chart.nesting.levels[state.name].chain
             running = {self.chart.nesting.levels[path].age for path in chain}
             for name in found:
                 flows[state.name, name] = Number(1.0 if name in running else 0.0)
-        return tuple(found)
+            for (age, _), (name, condition) in self.lasting.items():
+                rate = chosen(condition, Number(1.0), Number(0.0))
+                flows[state.name, name] = rate if age in running else Number(0.0)
+        return (*found, *(name for name, _ in self.lasting.values()))
 
     def state(self, level: Level) -> Part:
         """Return what errors call a state."""
@@ -224,10 +240,30 @@ class ChartReader:
             tree = parse_condition(text, [*self.known_now, *self.late, *_age(text)])
         except ExpressionError as error:
             raise error.at(owner) from None
-        if AGE not in names_in(tree):
-            return tree
-        self.ages.add(age)
-        return renamed_in(tree, {AGE: Name(age)})
+        return renamed_in(tree, self.timed(tree, age, owner))
+
+    def timed(self, tree: Value | Condition, age: str, owner: Part) -> dict[str, Value]:
+        """Return what the times in a text mean: that in a state, and those of conditions there."""
+        found: dict[str, Value] = {}
+        for name in sorted(names_in(tree)):
+            if name == AGE:
+                self.ages.add(age)
+                found[name] = Name(age)
+            elif name.startswith(LASTING):
+                found[name] = Name(self.duration(name[len(LASTING) : -1], age, owner))
+        return found
+
+    def duration(self, text: str, age: str, owner: Part) -> str:
+        """Return the variable that is how long a condition has held in the state of an age."""
+        if (age, text) not in self.lasting:
+            try:
+                condition = parse_condition(text, self.known_now)
+            except ExpressionError as error:
+                raise error.at(owner.of("duration")) from None
+            taken = {name for name, _ in self.lasting.values()} | self.taken
+            names = (f"{age.removesuffix(AGE)}duration{k or ''}" for k in itertools.count())
+            self.lasting[age, text] = next(n for n in names if n not in taken), condition
+        return self.lasting[age, text][0]
 
     def assignments(self, texts: Mapping[str, str], owner: Part, age: str) -> dict[str, Value]:
         """Read assignments to variables and velocities."""
@@ -246,10 +282,7 @@ class ChartReader:
         except ExpressionError as error:
             self.refuse_loop(text, names, owner)
             raise error.at(owner) from None
-        if AGE not in names_in(tree):
-            return tree
-        self.ages.add(age)
-        return renamed(tree, {AGE: Name(age)})
+        return renamed(tree, self.timed(tree, age, owner))
 
     def refuse_loop(self, text: str, names: list[str], owner: Part) -> None:
         """Refuse F and a where they would depend on themselves."""
@@ -302,6 +335,14 @@ class ChartReader:
                 )
 
 
+def called(durations: Mapping[str, Condition]) -> dict[str, Value]:
+    """Return what pictures call the times for which conditions have held."""
+    return {
+        name: Name(f"{LASTING}{spell(condition, MATLAB_LIKE)})")
+        for name, condition in durations.items()
+    }
+
+
 def _awaiting(event: str, guard: Condition) -> Condition:
     """Return a guard that holds only at its event."""
     arrived = Relation(">", Name(event_name(event)), Number(0.5))
@@ -313,5 +354,5 @@ def _awaiting(event: str, guard: Condition) -> Condition:
 
 def _age(text: object) -> list[str]:
     """Return the name of the age where a text seems to read it; else messages would offer it."""
-    words = (AGE, "after", "every")
+    words = (AGE, "after", "every", "duration")
     return [AGE] if isinstance(text, str) and any(word in text for word in words) else []

@@ -164,6 +164,21 @@ class FrictionBank:
         forces: FloatArray = self._joints.peek(*self._checked(v0, v1), time, self._lines(inputs))
         return forces
 
+    def send(self, event: str) -> None:
+        """Send an event: edges that wait for it are asked at the beginning of the next sample.
+
+        Parameters
+        ----------
+        event : str
+            One that the chart of a joint waits for.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such event.
+        """
+        self._joints.send(event)
+
     def _checked(self, v0: ArrayLike, v1: ArrayLike) -> tuple[FloatArray, FloatArray]:
         return self._row("v0", v0), self._row("v1", v1)
 

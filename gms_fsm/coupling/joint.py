@@ -15,6 +15,7 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.coupling.memory import JointMemory
 from gms_fsm.coupling.steppable import start_of
 from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.language import EVENT
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.run.plausible import bounds_of
 from gms_fsm.run.problem import LATEST, Problem
@@ -96,6 +97,8 @@ class Joint:
                 place=f"contact {contact.name!r}",
                 advice="give it another name",
             )
+        layout = start.program.layout
+        self.events = {name.removeprefix(EVENT): layout.y.index(name) for name in layout.events}
         # The entry of its default state sees the first velocity.
         self.enters = bool(self._chart.assigned())
 
@@ -111,7 +114,14 @@ class Joint:
                 start = start_of(self.given, *self.asked, values)
             except GMSError as error:
                 raise self._within(error) from None
+            sent = {k: b.now.y[k] for k in self.events.values()}
             b.now.y[:], b.memory.anchor[:] = start.y, start.y
+            for place, value in sent.items():
+                b.now.y[place] = value
+
+    def send(self, event: str) -> None:
+        """Let an event wait for the next sample."""
+        self.memory.buffers.now.y[self.events[event]] = 1.0
 
     def finish(self, now: float) -> list[ElementSwitch]:
         """Complete a sample that ended early, and return what its log lost; or raise its error."""
@@ -204,12 +214,11 @@ class Joint:
         """Return the time and the state that numbers mean, or refuse them."""
         least, most, whole = self._limits
         flat = np.where(np.abs(given) < MOST, given, np.copysign(np.inf, given))
-        y = next(part for part in self._parts if part.name == "y")
-        if (
-            self.enters
-            and flat[self._phase] == loop.START
-            and self.start.y != flat[y.where].tolist()
-        ):
+        part = next(part for part in self._parts if part.name == "y")
+        y = flat[part.where].tolist()
+        for place in self.events.values():  # one may have been sent
+            y[place] = 0.0
+        if self.enters and flat[self._phase] == loop.START and self.start.y != y:
             raise ParameterError(
                 "it is of a friction that begins with other initial values",
                 place="array",

@@ -16,7 +16,7 @@ from gms_fsm.coupling.joint import Asked, ElementSwitch, Joint, Line
 from gms_fsm.coupling.memory import BlockMemory, ListMemory, fast, machine_code
 from gms_fsm.coupling.steppable import start_of
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.arguments import checked_kind, unknown
 from gms_fsm.run.problem import LATEST
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
@@ -266,6 +266,16 @@ class Joints:
             self.t, self._last, self._spare = t, last, spare
             raise
         return force
+
+    def send(self, event: str) -> None:
+        """Let an event wait for the next sample of all joints that wait for it."""
+        known = dict.fromkeys(name for joint in self.each for name in joint.events)
+        if not isinstance(event, str) or event not in known:
+            raise unknown("event", event, known)
+        with self.alone:
+            for joint in self.each:
+                if event in joint.events:
+                    joint.send(event)
 
     # ------------------------------------------------------------------ what it found
     @property

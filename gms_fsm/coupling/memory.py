@@ -117,6 +117,7 @@ def prepared(start: Problem) -> tuple[Buffers, Sample]:
         force=0.0,
         impulse=0.0,
         inputs=[[0.0, 0.0] for _ in lines or (None,)],
+        events=[layout.y.index(name) for name in layout.events],
         seen=[0.0] * layout.observed.size,
         t=[0.0] * MOST_SWITCHES,
         machine=[0] * MOST_SWITCHES,

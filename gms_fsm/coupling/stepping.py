@@ -161,6 +161,21 @@ class FrictionState:
         force: float = self._joints.peek(v0, v1, dt, inputs)
         return force
 
+    def send(self, event: str) -> None:
+        """Send an event: edges that wait for it are asked at the beginning of the next sample.
+
+        Parameters
+        ----------
+        event : str
+            One that the chart waits for.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such event.
+        """
+        self._joints.send(event)
+
     def _lines(self, inputs: Mapping[str, Any]) -> dict[str, Line]:
         return input_lines(inputs, self._joint.inputs, _finite)
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import Parameter
+from gms_fsm.charts.reader import called
 from gms_fsm.coupling.steppable import other_inputs
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.language import Condition, Value, names_in
+from gms_fsm.language import Condition, Value, names_in, spell
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.system import Body, Contact, System
@@ -40,6 +41,12 @@ def check_moved_from_outside(chart: Chart, known: Iterable[str], title: str) -> 
                 place=f"{here}, state {state.name!r}",
                 advice="export a chart without locks, such as GMS, or a whole system as c99",
             )
+    for time in called(chart.durations).values():
+        raise ParameterError(
+            f"it reads {spell(time)}, which {title} does not have",
+            place=here,
+            advice="give the condition a state of its own, and after(...)",
+        )
     late = {*chart.force_names, *chart.rate_names} - {
         *chart.inputs,
         *chart.variables,

@@ -67,6 +67,7 @@ from gms_fsm.language.normal import (
     turning_inside,
 )
 from gms_fsm.language.tree import (
+    LASTING,
     Binary,
     Both,
     Call,
@@ -95,6 +96,7 @@ __all__ = [
     "EVENT",
     "FUNCTIONS",
     "LARGEST_PRODUCT_POWER",
+    "LASTING",
     "LATEX",
     "LEVELS",
     "MATHEMATICS",

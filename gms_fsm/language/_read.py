@@ -19,6 +19,7 @@ from gms_fsm.errors import ExpressionError, shown
 from gms_fsm.foundation.arguments import nearest, some_of
 from gms_fsm.foundation.parser import PARSER
 from gms_fsm.foundation.quantities import in_si
+from gms_fsm.language._print import spell
 from gms_fsm.language.functions import (
     CONSTANTS,
     FUNCTIONS,
@@ -29,6 +30,7 @@ from gms_fsm.language.functions import (
 )
 from gms_fsm.language.normal import chosen, written_out
 from gms_fsm.language.tree import (
+    LASTING,
     Binary,
     Both,
     Call,
@@ -351,6 +353,10 @@ class _Reader:
                 )
             case ast.Call(func=ast.Name(id="is_in" | "count" as f), args=[ast.Attribute() as of]):
                 return self.name(node, f"{f}({ast.unparse(of)})")
+            case ast.Call(func=ast.Name(id="duration"), args=[test], keywords=[]) if (
+                "age" in self.names and "duration" not in self.names
+            ):
+                return Name(f"{LASTING}{spell(self.condition(test, depth))})")
             case ast.Call(func=ast.Name(id="after")) if "age" in self.names:
                 raise self.refuse(
                     "found a comparison where a number is needed",
@@ -528,6 +534,8 @@ class _Reader:
                 func=ast.Name(id="after" | "every" as word), args=[time], keywords=[]
             ) if "age" in self.names and word not in self.names:
                 return Relation(">=", Name("age"), self.value(time, depth))
+            case ast.Call(func=ast.Name(id="is_in"), args=[ast.Attribute() as of]):
+                return Relation(">", self.name(node, f"is_in({ast.unparse(of)})"), Number(0.5))
             case ast.Call(func=ast.Name(id="after"), args=given) if "age" in self.names:
                 wanted = "one time in seconds, for example after(0.2)"
                 raise self.refuse(f"after got {len(given)} arguments", node, wanted)

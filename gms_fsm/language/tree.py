@@ -126,6 +126,8 @@ class Either:
         return self.operands
 
 
+LASTING = "duration("  # and how long a condition has held
+COUNTING = ("is_in(", "count(")  # names that stand for numbers of elements begin like this
 Value: TypeAlias = Number | Name | Negative | Binary | Call
 Condition: TypeAlias = Relation | InState | Not | Both | Either
 Node: TypeAlias = Value | Condition
@@ -188,6 +190,8 @@ def is_whole(value: Value) -> bool:
     match value:
         case Number(number):
             return number.is_integer()
+        case Name(name):
+            return name.startswith(COUNTING)
         case Call("floor" | "round" | "sgn"):
             return True
         case Call(function, arguments) if function in CHOICES:

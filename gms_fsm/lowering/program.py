@@ -99,6 +99,8 @@ class Program:
         For each edge 1 if it is an impulse, 2 if it lets go of a lock, else 0; empty if all are 0.
     events : int
         The bit of a tick that forgets events; 0 if there are none.
+    lasting : int
+        The bit of a tick that ends the times of conditions that have ceased; 0 if there are none.
     velocities : int
         Number of velocities that locks may hold or impulses set; 0 if nothing locks.
     leaps : bool
@@ -124,6 +126,7 @@ class Program:
     velocities: int
     leaps: bool
     events: int = 0
+    lasting: int = 0
     ticks: integrators.Ticks = field(default_factory=integrators.Ticks.none)
 
     @property
@@ -244,6 +247,7 @@ def _lowered(shape: _ProgramShape) -> Program:
         knots=[],
         jumps=[],
         events=plan.read.events_bit,
+        lasting=plan.read.lasting_bit,
         discrete=[bit for bank in plan.read.banks for bit in [plan.read.bit(bank)] * bank.n],
         **_jolts(plan),
     )
@@ -318,6 +322,7 @@ def equations(program: Program) -> integrators.Equations:
         velocities=program.velocities,
         leaps=program.leaps,
         events=program.events,
+        lasting=program.lasting,
     )
 
 

@@ -18,6 +18,7 @@ from gms_fsm.run.recording.moment import Moment
 from gms_fsm.run.recording.own_machines import engine_of, own_machines
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.run.recording.recording import Recorder, check_end, explained, interference_error
+from gms_fsm.run.recording.until import Until
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import arguments_of
@@ -45,6 +46,7 @@ def simulate(
     checkpoint: str | Path | None = None,
     checkpoint_every: float = 60.0,
     monitors: str | Iterable[str | Monitor] = (),
+    until: str | None = None,
     **options: Unpack[RunOptions],
 ) -> Trace:
     """Run a friction model on a rig, or a system: ``simulate(system, t_end)``.
@@ -89,6 +91,11 @@ def simulate(
         system also those of one contact, such as ``"gear: passivity"``. Their
         verdicts are in ``Trace.monitors``. They examine the rows and the log after the run has
         ended or failed.
+    until : str, optional
+        A condition, such as ``"v > 0.2 and t > 1"`` or ``"count(slip) == 4"``: the run ends where
+        it becomes true, located as a switch, and at t_end at the latest. It may read what a text of
+        the system may, of a model on a rig also F and, of a single element, its variables. If it
+        is true at the start it must first become false.
     **options
         Fields of `Settings` by name, which override those of `settings`: ``method``, ``step``,
         ``rtol``, ``atol``, ``max_step``, ``max_steps``, ``events``, ``output``, ``t_eval``.
@@ -139,6 +146,9 @@ def simulate(
     start = Problem.of(model, on, end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, start.what, start.output).values() if monitors else ()
     own = {} if machines is None else own_machines(machines, start)
+    stop = None if until is None else Until.of(start, until)
+    if stop is not None:
+        start = stop.start
     run: CompiledRun | Run
     if chosen.engine == "compiled":
         run = CompiledRun(start, engine_of(start, own) if own else None)
@@ -146,7 +156,7 @@ def simulate(
         run = Run(start, own)
     keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:
-        while run.advance():
+        while run.advance() and not (stop and stop.reached(run.recorder)):
             if keeper is not None:
                 keeper.look()
             if progress is not None:
@@ -154,15 +164,18 @@ def simulate(
         if progress is not None:
             progress(Moment(run.recorder))
     except SimulationError as error:
+        error.trace = error.trace if stop is None else stop.trace(error.trace)
         if watching:
             error.trace = watched(error.trace, watching, error)
         raise
     except KeyboardInterrupt as error:
-        error.trace = run.recorder.trace()  # type: ignore[attr-defined]
+        trace = run.recorder.trace()
+        error.trace = trace if stop is None else stop.trace(trace)  # type: ignore[attr-defined]
         raise
     if keeper is not None:
         keeper.finish()
     trace = run.recorder.trace()
+    trace = trace if stop is None else stop.trace(trace)
     return watched(trace, watching) if watching else trace
 
 

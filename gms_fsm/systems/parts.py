@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
@@ -30,6 +31,8 @@ from gms_fsm.systems.models import Model, check_bank, is_model, with_values
 Motion = Literal["along", "normal", "turning"]  # the first is the default
 LOAD = "N"  # the input of a contact that multiplies its Stribeck curve
 COUNTS = ("is_in", "count")  # of the elements in a state; the first where there is one element
+DELAY = re.compile(r"\bdelay\(\s*([^\W\d][\w.]*)\s*,\s*(\d+)\s*\)")
+MOST_DELAY = 1000  # ticks; each is a value of the system
 LEAST_LOAD = 1e-9  # N; charts divide by thresholds
 
 
@@ -348,9 +351,10 @@ class Sampled:
         s.
     updates : mapping of str to str
         For each value its text over the names of the system and ``period``; they run in this order
-        and see the results before them.
+        and see the results before them. ``delay(u, 3)`` is what u was three ticks before, kept in
+        the further values ``u__1``, ``u__2`` and ``u__3``.
     initial : mapping of str to float, optional
-        Values before the first tick; 0 where not given.
+        Values before the first tick; 0 where not given, what is delayed as what it comes from.
     offset : float
         s: the first tick is at t_start + offset. Period, offset and start count as the decimal
         numbers that are written, so that ticks of several rates coincide exactly: ten periods of
@@ -373,7 +377,7 @@ class Sampled:
         put = object.__setattr__
         put(self, "period", checked_scalar(f"{here}: period", self.period, "> 0"))
         put(self, "offset", checked_scalar(f"{here}: offset", self.offset, ">= 0"))
-        put(self, "updates", texts_of(self.updates, f"{here}: updates"))
+        put(self, "updates", _with_delays(texts_of(self.updates, f"{here}: updates"), here))
         put(self, "initial", mapping_of(self.initial, f"{here}: initial"))
         if not self.updates:
             raise ParameterError("it updates nothing", place=here)
@@ -388,9 +392,44 @@ class Sampled:
             self,
             "initial",
             {
-                name: checked_scalar(
-                    f"{here}: initial[{name!r}]", self.initial.get(name, 0.0), "finite"
-                )
+                name: checked_scalar(f"{here}: initial[{name!r}]", self._before(name), "finite")
                 for name in self.updates
             },
         )
+
+    def _before(self, name: str) -> float:
+        """Return a value before the first tick."""
+        source = name.rpartition("__")[0] if name not in self.initial else name
+        return self.initial.get(source, 0.0)
+
+
+def _with_delays(updates: Mapping[str, str], here: str) -> Mapping[str, str]:
+    """Return updates in which delayed values have names, and are handed on after all others."""
+    longest: dict[str, int] = {}
+
+    def named(found: re.Match[str]) -> str:
+        name, ticks = found[1], int(found[2])
+        if not 1 <= ticks <= MOST_DELAY:
+            raise ParameterError(
+                f"{found[0]} has {ticks} ticks", place=here, advice=f"1 to {MOST_DELAY:,} are kept"
+            )
+        longest[name] = max(ticks, longest.get(name, 0))
+        return _kept(name, ticks)
+
+    texts = {name: DELAY.sub(named, text) for name, text in updates.items()}
+    for name, text in texts.items():
+        if re.search(r"\bdelay\s*\(", text):
+            raise ParameterError(
+                f"{name} is {updates[name]!r}",
+                place=f"{here}: updates",
+                advice="delay takes a name and a number of ticks: delay(u, 3)",
+            )
+    for name, ticks in longest.items():
+        texts |= {_kept(name, k): _kept(name, k - 1) for k in range(ticks, 1, -1)}
+        texts[_kept(name, 1)] = name
+    return texts
+
+
+def _kept(name: str, ticks: int) -> str:
+    """Return what a value of some ticks before is called."""
+    return f"{name.replace('.', '__')}__{ticks}"

@@ -248,10 +248,11 @@ def _in_graph(state: str, certain: set[str], possible: set[str], yes: str, no: s
 def stability(prover: Prover) -> Iterator[Finding]:
     """Check that no state has an unstable equilibrium."""
     chart = prover.chart
-    if not chart.variables:
+    variables = [name for name in chart.variables if name in prover.subject.variables]
+    if not variables:
         yield Finding("stability", "proved", (), "it has no variables")
     for state in chart.states:
-        for variable in chart.variables:
+        for variable in variables:
             flow = prover.subject.flows[state.name, variable]
             signs = ("v = 0",) if state.locked else ("v > 0", "v < 0", "v = 0")
             for sign in signs if "v" in names_in(flow) else ("",):

@@ -17,6 +17,7 @@ from gms_fsm.language import (
     COMPARISONS,
     EVENT,
     LARGEST_PRODUCT_POWER,
+    LASTING,
     MATLAB_LIKE,
     Binary,
     Both,
@@ -115,7 +116,8 @@ class _Formulas:
         if name not in self.names:
             if name.startswith(EVENT):
                 raise Undecided(f"the event {name.removeprefix(EVENT)} is not encoded")
-            raise Undecided(f"{name} is not encoded for a contact with several velocities")
+            why = "" if name.startswith(LASTING) else " for a contact with several velocities"
+            raise Undecided(f"{name} is not encoded{why}")
         return self.names[name]
 
     def negative(self, _: Negative, parts: Iterator[Dual]) -> Dual:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.nesting import AGE
+from gms_fsm.charts.reader import called
 from gms_fsm.language import (
     Binary,
     Condition,
@@ -169,7 +170,9 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
     ('H > F_s', '(H - (F_c + b * v)) * W')
     """
     chart = facts.chart
-    lets: dict[str, Value] = {}
+    # How long conditions have held is not followed: a check that needs it is undecided.
+    lets: dict[str, Value] = called(chart.durations)
+    variables = tuple(name for name in chart.variables if name not in lets)
     for name, tree in chart.lets.items():
         lets[name] = renamed(tree, lets)
     declared = {*chart.inputs, *chart.velocities, *chart.variables, *chart.parameter_names, *lets}
@@ -181,7 +184,11 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
     moves = driven or (facts.free and bool(read & {"x", *chart.velocities}))
     moves = moves and bool(chart.velocities)  # a supervisor does not
     load, mobility = _fresh("H", declared), _fresh("W", declared)
-    flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
+    flows = {
+        key: renamed(tree, lets)
+        for key, tree in chart.flows.items()
+        if key[1] not in chart.durations
+    }
     rest = {
         force: _fresh(force_name("R", chart, force), declared)
         for force in chart.force_names
@@ -219,7 +226,7 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
         chart=chart,
         moves=moves,
         inputs=tuple(inputs),
-        variables=(*chart.variables, *(chart.velocities if moves else ())),
+        variables=(*variables, *(chart.velocities if moves else ())),
         guards={
             (edge.source, edge.name): renamed_in(guards[edge.name], values[edge.source])
             for edge in chart.transitions
@@ -242,7 +249,7 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
         assumed=(
             *([f"{mobility} > 0"] if moves else []),
             *([f"{viscous} >= 0"] if viscous else []),
-            *(f"{name} >= 0" for name in chart.hidden),
+            *(f"{name} >= 0" for name in chart.hidden if name in variables),
         ),
         facts=facts,
     )
@@ -253,7 +260,9 @@ def _steps(
 ) -> dict[tuple[str, str], tuple[tuple[str, Value], ...]]:
     return {
         (edge.source, edge.name): tuple(
-            (name, renamed(tree, lets)) for name, tree in chart.assigned(edge)
+            (name, renamed(tree, lets))
+            for name, tree in chart.assigned(edge)
+            if name not in chart.durations
         )
         for edge in chart.transitions
     }
@@ -309,4 +318,4 @@ def force_name(name: str, chart: Chart, force: str) -> str:
 
 
 def _rates(chart: Chart, flows: Mapping[tuple[str, str], Value], state: str) -> dict[str, Value]:
-    return {f"d{name}": flows[state, name] for name in chart.variables}
+    return {f"d{name}": flows[state, name] for name in chart.variables if (state, name) in flows}

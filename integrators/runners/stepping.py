@@ -70,6 +70,7 @@ class Sample:
     force: float  # at the end
     impulse: float  # integral of the force over the sample, if the mean is wanted
     inputs: list[Vector]  # of each input its value at the start and at the end; never empty
+    events: list[int]  # places of events among the states: 1 where one waits to be heard
     seen: Vector  # observed values at the end
     t: Vector  # of each switch its time
     machine: list[int]
@@ -157,13 +158,15 @@ def restart(b: Buffers, clocks: Clocks) -> None:
 
 
 def _begin(functions: Functions, b: Buffers, sample: Sample) -> None:
-    """Write the straight lines; where an input jumps, guards are asked again."""
+    """Write the straight lines; where an input jumps or an event waits, guards are asked again."""
     now, memory, end = b.now, b.memory, sample.end
     _shared, _own, tables = functions.p
     first = 1 if now.t >= end else 0  # of a sample without length only its end matters
     on, jumps = Held(functions, now.held, b.sliding), False
     for k in range(len(tables) // 2):
         jumps = jumps or tables[2 * k + 1][1] != sample.inputs[k][first]
+    for place in sample.events:
+        jumps = jumps or now.y[place] != 0.0
     jumps = jumps and memory.phase != START
     if jumps:
         look_back(on, now, b.relations)

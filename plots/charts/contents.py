@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.nesting import AGE, Level, written_guard
+from gms_fsm.charts.reader import called
 from gms_fsm.language import MATLAB_LIKE, Condition, Name, Value, parse_value, renamed, spell
 from gms_fsm.language.normal import renamed_in
 from plots.charts.notation import ChartWriter
@@ -168,7 +169,9 @@ def guard_of(chart: Chart, edge: Transition) -> Condition:
     if edge.performs:  # of a leaf
         return guard
     guard = written_guard(guard, chart.nesting, edge)
-    return renamed_in(guard, {chart.nesting.levels[edge.source].age: Name(AGE)})
+    return renamed_in(
+        guard, {**called(chart.durations), chart.nesting.levels[edge.source].age: Name(AGE)}
+    )
 
 
 def edge_text(write: ChartWriter, priority: int, edge: Transition) -> str:

@@ -15,6 +15,7 @@ from typing import cast
 
 from gms_fsm.charts.nesting import spelled
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
+from gms_fsm.charts.reader import called
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
@@ -28,6 +29,7 @@ from gms_fsm.exporters.plain.parts import (
 )
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
+    EVENT,
     Call,
     Comparison,
     Name,
@@ -35,6 +37,7 @@ from gms_fsm.language import (
     Value,
     names_in,
     renamed,
+    spell,
 )
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall, both_sides, plan_of
@@ -214,7 +217,19 @@ def _numbered(name: str) -> Iterator[str]:
 
 # --------------------------------------------------------------------------- refusals and names
 def _refuse_feedback(bank: Bank, place: str) -> None:
-    """Refuse guards and assignments that read the contact's force or acceleration."""
+    """Refuse what is more than guards over variables and v: events, times, forces."""
+    for name in bank.chart.events:
+        raise ParameterError(
+            f"it has the event {name.removeprefix(EVENT)!r}, which a text of one friction does not",
+            place=place,
+            advice="hand over a system with it, as c99, js, fmu2 or fmu3",
+        )
+    for time in called(bank.chart.durations).values():
+        raise ParameterError(
+            f"it reads {spell(time)}, which a text of one friction does not follow",
+            place=place,
+            advice="give the condition a state of its own, and after(...)",
+        )
     late = {*bank.forces, *bank.rates}
     for edge in bank.edges:
         trees = [edge.guard, *(tree for _, tree in edge.steps)]

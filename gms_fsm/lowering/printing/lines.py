@@ -380,6 +380,12 @@ class ProgramWriter(ABC):
             for name in y.shared
             if name in needed
         ]
+        # What is read of a single element outside of the loop over its contact.
+        lines += [
+            CodeLine(f"{self.local(name)} = y[{y.start_text(name)}]")
+            for name in y.own
+            if name in needed
+        ]
         return lines + values
 
     def defined(self, name: str, signs: Signs) -> list[CodeLine]:

@@ -575,6 +575,16 @@ class _PythonPrinter(LockFunctions):
         if bit := self.read.events_bit:
             lines.append(CodeLine(f"if bits & {bit}:  # all machines were asked"))
             lines += [CodeLine(f"    y[{y.text(name)}] = 0.0") for name in self.read.system.events]
+        if bit := self.read.lasting_bit:
+            lines.append(CodeLine(f"if bits & {bit}:  # before machines are asked"))
+            for bank in self.read.banks:
+                rows = [
+                    CodeLine(line.text, line.reads | sizes)
+                    for name, tree in bank.lasting.items()
+                    for place, sizes in [self.at("y", y, name)]
+                    for line in [self.put(place, tree)]
+                ]
+                lines += indented(self.loop(bank.index, "live", rows))
         if reads_of(lines) & self.late:
             lines = [*self.forces("live", wanted=True), *lines]
         return self.function(

@@ -13,9 +13,10 @@ import gms_fsm.systems.files.model_tables as model_tables
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.files.tables import ChartTable
 from gms_fsm.charts.registry import chart_named, charts
+from gms_fsm.charts.timetable import timetable
 from gms_fsm.errors import OutputError, ParameterError, ScenarioError
 from gms_fsm.foundation.files import inside
-from gms_fsm.foundation.tables import ONE, TABLE, Table, built, read_file, write_file
+from gms_fsm.foundation.tables import ONE, TABLE, Numbers, Table, built, read_file, write_file
 from gms_fsm.foundation.toml import parsed
 from gms_fsm.records.record import Record
 from gms_fsm.scenarios import shipped
@@ -102,12 +103,21 @@ class ContactInFile(ContactTable):
 class SupervisorInFile(SupervisorTable):
     """A supervisor of a system file."""
 
-    chart: ChartField = Field(  # type: ignore[assignment]
-        description="a chart file next to this one, the name of an included chart, or a table"
+    chart: ChartField | None = Field(  # type: ignore[assignment]
+        None, description="a chart file next to this one, the name of an included chart, or a table"
     )
+    times: dict[str, Numbers] = Field({}, description="when it sends events, s, instead of a chart")
 
     def chosen(self, folder: Path) -> Supervisor:
         """Return the supervisor; its chart may be a file in a folder."""
+        if (self.chart is None) == (not self.times):
+            raise ParameterError(
+                f"it has {'a chart and' if self.times else 'neither a chart nor'} times",
+                place=f"supervisor {self.name!r}",
+                advice='give chart = "own.toml", or times = { press = [0.5, 2.0] }',
+            )
+        if self.chart is None:
+            return self.build(built(timetable, "times", times=self.times))
         return self.build(built(_chart, "chart", given=self.chart, folder=folder))
 
 

@@ -28,7 +28,7 @@ from gms_fsm.language import (
     parse_value,
     renamed,
 )
-from gms_fsm.language.normal import renamed_in
+from gms_fsm.language.normal import chosen, renamed_in
 from gms_fsm.systems.given import derivative_free, is_positive, rank_of
 from gms_fsm.systems.parts import COUNTS, LEAST_LOAD, LOAD, Body, Contact
 from gms_fsm.systems.reading.definitions import ContactEdge, Definition
@@ -85,6 +85,8 @@ class Bank:
         In the chart's order.
     start : tuple of (str, Value)
         The assignments at the start of a run.
+    lasting : mapping of str to Value
+        Of each variable that is how long a condition has held: its value, or 0 if it does not hold.
     means : mapping of str to Value
         For each name of the chart what it stands for.
     """
@@ -103,6 +105,7 @@ class Bank:
     totals: Mapping[str, Value]
     edges: tuple[ContactEdge, ...]
     start: tuple[tuple[str, Value], ...]
+    lasting: Mapping[str, Value]
     means: Mapping[str, Value]
 
     @property
@@ -234,6 +237,13 @@ class Assembly:
         """The bit, among all that ticks, with which events are forgotten; 0 if there are none."""
         periodic = sum(each.periodic for each in self.banks)
         return 1 << (len(self.system.sampled) + periodic) if self.system.events else 0
+
+    @property
+    def lasting_bit(self) -> int:
+        """The bit with which the times of conditions that do not hold are set to 0, or 0."""
+        if not any(each.lasting for each in self.banks):
+            return 0
+        return 2 << (len(self.system.sampled) + sum(each.periodic for each in self.banks))
 
     def bank_of(self, tree: Value | Condition) -> int | None:
         """Return the bank whose elements have one value of a tree each; None if there is one."""
@@ -458,6 +468,10 @@ class SystemReader:
                 for number, edge in enumerate(chart.transitions)
             ),
             start=steps(),
+            lasting={
+                of(c, name): chosen(renamed_in(condition, names), Name(of(c, name)), ZERO)
+                for name, condition in chart.durations.items()
+            },
             means=names,
         )
 

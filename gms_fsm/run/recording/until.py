@@ -1,0 +1,150 @@
+"""A run that ends where a condition becomes true: a supervisor waits for it, and leaves no trace.
+
+The condition is located as every guard is. That supervisor is the last of all machines, so that
+what it adds to modes and log can be taken off again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.errors import ExpressionError, ParameterError
+from gms_fsm.language import Name, names_in, parse_condition, spell
+from gms_fsm.language.normal import renamed_in
+from gms_fsm.lowering.scales import scales_of_system
+from gms_fsm.run.problem import Problem, with_waking_times
+from gms_fsm.run.recording.moment import Recording
+from gms_fsm.systems.mounted import Mounted, mounted
+from gms_fsm.systems.parts import COUNTS, Supervisor
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.system_scope import in_si
+from gms_fsm.traces.trace import Trace
+
+NAME = "until"
+UNLIKE, WAITS, REACHED = range(3)  # the states of its chart
+_STATE = re.compile(rf"\b({'|'.join(COUNTS)})\(\s*(?=\w+\s*\))")
+
+
+@dataclass(frozen=True)
+class Until:
+    """What ends a run, and the same run without it.
+
+    Parameters
+    ----------
+    plain : Problem
+        Without the supervisor.
+    start : Problem
+        With it: what runs.
+    """
+
+    plain: Problem
+    start: Problem
+
+    @classmethod
+    def of(cls, plain: Problem, text: str) -> Until:
+        """Read a condition; raise an `ExpressionError` if it is none."""
+        system = plain.system
+        if plain.output == "end":
+            raise ParameterError(
+                "output is 'end'", place="until", advice="leave output out, and read the last row"
+            )
+        named: list[Any] = [*system.machines, *system.bodies, *system.springs, *system.sampled]
+        name = NAME
+        while name in {each.name for each in named}:
+            name += "_"
+        machine = _waiting(plain.what, text, name)
+        what = mounted(replace(system, supervisors=(*system.supervisors, machine)))
+        program = with_waking_times(what.system, plain.t_start, plain.last)
+        program = replace(program, ticks=plain.program.ticks)
+        start = replace(
+            plain,
+            what=what,
+            program=program,
+            mode=[*plain.mode, UNLIKE],
+            options=replace(plain.options, relaxing=scales_of_system(program).relaxing),
+        )
+        return cls(plain, start)
+
+    @property
+    def place(self) -> int:
+        """Where its state is among the modes, and its number among all machines."""
+        return self.plain.program.layout.n
+
+    def reached(self, recording: Recording) -> bool:
+        """Return whether the run has come to its end."""
+        return recording.latest[2][self.place] == REACHED
+
+    def trace(self, found: Trace) -> Trace:
+        """Return the run up to there, without the supervisor."""
+        mine = found.firings.machine == self.place
+        own, others = found.firings.at(mine), found.firings.at(~mine)
+        plain, end = self.plain, np.inf
+        ended = np.flatnonzero(found.stops.mode[:, self.place] == REACHED)
+        if ended.size:
+            end, last = float(own.t[-1]), int(np.flatnonzero(mine)[-1])
+            others = others.at(slice(0, last - (len(own) - 1)))  # what it fired before is taken off
+            plain = replace(plain, t_end=end, last=end, settings={**plain.settings, "t_end": end})
+        rows = self._without(found.rows, end)
+        stops = rows if found.stops is found.rows else self._without(found.stops, end)
+        named = plain.what.named and len(others) > 0
+        others = replace(others, layout=plain.program.layout, named=named)
+        return plain.trace(rows, stops, others)
+
+    def _without(self, rows: Rows, end: float) -> Rows:
+        """Return the rows up to a time, without those of the supervisor."""
+        own = rows.mode[:, self.place]
+        kept: NDArray[np.bool_] = (rows.t <= end) & (own != REACHED)
+        fired = (rows.microstep > 0) & (np.diff(own, prepend=own[:1]) != 0)
+        # Of one instant those after it are earlier by one.
+        later = np.zeros(len(rows), dtype=np.int64)
+        for row in np.flatnonzero(fired & kept):
+            step = row + 1
+            while step < len(rows) and rows.t[step] == rows.t[row] and rows.microstep[step] > 0:
+                later[step] += 1
+                step += 1
+        chosen = kept & ~fired
+        return Rows(
+            rows.t[chosen],
+            (rows.microstep - later)[chosen],
+            rows.y[chosen],
+            np.delete(rows.mode[chosen], self.place, axis=1),
+        )
+
+
+def _waiting(what: Mounted, text: str, name: str) -> Supervisor:
+    """Return a supervisor that waits until a condition is false, and then until it is true."""
+    system, alias = what.system, dict[str, str]()
+    text = in_si(what, text)
+    if not what.named:  # of a model on a rig, F is that of its only contact
+        (contact,) = system.contacts
+        text = _STATE.sub(rf"\1({contact.name}.", text)
+        own = [each for each in system.readable if each.startswith(f"{contact.name}.")]
+        alias = {each.partition(".")[2]: each for each in own}
+        alias = {short: each for short, each in alias.items() if short not in system.names}
+    try:
+        tree = parse_condition(text, [*system.readable, *alias])
+    except ExpressionError as error:
+        raise error.at(NAME) from None
+    inputs: Mapping[str, str] = {
+        f"u{i}": alias.get(each, each) for i, each in enumerate(sorted(names_in(tree)), start=1)
+    }
+    names = dict(zip(sorted(names_in(tree)), map(Name, inputs), strict=True))
+    guard = spell(renamed_in(tree, names))
+    chart = Chart(
+        NAME,
+        inputs=inputs,
+        velocities=(),
+        states=(State("unlike"), State("waits"), State("reached")),
+        transitions=(
+            Transition("begins", "unlike", "waits", guard=f"not ({guard})"),
+            Transition("ends", "waits", "reached", guard=guard),
+        ),
+    )
+    return Supervisor(name, chart, inputs=inputs)

@@ -1,0 +1,241 @@
+"""Runs end at conditions, events come at given times, values late, and conditions last."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from gms_fsm import (
+    Chart,
+    FrictionBank,
+    FrictionState,
+    PulledSlider,
+    Sampled,
+    State,
+    Supervisor,
+    System,
+    Trace,
+    Transition,
+    simulate,
+)
+from gms_fsm.traces.failures import SimulationError
+from tests.corpus import HEALS, OILED, switched
+from tests.helpers import FASTEST, bits, pulled_mass, stick_slip
+
+MODEL, RIG = stick_slip("signed"), PulledSlider(1.0, 2.0, 0.1)
+END = 30.0
+IDLE = Supervisor("idle", Chart("idle", (), velocities=(), states=(State("on"),)))
+
+
+def begins_like(part: Trace, whole: Trace) -> None:
+    """All rows but the last one of a run are the first rows of another, bit for bit."""
+    count = len(part) - 1
+    for name in ("t", "microstep", "y", "mode"):
+        ours, theirs = getattr(part.rows, name), getattr(whole.rows, name)
+        assert np.array_equal(ours[:count], theirs[:count]), name
+    fired = len(part.transitions)
+    assert repr(part.transitions.tolist()) == repr(whole.transitions[:fired].tolist())
+
+
+# --------------------------------------------------------------------------- until
+@pytest.mark.parametrize("engine", [FASTEST, "machines"])
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("F > 1.1", lambda trace: trace.F - 1.1),
+        ("v > 150 mm/s", lambda trace: trace.v - 0.15),
+        ("friction.F + x > 1.2", lambda trace: trace.F + trace.x - 1.2),
+        ("t >= 3.25", lambda trace: trace.t - 3.25),
+    ],
+)
+def test_a_run_ends_where_a_condition_becomes_true(text: str, value: Any, engine: str) -> None:
+    whole = simulate(MODEL, RIG, END)
+    part = simulate(MODEL, RIG, END, until=text, engine=engine)
+    begins_like(part, whole)
+    margin = value(part)
+    assert 0.0 <= margin[-1] < 1e-12
+    assert (margin[:-1] <= 0.0).all()
+    assert part.settings["t_end"] == part.t[-1]
+    assert (part.model, part.contacts) == (whole.model, whole.contacts)
+
+
+def test_a_run_ends_with_the_switch_that_a_condition_waits_for() -> None:
+    whole = simulate(MODEL, RIG, END)
+    part = simulate(MODEL, RIG, END, until="count(slip) == 4")
+    begins_like(part, whole)
+    assert (part.states[-1] == "slip").all()
+    assert part.t[-1] == whole.transitions.t[3]
+    assert len(part.transitions) == 4
+
+
+def test_a_condition_that_is_true_at_the_start_must_first_become_false() -> None:
+    trace = simulate(MODEL, RIG, END, until="v < 0.05")
+    assert trace.t[-1] > 1.0
+    assert 0.0 <= 0.05 - trace.v[-1] < 1e-12
+    assert (trace.v > 0.05).any()
+    assert (np.diff(trace.microstep) <= 1).all()
+
+
+def test_a_condition_that_never_comes_true_changes_no_bit() -> None:
+    whole = simulate(MODEL, RIG, END)
+    part = simulate(MODEL, RIG, END, until="v > 100")
+    assert bits(part) == bits(whole)
+
+
+def test_the_requested_rows_end_with_the_run() -> None:
+    times = np.arange(0.0, END, 0.5)
+    part = simulate(MODEL, RIG, END, until="F > 1.1", t_eval=times)
+    whole = simulate(MODEL, RIG, END, t_eval=times)
+    end = simulate(MODEL, RIG, END, until="F > 1.1").t[-1]
+    assert part.t.tolist() == times[times <= end].tolist()
+    assert np.array_equal(part.F, whole.F[: len(part)])
+    assert part.stops.t[-1] == end
+
+
+def test_a_system_with_supervisors_ends_at_a_condition_on_one_of_them() -> None:
+    system = switched()
+    trace = simulate(system, 2.0, until="is_in(hand.done)", monitors="coverage")
+    assert trace.t[-1] == OILED[-1]
+    assert trace.supervisor("hand").states[-1, 0] == "done"
+    assert {*trace.monitors} == {"pad: coverage", "hand: coverage"}
+    begins_like(trace, simulate(system, 2.0))
+
+
+def test_a_run_that_fails_before_its_condition_keeps_its_own_rows() -> None:
+    chart = Chart("grows", (), velocities=(), variables=("z",), states=(State("on", {"z": "z*z"}),))
+    system = System("grows", supervisors=(Supervisor("s", chart),))
+    with pytest.raises(SimulationError) as failed:
+        simulate(system, 2.0, until="s.z < 0", initial={"z": [1.0]})
+    trace = failed.value.trace
+    assert trace.t[-1] == pytest.approx(1.0, abs=1e-3)
+    assert trace.rows.mode.shape[1] == 1
+
+
+# --------------------------------------------------------------------------- events
+def test_a_timetable_sends_its_events_at_their_times() -> None:
+    log = simulate(switched(), 2.0).transitions
+    assert log.t[log.contact == "hand"].tolist() == [*OILED]
+    heard = log[(log.contact == "pad") & (log.edge == "oil")]
+    assert heard.t.tolist() == [0.0, 1.0, OILED[3]]  # at 0.2 s it is still oiled
+
+
+@pytest.mark.parametrize("engine", sorted({FASTEST, "ifelse"}))
+def test_a_stepping_friction_hears_events_as_a_run_does(engine: str) -> None:
+    times = np.union1d(np.linspace(0.0, 2.0, 401), OILED)
+    speeds = 0.3 * np.sin(7 * times)
+    system = switched()
+    record = {"v": (times, speeds)}
+    run = System(
+        "run",
+        bodies=system.bodies,
+        contacts=system.contacts,
+        supervisors=system.supervisors,
+        signals=record,
+    )
+    expected = simulate(run, 2.0, t_eval=times).contact("pad")
+    friction = FrictionState(system.contacts[0], engine=engine)
+    switches = []
+    for k, t in enumerate(times[:-1]):
+        if t in OILED:
+            friction.send("oil")
+            friction = pickle.loads(pickle.dumps(friction))
+        ahead = friction.peek(speeds[k], speeds[k + 1], times[k + 1] - t)
+        force = friction.advance_to(speeds[k], speeds[k + 1], times[k + 1])
+        if times[k] + (times[k + 1] - t) == times[k + 1]:
+            assert ahead == force
+        if times[k + 1] not in OILED:  # there the row of the run is that after the event
+            assert force == expected.F[k + 1]
+        switches += [(each.t, each.edge) for each in friction.switches]
+    assert switches == [(each.t, each.edge) for each in expected.transitions]
+
+
+def test_a_bank_sends_an_event_to_all_joints_that_wait_for_it() -> None:
+    bank = FrictionBank([switched().contacts[0], MODEL, switched().contacts[0]])
+    bank.send("oil")
+    bank.advance([0.0] * 3, [0.1] * 3, 0.1)
+    assert [states[0] for states in bank.states] == ["oiled", "stick", "oiled"]
+
+
+# --------------------------------------------------------------------------- late values
+def test_a_delayed_value_is_the_one_of_so_many_ticks_before() -> None:
+    late = Sampled(
+        "late",
+        period=0.1,
+        updates={"n": "n + 1", "m": "10 * delay(n, 3) + delay(n, 1)", "w": "delay(y, 2)"},
+        initial={"n": 7.0},
+    )
+    system = System("late", supervisors=(IDLE,), sampled=(late,), flow={"y": "1"})
+    ticks = np.arange(12)
+    trace = simulate(system, 1.15, t_eval=0.1 * ticks + 0.04)
+    n = 8.0 + ticks
+    before = [np.concatenate([[7.0] * k, n[:-k]]) for k in (1, 3)]
+    assert trace.value("n").tolist() == n.tolist()
+    assert trace.value("m").tolist() == (10 * before[1] + before[0]).tolist()
+    assert trace.value("w") == pytest.approx(np.maximum(ticks - 2, 0) * 0.1, abs=1e-12)
+
+
+# --------------------------------------------------------------------------- lasting conditions
+@pytest.mark.parametrize("seed", range(4))
+def test_a_condition_has_lasted_as_long_as_its_signal_says(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b, T = rng.uniform(0.5, 1.0), rng.uniform(2.0, 5.0), rng.uniform(0.15, 0.35)
+    phase = rng.uniform(0.0, 6.0)
+
+    def v(t: float) -> float:
+        return math.sin(b * t + phase) + a * math.sin(2.7 * b * t)
+
+    chart = Chart(
+        "waits for rest",
+        inputs=("v",),
+        velocities=(),
+        parameters=("T",),
+        states=(State("moving"), State("resting")),
+        transitions=(
+            Transition("rests", "moving", "resting", guard="duration(abs(v) < 0.6) >= T"),
+            Transition("moves", "resting", "moving", guard="abs(v) > 0.9"),
+        ),
+    )
+    signal = f"sin({b!r} * t + {phase!r}) + {a!r} * sin(2.7 * {b!r} * t)"
+    end = 20.0
+    system = System("rest", supervisors=(Supervisor("s", chart, {"T": T}),), signals={"v": signal})
+    log = simulate(system, end).transitions
+    # The same by the crossings of |v| - 0.6 and |v| - 0.9 alone.
+    grid = np.linspace(0.0, end, 40_001)
+    speed = np.abs(np.array([v(t) for t in grid]))
+
+    def crossings(level: float, *, rising: bool) -> list[float]:
+        above = speed > level
+        at = np.flatnonzero(above[1:] & ~above[:-1] if rising else ~above[1:] & above[:-1])
+        return [brentq(lambda t: abs(v(t)) - level, grid[k], grid[k + 1]) for k in at]
+
+    slow, fast, away = crossings(0.6, rising=False), crossings(0.6, rising=True), []
+    away = crossings(0.9, rising=True)
+    expected, now, moving = [], 0.0, True
+    while now < end:
+        if moving:
+            begins = [now] * bool(abs(v(now)) < 0.6) + [t for t in slow if t > now]
+            ends = [next((t for t in fast if t > begin), end) for begin in begins]
+            rests = (t + T for t, stop in zip(begins, ends, strict=True) if t + T < stop)
+            now = next(rests, end)
+        else:
+            now = next((t for t in away if t > now), end)
+        moving = not moving
+        expected += [now] * (now < end)
+    assert len(expected) >= 2, f"seed {seed}"
+    assert log.t == pytest.approx(expected, abs=2e-6), f"seed {seed}"
+
+
+def test_a_condition_lasts_for_each_element_from_its_own_entry() -> None:
+    log = simulate(HEALS, pulled_mass()[1], 0.4).transitions
+    # v stays below 0.3 m/s: each element is held when its own time is over.
+    healed = [(each.element, each.t) for each in log if each.edge == "heal"]
+    assert healed == [(0, pytest.approx(0.1)), (1, pytest.approx(0.15))]
+
+
+def test_charts_show_a_condition_that_lasts_as_it_is_written() -> None:
+    assert HEALS.chart.guard_text("heal") == "duration(|v| < 0.3) >= T"
