@@ -161,7 +161,10 @@ def page(executed: Any, name: str, title: str) -> tuple[str, dict[str, bytes]]:
     """
     widgets, lines, pictures = _widgets(executed), list[str](), dict[str, bytes]()
 
+    runs_shown = False
+
     def shown(output: Mapping[str, Any]) -> None:
+        nonlocal runs_shown
         if output["output_type"] == "stream":
             lines.append(f"```text\n{output['text'].rstrip()}\n```")
             return
@@ -172,10 +175,15 @@ def page(executed: Any, name: str, title: str) -> tuple[str, dict[str, bytes]]:
                 for each in widgets[child.removeprefix("IPY_MODEL_")]["state"].get("outputs", ()):
                     shown(each)
             lines.append(SLIDER_NOTE)
+        elif "image/svg+xml" in data:
+            file = f"{name}_{len(pictures) + 1}.svg"
+            pictures[file] = data["image/svg+xml"].encode()
+            lines.append(f"![{title}: a chart]({file})")
         elif "image/png" in data:
             file = f"{name}_{len(pictures) + 1}.png"
             pictures[file] = base64.b64decode(data["image/png"])
-            what = "initial picture of the slider" if pictures.keys() > {file} else "the runs"
+            what = "initial picture of the slider" if runs_shown else "the runs"
+            runs_shown = True
             lines.append(f"![{title}: {what}]({file})")
         else:
             lines.append(f"```text\n{data['text/plain']}\n```")
@@ -224,7 +232,7 @@ def write_all(folder: Path, run: Collection[int] = LESSONS) -> None:
         made = [folder / f"{name}{ending}" for ending in (".md", "_replay.html")]
         if stamp.exists() and stamp.read_text() == now and all(path.exists() for path in made):
             continue
-        for old in folder.glob(f"{name}_*.png"):
+        for old in [*folder.glob(f"{name}_*.png"), *folder.glob(f"{name}_*.svg")]:
             old.unlink()
         if number in run:
             book = executed(text, folder, f"{WITHOUT_DOCS}\n{STRICT}")

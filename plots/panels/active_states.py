@@ -38,7 +38,7 @@ def ribbons(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     ax : Axes
         Axes to draw on.
     trace : Trace
-        The run.
+        The run of a contact or of a supervisor.
     **part
         ``window`` and ``elements``.
 
@@ -48,7 +48,7 @@ def ribbons(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
         One collection per state and element, for a legend; then a band for each interval in which
         a sign is held, for example on v = 0, or in which an element is between two states.
     """
-    this = selected(trace, **part)
+    this = selected(trace, **part, moving=False)
     chosen, (begin, end) = this.elements, this.window
     states = [state.name for state in trace.model.chart.states]
     # Between many narrow rows there is no room for thicker outlines.

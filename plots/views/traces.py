@@ -6,13 +6,14 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace
 
 
-def check_trace(trace: object) -> None:
-    """Raise `ParameterError` unless an object to be drawn is a trace of one contact."""
+def check_trace(trace: object, *, moving: bool = True) -> None:
+    """Raise `ParameterError` unless an object is a trace of one contact, or supervisor."""
     if not isinstance(trace, Trace):
         raise ParameterError(
             "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
         )
-    if not trace.model.chart.velocities:  # a system with several contacts refuses here
+    # A system with several contacts refuses here to say which is meant.
+    if not trace.model.chart.velocities and moving:
         raise ParameterError(
             "a supervisor has no velocity and no force to draw",
             place="trace",

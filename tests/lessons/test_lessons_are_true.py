@@ -10,14 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 
 from gms_fsm import GMS, measure_phenomena
 from gms_fsm.app.lessons import Result
+from gms_fsm.app.lessons.basics import l0_first_chart as l0
 from gms_fsm.app.lessons.basics import l1_hysteresis as l1
 from gms_fsm.app.lessons.basics import l3_missed_window as l3
 from gms_fsm.app.lessons.basics import l5_how_many as l5
 from gms_fsm.app.lessons.basics import l6_stick_slip as l6
+from gms_fsm.app.lessons.engine.notebooks import composed
 from gms_fsm.app.lessons.practice import l7_frictional_lag as l7
 from gms_fsm.app.lessons.practice import l8_chart_or_ifelse as l8
 from gms_fsm.app.lessons.practice import l9_contacts as l9
@@ -32,6 +34,75 @@ approx = pytest.approx
 
 def close(found: Any, expected: Any, atol: float = 0.0, rtol: float = 0.0) -> None:
     np.testing.assert_allclose(found, expected, rtol=rtol, atol=atol)
+
+
+# ------------------------------------------------------------------ 0: a first chart
+def test_a_light_hears_every_second_press(ran: Ran) -> None:
+    r, green, presses = ran(0), 0.0, [14.0 * k for k in range(1, 7)]
+    warned = []
+    for press in presses:
+        if press > green:
+            warned.append(press)
+            green = press + 3.0 + 12.0
+    close(l0.times(r.lights, "press"), presses)
+    close(l0.times(r.lights, "warn"), warned)
+    close(l0.times(r.lights, "halt"), np.add(warned, 3.0))
+    assert (r.heard, r.presses, r.red_to_red) == (len(warned), len(presses), 28.0)
+
+
+def test_the_light_of_the_page_is_the_one_that_runs() -> None:
+    (written,) = (text for _, text in composed(0) if "Transition(" in text)
+    names: dict[str, Any] = {}
+    exec(written, names)
+    assert names["light"] == l0.LIGHT
+
+
+def test_a_room_warms_and_cools_between_two_exponentials(ran: Ran) -> None:
+    r = ran(0)
+    cool, heat = 600.0 * math.log(21.0 / 19.0), 600.0 * math.log(11.0 / 9.0)
+    first = 600.0 * math.log(20.0 / 19.0)
+    close(r.on, first + (cool + heat) * np.arange(r.on.size), rtol=1e-8)
+    close(r.off, first + heat + (cool + heat) * np.arange(r.off.size), rtol=1e-8)
+    close([r.low, r.high, r.cycle], [19.0, 21.0, cool + heat], rtol=1e-8)
+    assert r.at_middle == "either"
+    warming = r.u[r.there] == 1.0
+    assert (np.diff(r.T)[r.there] > 0.0).tolist() == warming.tolist()
+
+
+def test_a_mass_on_one_bristle_slips_when_scipy_says(ran: Ran) -> None:
+    r, v_c, slipping, t, y = ran(0), 1e-6, False, 0.0, np.zeros(3)
+    found: dict[bool, list[float]] = {True: [], False: []}
+
+    def s(v: float) -> float:
+        return float(1.0 + 0.5 * math.exp(-((v / 0.05) ** 2))) / l0.K
+
+    def flow(t: float, y: Any, slipping: bool) -> list[float]:
+        _, v, z = y
+        bend = l0.C * (math.copysign(1.0, v) - z / s(v)) if slipping else v
+        friction = l0.K * z + l0.SIGMA * bend + 0.4 * v
+        return [v, 2.0 * (0.1 * t - y[0]) - friction, bend]
+
+    def breaks(t: float, y: Any, _: bool) -> float:
+        return float(y[2] - s(y[1]))
+
+    def rests(t: float, y: Any, _: bool) -> float:
+        return float(y[1] - v_c)
+
+    for event, direction in ((breaks, 1.0), (rests, -1.0)):
+        vars(event).update(terminal=True, direction=direction)
+    while t < 40.0:
+        event = rests if slipping else breaks
+        done = solve_ivp(
+            flow, (t, 40.0), y, "DOP853", events=event, args=(slipping,), rtol=1e-10, atol=1e-13
+        )
+        t, y = done.t[-1], done.y[:, -1]
+        if done.status == 1:
+            assert abs(y[2]) < s(y[1]) or not slipping  # the other half of the guard
+            found[slipping].append(t)
+            slipping = not slipping
+    close(r.slips, found[False], rtol=1e-5)
+    close(r.arrests, found[True], rtol=1e-5)
+    close(r.bent, s(0.002), rtol=1e-3)
 
 
 # ------------------------------------------------------------------ 1: pre-sliding hysteresis

@@ -68,6 +68,16 @@ def test_traffic_lights_see_each_other_and_events_are_counted_at_the_same_instan
     assert trace.value("cycles.n")[-1] == 3.0
 
 
+def test_ribbons_show_the_states_of_a_supervisor():
+    figure = pytest.importorskip("matplotlib.figure", reason="pictures need the extra 'plots'")
+    from plots import panels
+
+    trace = crossing().run().supervisor("main")
+    _, green, _ = panels.ribbons(figure.Figure().subplots(), trace)
+    ends = [end for path in green.get_paths() for end in path.get_extents().intervalx]
+    assert ends == pytest.approx([30.0, 55.0, 90.0, 115.0, 150.0, 175.0])
+
+
 def test_a_drive_shifts_gears():
     trace = gear_shift().run()
     declutch = math.log(4.0)  # w = 4 (1 - exp(-t)) reaches 3

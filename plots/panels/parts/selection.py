@@ -59,7 +59,7 @@ class RunPart:
     @property
     def window(self) -> Window:
         """Begin and end, s."""
-        return checked_window(self.run, self.given)
+        return window_of(self.run, self.given)
 
     @cached_property
     def rows(self) -> Trace:
@@ -68,10 +68,14 @@ class RunPart:
 
 
 def selected(
-    trace: Trace, window: Window | None = None, elements: Sequence[int] | None = None
+    trace: Trace,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+    *,
+    moving: bool = True,
 ) -> RunPart:
     """Return the part of a run that the options of a panel choose."""
-    check_trace(trace)
+    check_trace(trace, moving=moving)
     return RunPart(trace, window, checked_elements(trace, elements))
 
 
