@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from gms_fsm import Body, Chart, Contact, State, Supervisor, System, Transition
 from gms_fsm.charts import CHARTS
@@ -131,6 +132,90 @@ VALVE = Chart(  # the stem q of He et al. (2007); r: force that is left, p: the 
         ),
     ),
 )
+LATE = {"p": "u", "m": "n"}  # the sample n is dealt with, and its signal is the last one
+KANO = Chart(  # d: direction, w: signal where it rests, p and q: last signal and its change
+    "valve stiction of Kano",
+    inputs=("u", "n"),
+    velocities=(),
+    variables=("d", "w", "p", "q", "y", "m"),
+    initial={"d": 1.0, "m": -1.0},
+    parameters=("S", "J"),
+    states=(State("rests", outputs={"stem": "y"}), State("moves", outputs={"stem": "y"})),
+    transitions=(
+        Transition(
+            "turn",
+            "rests",
+            "moves",
+            guard="n > m and -d * (u - w) > S",
+            actions={"y": "u + d * (S - J) / 2", "d": "-d", "q": "u - p", **LATE},
+        ),
+        Transition(
+            "go_on",
+            "rests",
+            "moves",
+            guard="n > m and d * (u - w) > J",
+            actions={"y": "u - d * (S - J) / 2", "q": "u - p", **LATE},
+        ),
+        Transition("stay", "rests", "rests", guard="n > m", actions={"q": "u - p", **LATE}),
+        Transition(
+            "rest", "moves", "rests", guard="n > m and (u - p) * q <= 0", actions={"w": "p"}
+        ),
+        Transition(
+            "slide",
+            "moves",
+            "moves",
+            guard="n > m",
+            actions={"y": "u - d * (S - J) / 2", "q": "u - p", **LATE},
+        ),
+    ),
+)
+STUCK, MOVED = {"w": "p", **LATE}, {"y": "u - d * (S - J) / 2", **LATE}
+CHOUDHURY = Chart(  # d: direction of the signal, w: signal where it sticks, p: last signal
+    "valve stiction of Choudhury",
+    inputs=("u", "n"),
+    velocities=(),
+    variables=("d", "w", "p", "y", "m"),
+    initial={"d": 1.0, "m": -1.0},
+    parameters=("S", "J"),
+    states=tuple(State(name, outputs={"stem": "y"}) for name in ("halted", "reversed", "moves")),
+    transitions=(
+        *(
+            Transition(
+                f"reverse_{name}",
+                name,
+                "reversed",
+                guard="n > m and (u - p) * d < 0",
+                actions={"d": "-d", **STUCK},
+            )
+            for name in ("halted", "reversed", "moves")
+        ),
+        Transition("pass_J", "halted", "moves", guard="n > m and abs(u - w) > J", actions=MOVED),
+        Transition("pass_S", "reversed", "moves", guard="n > m and abs(u - w) > S", actions=MOVED),
+        Transition("halt", "moves", "halted", guard="n > m and (u - p) * d <= 0", actions=STUCK),
+        Transition("slide", "moves", "moves", guard="n > m", actions=MOVED),
+        *(
+            Transition(f"stay_{name}", name, name, guard="n > m", actions=LATE)
+            for name in ("halted", "reversed")
+        ),
+    ),
+)
+GEARBOX = Chart(
+    "gearbox",
+    inputs=("w", "shut"),
+    velocities=(),
+    parameters=("w_up",),
+    states=(
+        State("first", outputs={"torque": "30", "N_1": "60", "N_2": "0"}),
+        State("open", outputs={"torque": "-20", "N_1": "0", "N_2": "0"}),
+        State("closing", outputs={"torque": "30", "N_1": "0", "N_2": "60"}),
+        State("second", outputs={"torque": "30", "N_1": "0", "N_2": "60"}),
+    ),
+    transitions=(
+        Transition("release", "first", "open", guard="w > w_up"),
+        Transition("close", "open", "closing", guard="after(0.5)"),
+        Transition("locked", "closing", "second", guard="shut > 0.5"),
+    ),
+)
 CALM = Chart(
     "anti-hunting",
     inputs=("e", "rests"),
@@ -249,6 +334,35 @@ def valve() -> Case:
     return Case(System("valve", supervisors=(stem,)), 60.0)
 
 
+def sampled_valve(chart: Chart, S: float, J: float, signal: Sequence[float]) -> Case:
+    """A sticking valve that gets one value of a signal a second."""
+    values, inputs = {"S": S, "J": J}, {"u": "u", "n": "t"}
+    stem = Supervisor("valve", chart, values, inputs=inputs, period=1.0)
+    corners = [(float(k), value) for k, value in enumerate([*signal, signal[-1]])]
+    return Case(System("valve", supervisors=(stem,), signals={"u": corners}), float(len(signal)))
+
+
+def clutches() -> Case:
+    """A car of 20 kg m^2 that shifts up: a gear of 3 and one of 2, each with its clutch."""
+    gears = (("one", 3, "box.N_1"), ("two", 2, "box.N_2"))
+    inputs = {"w": "w_e", "shut": "is_in(two.stuck)"}
+    return Case(
+        System(
+            "clutches",
+            bodies=(
+                Body("engine", inertia=1.0, force="box.torque", x="phi_e", v="w_e"),
+                Body("car", inertia=20.0, force="-10", x="phi_c", v="w_c"),
+            ),
+            contacts=tuple(
+                Contact(name, PARKING, {"mu": 1.0}, v=f"w_e - {ratio} * w_c", inputs={"N": N})
+                for name, ratio, N in gears
+            ),
+            supervisors=(Supervisor("box", GEARBOX, {"w_up": 100.0}, inputs=inputs),),
+        ),
+        15.0,
+    )
+
+
 def hunting(band: float = 0.05) -> Case:
     """A servo with stiction, whose integral is frozen while the mass rests near its aim."""
     inputs = {"e": "1 - x", "rests": "is_in(pad.stuck)"}
@@ -288,6 +402,7 @@ CASES = (
     valve,
     hunting,
     lift,
+    clutches,
 )
 HEATING = (
     math.log(30.0 / 9.0),  # from 0 to 21 degrees

@@ -1,6 +1,7 @@
 """Machines that are no contacts switch when they should, see others, and hear events."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,10 +30,13 @@ from tests.helpers import FASTEST
 from tests.scenario_files import CommandLine
 from tests.supervisor_cases import (
     BRAKE,
+    CHOUDHURY,
     HEATING,
+    KANO,
     LIGHT,
     SIDE,
     THERMOSTAT,
+    clutches,
     crossing,
     gear_shift,
     hot_brake,
@@ -40,6 +44,7 @@ from tests.supervisor_cases import (
     intermittent_drive,
     lift,
     relay,
+    sampled_valve,
     thermostat,
     valve,
 )
@@ -150,6 +155,82 @@ def test_a_valve_sticks_and_jumps_as_the_published_rule_says():
     trace = simulate(case.system, case.t_end, t_eval=ticks + 0.5).sample(ticks + 0.5)
     assert trace.value("valve.y").tolist() == expected
     assert 20 < len(set(expected)) < 60
+
+
+def kano(signal: Sequence[float], S: float, J: float) -> list[float]:
+    """Return the stem after each sample by the rule of Kano; it begins at rest."""
+    stem = before = change_before = rested_at = 0.0
+    direction, stopped, found = 1.0, True, []
+    for u in signal:
+        change = u - before
+        if change * change_before <= 0.0 and not stopped:
+            rested_at, stopped = before, True
+        if stopped and -direction * (u - rested_at) > S:
+            direction, stopped = -direction, False
+        elif stopped and direction * (u - rested_at) > J:
+            stopped = False
+        if not stopped:
+            stem = u - direction * (S - J) / 2.0
+        before, change_before = u, change
+        found.append(stem)
+    return found
+
+
+def choudhury(signal: Sequence[float], S: float, J: float) -> list[float]:
+    """Return the stem after each sample by the rule of Choudhury; it begins halted."""
+    stem = before = stuck_at = 0.0
+    needed: float | None = J
+    direction, found = 1.0, []
+    for u in signal:
+        if (u - before) * direction < 0.0:
+            direction, stuck_at, needed = -direction, before, S
+        elif needed is None and u == before:
+            stuck_at, needed = before, J
+        elif needed is None or abs(u - stuck_at) > needed:
+            stem, needed = u - direction * (S - J) / 2.0, None
+        before = u
+        found.append(stem)
+    return found
+
+
+@pytest.mark.parametrize(("S", "J"), [(1.0, 0.0), (1.0, 0.5), (0.75, 0.75), (0.5, 1.0)])
+@pytest.mark.parametrize(("chart", "rule"), [(KANO, kano), (CHOUDHURY, choudhury)])
+def test_a_sampled_valve_moves_as_its_published_rule_says(chart, rule, S: float, J: float):
+    """M. Kano et al., 7th IFAC DYCOPS, 2004; Choudhury, Thornhill, Shah, CEP 13, 641-658, 2005.
+
+    S is deadband and stickband, J the slip jump. Choudhury's flow chart leaves open what follows a
+    reversal. Our reading, here and in the chart: in its sample the stem keeps still; from there the
+    signal has to change by S, after a halt in the same direction by J; each reversal counts anew.
+    Saturation is left out. All numbers are sixteenths, so that both sides are exact.
+    """
+    taken = set()
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        turns = np.where(random.random(150) < 0.25, -1, 1).cumprod()
+        steps = np.where(random.random(150) < 0.2, 0, random.integers(1, 8, 150)) * turns
+        signal = (steps.cumsum() / 16.0).tolist()
+        case, ticks = sampled_valve(chart, S, J, signal), np.arange(150.0)
+        trace = simulate(case.system, case.t_end, t_eval=ticks + 0.5, engine=FASTEST)
+        stem = trace.sample(ticks + 0.5).value("valve.stem").tolist()
+        assert stem == rule(signal, S, J), f"seed {seed}"
+        taken |= {*trace.transitions.edge.tolist()}
+    assert taken == {each.name for each in chart.transitions}
+
+
+def test_a_car_shifts_up_through_an_open_clutch():
+    """Engine 1 kg m^2, car 20: locked by 3, apart for 0.5 s, slipping to 2, locked by 2."""
+    trace = clutches().run()
+    release = 100.0 * (20.0 + 9.0) / (3.0 * (3.0 * 30.0 - 10.0))
+    close = release + 0.5
+    engine, car = 100.0 - 20.0 * 0.5, 100.0 / 3.0 - 0.5 * 10.0 / 20.0
+    gain = (2.0 * 60.0 - 10.0) / 20.0  # of the car, 1/s^2, while the second clutch slips
+    slips = (engine - 2.0 * car) / (60.0 - 30.0 + 2.0 * gain)
+    lock = close + slips
+    found = [times(trace, edge) for edge in ("release", "close", "arrest_up", "locked")]
+    assert found == [[pytest.approx(t, rel=1e-9)] for t in (release, close, lock, lock)]
+    end = car + gain * slips + (2.0 * 30.0 - 10.0) / (20.0 + 4.0) * (15.0 - lock)
+    assert trace.body("car").v[-1] == pytest.approx(end, rel=1e-9)
+    assert trace.body("engine").v[-1] == pytest.approx(2.0 * end, rel=1e-9)
 
 
 @pytest.mark.parametrize("band", [1e-9, 0.05])
