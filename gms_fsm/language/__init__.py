@@ -36,7 +36,7 @@ from gms_fsm.language._dialects import (
 from gms_fsm.language._evaluate import evaluate
 from gms_fsm.language._fold import Algebra, ValueAlgebra, fold
 from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, integer_power, product_power
-from gms_fsm.language._print import EVENT, spell
+from gms_fsm.language._print import EVENT, awaited, spell
 from gms_fsm.language._read import Owner, parse_condition, parse_value
 from gms_fsm.language._vectors import truths, values_of
 from gms_fsm.language.functions import (
@@ -131,6 +131,7 @@ __all__ = [
     "Split",
     "Value",
     "ValueAlgebra",
+    "awaited",
     "clauses",
     "comparisons",
     "derivative",

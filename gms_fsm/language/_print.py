@@ -25,6 +25,14 @@ from gms_fsm.language.tree import (
 EVENT = "event__"  # the name of an event begins like this; it is 1 where the event has come
 
 
+def awaited(clause: Node) -> str:
+    """Return the event that a clause of a guard waits for; empty for any other clause."""
+    if isinstance(clause, Relation) and isinstance(clause.left, Name):
+        name = clause.left.id
+        return name.removeprefix(EVENT) if name.startswith(EVENT) else ""
+    return ""
+
+
 def spell(node: Node, dialect: Dialect = PYTHON, rename: Mapping[str, str] | None = None) -> str:
     """Write a tree as text.
 
@@ -157,9 +165,8 @@ class _Printer:
         if node.left == Name("age") and node.op == ">=" and "after" in self.dialect.functions:
             next(parts)
             return self.function("after", parts)
-        event = node.left.id if isinstance(node.left, Name) else ""
-        if event.startswith(EVENT) and "after" in self.dialect.functions:  # a chart shows it
-            return self.name(event.removeprefix(EVENT))
+        if (event := awaited(node)) and "after" in self.dialect.functions:  # a chart shows it
+            return self.name(event)
         return self.operator(node.op, *parts)
 
     def in_state(self, element: int, state: str) -> Printed:

@@ -19,6 +19,7 @@ from gms_fsm.language import (
     MATLAB_LIKE,
     Condition,
     Relation,
+    awaited,
     clauses,
     evaluate,
     names_in,
@@ -61,6 +62,8 @@ class Clause:
         False if the clause has no value (1/0); it then counts as false.
     unit : str
         Unit of the margin, if the units of the names determine it; else empty.
+    event : str
+        The event that the clause waits for, which has no margin; empty for any other clause.
     """
 
     text: str
@@ -70,6 +73,7 @@ class Clause:
     margin: float
     computable: bool = True
     unit: str = ""
+    event: str = ""
 
     @property
     def scale(self) -> Scale:
@@ -353,8 +357,9 @@ def _clause(chart: Chart, part: Condition, values: Mapping[str, float]) -> Claus
     text = spell(part, MATLAB_LIKE)
     try:
         truth = bool(evaluate(part, values))
-        if not isinstance(part, Relation):
-            return Clause(text, truth, math.nan, math.nan, math.nan)
+        event = awaited(part)
+        if event or not isinstance(part, Relation):
+            return Clause(text, truth, math.nan, math.nan, math.nan, event=event)
         left, right = evaluate(part.left, values), evaluate(part.right, values)
     except (ArithmeticError, ValueError):
         return Clause(text, False, math.nan, math.nan, math.nan, computable=False)
@@ -417,18 +422,23 @@ def _verdict(each: Explanation) -> str:
         if each.tick is not None:
             return f"{name} fires at the next tick if its guard is then still true."
         return f"{name} fires next: every clause is true."
-    parts = []
-    for clause in each.clauses:
-        if not clause.holds:
-            by = "" if math.isnan(clause.margin) else f" by {_amount(clause, signed=False)}"
-            parts.append(f"{clause.text} is false{by}")
+    parts = [_missing(clause) for clause in each.clauses if not clause.holds]
     return f"{name} {'did' if each.past else 'does'} not fire: {' and '.join(parts)}."
+
+
+def _missing(clause: Clause) -> str:
+    """Return what a clause that does not hold lacks."""
+    if clause.event:
+        return f"it waits for the event {clause.event}"
+    by = "" if math.isnan(clause.margin) else f" by {_amount(clause, signed=False)}"
+    return f"{clause.text} is false{by}"
 
 
 def _detail(each: Explanation) -> str:
     """Return the guard of an edge, one line per clause."""
     wide = max(len(clause.text) for clause in each.clauses)
-    lines = [f"  {each.priority} {each.edge.name}: {each.edge.source} -> {each.edge.target}"]
+    edge, sends = each.edge, f", sends {', '.join(each.edge.emit)}" if each.edge.emit else ""
+    lines = [f"  {each.priority} {edge.name}: {edge.source} -> {edge.target}{sends}"]
     for clause in each.clauses:
         truth = "true " if clause.holds else "false"
         lines.append(f"    {truth}  {clause.text:<{wide}}{_sides(clause)}".rstrip())

@@ -42,20 +42,22 @@ def watch_names(model: Model) -> list[str]:
     ['t', 'x', 'v', 'F', 's', 'z', 'z1', 's1', 'F1']
     """
     bare = model.chart.variables if model.n == 1 else ()
-    return ["t", "x", "v", "F", *_curve(model), *bare, *_numbered(model)]
+    return ["t", *_moving(model.chart), *_curve(model), *bare, *_numbered(model)]
 
 
 def invariant_names(model: Model) -> list[str]:
     """Return the names allowed in an invariant."""
     chart = model.chart
     own = (*_curve(model), *chart.variables, *chart.parameter_names)
-    return ["t", "x", "v", "F", *own, *_numbered(model)]
+    return ["t", *_moving(chart), *own, *_numbered(model)]
 
 
 def unit_of(chart: Chart, name: str) -> str:
     """Return the unit of a name in guards; empty if it is unknown."""
-    known = dict.fromkeys(chart.force_names, "N") | dict.fromkeys(chart.rate_names, "m/s^2")
-    known |= dict.fromkeys(chart.velocities, "m/s") | {"t": "s", "x": "m", "age": "s"}
+    known = {"t": "s", "age": "s"}
+    if chart.velocities:
+        known |= dict.fromkeys(chart.force_names, "N") | dict.fromkeys(chart.rate_names, "m/s^2")
+        known |= dict.fromkeys(chart.velocities, "m/s") | {"x": "m"}
     return chart.unit(name) or known.get(name, "")
 
 
@@ -67,18 +69,24 @@ def parameter_values(model: Model, element: int) -> dict[str, float]:
     }
 
 
+def _moving(chart: Chart) -> tuple[str, ...]:
+    """Return the names of what moves and what holds it; a supervisor has neither."""
+    return ("x", "v", "F") if chart.velocities else ()
+
+
 def _curve(model: Model) -> tuple[str, ...]:
     return () if model.stribeck is None else ("s",)
 
 
 def _numbered(model: Model) -> Mapping[str, tuple[str, int]]:
     """Return the numbered names, each with its quantity and element."""
-    return _all_numbered((*model.chart.variables, *_curve(model)), model.n)
+    chart = model.chart
+    return _all_numbered((*chart.variables, *_curve(model)), bool(chart.velocities), model.n)
 
 
 @functools.lru_cache(maxsize=64)  # `until` calls this for every state it tests
-def _all_numbered(names: tuple[str, ...], n: int) -> Mapping[str, tuple[str, int]]:
-    quantities = {name: name for name in names} | {"F": FORCE}
+def _all_numbered(names: tuple[str, ...], moves: bool, n: int) -> Mapping[str, tuple[str, int]]:
+    quantities = {name: name for name in names} | {"F": FORCE for _ in range(moves)}
     return {
         f"{name}{i + 1}": (quantity, i) for name, quantity in quantities.items() for i in range(n)
     }
@@ -227,7 +235,8 @@ class Scope:
     # ------------------------------------------------------------------ by name
     def guards(self, element: int) -> dict[str, Any]:
         """Return the values of the names allowed in guards of an element."""
-        values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
+        values = {name: u for name, u in self._shared().items() if name != "F"}
+        values["s"] = self.s[element]
         for name, value in self.read.items():
             values[name] = value[element] if isinstance(value, list) else value
         for name in self.places.variables:
@@ -258,7 +267,8 @@ class Scope:
         return values
 
     def _shared(self) -> dict[str, Any]:
-        return {"t": self.t, "x": self.x, "v": self.v, "F": self.F}
+        moving = {name: getattr(self, name) for name in _moving(self.model.chart)}
+        return {"t": self.t, **moving}
 
     def _single(self) -> dict[str, Any]:
         """Return the quantities of single elements under their numbered names."""
@@ -275,7 +285,7 @@ def _read(
 ) -> dict[str, Any]:
     """Return what guards of a contact can read besides ``t, x, v, s``, variables, parameters."""
     shown, start = program.layout.shown, places.of("")
-    known = {places.of(name) for name in ("x", places.velocity)}
+    known = {places.of(name) for name in ("x", places.velocity) if places.velocity}
     names = {name for name in (*shown.shared, *shown.own) if name.startswith(start)} - known
     if names <= {places.of("s")}:
         return {}

@@ -1,9 +1,9 @@
 """What a name means in a condition over the run of a system: in ``until``, a watch, a monitor.
 
 The names of the system mean what they mean in its texts. What belongs to a contact has its name in
-front: ``gear.F``, ``gear.z1``, ``gear.state(1)``. In a system with one contact these names may also
-be written without it, unless the system itself uses them. A model on a rig has the names of
-`gms_fsm.traces.scope`.
+front: ``gear.F``, ``gear.z1``, ``gear.state(1)``. In a system with one contact or supervisor in all
+these names may also be written without it, unless the system itself uses them. A model on a rig has
+the names of `gms_fsm.traces.scope`.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def system_names(system: System) -> list[str]:
     names = [*system.names]
     for contact in system.machines:
         names += [f"{contact.name}.{name}" for name in _names_of(contact)]
-    if len(system.contacts) == 1:
-        names += _names_of(system.contacts[0])
+    if len(system.machines) == 1:
+        names += _names_of(system.machines[0])
     return list(dict.fromkeys(names))
 
 
@@ -62,7 +62,6 @@ def _names_of(contact: Contact) -> list[str]:
     """Return the names that belong to a contact, without its own."""
     chart = contact.chart
     own = [name for name in watch_names(contact) if name not in ("t", "x", "v", "F")]
-    own = own if chart.velocities else [name for name in own if not name.startswith("F")]
     return [*["x"][: len(chart.velocities)], *chart.velocities, *chart.force_names, *own]
 
 

@@ -13,6 +13,7 @@ from gms_fsm.language import (
     MATLAB_LIKE,
     Condition,
     Relation,
+    awaited,
     clauses,
     names_in,
     parse_value,
@@ -21,7 +22,7 @@ from gms_fsm.language import (
 )
 from gms_fsm.session.explain import clause_unit
 from gms_fsm.systems.system import loaded
-from gms_fsm.traces.scope import Scope, guard_columns, watch_names
+from gms_fsm.traces.scope import Scope, guard_columns, unit_of, watch_names
 from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
@@ -59,13 +60,13 @@ def stored_run(page: PageRows, charts: Sequence[int], reports: Sequence[Report])
 
 
 def views_of(trace: Trace) -> list[Trace]:
-    """Return the run as each of its contacts sees it; a contact chosen before stays alone."""
+    """Return the run as each contact and supervisor sees it; one chosen before stays alone."""
     if not trace.subject.named:
         return [trace]
-    return [trace.contact(name) for name in trace.contacts]
+    return [trace.contact(name) for name in trace.what.machines]
 
 
-# --------------------------------------------------------------------------- a contact
+# --------------------------------------------------------------------------- a contact, a supervisor
 def _contact(
     trace: Trace, pool: ColumnStore, picture: int, reports: Sequence[Report]
 ) -> dict[str, Any]:
@@ -89,7 +90,9 @@ def _contact(
         },
         "values": values,
         "forces": [pool.add(column, exact=False) for column in trace.F_elements.T],
-        "velocity": chart.velocities[0],
+        "outputs": list(chart.force_names[: 1 if chart.velocities else None]),
+        "inputs": list(chart.inputs),
+        "velocity": next(iter(chart.velocities), None),
         "velocities": list(chart.velocities),
         "variables": list(chart.variables),
         "curve": None
@@ -107,8 +110,8 @@ def _contact(
         "plane": _plane(trace, reports),
         "units": {
             name: unit
-            for name in (*chart.inputs, *chart.variables, *chart.parameter_names)
-            if (unit := chart.unit(name))
+            for name in (*chart.inputs, *chart.variables, *chart.parameter_names, *_given(chart))
+            if (unit := unit_of(chart, name))
         },
         "threshold": "s" in chart.inputs and bool(chart.transitions),
         "initial": modes[0].tolist(),
@@ -125,6 +128,7 @@ def _edges(chart: Chart, stored: Stored) -> list[dict[str, Any]]:
             "priority": priority,
             "source": chart.state_index(edge.source),
             "target": chart.state_index(edge.target),
+            "emit": list(edge.emit),
             "clauses": [_clause(chart, part, stored) for part in clauses(chart.guards[edge.name])],
             "guard": tree_of(chart.guards[edge.name], stored),
         }
@@ -137,7 +141,8 @@ def _clause(chart: Chart, part: Condition, stored: Stored) -> dict[str, Any]:
     return {
         "text": text,
         "tree": tree_of(part, stored),
-        "compares": isinstance(part, Relation),
+        "event": awaited(part),
+        "compares": isinstance(part, Relation) and not awaited(part),
         "unit": clause_unit(chart, part, text),
     }
 
@@ -146,13 +151,18 @@ def _values(trace: Trace, stored: Stored, pool: ColumnStore) -> dict[str, Any]:
     """Return the columns of what guards read and plots show, by name: one, or one per element."""
     chart, n = trace.model.chart, trace.n
     read = _read(chart)
-    read -= {*chart.parameter_names, *chart.variables, "t", "x", "v", "s"}
-    found: dict[str, Any] = {
-        "t": {"all": pool.add(trace.t)},
-        "x": {"all": pool.add(trace.x)},
-        "F": {"all": pool.add(trace.F, exact="F" in read)},
-        chart.velocities[0]: {"all": pool.add(trace.v)},
-    }
+    read -= {*chart.parameter_names, *chart.variables, "t"}
+    found: dict[str, Any] = {"t": {"all": pool.add(trace.t)}}
+    if chart.velocities:
+        read -= {"x", "v", "s"}
+        found |= {
+            "x": {"all": pool.add(trace.x)},
+            "F": {"all": pool.add(trace.F, exact="F" in read)},
+            chart.velocities[0]: {"all": pool.add(trace.v)},
+        }
+    else:
+        given = {name: trace.seen[trace.places.of(name)] for name in chart.force_names}
+        found |= {name: {"all": pool.add(column)} for name, column in given.items()}
     if thresholds := _thresholds(trace, pool):
         found["s"] = {"by": thresholds}
     columns = dict(guard_columns(trace, read)) if read else {}
@@ -176,6 +186,11 @@ def _values(trace: Trace, stored: Stored, pool: ColumnStore) -> dict[str, Any]:
         else:
             found[name] = {"all": pool.add(table)}
     return found
+
+
+def _given(chart: Chart) -> tuple[str, ...]:
+    """Return the names that a chart does not declare."""
+    return ("t", "x", *chart.rate_names, *chart.velocities, *chart.force_names)
 
 
 def _read(chart: Chart) -> set[str]:

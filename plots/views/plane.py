@@ -57,6 +57,8 @@ def plane_axes(chart: Chart) -> tuple[str, str] | None:
     >>> [plane_axes(CHARTS[name]) for name in ("lugre", "stiction", "prandtl-tomlinson")]
     [('v', 'z'), ('v', 'F'), None]
     """
+    if not chart.velocities:
+        return None
     velocity = chart.velocities[0]
     if chart.variables:
         return velocity, chart.variables[0]

@@ -24,6 +24,7 @@ from gms_fsm.systems.models import ChartModel, demonstration
 from tests.helpers import FIG4_SINE, SINE, bank, open_loop, pulled_mass, stick_slip, wear
 from tests.plots.systems_to_draw import BALL, BLOCKS, SERVO, SHARED, TIMED
 from tests.plots.systems_to_draw import run as system_run
+from tests.supervisor_cases import crossing, hunting
 from tests.systems_cases import puck
 from tests.zoo.zoo_cases import CASES
 
@@ -128,6 +129,8 @@ RUNS: dict[str, Callable[[], Trace]] = {
     "timed": lambda: pushed(Contact("pad", TIMED, {"T_d": 0.3, "F_c": 1.0, "F_s": 1.5})),
     "shared": lambda: pushed(Contact("pad", SHARED, {"k": 10.0, "F_c": 1.0, "b": 0.2})),
     "puck": lambda: puck().run(),
+    "hunting": lambda: hunting().run(),
+    "crossing": lambda: crossing().run(),
     "dahl": partial(shown, "dahl"),
     "karnopp": lambda: CASES["karnopp"](1.0).run(),
     "elasto-plastic": lambda: CASES["elasto-plastic"](1.0).run(),

@@ -20,10 +20,12 @@ from gms_fsm.language import evaluate
 from gms_fsm.session.explain import explain, values_at
 from tests.plots.browser import (
     Open,
+    Page,
     at_rows,
     box_of,
     browser,
     events,
+    faults,
     frame,
     in_view,
     open_page,
@@ -57,11 +59,13 @@ EXPLAINED = """([place, rows]) => rows.map((row) => {
 })"""
 
 
-@pytest.mark.parametrize("name", ["signed", "ball", "blocks", "timed", "shared"])
+@pytest.mark.parametrize(
+    "name", ["signed", "ball", "blocks", "timed", "shared", "hunting", "crossing"]
+)
 def test_every_row_has_the_truths_and_margins_of_the_run_bit_for_bit(
     open_page: Open, name: str
 ) -> None:
-    """Also for guards that read forces, accelerations, clocks, named expressions; by contact."""
+    """Also for guards that read forces, clocks, events, named expressions; by contact."""
     page, whole = open_page(name), run(name)
     own = own_rows(page)
     assert {number for _, number in own} >= set(np.flatnonzero(whole.microstep).tolist())
@@ -69,7 +73,7 @@ def test_every_row_has_the_truths_and_margins_of_the_run_bit_for_bit(
     some = range(0, len(own), max(1, len(own) // 50))
     own = [each for k, each in enumerate(own) if k in some or whole.microstep[each[1]]]
     held = 0
-    for place, each in enumerate(whole.contacts):
+    for place, each in enumerate(whole.what.machines or whole.contacts):
         trace = whole.contact(each)
         found = page.evaluate(EXPLAINED, [place, [row for row, _ in own]])
         for (_, number), elements in zip(own, found, strict=True):
@@ -387,6 +391,46 @@ def test_a_system_has_its_contacts_bodies_signals_and_samples(open_page: Open) -
     assert values["r"] == pytest.approx(0.5 * np.sin(2.0 * trace.t[-1]), rel=1e-12)
     until(page, "gear.F > 0 and bearing.state(1) == stuck")
     assert page.locator("#until").get_attribute("aria-invalid") == "false"
+
+
+# --------------------------------------------------------------------------- supervisors
+def texts_of(page: Page, selector: str) -> list[str]:
+    return page.locator(selector).all_inner_texts()
+
+
+def test_a_supervisor_is_shown_and_chosen_as_a_contact_is(open_page: Open) -> None:
+    page = open_page("hunting", "laptop")
+    assert texts_of(page, "select.contact option") == ["pad", "calm"]
+    page.locator("select.contact").select_option("calm")
+    assert texts_of(page, ".plots h3 > span:first-child") == ["k", "e", "rests"]
+    assert "freeze does not fire: " in said(page)
+    until(page, "calm.state(1) == hold")
+    assert page.locator("#element1-state-hold.active").count() == 1
+    assert page.locator("#element1-edge-freeze.fired").count() == 1
+    assert texts_of(page, "tbody tr.fired em") == ["FIRED"]
+    open_tab(page, "System")
+    assert texts_of(page, ".system .ribbon b") == ["pad", "calm"]
+    assert "calm: k" in texts_of(page, ".system h3 > span:first-child")
+
+
+def test_a_page_of_supervisors_alone_has_no_empty_panel_and_names_events(open_page: Open) -> None:
+    for size in ("laptop", "phone"):
+        page = open_page("crossing", size)
+        tabs = ["Chart", "Transitions", "Time", "System", "Microscope"]
+        assert texts_of(page, "[role=tab]") == tabs
+        press(page, *["Shift+ArrowRight"] * 5)
+        assert said(page).startswith("main 1 amber → red (halt, sends red)")
+        assert "sends red" in page.locator("tbody tr.fired th").inner_text()
+        press(page, *["Shift+ArrowRight"] * 2)  # side goes, and the cycle is counted
+        assert page.locator("tbody td").first.inner_text() == "event red"
+        assert texts_of(page, "td.number") == ["", "", ""]
+        press(page, "ArrowRight")
+        assert said(page).endswith("count_one does not fire: it waits for the event red")
+        for tab in ("Time", "System", "Microscope"):
+            open_tab(page, tab)
+            assert page.evaluate(CUT_OFF, ["main", "h2, h3, th, .ribbon, .values, .which"]) == []
+        assert "NaN" not in page.locator("body").inner_text()
+        assert faults(page) == []
 
 
 # --------------------------------------------------------------------------- bristles

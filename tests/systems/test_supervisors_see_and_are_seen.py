@@ -14,6 +14,7 @@ from gms_fsm import (
     ChartError,
     ChartModel,
     Contact,
+    ExpressionError,
     ParameterError,
     Prescribed,
     Session,
@@ -406,6 +407,32 @@ def test_a_session_steps_through_a_supervisor():
     assert "heater: u = 1, on" in str(here)
     assert session.until("heater.u < 0.5").t == pytest.approx(HEATING[0])
     assert session.why("heater 1")[0].edge.name == "switch_off"
+
+
+def test_why_shows_the_input_that_a_guard_reads_also_if_it_is_called_as_a_motion():
+    session = Session(lift().system, 8.0)  # reads x
+    session.until("x > 0.5")
+    (apply,) = session.why("control 1")
+    (clause,) = apply.clauses
+    assert clause.left == session.here.bodies["cage"].x
+    assert clause.margin == clause.left - 1.0
+
+
+def test_why_says_which_event_an_edge_waits_for_and_sends():
+    case = crossing()
+    session = Session(case.system, case.t_end)
+    session.goto(56.0)
+    why = session.why("cycles 1")
+    assert why[0].verdict == "count_one does not fire: it waits for the event red."
+    assert "margin" not in str(why)
+    assert "halt: amber -> red, sends red" in str(session.why("main 1"))
+
+
+def test_names_without_an_owner_are_those_of_the_only_machine():
+    session = Session(thermostat().system, 3.0)
+    assert session.until("u < 0.5").t == pytest.approx(HEATING[0])
+    with pytest.raises(ExpressionError, match=r"write pad\.F"):
+        Session(hunting().system, 1.0).until("F > 1")
 
 
 def test_an_event_is_sent_to_a_session():

@@ -37,7 +37,7 @@ function tell() {
   const shown = views.map(({ run, row, contact, element }) => ({
     number: run.number[row], between: run.between[row] !== 0, microstep: run.microstep[row], t: run.t(row), contact: contact.name, element,
     contacts: run.contacts.map((each) => ({
-      name: each.name, states: each.modes.map((mode) => each.states[mode[row]]), v: each.value(each.velocity, 0, row),
+      name: each.name, states: each.modes.map((mode) => each.states[mode[row]]), v: each.value(each.velocity, 0, row) ?? null,
       values: Object.fromEntries(each.variables.map((name) => [name, each.modes.map((_, i) => each.value(name, i, row))])),
     })),
   }));

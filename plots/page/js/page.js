@@ -28,7 +28,7 @@ function show(k, words = "") {
 function pointAt(k) {
   if (pointed === k) return;
   pointed = k;
-  for (const view of views) for (const pane of Object.values(view.open)) pane.point?.();
+  for (const view of views) for (const pane of view.live) pane.point?.();
 }
 
 function eachPlots(act) {
@@ -277,7 +277,8 @@ function load(given) {
   document.title = $("#title").textContent = data.title;
   $("#runs").className = runs.length > 1 ? "two" : "one";
   document.documentElement.classList.toggle("wide", isWide());
-  $("#names").textContent = `${Object.keys(runs[0].names).join(", ")}, state(1) == ${runs[0].contacts[0].states.at(-1)}`;
+  const [{ name, states }, another] = runs[0].contacts;
+  $("#names").textContent = `${Object.keys(runs[0].names).join(", ")}, ${another ? `${name}.` : ""}state(1) == ${states.at(-1)}`;
   $("#facts").textContent = runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" ");
   for (const run of runs) views.push(new RunView(run));
   views.forEach((view, place) => {

@@ -2,7 +2,7 @@
 // The plots over time, of one run or of two in the same plots. All share one time axis, a cursor at the row shown and a
 // crosshair under the mouse; the head of each plot tells its value at the crosshair, or else at the cursor.
 const AXIS = 58, GAP = 10, TIME_AXIS = 20; // px to the left and to the right of the plots, and below them
-const LEAST = 46; // px, of a plot
+const LEAST = 46, BARE = 14; // px, of a plot, and of one that is an axis only
 const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
 const elementStep = (i, n) => (n > 1 ? Math.round((i * (COLOURS - 1)) / (n - 1)) : 0); // of the ramp from the first element to the last
@@ -48,13 +48,14 @@ class TimePlots {
 
   add(plot) { this.wanted.push(plot); }
 
-  // Only the last plot has marks on its time axis.
+  // Only the last plot has marks on its time axis; without plots there is this axis alone.
   addAll() {
+    if (!this.wanted.length) this.add({ title: "", bare: true, lines: [{ get: () => 0, run: runs[0], stroke: "--paper" }], at: () => "" });
     this.plots = this.wanted.map((each, k) => this.made(each, k === this.wanted.length - 1));
     this.wanted = [];
   }
 
-  made({ title, note = "", unit = "", lines, at, step = false, band = false }, isLast) {
+  made({ title, note = "", unit = "", lines, at, step = false, band = false, bare = false }, isLast) {
     const head = make("h3", this.body, ""), name = make("span", head), value = make("output", head);
     const power = powerOf(largest(extent(lines.map(({ get, run }) => ({ get, rows: run.rows })))), unit);
     name.textContent = unit ? `${title} [${PREFIXES[power]}${unit}]` : title;
@@ -64,13 +65,13 @@ class TimePlots {
     const plot = new uPlot({
       width: 300, height: 100, padding: [7, GAP, isLast ? 2 : 7, 0], pxAlign: false, legend: { show: false },
       scales: { x: { time: false } },
-      axes: [isLast ? { ...axis, size: TIME_AXIS, values: marks(10 ** TIME_POWER) } : { ...axis, size: 0, values: (u, splits) => splits.map(() => "") }, { ...axis, size: AXIS, values: marks(10 ** power), space: 20 }],
+      axes: [isLast ? { ...axis, size: TIME_AXIS, values: marks(10 ** TIME_POWER) } : { ...axis, size: 0, values: (u, splits) => splits.map(() => "") }, { ...axis, size: AXIS, values: marks(10 ** power), space: 20, ...(bare && { values: () => [""], splits: () => [0] }) }],
       series: [{}, ...lines.map(({ stroke, dash = [], width = 1.3 }) => ({
         stroke: ink(stroke), dash, width, points: { size: 4 }, ...(step && { paths: uPlot.paths.stepped({ align: 1 }) }),
       }))],
       cursor: { y: false, x: false, points: { show: false } },
       hooks: { ...(band && { drawAxes: [(u) => fillBetween(u, lines)] }), setScale: [(u, key) => key === "x" && zoomTo(u.scales.x.min, u.scales.x.max, u)] },
-    }, [frames.t, ...lines.map(alongFrames)], make("div", this.body, "", { role: "img", "aria-label": `${title} over time`, class: "plot" }));
+    }, [frames.t, ...lines.map(alongFrames)], make("div", this.body, "", { role: "img", "aria-label": `${title || "Axis"} over time`, class: "plot" }));
     if (span.min !== whole.min || span.max !== whole.max) plot.setScale("x", { ...span }); // made while zoomed
     if (isLast) make("span", plot.root, `t [${PREFIXES[TIME_POWER]}s]`, { class: "time-unit" });
     let down = 0;
@@ -80,7 +81,7 @@ class TimePlots {
       if (Math.abs(event.clientX - down) < 4) go(Math.max(lastAt(frames.t, plot.posToVal(event.offsetX, "x")), 0));
     });
     if (note) make("small", head, note);
-    return { plot, value, at: () => at(power) };
+    return { plot, value, at: () => at(power), bare };
   }
 
   // The states of every element; of two runs both, one under the other.
@@ -94,7 +95,7 @@ class TimePlots {
     for (const { contact, i, pieces } of tracks) {
       const { place } = contact.run, [short, long] = runs.length > 1 ? [`${place + 1}: `, `run ${place + 1}, `] : ["", ""];
       const ribbon = make("div", this.ribbons, "", { class: "ribbon", role: "img", "aria-label": `States of ${long}${nameOf(contact, i)} over time` });
-      make("b", ribbon, `${short}${several ? `${contact.name}${contact.n > 1 ? ` ${i + 1}` : ""}` : `E${i + 1}`}`);
+      make("b", ribbon, `${short}${several || !contact.velocity ? `${contact.name}${contact.n > 1 ? ` ${i + 1}` : ""}` : `E${i + 1}`}`, { title: nameOf(contact, i) });
       this.tracks.push({ contact, i, pieces, ribbon, track: make("div", ribbon) });
     }
   }
@@ -105,7 +106,7 @@ class TimePlots {
     if (!width || !this.plots.length) return;
     const heads = this.plots.reduce((sum, { value }) => sum + value.parentNode.offsetHeight, 0);
     const left = this.box.clientHeight - heads - (this.ribbons?.offsetHeight ?? 0) - TIME_AXIS - 2;
-    const height = isWide() ? Math.max(Math.floor(left / this.plots.length), LEAST) : 92;
+    const height = last.bare ? BARE : isWide() ? Math.max(Math.floor(left / this.plots.length), LEAST) : 92;
     for (const each of this.plots) {
       const own = each === last ? height + TIME_AXIS : height;
       if (each.plot.width !== width || each.plot.height !== own) each.plot.setSize({ width, height: own });
@@ -222,14 +223,14 @@ class TimePane extends TimePlots {
     this.lit = -1;
     const name = this.view.contact.name;
     this.contacts = runs.map(({ contacts }) => contacts.find((each) => each.name === name) ?? contacts[0]);
-    const column = (each) => (run) => {
-      const contact = this.contacts[run.place], found = contact.columns[each === "v" ? contact.velocity : each];
-      return Array.isArray(found) ? found[0] : found;
+    const { contact } = this.view, [force, ...rest] = contact.shown;
+    const compare = (name, note = "") => {
+      const moves = name === contact.velocity, column = ({ place }) => this.contacts[place].column(moves ? this.contacts[place].velocity : name);
+      this.compare(moves ? "v" : name, unitOf(contact, name), column, { band: !moves, note });
     };
-    this.compare("F", "N", column("F"), { band: true, note: runs.length > 1 ? "dashed: run 2" : "" });
-    const inner = this.addInner();
-    this.compare("v", "m/s", column("v"));
-    this.compare("x", "m", column("x"), { band: true });
+    if (force) compare(force, runs.length > 1 ? "dashed: run 2" : "");
+    const inner = contact.velocity && this.addInner();
+    for (const name of rest) compare(name);
     this.addAll();
     this.inner = inner && this.plots[1].plot;
     this.addRibbons(this.contacts);
@@ -278,7 +279,7 @@ class TimePane extends TimePlots {
 }
 PANES.push(TimePane);
 
-// Bodies, further states, signals and sampled values of a system, and the states of all its contacts.
+// Bodies, further states, signals and sampled values of a system, what its contacts and supervisors give out, and all states.
 class SystemPane extends TimePlots {
   static side = "right"; static key = "system"; static title = "System"; static shared = true;
   static of() { return runs.some(({ system }) => system); }
@@ -302,8 +303,11 @@ class SystemPane extends TimePlots {
       const step = kind !== "signal" && kind !== "state";
       this.compare(step ? `${name}, sampled by ${kind}` : `${name}, ${kind}`, "", column("column"), { step });
     });
-    const contacts = runs.flatMap((run) => run.contacts), force = (name) => (run) => run.contacts.find((each) => each.name === name)?.columns.F;
-    for (const name of new Set(contacts.map((each) => each.name))) this.compare(`${name}: F`, "N", force(name));
+    const contacts = runs.flatMap((run) => run.contacts), given = new Map(); // by title
+    for (const each of contacts) for (const output of each.outputs) given.set(`${each.name}: ${output}`, { each, output });
+    for (const [title, { each: { name, units }, output }] of given) {
+      this.compare(title, units[output] ?? "", (run) => run.contacts.find((each) => each.name === name)?.columns[output]);
+    }
     this.addAll();
     this.addRibbons(contacts);
   }

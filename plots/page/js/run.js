@@ -1,5 +1,6 @@
 "use strict";
-// A run as data: columns by row, and what each of its contacts reads, switches and logs. Nothing is drawn here.
+// A run as data: columns by row, and what each of its contacts and supervisors reads, switches and logs. Nothing is drawn
+// here. A supervisor is a contact without a velocity.
 const WIDTHS = { u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, f4: Float32Array, f8: Float64Array };
 
 function unpacked(kind, text) {
@@ -111,6 +112,15 @@ class Contact {
     return Array.isArray(column) ? column[element](row) : column(row);
   }
 
+  // What is shown of it: the force and the motion; of a supervisor its outputs and variables, and the inputs that it reads.
+  get shown() {
+    if (this.velocity) return [...this.outputs, this.velocity, "x"];
+    return [...this.outputs, ...this.variables, ...this.inputs.filter((name) => this.columns[name])];
+  }
+
+  // A column of its first element by row; undefined if there is none.
+  column(name) { return [this.columns[name]].flat()[0]; }
+
   // What a guard of an element reads at a row of the run, bit for bit.
   scope(element, row) { return (name) => this.value(name, element, row); }
 
@@ -129,8 +139,8 @@ class Contact {
 
   // The clauses of an edge with truth, sides and margin (negative on the false side).
   clauses(edge, scope) {
-    return this.edges[edge].clauses.map(({ text, unit, holds, op, left, right }) => {
-      const truth = truthOf(holds, scope), found = { text, unit, truth, left: NaN, right: NaN, margin: NaN };
+    return this.edges[edge].clauses.map(({ text, unit, event, holds, op, left, right }) => {
+      const truth = truthOf(holds, scope), found = { text, unit, event, truth, left: NaN, right: NaN, margin: NaN };
       if (!op || truth < 0) return found;
       const a = left(scope), b = right(scope);
       return { ...found, left: a, right: b, margin: op.startsWith(">") ? a - b : b - a };
@@ -162,9 +172,11 @@ class Contact {
     return found;
   }
 
+  sends(edge) { const { emit } = this.edges[edge]; return emit.length ? `, sends ${emit.join(", ")}` : ""; }
+
   sentence({ element, edge }) {
     const { name, source, target } = this.edges[edge];
-    return `${nameOf(this, element)} ${this.states[source]} → ${this.states[target]} (${name})`;
+    return `${nameOf(this, element)} ${this.states[source]} → ${this.states[target]} (${name}${this.sends(edge)})`;
   }
 }
 

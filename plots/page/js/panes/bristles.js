@@ -10,7 +10,7 @@ const DAMPER = "M0 7H38M62 2H38V12H62M50 7H100M50 4V10";
 const FRAME = "M0 -7V7M100 -7V7";
 
 class BristlesPane {
-  static side = "left"; static key = "bristles"; static title = "Bristles";
+  static side = "left"; static key = "bristles"; static title = "Bristles"; static moves = true;
 
   constructor(view, box) {
     Object.assign(this, { view, box });

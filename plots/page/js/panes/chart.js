@@ -3,7 +3,7 @@
 // A pane is what a tab shows. It is a class with: static side ("left" or "right"), static key and title,
 // constructor(view, box), show() for the row view.row and the element view.element, fit() after a change of size,
 // theme, contact or zoom, close() before it is thrown away. Only the pane in view is called. `static of()` is false where it has nothing to show;
-// a pane that is `static shared` shows both runs.
+// a pane that is `static shared` shows both runs; one that is `static moves` draws motion, which a supervisor does not have.
 const PANES = [];
 const MARKS = { 1: "✓", 0: "✗", "-1": "?" };
 
@@ -19,6 +19,8 @@ class RunView {
     for (const text of run.trust) make("li", $("ul", trust), text);
     $(".of", this.root).textContent = `Run ${this.place + 1}`;
     const which = $(".contact", this.root);
+    const kinds = new Set(run.contacts.map(({ velocity }) => (velocity ? "contact" : "supervisor")));
+    which.before(`${[...kinds].join(" or ")} `);
     run.contacts.forEach(({ name }) => make("option", which, name));
     $(".which", this.root).hidden = run.contacts.length < 2;
     which.addEventListener("change", () => { this.choose(run.contacts[which.selectedIndex], 0); show(frame); });
@@ -29,7 +31,7 @@ class RunView {
   addTabs() {
     for (const side of ["left", "right"]) {
       const list = $(`.${side} .tabs`, this.root), boxes = $(`.${side} .panes`, this.root);
-      for (const Pane of PANES.filter((each) => each.side === side && (each.of?.() ?? true) && !(each.shared && this.place))) {
+      for (const Pane of PANES.filter((each) => each.side === side && (each.of?.() ?? true) && (anyMoves() || !each.moves) && !(each.shared && this.place))) {
         const id = `run${this.place + 1}-${Pane.key}`, number = list.children.length;
         const tab = make("button", list, Pane.title, { role: "tab", id: `${id}-tab`, "aria-controls": id, "data-key": Pane.key });
         const box = make("div", boxes, "", { role: "tabpanel", id, "aria-labelledby": `${id}-tab`, class: `pane ${Pane.key}`, tabindex: 0 });
@@ -64,11 +66,23 @@ class RunView {
       box.hidden = !on;
     }
     if (each) this.open[side] = each.pane ??= new each.Pane(this, each.box); // made when first opened
+    this.markStill();
   }
+
+  // Panes of motion say so where a supervisor is chosen, and wait.
+  markStill() {
+    const { name, velocity } = this.contact;
+    for (const { Pane, box } of Object.values(this.panes)) {
+      if (Pane.moves && !velocity) box.dataset.still = `${name} is a supervisor: it does not move, so there is nothing to draw here.`;
+      else delete box.dataset.still;
+    }
+  }
+
+  get live() { return Object.values(this.open).filter(({ constructor }) => this.contact.velocity || !constructor.moves); }
 
   fit() {
     this.fitTable();
-    for (const pane of Object.values(this.open)) { pane.fit?.(); pane.show(); }
+    for (const pane of this.live) { pane.fit?.(); pane.show(); }
   }
 
   close() { for (const { pane } of Object.values(this.panes)) pane?.close?.(); }
@@ -83,7 +97,8 @@ class RunView {
       this.makeTokens();
       this.listEdges();
     }
-    for (const pane of Object.values(this.open)) { pane.choose?.(other); if (other) pane.fit?.(); }
+    if (other) this.markStill();
+    for (const pane of this.live) { pane.choose?.(other); if (other) pane.fit?.(); }
   }
 
   show(row) {
@@ -91,16 +106,15 @@ class RunView {
     const { run } = this, fired = run.fired.get(row);
     if (fired && following) this.choose(fired.contact, fired.element);
     const { contact } = this;
-    const get = (name) => contact.tell(name, contact.value(name, 0, row), 5);
     const ended = run.ended(frames.t[frame]) && `ended at ${timeText(run.t(row), 5)}`;
     $(".values", this.root).textContent = [
-      `F = ${get("F")}`, `v = ${get(contact.velocity)}`, `x = ${get("x")}`,
+      ...contact.shown.map((name) => `${name === contact.velocity ? "v" : name} = ${contact.tell(name, contact.value(name, 0, row), 5)}`),
       run.rowName(row) + (run.between[row] ? "" : ` of ${run.of}`),
       ended || (run.between[row] ? "" : `micro-step ${run.microstep[row]}`),
     ].filter(Boolean).join("   ");
     this.showTokens();
     this.explain();
-    for (const pane of Object.values(this.open)) pane.show();
+    for (const pane of this.live) pane.show();
   }
 
   // Whether an element of the contact shown is in another state than in the other run, at the row shown.
@@ -173,10 +187,10 @@ class RunView {
         found.button = make("button", head, "○", { "aria-label": `Breakpoint on ${edge.name}` });
         found.button.addEventListener("click", () => toggleBreak(this, this.element, k));
         head.append(` ${edge.priority} ${edge.name}`);
-        const small = make("small", head, `${contact.states[edge.source]} → ${contact.states[edge.target]} `);
+        const small = make("small", head, `${contact.states[edge.source]} → ${contact.states[edge.target]}${contact.sends(k)} `);
         found.word = make("em", small);
       }
-      make("td", line, clause.text);
+      make("td", line, clause.event ? `event ${clause.event}` : clause.text);
       found.truth = make("td", line);
       found.sides = ["margin", "left", "right"].map((name) => make("td", line, "", { class: "number", "data-name": clause.compares ? name : "" }));
       return found;
@@ -217,6 +231,8 @@ class RunView {
     if (first) reveal(first, $(".why", this.root), first.querySelector("th")?.rowSpan ?? 1, $("caption", this.root).offsetHeight);
   }
 }
+
+const anyMoves = () => runs.some(({ contacts }) => contacts.some(({ velocity }) => velocity));
 
 // What an element waits for, in words.
 function waiting(contact, element, row) {
@@ -259,7 +275,8 @@ function inClause({ left, right, unit }, u, digits) { return inUnit(u, unit, pow
 function heldBack(contact, leaving, scope) {
   const each = leaving.map((k) => ({ k, worst: worstClause(contact.clauses(k, scope)) })).sort((a, b) => relative(b.worst) - relative(a.worst));
   const { k, worst } = each[0], by = Number.isNaN(worst.margin) ? "" : ` by ${inClause(worst, Math.abs(worst.margin), 3)}`;
-  return `${contact.edges[k].name} does not fire: ${worst.text} is ${worst.truth < 0 ? "not computable" : `false${by}`}`;
+  const why = worst.event ? `it waits for the event ${worst.event}` : `${worst.text} is ${worst.truth < 0 ? "not computable" : `false${by}`}`;
+  return `${contact.edges[k].name} does not fire: ${why}`;
 }
 
 // ------------------------------------------------------------------ the chart: its SVG is laid out once and restyled

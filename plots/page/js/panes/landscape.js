@@ -9,7 +9,7 @@ const LETTERS = { "clause-name": 6.8, "curve-name": 6.2, "edge-name": 7.8 }; // 
 const HATCHING = [45, 135, 0, 90, 20]; // degrees, of the edges of a state in order of priority
 
 class LandscapePane {
-  static side = "right"; static key = "landscape"; static title = "Landscape";
+  static side = "right"; static key = "landscape"; static title = "Landscape"; static moves = true;
 
   constructor(view, box) {
     Object.assign(this, { view, box, moved: null, at: -1, drawnAt: 0, layouts: new Map(), drawings: new Map() });

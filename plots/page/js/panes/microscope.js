@@ -105,7 +105,7 @@ class MicroscopePane {
       make("p", box, run.log.length ? "The rows of this run do not show its transitions one by one." : "This run has no transitions.", { class: "note" });
       return;
     }
-    const many = run.contacts.length > 1, shown = run.contacts.filter(({ states }) => states.length > 1);
+    const many = run.contacts.length > 1 || !run.contacts[0].velocity, shown = run.contacts.filter(({ states, log }) => states.length > 1 || log.length);
     this.lines = shown.flatMap((contact) => contact.modes.map((_, element) => ({
       contact, element, label: many ? `${contact.name}${contact.n > 1 ? ` ${element + 1}` : ""}` : `E${element + 1}`,
     })));
@@ -143,11 +143,11 @@ class MicroscopePane {
   // Where all panes are in view the stairs take the height that is left.
   fit() {
     if (!this.scroller || !this.box.clientWidth) return;
-    const count = this.lines.length, rest = this.box.clientHeight - COLUMN.foot - 14; // 14: the bar to scroll
+    const { run } = this.view, count = this.lines.length, rest = this.box.clientHeight - COLUMN.foot - 14; // 14: the bar to scroll
     const { least, two, most, page } = LINE_HEIGHT, fits = Math.floor((rest - STAIRS.page) / count);
     const height = fits < two && rest - count * two >= STAIRS.least ? two : clamp(fits, least, most);
     this.height = isWide() ? height : page;
-    this.top = isWide() ? clamp(rest - count * this.height, STAIRS.least, STAIRS.most) : STAIRS.page;
+    this.top = !run.contacts.some(({ shown }) => shown.length) ? COLUMN.head + 2 : isWide() ? clamp(rest - count * this.height, STAIRS.least, STAIRS.most) : STAIRS.page;
     this.unfold(this.height >= LINE_HEIGHT.two);
     for (const [name, value] of [["--row", this.height], ["--top", this.top], ["--foot", COLUMN.foot]]) this.scroller.style.setProperty(name, `${value}px`);
     this.scroller.style.height = isWide() ? "" : `${this.top + COLUMN.foot + 14 + Math.min(count, LINE_HEIGHT.count) * this.height}px`;
@@ -265,17 +265,18 @@ class MicroscopePane {
   }
 
   button(k, { row, contact, element, edge }) {
-    const { strip, view: { run } } = this, at = contact.columns.F;
+    const { strip, view: { run } } = this, [name] = contact.shown, at = contact.column(name);
+    const both = at ? `, ${name} ${contact.tell(name, at(row - 1), F_DIGITS)} before, ${contact.tell(name, at(row), F_DIGITS)} after` : "";
     const node = make("button", this.foot, `${BETWEEN[run.between[row]]}${run.number[row]}\n${run.microstep[row]}`, {
-      tabindex: -1, "aria-label": `Row ${run.number[row]}, micro-step ${run.microstep[row]}: ${contact.sentence({ element, edge })}, `
-        + `F ${contact.tell("F", at(row - 1), F_DIGITS)} before, ${contact.tell("F", at(row), F_DIGITS)} after`,
+      tabindex: -1, "aria-label": `Row ${run.number[row]}, micro-step ${run.microstep[row]}: ${contact.sentence({ element, edge })}${both}`,
     });
     node.style.left = `${this.labels + strip.lefts[k]}px`;
     node.style.width = `${strip.pitch}px`;
     return node;
   }
 
-  // The stairs of F and the times above them, for the columns in view. A text that would be cut off is left out.
+  // The stairs of F, or of what is shown first of a supervisor, and the times above them, for the columns in view. A text
+  // that would be cut off is left out.
   drawTop(left, first, last) {
     const { strip, labels, view } = this, told = [];
     const tell = (text, middle, level, kind) => {
@@ -299,10 +300,10 @@ class MicroscopePane {
   }
 
   drawStairs(left, levels, tell) {
-    const { contact } = this.view, F = contact.columns.F, title = `F ${contact.name}`;
-    this.title.textContent = textWidth(title) * BOLD < this.labels ? title : "F";
-    const values = levels.map(({ row }) => F(row));
-    const texts = values.map((u) => contact.tell("F", u, F_DIGITS)), floor = this.top - STAIRS.below;
+    const { contact } = this.view, [name = ""] = contact.shown, at = contact.column(name), title = `${name} ${contact.name}`;
+    this.title.textContent = textWidth(title) * BOLD < this.labels ? title : name;
+    const values = levels.map(({ row }) => (at ? at(row) : NaN));
+    const texts = values.map((u) => contact.tell(name, u, F_DIGITS)), floor = this.top - STAIRS.below;
     // Values that are written alike are drawn alike.
     const known = new Map(texts.map((text, k) => [text, values[k]]).filter(([, u]) => Number.isFinite(u)));
     const sorted = [...known].sort((a, b) => a[1] - b[1]), found = heights(sorted.map(([, u]) => u), floor - COLUMN.head - STAIRS.above);
@@ -314,7 +315,7 @@ class MicroscopePane {
       if (begins && before) through += `M${x(before.to)} ${before.level.toFixed(1)}L${x(from)} ${level.toFixed(1)}`;
       path += begins || !before ? `M${x(from)} ${level.toFixed(1)}H${x(to)}` : `V${level.toFixed(1)}H${x(to)}`;
       before = { to, level };
-      const shown = [texts[k], contact.tell("F", values[k], F_DIGITS - 1)].find((text) => textWidth(text) <= to - from - 4);
+      const shown = [texts[k], contact.tell(name, values[k], F_DIGITS - 1)].find((text) => textWidth(text) <= to - from - 4);
       if (shown) tell(shown, (from + to) / 2, level - 4, "value");
     });
     place(this.path, { d: path });

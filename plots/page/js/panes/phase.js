@@ -4,7 +4,7 @@ const RECENT = 1 / 30; // of the run: the part of the path that is shown behind 
 const LEVELS = 7; // looks of the path
 
 class PhasePane {
-  static side = "right"; static key = "phase"; static title = "Phase";
+  static side = "right"; static key = "phase"; static title = "Phase"; static moves = true;
 
   constructor(view, box) {
     Object.assign(this, { view, box });

@@ -134,7 +134,7 @@ class Boxes {
 
 // The unit of a name in guards.
 function unitOf(contact, name) {
-  return contact.units[name] ?? { [contact.velocity]: "m/s", F: "N", a: "m/s^2", x: "m", t: "s", s: contact.units[contact.variables[0]] }[name] ?? "";
+  return contact.units[name] ?? (name === "s" ? contact.units[contact.variables[0]] : undefined) ?? "";
 }
 
 // A range with some room at both ends.
