@@ -213,7 +213,8 @@ def sweep_summary(loaded: Loaded, axes: Sequence[Axis], result: Sweep, engine: s
         ends = {"x [m]": result.x, "v [m/s]": result.v, "F [N]": result.F}
     else:
         ends = {f"{each.name}.x": result.ends[f"{each.name}.x"] for each in loaded.system.bodies}
-        ends |= {f"{name}.F": result.contact(name).F for name in result.contacts}
+        forces = (each.name for each in loaded.system.contacts)
+        ends |= {f"{name}.F": result.contact(name).F for name in forces}
     heads += ["outcome", "transitions", "t [s]", *ends]
     rows = [
         [

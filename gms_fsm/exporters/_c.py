@@ -34,6 +34,7 @@ TEMPLATES = Path(__file__).parent / "_templates"
 TAKES = ("initial", "t_start", "settings")  # what the engine uses
 WORDS = C_WORDS | {*FIELDS, "INFINITY", "NAN", "NULL"}
 BAD_ARGUMENT = -1
+PARAMETERS = "Names of the parameters; of one per element, add the number of the element, from 0."
 
 
 @dataclass(frozen=True)
@@ -124,9 +125,9 @@ class _Text:
             words=self.layout.words,
             bad_argument=BAD_ARGUMENT,
             codes=_closed(codes),
-            parameters=_closed(places),
+            parameters=_enumeration(PARAMETERS, places),
             states=_closed(states),
-            edges=f"\n/* Edges. */\nenum {{\n{_closed(edges)}\n}};\n" if edges else "",
+            edges=_enumeration("Edges.", edges),
             t_start=repr(self.start.t_start),
             both="".join(f" {each}0, {each}1:" for each in made.inputs),
             lines=made.lines,
@@ -171,7 +172,7 @@ class _Text:
             resumed=place("sample.resumed"),
             switches=place("sample.switches"),
             full_log=FULL_LOG,
-            spans=" || ".join(spans),
+            spans=" || ".join(spans) or "(void)parameter, false",
             time_scale=place("buffers.plan.control.time_scale"),
             log_t=place("sample.t"),
             log_element=place("sample.machine"),
@@ -265,6 +266,11 @@ def _comment(each: Quantity) -> str:
 def safe(text: str) -> str:
     """Return a text that does not end a comment."""
     return visible(text).replace("*/", "* /").replace("/*", "/ *")
+
+
+def _enumeration(about: str, lines: Sequence[str]) -> str:
+    """Return an enumeration; nothing if it would be empty, which C does not have."""
+    return f"\n/* {about} */\nenum {{\n{_closed(lines)}\n}};\n" if lines else ""
 
 
 def _closed(lines: Sequence[str]) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from gms_fsm.charts.parameters import QUANTITIES, SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
 from gms_fsm.foundation.text import visible
+from gms_fsm.language import EVENT
 from gms_fsm.run.problem import Problem
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.system import Contact, System
@@ -73,6 +74,8 @@ def outputs_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Quant
             count = 1 + len(others) if label in places.own else None
             if any(each.label == label for each in found):
                 continue  # a position is in both
+            if count is not None and _of_bristles(start.system, label):
+                continue
             known = _declared(start.system, label)
             values = tuple(start.y[k] for k in (first, *others)) if place == "y" else ()
             what = known.unit, known.meaning
@@ -87,8 +90,30 @@ def outputs_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Quant
         found.append(
             Quantity(_plain(label, alone), label, "mode", bank.first, bank.n, "", states, initial)
         )
+    found = _named(found, start, alone, words)
     _check([each.name for each in found], [each.label for each in found], words)
     return tuple(found)
+
+
+def _named(
+    found: list[Quantity], start: Problem, alone: bool, words: Iterable[str]
+) -> list[Quantity]:
+    """Return the same with events called as their users call them, where that name is free."""
+    others = {each.name for each in (*found, *parameters_of(start, alone, ()))}
+    others |= {*start.system.names, *words}
+    return [
+        replace(each, name=plain)
+        if each.label.startswith(EVENT) and (plain := each.label.removeprefix(EVENT)) not in others
+        else each
+        for each in found
+    ]
+
+
+def _of_bristles(system: System, label: str) -> bool:
+    """Return whether a quantity is that of the one element of a supervisor, which is no bristle."""
+    owner, _, name = label.rpartition(".")
+    known = name in ("s", WEIGHT) or name.endswith("_elements")
+    return known and any(each.name == owner for each in system.supervisors)
 
 
 def parameters_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
@@ -103,6 +128,7 @@ def parameters_of(start: Problem, alone: bool, words: Iterable[str]) -> tuple[Qu
     found += [
         _parameter(start.system, label, "own", k * width, values.size, values.tolist(), alone)
         for k, (label, (_, values)) in enumerate(own.items())
+        if not _of_bristles(start.system, label)
     ]
     _check([each.name for each in found], [each.label for each in found], words)
     return tuple(found)
@@ -136,6 +162,8 @@ def _declared(system: System, label: str) -> Parameter:
         known = {name: Parameter(name, "m", meaning="position")}
     elif name in {body.v for body in system.bodies}:
         known = {name: Parameter(name, "m/s", meaning="velocity")}
+    elif name.startswith(EVENT):
+        known = {name: Parameter(name, meaning="event, 1 where it has come")}
     return known.get(name, Parameter(re.sub(r"\W", "_", name)))
 
 

@@ -169,6 +169,11 @@ class Sweep:
         log = self.transitions[self.transitions["run"] == run]
         return [(int(i), self.edges[edge]) for i, edge in zip(log.element, log.edge, strict=True)]
 
+    def _has(self, values: FloatArray) -> bool:
+        """Return whether a quantity exists: a supervisor has no motion and no force."""
+        started = np.isfinite(self.t)
+        return not (self.contacts and started.any() and np.isnan(values[started]).all())
+
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per run, by column.
 
@@ -177,7 +182,8 @@ class Sweep:
         dict of str to ndarray, shape (runs,)
             Parameters, outcome, end of the run; columns for elements are numbered from 1. A
             parameter with the same name as a result is called ``parameter_<name>``. Of a system,
-            those of a contact have its name: ``gear.F``.
+            those of a contact have its name, ``gear.F``, and what a supervisor does not have, its
+            position, velocity and force, has no column.
 
         Examples
         --------
@@ -195,8 +201,10 @@ class Sweep:
         results |= {_distinct(name, results): values for name, values in self.ends.items()}
         for name in self.contacts or ("",):
             part, lead = (self.contact(name), f"{name}.") if name else (self, "")
-            results |= {f"{lead}{each}": getattr(part, each) for each in ("x", "v", "F")}
-            results |= _numbered(f"{lead}z", part.z) | _numbered(f"{lead}state", part.states)
+            ends = {each: getattr(part, each) for each in ("x", "v", "F", "z")}
+            for each, values in ends.items():
+                results |= _numbered(f"{lead}{each}", values) if self._has(values) else {}
+            results |= _numbered(f"{lead}state", part.states)
         results |= {"transitions": self.transition_count}
         parameters = {
             _distinct(column, results): numbers
@@ -227,15 +235,18 @@ class Sweep:
         xarray = require("xarray", "sweep")
         units = {name: QUANTITIES[name].unit for name in ("t", "x", "v", "F", "z")}
         data: dict[str, Any] = {}
-        for name in ("outcome", "message", "t", "x", "v", "F"):
+        shown = [name for name in ("x", "v", "F") if self._has(getattr(self, name))]
+        for name in ("outcome", "message", "t", *shown):
             values = getattr(self, name)
             dimensions = ("run", "contact")[: values.ndim]
             data[f"{name}_end" if name in units else name] = (dimensions, values)
         data |= {f"end.{name}": ("run", values) for name, values in self.ends.items()}
-        data["z_end"] = (("run", "element"), self.z)
+        data |= {"z_end": (("run", "element"), self.z)} if self._has(self.z) else {}
         data["state_end"] = (("run", "element"), self.states)
         data["transitions"] = ("run", self.transition_count)
         for name, values in self.rows.items():
+            if not self._has(values):
+                continue
             last = "element" if name == "z" else "contact"
             data[name] = (("run", "time", last)[: values.ndim], values)
         coordinates: dict[str, Any] = {

@@ -86,7 +86,7 @@ def _numbered(model: Model) -> Mapping[str, tuple[str, int]]:
 
 @functools.lru_cache(maxsize=64)  # `until` calls this for every state it tests
 def _all_numbered(names: tuple[str, ...], moves: bool, n: int) -> Mapping[str, tuple[str, int]]:
-    quantities = {name: name for name in names} | {"F": FORCE for _ in range(moves)}
+    quantities = {name: name for name in names} | ({"F": FORCE} if moves else {})
     return {
         f"{name}{i + 1}": (quantity, i) for name, quantity in quantities.items() for i in range(n)
     }

@@ -66,7 +66,7 @@ def views_of(trace: Trace) -> list[Trace]:
     return [trace.contact(name) for name in trace.what.machines]
 
 
-# --------------------------------------------------------------------------- a contact, a supervisor
+# ----------------------------------------------------------------- a contact or a supervisor
 def _contact(
     trace: Trace, pool: ColumnStore, picture: int, reports: Sequence[Report]
 ) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import tempfile
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
@@ -20,6 +21,7 @@ from gms_fsm import ChartModel, Model, Prescribed, System, export, simulate
 from gms_fsm.exporters.fmi.units import base_units
 from tests.exporters.frictions import reads_acceleration, servo
 from tests.helpers import stick_slip
+from tests.supervisor_cases import crossing
 
 PAPER = stick_slip("signed")
 FORMATS = ("fmu2", "fmu3")
@@ -93,6 +95,17 @@ def test_the_variables_of_a_system(form: str) -> None:
     assert "der(u)" not in found
     assert "bearing.margin.arrest" not in found  # its comparisons are those of the break-aways
     assert "bearing.margin.break_away_forward[1]" in found
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_an_event_has_its_own_name_where_it_is_free_and_a_supervisor_no_bristle(form: str) -> None:
+    system = crossing().system
+    named = archive(system, form).variables()
+    assert named["red"]["description"] == "event, 1 where it has come"
+    assert not [name for name in named if "event__" in name or re.search("weights|_elements", name)]
+    assert "main.s[1]" not in named
+    taken = archive(replace(system, numbers={"red": 2.0}), form).variables()
+    assert {"red", "event__red"} <= taken.keys()
 
 
 @pytest.mark.parametrize("form", FORMATS)

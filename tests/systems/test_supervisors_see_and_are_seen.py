@@ -409,6 +409,15 @@ def test_a_session_steps_through_a_supervisor():
     assert session.why("heater 1")[0].edge.name == "switch_off"
 
 
+def test_a_sweep_has_no_columns_for_a_motion_that_there_is_not():
+    found = sweep(thermostat().system, 3.0, {"heater.low": [18.0, 19.0]})
+    names = ["heater.low", "outcome", "message", "t", "T", "heater.state1", "transitions"]
+    assert list(found.columns()) == names
+    mixed = sweep(hunting().system, 1.0, {"calm.band": [0.01, 0.05]}).columns()
+    assert {"pad.x", "pad.v", "pad.F"} <= mixed.keys()
+    assert not {"calm.x", "calm.v", "calm.F"} & mixed.keys()
+
+
 def test_why_shows_the_input_that_a_guard_reads_also_if_it_is_called_as_a_motion():
     session = Session(lift().system, 8.0)  # reads x
     session.until("x > 0.5")

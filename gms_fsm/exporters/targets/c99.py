@@ -142,7 +142,7 @@ def _readme(subject: Subject, made: CEngine) -> str:
         inputs=inputs,
         method=settings.method_name,
         rtol=repr(settings.rtol),
-        numbers=numbers,
+        numbers=numbers or "- none",
     )
 
 

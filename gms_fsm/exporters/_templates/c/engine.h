@@ -33,12 +33,7 @@ enum {
     ${name}_BAD_ARGUMENT = $bad_argument,
 $codes
 };
-
-/* Names of the parameters; of one per element, add the number of the element, from 0. */
-enum {
 $parameters
-};
-
 /* States of the elements. */
 enum {
 $states
