@@ -100,8 +100,8 @@ def subject_html(subject: Chart | Model | Contact | System) -> str:
 
 # --------------------------------------------------------------------------- runs
 def trace_png(trace: Trace) -> bytes | None:
-    """Return a run's overview as PNG, or None without matplotlib or with several contacts."""
-    if trace.subject.several:
+    """Return a run's overview as PNG, or None without matplotlib or without one contact alone."""
+    if trace.subject.several or not trace.model.chart.velocities:
         return None
     try:
         from plots.figures import overview
@@ -111,11 +111,13 @@ def trace_png(trace: Trace) -> bytes | None:
 
 
 def trace_html(trace: Trace) -> str | None:
-    """Return a table of the contacts of a run that has no overview."""
+    """Return a table of the contacts of a run that has no overview, if it has any."""
     several = trace.subject.several
-    if not several and find_spec("matplotlib") is not None:
+    if not several and (not trace.model.chart.velocities or find_spec("matplotlib") is not None):
         return None
     parts = [trace.contact(name) for name in trace.contacts] if several else [trace]
+    if not parts:
+        return None
     rows = [[p.model.title, p.n, len(p.transitions), *range_of_force(p)] for p in parts]
     return table(
         ["contact", "elements", "transitions", "least F [N]", "largest F [N]"],

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.systems.system import System
 
@@ -47,7 +48,7 @@ def schematic(system: System) -> Figure:
     MissingExtraError
         If matplotlib is not installed.
     ParameterError
-        If it is no system.
+        If it is no system, or has no bodies.
 
     Examples
     --------
@@ -59,6 +60,11 @@ def schematic(system: System) -> Figure:
     ['contact friction', 'spring stiffness']
     """
     checked_kind("system", system, System, "a System")
+    if not system.bodies:
+        raise ParameterError(
+            f"system {system.name!r} has no bodies to draw",
+            advice="plots.block_diagram draws its supervisors and signals",
+        )
     from plots.systems.mechanical_drawing import mechanical_figure
 
     return mechanical_figure(system)

@@ -12,11 +12,11 @@ def check_trace(trace: object, *, moving: bool = True) -> None:
         raise ParameterError(
             "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
         )
-    # A system with several contacts refuses here to say which is meant.
-    if not trace.model.chart.velocities and moving:
+    # A system with several contacts refuses here, if there is one that could be drawn.
+    if moving and not (trace.contacts and trace.model.chart.velocities):
         raise ParameterError(
             "a supervisor has no velocity and no force to draw",
             place="trace",
             value=trace,
-            advice="its states are in .states, its chart is drawn by plots.statechart",
+            advice="its chart is drawn by plots.statechart, its run by plots.replay",
         )

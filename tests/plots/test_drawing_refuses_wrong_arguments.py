@@ -37,6 +37,7 @@ from tests.helpers import open_loop, stick_slip
 from tests.identification.fits_made import small, two_records
 from tests.plots.systems_to_draw import BLOCKS, STICTION
 from tests.plots.systems_to_draw import run as system_run
+from tests.supervisor_cases import crossing
 from tests.zoo.zoo_cases import prandtl_tomlinson
 
 NAN = math.nan
@@ -251,6 +252,19 @@ def test_a_run_of_several_contacts_says_to_choose_one() -> None:
     assert first.contact("pad2").transitions.t.tolist() == second.transitions.t.tolist()
     for name in set(OF_A_TRACE) - {"stribeck"}:  # and every panel takes it; it has no curve
         assert getattr(panels, name)(ax(), second)
+
+
+def test_supervisors_alone_are_refused_with_what_shows_them() -> None:
+    case = crossing()
+    trace = case.run()
+    for name in ("overview", "landscape", "unfold", "phase", "animate"):
+        with pytest.raises(ParameterError, match=r"no force to draw.* by plots\.replay$"):
+            DRAWN[name](trace.supervisor("main"))
+    for each in (trace, trace.supervisor("main")):
+        assert each._repr_png_() is None  # a notebook shows their text
+        assert each._repr_html_() is None
+    with pytest.raises(ParameterError, match="has no bodies to draw"):
+        plots.schematic(case.system)
 
 
 def test_pictures_of_runs_need_a_trace() -> None:
