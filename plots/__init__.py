@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.extras import require
 from plots.charts.live_chart import LiveChart, live_statechart
 from plots.charts.statechart import layout, statechart
@@ -74,6 +75,7 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *_LATE})
 
 
+@refusing()
 def explore(
     model: Model | System,
     rig: Rig | float,
@@ -135,6 +137,7 @@ def explore(
     return Explorer(model, rig, t_end, sliders=sliders, height=height, **options)
 
 
+@refusing()
 def overview(trace: Trace, title: str = "") -> Figure:
     """Draw an overview of a run; see `plots.figures.overview`.
 

@@ -83,6 +83,7 @@ from gms_fsm.errors import (
     TraceFileError,
     UnitError,
 )
+from gms_fsm.foundation.arguments import LACKING
 from gms_fsm.foundation.quantities import factor
 from gms_fsm.identification.certainty.intervals import Bootstrap
 from gms_fsm.phenomena.results import PhenomenaTable, PhenomenonResult
@@ -216,6 +217,7 @@ RIG = OPEN_LOOP[OPEN_LOOP.index("[rig]") : OPEN_LOOP.index("[run]")]
 PAPER = '[model]\nkind = "GMS"\nlaw = "signed"\npreset = "stick-slip"\n'
 SIN, END, ONE_C = "0.1*sin(t)", "t_end = 1.0", "C = [0.1, 0.1]"
 QUOTED = f'"{SIN}"'
+PULLED = '[rig]\nkind = "pulled"\nmass = 1.0\nstiffness = -5.0\nspeed = 0.1\n'
 COLUMN = 'time = { column = "t", unit = "s" }'
 SIGNAL = f'{{ file = "%s", {COLUMN}, value = {{ column = "x", unit = "m" }} }}'
 
@@ -227,6 +229,7 @@ rows = {
     "unknown": (END, f"{END}\nspeed_of_light = 3e8"),
     "of another rig": ('kind = "prescribed"', 'kind = "pulled"'),
     "of another model": ('"GMS"', '"LuGre"'),
+    "of another rig beside one's own": (QUOTED, f"{QUOTED}\nspeed = 0.1"),
     "called float": (END, f"{END}\nfloat = 1"),
     "typo in a measured signal": (QUOTED, f'{{ file = "a.csv", {COLUMN}, valeu = 1 }}'),
     "record that no rig uses": ("[run]", f'[record]\nfile = "a.csv"\n{COLUMN}\n[run]'),
@@ -304,15 +307,19 @@ rows = {
     "case without a comparison": ("signal, column 4", ..., SIN, "if(t, 0, 0.1)"),
     "case without an alternative": ("signal, column 1", ..., SIN, "if(t < 1, 0.1)"),
     "program": ("signal, column 1", ..., QUOTED, """'__import__("os").mkdir("pwned")'"""),
-    "one corner": ("a.toml: rig.velocity = [[0.0, 0.1]]: signal", ..., QUOTED, "[[0.0, 0.1]]"),
-    "no corner": ("a.toml: rig.velocity = []: signal", ..., QUOTED, "[]"),
+    "one corner": (
+        "line 13: rig.velocity = [[0.0, 0.1]]: signal",
+        ...,
+        QUOTED,
+        "[[0.0, 0.1]]",
+    ),
+    "no corner": ("line 13: rig.velocity = []: signal", ..., QUOTED, "[]"),
     "ramps that go back in time": ("signal", ..., QUOTED, "[[0.0, 0.0], [2.0, 1.0], [1.0, 1.0]]"),
     "very long expression": ("signal, column 10001", ..., SIN, "t + " * 50_000 + "x"),
     "deep expression": ("signal, column 10001", ..., SIN, "(" * 5000 + "t" + ")" * 5000),
 }
 group("value of a scenario", ScenarioError, edited, rows)
 rows = {
-    "end before the start": (END, "t_end = -1.0"),
     "step under the clock": (END, f"{END}\nmax_step = 1e-18"),
     "no step for a method without error estimate": (END, f'{END}\nmethod = "rk4"'),
     "events per step without a step": (END, f'{END}\nevents = "step"'),
@@ -321,6 +328,12 @@ rows = {
     "initial velocity of a prescribed motion": ("[output]", "[initial]\nv = 0.1\n[output]"),
 }
 group("run of a scenario", ScenarioError, edited, rows, "a.toml")
+rows = {
+    "end before the start": ("a.toml: line 16: run.t_end", -1.0, END, "t_end = -1.0"),
+    "end at the start": ("a.toml: line 16: run.t_end", 0.0, END, "t_end = 0"),
+    "stiffness below zero": ("line 14: [rig] stiffness", -5.0, RIG, PULLED),
+}
+group("run of a scenario", ScenarioError, edited, rows)
 rows = {
     "empty": (b"",),
     "only a comment": ("# later\n",),
@@ -597,7 +610,11 @@ rows = {
     "debug of a trace": ("t.CSV", ..., "debug t.CSV"),
     "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),
     "fit of a missing scenario": ("none.toml", ..., "fit none.toml"),
-    "debug of a run that cannot be": ("pulled.toml", ..., "debug pulled.toml --set run.t_end=-1"),
+    "debug of a run that cannot be": (
+        "pulled.toml: --set: run.t_end",
+        -1.0,
+        "debug pulled.toml --set run.t_end=-1",
+    ),
 }
 group("command", ScenarioError, command, rows)
 rows = {
@@ -702,9 +719,10 @@ rows = {
     "two delimiters": (FILE, f'{FILE}\ndelimiter = ";;"'),
     "line end as delimiter": (FILE, f'{FILE}\ndelimiter = "\\n"'),
     "start before the record": ("[output]", "[run]\nt_start = -1.0\n[output]"),
-    "start after the record": ("[output]", "[run]\nt_start = 0.7\n[output]"),
 }
 group("setting of a record", ScenarioError, setting, rows, "a.toml")
+rows = {"start after the record": ("run.t_end", 0.59, "[output]", "[run]\nt_start = 0.7\n[output]")}
+group("setting of a record", ScenarioError, setting, rows)
 rows = {
     "no motion": ('position = { column = "x", unit = "mm" }\n', ""),
     "smoothing beyond all bounds": (FILE, f"{FILE}\nsmoothing = 1e100"),
@@ -827,6 +845,10 @@ rows = {"unit in the name alone": ("position", "x_mm", from_csv(position="x_mm")
 group("Record.from_csv", ParameterError, lambda given: read(**given), rows)
 rows = {
     "unit of something else": ("", ..., from_csv(force=("F_N", "mm"))),
+}
+group("Record.from_csv", UnitError, lambda given: read(**given), rows)
+rows = {
+    "unit against the name": ("column of time", "t [ms]", from_csv(time=("t [ms]", "s"))),
 }
 group("Record.from_csv", UnitError, lambda given: read(**given), rows)
 rows = {
@@ -1396,6 +1418,8 @@ group("chart", ChartError, chart, rows, "")
 rows = {"states inside without a name": (State("stick"), State("slip"))}
 group("state", ChartError, lambda *inside: State("on", *inside), rows, "state 'on'")
 rows = {
+    "state of a machine in a guard": ("column 1", ..., edge(guard="is_in(pad.stuck) > 0")),
+    "count in a guard": ("column 1", ..., edge(guard="count(slip) > 2")),
     "unknown name in a guard": ("guard, column 12", ..., edge(guard="z >= s and u > v_c")),
     "function that is a parameter": (
         "guard, column 1",
@@ -1504,6 +1528,12 @@ rows = {
     "number too few": ("PulledSlider", (PulledSlider, 1.0, 2.0), {}),
     "stiffness of a spring": ("spring 'shaft'", (Spring, "shaft", "motor"), {"stiffness": 2.0}),
     "sample time": ("sampled 'pid'", (Sampled, "pid"), {"sample_time": 1e-3, "updates": {}}),
+    "velocity of a supervisor": ("supervisor 'mode'", (Supervisor, "mode", None), {"v": "w"}),
+    "shares": ("GMSParameters.from_shares", (GMSParameters.from_shares,), {"shares": [1.0]}),
+    "nothing": ("GMSParameters.paper", (GMSParameters.paper,), {}),
+    "no rig": ("simulate", (simulate, GMSParameters.paper("stick-slip")), {}),
+    "option by its place": ("Trace.trust", (Trace.trust, None, True), {}),
+    "arrays by their places": ("Record.from_arrays", (Record.from_arrays, [0, 1], [0, 1]), {}),
 }
 group(
     "argument",
@@ -2047,6 +2077,7 @@ rows = {
     "number": ("model_or_contact", 3, lambda: FrictionState(3)),
     "class": ("model_or_contact", GMS, lambda: FrictionState(GMS)),
     "late start": ("t", 1e9, lambda: FrictionState(GIVEN, t=1e9)),
+    "length alone": ("v1", LACKING, lambda: FrictionState(GIVEN).advance(1e-3)),
     "sample that the clock does not resolve": (
         "dt", 1e-9, lambda: FrictionState(GIVEN, t=1e8).advance(0.1, 0.1, 1e-9)),
     "input with the name of an argument": (
@@ -2142,6 +2173,7 @@ rows = {
 }
 group("session", SessionError, unmoved, rows, "")
 rows = {
+    "poke of a variable by its name": ("Session.poke", ..., lambda s: s.poke(z1=0.1)),
     "poke of all elements at once": ("z", 0.1, lambda s: s.poke({"z": 0.1})),
     "poke of a text": ("variables", "z", lambda s: s.poke("z")),
     "poke of a state as a text": ("state", "slip", lambda s: s.poke(state="slip")),

@@ -28,7 +28,7 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
 from gms_fsm.foundation.arguments import no_file, unknown
 from gms_fsm.foundation.files import inside
-from gms_fsm.foundation.tables import read_file
+from gms_fsm.foundation.tables import place_in, read_file
 from gms_fsm.foundation.toml import parsed
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
@@ -171,14 +171,14 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         return _loaded_system(path, overrides)
     scenario = read_file(path, Scenario, ScenarioError, lambda table: table, overrides)
     try:
-        return _loaded(path, scenario)
+        return _loaded(path, scenario, overrides)
     except (RecordError, ScenarioError):
         raise
     except UnitError as error:
         place = f"[record] {error.place}".rstrip()
         raise ScenarioError.of(error).replaced(place=place).inside(path) from None
     except GMSError as error:
-        place = f"[rig] {error.place}".rstrip()
+        place = place_in(path, ("rig", error.place), overrides) + f"[rig] {error.place}".rstrip()
         raise ScenarioError.of(error).replaced(place=place).inside(path) from None
 
 
@@ -298,6 +298,7 @@ def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
             place=str(path),
             advice="add a table [run] with t_end in s, or give --set run.t_end=10.0",
         )
+    _check_end(path, start, end, overrides)
     arguments = run.options() | {"t_start": start, "t_end": end}
     if initial := scenario.initial_values():
         arguments["initial"] = initial
@@ -307,6 +308,16 @@ def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
     if run.monitors:
         arguments["monitors"] = tuple(run.monitors)  # checked by the run
     return Loaded(path, scenario, what.model, what.rig, arguments, None, None, system)
+
+
+def _check_end(path: Path, start: float, end: float, overrides: Sequence[str]) -> None:
+    """Refuse a run that ends before it starts."""
+    if end <= start:
+        raise ScenarioError(
+            f"it must be later than t_start, {start!r}",
+            place=f"{place_in(path, ('run', 't_end'), overrides)}run.t_end",
+            value=end,
+        ).inside(path)
 
 
 def _rows(path: Path, every: float, start: float, end: float) -> FloatArray:
@@ -330,7 +341,7 @@ def _monitors(path: Path, given: Sequence[str], model: Model) -> tuple[Monitor, 
 
 
 # --------------------------------------------------------------------------- a model on a rig
-def _loaded(path: Path, scenario: Scenario) -> Loaded:
+def _loaded(path: Path, scenario: Scenario, overrides: Sequence[str]) -> Loaded:
     run, record, motion = scenario.run, None, None
     start, end = run.t_start, run.t_end
     initial = scenario.initial.model_dump(exclude_none=True)
@@ -338,9 +349,9 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
     rig: Rig
     match scenario.rig:
         case PrescribedTable(velocity=velocity):
-            rig = Prescribed(_signal(path, velocity, "rig.velocity", "velocity"))
+            rig = Prescribed(_signal(path, velocity, "velocity", overrides))
         case SliderTable(mass=mass, force=force):
-            rig = Slider(mass, _signal(path, force, "rig.force", "force"))
+            rig = Slider(mass, _signal(path, force, "force", overrides))
         case PulledTable(mass=mass, stiffness=stiffness, speed=speed):
             rig = PulledSlider(mass, stiffness, speed)
         case _:
@@ -357,6 +368,7 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
                 arguments["t_eval"] = motion.time[inside]
     assert end is not None
     start = 0.0 if start is None else start
+    _check_end(path, start, end, overrides)
     if scenario.output.every is not None:
         arguments["t_eval"] = _rows(path, scenario.output.every, start, end)
     arguments |= {"t_start": start, "t_end": end, "initial": initial}
@@ -366,24 +378,22 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
     return Loaded(path, scenario, model, rig, arguments, record, motion)
 
 
-def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLike:
-    if isinstance(given, SignalRecordTable):
-        file = find_file(path, given.file)
-        # The value column is read as the quantity it represents, so that units are checked.
-        try:
-            record = given.read(file, {quantity: given.value.build()})
-        except UnitError as error:
-            raise ScenarioError.of(error).inside(key).inside(path) from None
-        rows = record.chosen
-        return Corners(record.columns["time"][rows], record.columns[quantity][rows], held=False)
+def _signal(path: Path, given: SignalField, quantity: str, overrides: Sequence[str]) -> SignalLike:
+    key = f"rig.{quantity}"
     try:
-        if isinstance(given, list):
-            return as_signal([(t, value) for t, value in given])
-        return as_signal(given)
+        if isinstance(given, SignalRecordTable):
+            file = find_file(path, given.file)
+            # The value column is read as the quantity it represents, so that units are checked.
+            record = given.read(file, {quantity: given.value.build()})
+            rows = record.chosen
+            return Corners(record.columns["time"][rows], record.columns[quantity][rows], held=False)
+        key += f" = {cut(shown(given), 40)}"
+        return as_signal([(t, value) for t, value in given] if isinstance(given, list) else given)
+    except (RecordError, ScenarioError):
+        raise
     except GMSError as error:
-        raise (
-            ScenarioError.of(error).inside(f"{key} = {cut(shown(given), 40)}").inside(path)
-        ) from None
+        line = place_in(path, ("rig", quantity), overrides)
+        raise ScenarioError.of(error).inside(f"{line}{key}").inside(path) from None
 
 
 def find_file(scenario: Path, name: str) -> Path:

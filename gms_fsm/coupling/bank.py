@@ -12,11 +12,12 @@ from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.coupling.joint import Asked, ElementSwitch, Line
 from gms_fsm.coupling.joints import Joints, Snapshot, input_lines, made_again
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import listed
+from gms_fsm.foundation.arguments import listed, refusing
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
 
+@refusing(quick=("advance", "advance_to", "peek"))
 class FrictionBank:
     """The frictions of m joints, as `FrictionState` does it for one.
 

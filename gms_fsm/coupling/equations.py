@@ -18,6 +18,7 @@ from gms_fsm.charts.parameters import FloatArray, as_numbers, checked_array, che
 from gms_fsm.coupling.driven import Driven
 from gms_fsm.coupling.stepping import ElementSwitch
 from gms_fsm.errors import ChartError, ParameterError
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
 from gms_fsm.systems.models import Model
@@ -28,6 +29,7 @@ from integrators.loop import FIRED, FIRING, PAUSED, run_to_event
 from integrators.steps import ArcMotion
 
 
+@refusing(quick=("derivatives", "force", "margins", "truth"))
 class FrictionEquations:
     """One friction as equations with events.
 

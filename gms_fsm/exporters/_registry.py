@@ -12,7 +12,7 @@ from gms_fsm.errors import ParameterError, shown
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.formats import Format, of
-from gms_fsm.foundation.arguments import checked_path, either, unknown
+from gms_fsm.foundation.arguments import checked_path, either, refusing, unknown
 from gms_fsm.foundation.display import asked
 from gms_fsm.foundation.files import output_folder, write_together
 from gms_fsm.foundation.text import encoded
@@ -38,6 +38,7 @@ def formats() -> dict[str, Format]:
     return {each.name: each for each in table("friction", "chart")}
 
 
+@refusing()
 def export(
     system: System | Model | Contact | Chart,
     format: str,  # noqa: A002 (as the command line calls it)

@@ -19,6 +19,9 @@ from typing import Any, TypeVar, cast
 from gms_fsm.errors import GMSError, ParameterError, shown
 
 Called = TypeVar("Called", bound=Callable[..., Any])
+Kind = TypeVar("Kind", bound=type)
+OWN = ("self", "cls")
+ANY_NUMBER = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
 MOST_NAMED = 12  # of all names: more are a wall that nobody reads
 
 
@@ -94,12 +97,15 @@ def refusing(
     error: type[GMSError] = ParameterError,
     *advice: str,
     instead: Mapping[str, str] | None = None,
+    quick: tuple[str, ...] = (),
     **needed: str,
 ) -> Callable[[Called], Called]:
     """Return a decorator: a class or function refuses arguments that it does not take, or lacks.
 
-    `instead` has names of other programs, with ours; `needed` says what to give for one that is
-    missing, `advice` what else holds where there is no such argument.
+    So do the methods of a class, except those that are `quick`, for which a look at each call would
+    cost too much: their own checks refuse what is lacking. `instead` has names of other programs,
+    with ours; `needed` says what to give for one that is missing, `advice` what else holds where
+    there is no such argument.
 
     Examples
     --------
@@ -114,26 +120,52 @@ it takes speed, load
     gms_fsm.errors.ParameterError: belt: speed is missing; give a number [m/s]
     """
 
-    def add(kind: Called) -> Called:
-        call: Any = kind.__init__ if isinstance(kind, type) else kind  # type: ignore[misc]
-
+    def guarded(kind: Any, call: Any, *more: str) -> Any:
         @functools.wraps(call)
         def checked(*args: Any, **given: Any) -> Any:
             try:
                 return call(*args, **given)
             except TypeError:
-                misfit = _misfit(kind, call, args, given, instead or {}, needed, advice)
+                misfit = _misfit(kind, call, args, given, instead or {}, needed, more)
                 if misfit is None:  # raised within
                     raise
                 place, reason, *rest = misfit
             raise error(reason, place=place, advice="; ".join(rest))
 
+        return checked
+
+    def add(kind: Called) -> Called:
         if not isinstance(kind, type):
-            return cast("Called", checked)
-        kind.__init__ = checked  # type: ignore[misc]
+            return cast("Called", guarded(kind, kind, *advice))
+        kind.__init__ = guarded(kind, kind.__init__, *advice)  # type: ignore[misc]
+        for name, each in [*vars(kind).items()]:
+            method = getattr(each, "__func__", each)
+            if name.startswith("_") or not inspect.isfunction(method):
+                continue
+            if name in quick:
+                _lacking(method)
+            elif not hasattr(method, "__wrapped__"):
+                checked = guarded(method, method)
+                setattr(kind, name, checked if method is each else type(each)(checked))
         return kind
 
     return add
+
+
+class _Lacking:
+    """Stands for an argument that is lacking."""
+
+    def __repr__(self) -> str:
+        return "missing"
+
+
+LACKING = _Lacking()
+
+
+def _lacking(call: Any) -> None:
+    """Let a function be called without its arguments, so that its checks see that they lack."""
+    call.__signature__ = inspect.signature(call)
+    call.__defaults__ = (LACKING,) * (call.__code__.co_argcount - 1)
 
 
 def _misfit(
@@ -153,33 +185,61 @@ def _misfit(
         said = str(error)
     else:
         return None
-    takes = {name: each for name, each in signature.parameters.items() if name != "self"}
-    args = args[len(signature.parameters) - len(takes) :]
-    named = given.get("name", args[0] if args else None) if "name" in takes else None
-    place = kind.__name__ if named is None else f"{kind.__name__.lower()} {shown(named)}"
-    for name in given:
+    every = {name: each for name, each in signature.parameters.items() if name not in OWN}
+    args = args[len(signature.parameters) - len(every) :]
+    takes = {name: each for name, each in every.items() if each.kind not in ANY_NUMBER}
+    place = kind.__qualname__
+    if isinstance(kind, type) and "name" in takes and (args or "name" in given):
+        place = f"{kind.__name__.lower()} {shown(given.get('name', args[0] if args else None))}"
+    for name in given if takes == every else ():
         if name not in takes:
-            near = instead.get(name) or nearest(name, takes)
+            ours = instead.get(name)
+            near = ours if ours in takes else nearest(name, takes)
             hint = f"did you mean {near!r}? " if near else ""
             return (
                 place,
                 f"it has no argument {name!r}",
-                f"{hint}it takes {', '.join(takes)}",
+                f"{hint}it takes {', '.join(takes) or 'none'}",
                 *advice,
             )
     ordered = [name for name, each in takes.items() if each.kind is not each.KEYWORD_ONLY]
     if len(args) > len(ordered):
         rest = [name for name in takes if name not in ordered]
         form = f": {', '.join(f'{name}=...' for name in rest)}" if rest else ""
-        return (
-            place,
-            f"{len(args)} arguments without a name are too many",
-            f"give at most {len(ordered)}{', the others by name' * bool(rest)}{form}",
-        )
+        cure = f"give at most {len(ordered)}{', the others by name' * bool(rest)}{form}"
+        if not ordered:
+            cure = f"give each by its name{form}" if rest or takes != every else "it takes none"
+        several = f"{len(args)} argument{'s' * (len(args) > 1)} without a name"
+        return place, f"{several} {'are' if len(args) > 1 else 'is'} too many", cure
     for name, each in takes.items():
         if each.default is each.empty and name not in given and name not in ordered[: len(args)]:
             return place, f"{name} is missing", f"give {needed.get(name, f'{name}=...')}"
     return place, said
+
+
+def pointing(ours: Mapping[str, str]) -> Callable[[Kind], Kind]:
+    """Return a decorator: a class that is asked for what other programs have says what is ours.
+
+    Examples
+    --------
+    >>> @pointing({"velocity": "run.v"})
+    ... class Run: ...
+    >>> Run().velocity
+    Traceback (most recent call last):
+    AttributeError: a Run has no 'velocity'; write run.v
+    """
+
+    def add(kind: Kind) -> Kind:
+        def missing(self: object, name: str) -> Any:
+            if hasattr(kind, name):
+                return object.__getattribute__(self, name)  # raises what the property has raised
+            cure = f"; write {ours[name]}" if name in ours else ""
+            raise AttributeError(f"a {kind.__name__} has no {name!r}{cure}", name=name, obj=self)
+
+        kind.__getattr__ = missing  # type: ignore[attr-defined]
+        return kind
+
+    return add
 
 
 # --------------------------------------------------------------------------- names

@@ -5,6 +5,7 @@ The sentence gives key, value, rule, and the nearest key; it names no file.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -65,14 +66,7 @@ def read_file(
     text = text_of(path, error)
     data = data_of(text, path, error)
     replaced = [override(data, each) for each in overrides]
-
-    def place_of(key: Key) -> list[str]:
-        """Return where a key is given: on a line, or by an override."""
-        if any(key[: len(each)] == each for each in replaced):
-            return ["--set"]
-        line = line_of(text, key)
-        return [f"line {line}"] if line else []
-
+    place_of = functools.partial(_place_of, text, replaced)
     try:
         table = kind.model_validate(data)
     except ValidationError as found:
@@ -85,6 +79,22 @@ def read_file(
         place = place_of(key)
         place += [".".join(map(str, key))] if key else []
         raise (found.inside(", ".join(place)) if place else found).inside(path) from None
+
+
+def place_in(path: Path, key: Key, overrides: Sequence[str] = ()) -> str:
+    """Return where a key of a file is given, to stand before what is said of it."""
+    text = text_of(path)
+    data = data_of(text, path)
+    found = _place_of(text, [override(data, each) for each in overrides], key)
+    return "".join(f"{each}: " for each in found)
+
+
+def _place_of(text: str, replaced: Sequence[Key], key: Key) -> list[str]:
+    """Return where a key is given: on a line, or by an override."""
+    if any(key[: len(each)] == each for each in replaced):
+        return ["--set"]
+    line = line_of(text, key)
+    return [f"line {line}"] if line else []
 
 
 def write_file(path: Path, table: Table) -> Path:
@@ -182,6 +192,8 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
         valid = _fields_at(places[:-1], data, root)
         near = _instead(str(places[-1])[:LONGEST_SHOWN], places[:-1], valid, data, root)
         hint = f"did you mean {near!r}? " if near else ""
+        if kinds := _kinds_with(str(places[-1]), places[:-1], data, root):
+            hint = f"it is a key of kind = {either(kinds)}; "
         return f"{key} = {cut(shown(value), 40)}: unknown key; {hint}valid here: {some_of(valid)}"
     if kind == "missing":
         field = _fields_at(places[:-1], data, root).get(str(places[-1]))
@@ -209,6 +221,8 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
     pair = isinstance(places[-1], str) and (_pair_in(field) or _pair_in(outer))
     if pair and kind in ("list_type", "too_short", "too_long"):
         return f"{key} = {shown(value)}: {_as_pair(value, field)}"
+    if kind == "too_short" and not value and field is not None:
+        return f"{key} = {shown(value)}: it must not be empty{_what(field)}"
     per_element = field is not None and "element" in (field.description or "")
     elements = _beside(places, data) if per_element else 0
     return f"{key} = {shown(value)}: {_other_form(kind, value, elements) or text}"
@@ -373,24 +387,40 @@ def _inside(data: Any, part: str | int) -> Any:
     return data[part]
 
 
+def _kinds_with(key: str, places: Key, data: dict[str, Any], root: type[BaseModel]) -> list[str]:
+    """Return the other kinds of a table that have a key."""
+    options, _ = _options_at(places, data, root)
+    known = [each.model_fields for each in options]
+    kinds = (_choices(each["kind"].annotation) for each in known if key in each and "kind" in each)
+    return [kind for several in kinds for kind in several]
+
+
 def _fields_at(places: Key, data: dict[str, Any], root: type[BaseModel]) -> dict[str, FieldInfo]:
     """Return the keys that are valid in a table of the file."""
+    options, table = _options_at(places, data, root)
+    fields = _fitting(options, table).model_fields if options else {}
+    return {field.alias or name: field for name, field in fields.items()}
+
+
+def _options_at(
+    places: Key, data: dict[str, Any], root: type[BaseModel]
+) -> tuple[list[type[BaseModel]], Any]:
+    """Return the kinds that a table of the file may have, and the table."""
     options, table = [root], data
     for place in places:
         if not isinstance(place, int):
             fields = _fitting(options, table).model_fields
             named = {field.alias or name: field for name, field in fields.items()} | fields
             if place not in named:
-                return {}
+                return [], {}
             options = _tables_in(named[place].annotation)
             if not options:
-                return {}
+                return [], {}
         try:
             table = _inside(table, place)
         except (LookupError, TypeError):
             table = {}
-    fields = _fitting(options, table).model_fields
-    return {field.alias or name: field for name, field in fields.items()}
+    return options, table
 
 
 def _fitting(options: list[type[BaseModel]], table: Any) -> type[BaseModel]:

@@ -19,7 +19,7 @@ LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 2000  # characters that are searched for what is usual, in quadratic time
 MOST_PREFIXES = 60  # that are read to find a line
 DEEPEST_KEY = 6  # parts
-SEVERAL = ("state", "edge", "parameter", "body", "spring", "contact", "supervisor", "sampled")
+REPEATED = ("state", "edge", "parameter", "body", "spring", "contact", "supervisor", "sampled")
 # tomllib takes quadratic time in the number of parts of a key, which can be hours.
 _ENDLESS_KEY = re.compile(
     r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}"""
@@ -190,7 +190,7 @@ def _twice(lines: Sequence[str]) -> str:
             if before.lstrip().startswith("["):
                 break
     head = re.match(r"\s*\[+([\w.-]+)\]", lines[-1])
-    if head and head[1].rpartition(".")[2] in SEVERAL:
+    if head and head[1].rpartition(".")[2] in REPEATED:
         return f"there may be several of it: write each head as [[{head[1]}]]"
     return "the key, or its table, is given twice: join them"
 

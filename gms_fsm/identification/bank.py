@@ -25,7 +25,7 @@ from gms_fsm.charts.gms import Law, check_law
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, RecordError
-from gms_fsm.foundation.arguments import checked_integer, checked_kind, listed
+from gms_fsm.foundation.arguments import checked_integer, checked_kind, listed, refusing
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.systems.gms_parameters import GMSParameters
@@ -49,6 +49,7 @@ ARREST = 1e-3  # v_c as a share of the median speed, of records without standsti
 FASTEST_ARREST = 0.1  # ... and at most: an element that moves slower cannot break away
 
 
+@refusing()
 def initial_bank(
     records: Record | Sequence[Record],
     n: int,

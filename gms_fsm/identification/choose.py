@@ -18,7 +18,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
-from gms_fsm.foundation.arguments import checked_kind, listed, one_of
+from gms_fsm.foundation.arguments import checked_kind, listed, one_of, refusing
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, FitStart
 from gms_fsm.identification.certainty.statistics import correlation_time
 from gms_fsm.identification.fit import fitted, options_of, task_of, window_of
@@ -50,6 +50,7 @@ NEARLY = 0.1  # of a cycle may be missing at the end
 INTERRUPTED = "The choice was interrupted: {done} of {all} candidates were compared."
 
 
+@refusing()
 def choose(
     records: Record | Sequence[Record],
     *,

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.records.record import Record
 
 __all__ = ["excite"]
@@ -34,6 +35,7 @@ START, END = "at rest", "back to the middle"
 TO_AND_FRO = (1.0, -1.0, 0.5, 0.0, 1.0, -1.0)
 
 
+@refusing()
 def excite(
     stroke: float,
     speeds: ArrayLike,

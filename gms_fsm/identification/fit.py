@@ -17,7 +17,14 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, RecordError
-from gms_fsm.foundation.arguments import checked_integer, checked_kind, listed, one_of, unknown
+from gms_fsm.foundation.arguments import (
+    checked_integer,
+    checked_kind,
+    listed,
+    one_of,
+    refusing,
+    unknown,
+)
 from gms_fsm.identification.certainty.assess import (
     NO_INFLUENCE,
     Assessed,
@@ -47,6 +54,7 @@ AGAIN = 3  # searches from a better point met while looking for the ends of inte
 STILL = 1e-9  # of its size: a column that varies less is constant
 
 
+@refusing()
 def fit(
     records: Record | Sequence[Record],
     model: Model | System,

@@ -19,6 +19,7 @@ from gms_fsm.foundation.arguments import (
     checked_kind,
     checked_path,
     listed,
+    refusing,
     unknown,
 )
 from gms_fsm.foundation.display import asked, displayed
@@ -66,6 +67,7 @@ class Residuals:
     held: NDArray[np.bool_]
 
 
+@refusing()
 @displayed("html")
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit:

@@ -22,6 +22,7 @@ from gms_fsm.foundation.quantities import in_si
 from gms_fsm.language._print import spell
 from gms_fsm.language.functions import (
     CONSTANTS,
+    ELSEWHERE,
     FUNCTIONS,
     NAMESPACE,
     SEVERAL,
@@ -351,7 +352,7 @@ class _Reader:
                 return Binary(
                     _OPERATORS[type(op)], self.value(left, depth), self.value(right, depth)
                 )
-            case ast.Call(func=ast.Name(id="is_in" | "count" as f), args=[ast.Attribute() as of]):
+            case ast.Call(ast.Name("is_in" | "count" as f), [ast.Attribute() as of]) if self.dotted:
                 return self.name(node, f"{f}({ast.unparse(of)})")
             case ast.Call(func=ast.Name(id="duration"), args=[test], keywords=[]) if (
                 "age" in self.names and "duration" not in self.names
@@ -415,6 +416,10 @@ class _Reader:
     def known(self, node: ast.expr, function: str) -> None:
         if function in self.names and function in YIELDING:
             raise self.refuse(f"{function!r} is a declared name here", node, "another name for it")
+        if function in ELSEWHERE:
+            if here := [name for name in self.names if name.startswith(f"{function}(")]:
+                raise self.refuse(f"{function} takes a state of a machine", node, some_of(here))
+            raise self.refuse(f"{function} does not stand here", node, ELSEWHERE[function])
         if function not in NAMESPACE and function not in SHORT:
             raise self.refuse(
                 f"unknown function {shown(function)}{_suggestion(function, _CALLED)}",

@@ -68,6 +68,12 @@ CHOICES: Mapping[str, str] = {"if_lt": "<", "if_le": "<=", "if_gt": ">", "if_ge"
 # Words that are younger than files which use them as names: a declared name wins.
 YIELDING = ("floor", "round", *SHORT)
 CONSTANTS: Mapping[str, float] = {"pi": math.pi}
+# Conditions that stand only in some texts, and in which.
+ELSEWHERE: Mapping[str, str] = {
+    "is_in": "is_in(pad.stuck) in the texts of a system; state(1) == stuck in a session",
+    "count": "count(pad.slip) in the texts of a system",
+    "after": "after(2), in s, alone or joined by and, in the guard of an edge",
+}
 SEVERAL = ("min", "max")  # functions of two or more arguments; the others take one
 # Functions whose flow has a corner or a jump.
 ROUGH = ("sgn", "abs", "min", "max", "floor", "round", *CHOICES)

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.integrate import Radau
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.arguments import refusing, unknown
 from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.system import Body, Contact, System
 from gms_fsm.traces.failures import StepLimitError
@@ -34,6 +34,7 @@ Ramps = Sequence[tuple[float, float]]
 FLAT: Ramps = ((0.0, 0.0), (1.0, 0.0))
 
 
+@refusing()
 @dataclass(frozen=True, kw_only=True)
 class Bench:
     """Numbers of the canonical signals, and of the models whose values they are.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 from gms_fsm.errors import GMSError
-from gms_fsm.foundation.arguments import checked_kind, listed, unknown
+from gms_fsm.foundation.arguments import checked_kind, listed, refusing, unknown
 from gms_fsm.phenomena import _break_away, _sliding, presliding
 from gms_fsm.phenomena._bench import Bench
 from gms_fsm.phenomena.results import Cell, PhenomenaTable, Phenomenon, PhenomenonResult
@@ -20,6 +20,7 @@ PHENOMENA: Mapping[str, Phenomenon] = {each.name: each for each in _EVERY}
 Progress = Callable[[str, float], None]
 
 
+@refusing()
 def measure_phenomena(
     models: Iterable[str] | Mapping[str, str | Model | Contact] | None = None,
     phenomena: Iterable[str] | None = None,

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.foundation.arguments import unknown
+from gms_fsm.foundation.arguments import refusing, unknown
 from gms_fsm.phenomena.limits import LIMITS, Limit
 
 __all__ = [
@@ -201,6 +201,7 @@ class Cell:
     measured: PhenomenonResult
 
 
+@refusing()
 @dataclass(frozen=True, eq=False)
 class PhenomenaTable:
     """Models against phenomena: the result of `measure_phenomena`.

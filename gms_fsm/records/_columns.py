@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ParameterError, UnitError
 from gms_fsm.foundation.quantities import UNITS, factor, plain
 
 if TYPE_CHECKING:
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 QUANTITIES = ("time", "position", "velocity", "force", "normal")
 LOADS = ("force", "normal")  # needed only in selected rows; motion is needed in between too
+
+
+RENAME = "a name stands for one column: rename the others in the header"
 
 
 @dataclass(frozen=True)
@@ -82,9 +85,9 @@ def _column(quantity: str, given: Any) -> Column:
             _check_named_unit(quantity, name)
             return Column(name, _si(quantity))
         case (str() as name, str() as unit):
-            return Column(name, unit)
+            return _named(quantity, Column(name, unit))
         case (str() as name, str() as unit, 1 | -1 as sign):
-            return Column(name, unit, sign)
+            return _named(quantity, Column(name, unit, sign))
     raise ParameterError(
         "it must be the name of a column, (name, unit) or (name, unit, sign) with a sign "
         "of 1 or -1",
@@ -95,8 +98,7 @@ def _column(quantity: str, given: Any) -> Column:
 
 def _check_named_unit(quantity: str, name: str) -> None:
     """Refuse a name that ends in another unit than that in which the column would be read."""
-    before, *parts = re.split(r"[\s_(\[]+", name.rstrip(" )]"))
-    unit = plain(parts[-1]) if before and parts else ""
+    unit = _named_unit(name)
     if UNITS[quantity].get(unit, 1.0) != 1.0:
         raise ParameterError(
             f"its values would be read in {_si(quantity)}",
@@ -104,6 +106,26 @@ def _check_named_unit(quantity: str, name: str) -> None:
             value=name,
             advice=f"give the unit, too: ({name!r}, {unit!r})",
         )
+
+
+def _named_unit(name: str) -> str:
+    """Return what stands at the end of a name as a unit does: in brackets, or after a blank."""
+    before, *parts = re.split(r"[\s_(\[]+", name.rstrip(" )]"))
+    return plain(parts[-1]) if before and parts else ""
+
+
+def _named(quantity: str, column: Column) -> Column:
+    """Return a column; refuse one whose name clearly gives another unit."""
+    known, unit = UNITS[quantity], _named_unit(column.name)
+    clear = len(unit) > 1 or column.name.rstrip().endswith(("]", ")"))
+    if clear and known.get(unit, 0.0) != known.get(plain(column.unit), 0.0) and unit in known:
+        raise UnitError(
+            f"it is read in {column.unit}",
+            place=f"column of {quantity}",
+            value=column.name,
+            advice=f"give the unit of its name, {unit!r}, or rename the column",
+        )
+    return column
 
 
 def _si(quantity: str) -> str:

@@ -22,7 +22,7 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError, cut, shown
 from gms_fsm.foundation.arguments import meant, no_file
 from gms_fsm.foundation.quantities import UNITS, plain
-from gms_fsm.records._columns import Column
+from gms_fsm.records._columns import RENAME, Column
 
 LONGEST_LINE = 100_000  # characters
 LONGEST_FILE = 5_000_000  # rows
@@ -299,7 +299,9 @@ def _places(path: Path, head: _Head, columns: Mapping[str, Column]) -> dict[str,
                 f"name the right one: {quantity} = {{ column = ..., unit = ... }} in a scenario, "
                 f"{quantity}=(name, unit){or_none} in Python"
             )
-            if column.name not in head.names:
+            if column.name in head.names:
+                advice = RENAME
+            else:
                 advice = meant(column.name, head.names) + advice
             if not any(each.isalpha() for each in "".join(head.names) if each not in "eE"):
                 advice = "the table has no names: write a line of names above the numbers"

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import RecordError, cut, shown
-from gms_fsm.foundation.arguments import checked_kind, checked_path
-from gms_fsm.records._columns import QUANTITIES, Column, ColumnLike, columns_of
+from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing
+from gms_fsm.records._columns import QUANTITIES, RENAME, Column, ColumnLike, columns_of
 from gms_fsm.records._selection import FEWEST, Origin, selected
 from gms_fsm.records._table import TextFormat, Words, number, read_cells
 from gms_fsm.records._written import write_csv
@@ -30,6 +30,7 @@ __all__ = ["Column", "Record"]
 Missing = Literal["error", "drop", "interpolate"]
 
 
+@refusing()
 @dataclass(frozen=True, eq=False, repr=False)
 class Record:
     """A measured record in SI units, made by `from_csv`, `from_arrays` or `from_dataframe`.
@@ -462,11 +463,12 @@ def _frame_column(
         ) from None
     if found is None:
         what = "several columns" if column.name in names else "no column"
+        right = f"name the right one: {quantity}=(name, unit)" + ", or None" * (quantity != "time")
         raise RecordError(
             f"{what} {shown(column.name)} (for {quantity})",
             place=place,
-            advice=f"columns: {cut(', '.join(map(repr, names)), 1000)}; name the right one: "
-            f"{quantity}=(name, unit)" + (", or None" if quantity != "time" else ""),
+            advice=f"columns: {cut(', '.join(map(repr, names)), 1000)}; "
+            f"{RENAME if column.name in names else right}",
         )
     if getattr(getattr(found, "dtype", None), "na_value", None) is not None:  # a nullable column
         found = found.to_numpy(dtype=object, na_value=np.nan)

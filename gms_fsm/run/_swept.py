@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
-from gms_fsm.foundation.arguments import checked_path, no_file, unknown
+from gms_fsm.foundation.arguments import checked_path, no_file, refusing, unknown
 from gms_fsm.foundation.display import Log
 from gms_fsm.foundation.extras import require
 from gms_fsm.foundation.files import write_whole
@@ -36,6 +36,7 @@ LOG = np.dtype(
 )
 
 
+@refusing()
 @dataclass(frozen=True, eq=False)
 class Sweep:
     """The results of many runs, one row per run, in the order of the parameters.

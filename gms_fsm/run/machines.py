@@ -16,7 +16,7 @@ from transitions import Machine, MachineError
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.nesting import spelled
 from gms_fsm.errors import ChartError, ParameterError, shown
-from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.language import PYTHON, Condition, names_in, spell
 from gms_fsm.lowering.generated import ieee, load, load_careful
 from gms_fsm.lowering.program import Arguments, Program
@@ -109,6 +109,7 @@ class Guard:
         return f"<guard {self.text}>"
 
 
+@refusing(quick=("table",))
 class ElementMachines:
     """n elements of a model, each in a state of one shared `transitions.Machine`.
 

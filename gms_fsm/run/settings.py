@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 import integrators
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import meant, one_of
+from gms_fsm.foundation.arguments import meant, one_of, refusing
 from gms_fsm.lowering.scales import Tolerance
 
 MOST_STEPS = 1_000_000  # default limit for a run
@@ -43,6 +43,7 @@ class SettingOptions(RunOptions, total=False):
     engine: str
 
 
+@refusing()
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Settings:
     """How to integrate, which engine evaluates the guards, and what to record.

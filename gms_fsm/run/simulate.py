@@ -8,7 +8,7 @@ from typing import Any, Unpack
 
 import integrators
 from gms_fsm.errors import ParameterError, SignalError
-from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.foundation.arguments import checked_path, refusing
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
@@ -32,6 +32,7 @@ from integrators import Arc, HybridError, hybrid
 __all__ = ["Moment", "Run", "simulate"]
 
 
+@refusing()
 def simulate(
     model: Model | System,
     rig: Rig | float,

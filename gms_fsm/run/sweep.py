@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut, shown
-from gms_fsm.foundation.arguments import checked_kind, meant, unknown
+from gms_fsm.foundation.arguments import checked_kind, meant, refusing, unknown
 from gms_fsm.foundation.display import Log
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
@@ -45,6 +45,7 @@ __all__ = ["Sweep", "sweep"]
 AT_ONCE = 64  # maximum number of runs per task
 
 
+@refusing()
 def sweep(
     model: Model | System,
     rig: Rig | float,

@@ -1,8 +1,7 @@
 """Stepping through a run: stop at a guard, see why, go back, change a value, compare.
 
-This module has no user interface. A session has a tree of branches; a branch is a run computed row
-by row, with a cursor. A poke makes a new branch from the row under the cursor, a fork one with
-other numbers from the start; both leave the old branch unchanged.
+A session has a tree of branches; a branch is a run computed row by row, with a cursor. A poke makes
+a new branch from the row under the cursor, a fork one with other numbers from the start.
 """
 
 from __future__ import annotations
@@ -11,7 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Unpack
 
-from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.errors import SessionError
+from gms_fsm.foundation.arguments import checked_path, pointing, refusing
 from gms_fsm.foundation.display import displayed
 from gms_fsm.language import Condition
 from gms_fsm.run.problem import Problem
@@ -36,6 +36,8 @@ from gms_fsm.traces.system_scope import names_of
 __all__ = ["KINDS", "Branch", "BranchComparison", "Breakpoint", "Fired", "Here", "Session"]
 
 
+@refusing(SessionError)
+@pointing({"send": 'session.poke({"hot": 1}), where hot is the event'})
 @displayed("html")
 class Session:
     """A simulation to step through: ``Session(model, rig, t_end)``, or ``Session(system, t_end)``.
@@ -171,7 +173,6 @@ class Session:
         check_row(row, len(self.branch))
         return here_at(self.branch, row)
 
-    # ------------------------------------------------------------------ walking
     def step(self, count: int = 1) -> Here:
         """Go forward by rows (each micro-step is a row).
 
@@ -224,7 +225,6 @@ class Session:
         walker.goto(self.branch, t)
         return self.here
 
-    # ------------------------------------------------------------------ conditions
     @property
     def names(self) -> list[str]:
         """Names allowed in conditions and watches, with elements numbered from 1.
@@ -420,6 +420,7 @@ class Session:
         return why_at(self.branch, machine_of(element, self.start), edge)
 
     # ------------------------------------------------------------------ branches
+    @refusing(SessionError, 'give variables in one mapping: {"z": {0: 0.1}}')
     def poke(
         self,
         variables: Mapping[str, Any] | None = None,
@@ -551,7 +552,6 @@ class Session:
         """
         return self.tree.compare(a, b)
 
-    # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
         """Write the session: the system, the pokes, cursors, breakpoints and watches.
 

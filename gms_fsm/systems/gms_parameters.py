@@ -28,7 +28,7 @@ RULES = {each.name: each.rule for each in PARAMETERS}
 EVERY = {each.name: each for each in (*PARAMETERS, SIGMA_2, WEIGHTS)}  # in the order of checks
 
 
-@refusing()
+@refusing(ParameterError, "shares are for GMSParameters.from_shares", instead={"shares": "alpha"})
 @displayed("html")
 @short_repr
 @by_value()

@@ -275,6 +275,7 @@ class Contact:
         return 0.0 if self.model is None else self.model.sigma_2
 
 
+@refusing(ParameterError, "what moves is a Contact")
 class Supervisor(Contact):
     """A machine that is no contact: its chart has no velocity, and its outputs are signals.
 

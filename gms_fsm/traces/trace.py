@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import checked_integer, checked_path, unknown
+from gms_fsm.foundation.arguments import checked_integer, checked_path, pointing, refusing, unknown
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import require
 from gms_fsm.foundation.text import visible
@@ -37,10 +37,10 @@ from gms_fsm.traces.observed import Observed
 from gms_fsm.traces.rows import Rows, merged
 from gms_fsm.traces.verdicts import Trust, Verdict
 from gms_fsm.traces.views import (
+    CALLED,
     BodyTrace,
     driven_velocity,
     dwell_times,
-    no_attribute,
     read_parts,
     sampled,
     sigma_at,
@@ -54,6 +54,8 @@ if TYPE_CHECKING:
 __all__ = ["BodyTrace", "Trace", "dwell_times"]
 
 
+@refusing()
+@pointing(CALLED)
 @displayed("png", "html")
 @dataclass(frozen=True, eq=False)
 class Trace:
@@ -117,12 +119,6 @@ class Trace:
 
     def __len__(self) -> int:
         return len(self.rows)
-
-    if not TYPE_CHECKING:  # which knows all attributes there are
-
-        def __getattr__(self, name):
-            """Raise an error that says how the attribute is called here."""
-            raise AttributeError(no_attribute(name), name=name, obj=self)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: generated functions cannot be, and are made again."""

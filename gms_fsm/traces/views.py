@@ -241,7 +241,7 @@ def read_parts(path: Path) -> Parts:
         ) from None
 
 
-_CALLED = {  # what other programs have, and what it is here
+CALLED = {  # what other programs have, and what it is here
     "time": "trace.t",
     "position": "trace.x",
     "velocity": "trace.v",
@@ -252,8 +252,3 @@ _CALLED = {  # what other programs have, and what it is here
     "plot": "plots.overview(trace)",
     "to_csv": "trace.save('run.csv')",
 }
-
-
-def no_attribute(name: str) -> str:
-    """Return what is said of an attribute that a trace does not have."""
-    return f"a Trace has no {name!r}" + (f"; write {_CALLED[name]}" if name in _CALLED else "")

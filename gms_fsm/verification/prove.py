@@ -55,7 +55,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.foundation.arguments import listed
+from gms_fsm.foundation.arguments import listed, refusing
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.system import System
@@ -105,6 +105,7 @@ def _rules(subject: ChartSubject) -> tuple[str, ...]:
     )
 
 
+@refusing()
 def prove(
     chart: Chart | Model | Contact | System,
     domain: Sequence[str] | None = None,

@@ -186,7 +186,7 @@ def warn_of_missing_glyphs(write: ChartWriter, note: str = "") -> None:
         warnings.warn(
             f"the font of charts, {MONO_FONT}, has no {listed}{more}: the picture shows a box "
             "or another font there",
-            stacklevel=3,
+            stacklevel=4,
         )
 
 

@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gms_fsm.errors import OutputError, ParameterError, shown
-from gms_fsm.foundation.arguments import checked_integer
+from gms_fsm.foundation.arguments import checked_integer, refusing
 from gms_fsm.foundation.quantities import Scale, scale_of, trimmed
 from gms_fsm.language import Condition, clauses, evaluate, names_in
 from gms_fsm.session.explain import values_at
@@ -309,6 +309,7 @@ class LiveChart:
         ]
 
 
+@refusing()
 def live_statechart(
     trace: Trace,
     *,

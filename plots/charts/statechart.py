@@ -18,7 +18,7 @@ import graphviz
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.nesting import Level
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import checked_kind, listed, one_of
+from gms_fsm.foundation.arguments import checked_kind, listed, one_of, refusing
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
@@ -75,6 +75,7 @@ class ChartGraph(DrawnGraph):
     chart: Chart
 
 
+@refusing()
 def statechart(
     chart: Chart,
     elements: int | Sequence[int] = 1,
@@ -182,6 +183,7 @@ def _check_chart(chart: object) -> None:
         )
 
 
+@refusing()
 def layout(chart: Chart, *, direction: str = "TB") -> dict[str, tuple[float, float]]:
     """Return where a chart's states are in its picture, to move them by hand.
 

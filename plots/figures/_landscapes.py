@@ -6,6 +6,7 @@ from textwrap import wrap
 from typing import Any
 
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.quantities import Scale
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.findings import Report
@@ -40,6 +41,7 @@ LANE, LOWEST = 0.5, 0.36  # inches: a row of the race, if there is room; below t
 LETTERS = 14.2  # of the caption, per inch
 
 
+@refusing()
 def landscape(
     trace: Trace,
     element: int,

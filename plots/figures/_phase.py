@@ -9,6 +9,7 @@ import numpy as np
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import fitted, narrow, sheet
@@ -28,6 +29,7 @@ from plots.views.traces import check_trace
 from plots.views.window import Window
 
 
+@refusing()
 def phase(
     trace: Trace,
     *,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import fitted, low, sheet
@@ -31,6 +32,7 @@ FIRED = "has fired"
 HEAD = 0.55  # inches: the title alone
 
 
+@refusing()
 def unfold(
     trace: Trace,
     t0: float,

@@ -12,6 +12,7 @@ from typing import cast
 
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ParameterError, shown
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.traces.trace import Trace
 from plots.charts.statechart import ChartSheet, chosen
 from plots.film._chart import FilmChart
@@ -29,6 +30,7 @@ FASTEST = 50  # frames per second: GIF delays are in 10 ms, and readers reject a
 USUAL = 200  # frames
 
 
+@refusing()
 def animate(
     trace: Trace,
     path: str | Path,

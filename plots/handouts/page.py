@@ -20,6 +20,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import parse_value
 from gms_fsm.systems.models import Model, is_model
@@ -51,6 +52,7 @@ LARGEST = 1.2  # the largest scale of a chart
 SIZES = presets.Preset("handout", None, None, TEXT, SMALLEST, 1.0, 150.0)
 
 
+@refusing()
 def handout(model: Model | Trace, path: str | Path) -> Path:
     """Write a model on one A4 page: chart, equations, parameters, and a hysteresis loop.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.foundation.text import visible
 from plots.charts.contents import (
     chart_texts,
@@ -28,6 +28,7 @@ from plots.output.drawings import MermaidText
 PLAIN = " _.,=+*/|()[]-!^"
 
 
+@refusing()
 def mermaid(chart: Chart) -> str:
     """Write a chart as a Mermaid state diagram.
 

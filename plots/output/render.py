@@ -12,12 +12,13 @@ from pathlib import Path
 import graphviz
 
 from gms_fsm.errors import MissingExtraError, ParameterError
-from gms_fsm.foundation.arguments import checked_path
+from gms_fsm.foundation.arguments import checked_path, refusing
 from gms_fsm.foundation.files import write_whole
 from plots.charts.statechart import ChartGraph
 from plots.output import formats
 
 
+@refusing()
 def render(graph: graphviz.Digraph, path: str | Path) -> Path:
     """Write a picture, or the text of a graph; the file ending selects the format.
 
@@ -69,5 +70,5 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
         path = path.with_suffix(formats.INSTEAD)
         content = formats.chosen(path, "graph").write(graph)
         # The same text each time, so that Python shows it once per process, not per picture.
-        warnings.warn(f"charts are written as DOT text: {error}", stacklevel=2)
+        warnings.warn(f"charts are written as DOT text: {error}", stacklevel=3)
     return write_whole(path, lambda file: file.write(content))

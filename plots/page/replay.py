@@ -25,7 +25,7 @@ from typing import Any, TypedDict, Unpack
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import checked_kind, listed
+from gms_fsm.foundation.arguments import checked_kind, listed, refusing
 from gms_fsm.foundation.extras import missing
 from gms_fsm.foundation.quantities import PREFIXES, SMALLEST, TAKES_PREFIX, UNITS
 from gms_fsm.foundation.text import visible
@@ -134,6 +134,7 @@ class PageOptions(TypedDict, total=False):
     checks: Report | Sequence[Report]
 
 
+@refusing()
 def replay(
     trace: Trace,
     other: Trace | None = None,
@@ -181,6 +182,7 @@ def replay(
     return Replay(replay_html(trace, other, **options))
 
 
+@refusing()
 def write_replay(
     path: str | Path,
     trace: Trace,

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import graphviz
 
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import refusing
 from gms_fsm.systems.system import System
 from plots.output.drawings import DrawnGraph
 from plots.style import INK, PANEL, PAPER, TEXT_GREY
@@ -89,6 +90,7 @@ class Lane:
         return [] if self.count == 1 else [(end[0] - 6, end[1])]
 
 
+@refusing()
 def block_diagram(elements: int | System = 4) -> DrawnGraph:
     """Draw the block diagram of a system, or of a GMS model.
 

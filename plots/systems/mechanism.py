@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.systems.system import System
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["schematic", "schematic_figure"]
 
 
+@refusing()
 def schematic(system: System) -> Figure:
     """Draw a system as a mechanism: masses, springs, dampers, and the contacts between them.
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gms_fsm as package
-from gms_fsm import Prescribed, simulate
+from gms_fsm import Prescribed, Session, simulate
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.run.simulate import Moment
@@ -108,6 +108,12 @@ def test_a_trace_says_what_is_called_otherwise(name: str, cure: str) -> None:
     trace = simulate(stick_slip("signed"), Prescribed("0.2"), 0.1)
     with pytest.raises(AttributeError, match=f"a Trace has no '{name}'; {re.escape(cure)}$"):
         getattr(trace, name)
+
+
+def test_a_session_says_how_it_sends_an_event() -> None:
+    session = Session(stick_slip("signed"), Prescribed("0.2"), 0.1)
+    with pytest.raises(AttributeError, match=r"a Session has no 'send'; write session\.poke"):
+        session.send("hot")  # type: ignore[attr-defined]
 
 
 def test_the_package_suggests_a_name() -> None:

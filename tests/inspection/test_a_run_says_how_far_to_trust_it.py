@@ -19,6 +19,7 @@ from gms_fsm import (
     Prescribed,
     PulledSlider,
     Sampled,
+    Session,
     Slider,
     State,
     Stribeck,
@@ -107,6 +108,23 @@ def test_weights_that_nobody_gave_are_named():
     (note,) = notes(GMS(p, law="signed"), "1e-4*sin(t)")
     assert "all weights are 1 m/N" in note
     assert "give shares of the friction" in note
+
+
+def test_an_event_that_nothing_emits_is_named_unless_it_came() -> None:
+    lamp = Chart(
+        "lamp",
+        inputs=(),
+        velocities=(),
+        states=(State("off"), State("on")),
+        transitions=(Transition("lights", "off", "on", event="dusk"),),
+    )
+    system = System("house", supervisors=(Supervisor("lamp", lamp),), flow={"T": "1"})
+    (note,) = simulate(system, 1.0).trust().of("unused")
+    assert "nothing emits the event dusk, for which lights of lamp waits" in note.text
+    session = Session(system, 1.0)
+    session.goto(0.5)
+    session.poke({"dusk": 1})
+    assert session.tree.trace(1).trust().of("unused") == ()
 
 
 @pytest.mark.parametrize(

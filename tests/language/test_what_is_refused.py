@@ -95,7 +95,7 @@ NO_CONDITIONS: dict[str, list[tuple[str, int]]] = {
         ("z", 1), ("abs(z)", 1), ("pow(z, 2)", 1), ("z + 1", 1), ("z < s and v", 11),
         ("z < s or not 1", 14),
     ],
-    "unknown function 'after'": [("after(0.2)", 1), ("z < s and after(0.2)", 11)],
+    "after does not stand here": [("after(0.2)", 1), ("z < s and after(0.2)", 11)],
     "": [("z < s and False", 11), ("any(z < s)", 1)],
     NUMBER_WANTED: [("z < (s < v)", 6), ("(z < s) + 1 < 2", 2)],
     "only < <= > >=": [

@@ -88,7 +88,7 @@ def load(kind: type[Chart], path: Path, texts: Mapping[str, Any]) -> Chart:
         warnings.warn(
             f"{here}: <log> is left out, because a chart writes nothing: "
             f"{', '.join(dict.fromkeys(document.logs))}",
-            stacklevel=3,
+            stacklevel=4,
         )
     return chart
 

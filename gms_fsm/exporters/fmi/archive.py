@@ -210,7 +210,7 @@ def _binary(
                 return {f"binaries/{folder}/{name}{ending}": made.read_bytes()}, ""
         first = (done.stderr.strip().splitlines() or ["no message"])[0]
         why = f"{' '.join(command)} failed: {first}"
-    warnings.warn(f"the FMU has no binary: {why}", stacklevel=5)
+    warnings.warn(f"the FMU has no binary: {why}", stacklevel=6)
     return {}, why
 
 

@@ -40,10 +40,12 @@ def meant(trace: Trace) -> Iterator[Doubt]:
 
 
 def unused(trace: Trace) -> Iterator[Doubt]:
-    """Yield what a system does not use: values that nothing reads, bodies that nothing moves."""
+    """Yield what is not used: values that nothing reads, bodies that nothing moves, events."""
+    texts = [*_awaited(trace)]
     if trace.system is not None:
-        for text in (*_unread(trace.system), *_idle(trace.system)):
-            yield Doubt("unused", "note", text)
+        texts += [*_unread(trace.system), *_idle(trace.system)]
+    for text in texts:
+        yield Doubt("unused", "note", text)
 
 
 def _unread(system: System) -> Iterator[str]:
@@ -60,6 +62,24 @@ def _unread(system: System) -> Iterator[str]:
                 yield (
                     f"nothing reads {name} of {sampled.name}, so that it acts on nothing; if it is "
                     f'a force, give it to a body: force = "{name}"'
+                )
+
+
+def _awaited(trace: Trace) -> Iterator[str]:
+    """Yield the events that edges wait for, and nothing has sent."""
+    machines = trace.what.system.machines
+    emitted = {name for each in machines for edge in each.chart.transitions for name in edge.emit}
+    for each in machines:
+        taken = set(trace.contact(each.name).transitions.edge)
+        waiting = [edge for edge in each.chart.transitions if edge.event not in ("", *emitted)]
+        for event in dict.fromkeys(edge.event for edge in waiting):
+            edges = [edge.name for edge in waiting if edge.event == event]
+            if taken.isdisjoint(edges):
+                wait = "waits" if len(edges) == 1 else "wait"
+                yield (
+                    f"nothing emits the event {event}, for which {', '.join(edges)} of {each.name} "
+                    f"{wait}; it can come from outside: session.poke({{'{event}': 1}}), or "
+                    f"send {event} in the debugger"
                 )
 
 
