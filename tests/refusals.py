@@ -59,6 +59,7 @@ from gms_fsm import (
     Transition,
     choose,
     excite,
+    export,
     fit,
     initial_bank,
     measure_phenomena,
@@ -73,6 +74,7 @@ from gms_fsm.charts.registry import Demonstration, Entry, entry
 from gms_fsm.errors import (
     NOTHING,
     ChartError,
+    CheckpointError,
     ExpressionError,
     OutputError,
     ParameterError,
@@ -1531,6 +1533,7 @@ rows = {
     "velocity of a supervisor": ("supervisor 'mode'", (Supervisor, "mode", None), {"v": "w"}),
     "shares": ("GMSParameters.from_shares", (GMSParameters.from_shares,), {"shares": [1.0]}),
     "nothing": ("GMSParameters.paper", (GMSParameters.paper,), {}),
+    "no end of a system": ("simulate", (simulate, DRIVEN), {}),
     "no rig": ("simulate", (simulate, GMSParameters.paper("stick-slip")), {}),
     "option by its place": ("Trace.trust", (Trace.trust, None, True), {}),
     "arrays by their places": ("Record.from_arrays", (Record.from_arrays, [0, 1], [0, 1]), {}),
@@ -3126,6 +3129,39 @@ rows = {
     "damper with a damaged file": ("test12.csv", ..., lambda: sets(damper, "0,0,0,a\n" * 9)),
 }
 group("public data", RecordError, called, rows)
+
+rows = {
+    "list for a bank of one": ("", ..., lambda: bank(k=4e5)),
+    "column for a list": ("", ..., lambda: bank(k=np.array([[40.0], [10.0]]))),
+    "number with its unit": ("mass", "1 kg", lambda: Slider("1 kg", "t")),
+    "number with a decimal comma": ("mass", "0,5", lambda: Slider("0,5", "t")),
+    "times for the end": ("t_end", (0, 1), lambda: simulate(GIVEN, MOVING, (0, 1))),
+    "name of a scenario": ("model", "servo", lambda: simulate("servo", 1.0)),
+    "name of a chart": ("chart", "lugre", lambda: prove("lugre")),
+    "threads by their number": (
+        "executor", 4, lambda: sweep(GIVEN, MOVING, 1.0, {"v_c": [1e-6]}, executor=4)),
+    "folder for the format": ("", ..., lambda: export(GIVEN, "out", "c99")),
+    "parameter of a contact": ("", ..., lambda: sweep(DRIVEN, 1.0, {"v_s": [1e-3]})),
+    "frame for a record": ("records", "t_s", lambda: fit(Frame(CELLS), GIVEN, free=["k"])),
+}  # fmt: skip
+group("call that is meant otherwise", ParameterError, called, rows)
+rows = {
+    "motion for its velocity": ("signal", ..., lambda: Prescribed(arrays().motion())),
+}
+group("signal that is meant otherwise", SignalError, called, rows)
+rows = {"decimal comma": ("signal, column 3", ..., lambda: Prescribed("0,001*sin(t)"))}
+group("signal that is meant otherwise", ExpressionError, called, rows)
+rows = {"date for a time": ("own.csv", ..., {3: "2024-01-01 00:00:01,1,1"})}
+group("cell that is meant otherwise", RecordError, cells, rows)
+rows = {"folder": (".", ..., ".")}
+group(
+    "checkpoint",
+    CheckpointError,
+    lambda path: simulate(GIVEN, MOVING, 1.0, checkpoint=path),
+    rows,
+)
+rows = {"scenario": ("own.toml", ..., OPEN_LOOP.encode())}
+group("file that is another", ChartError, chart_bytes, rows)
 
 
 if __name__ == "__main__":

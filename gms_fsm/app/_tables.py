@@ -162,7 +162,9 @@ _DEFAULT = Settings()
 class RunTable(Table):
     """How to integrate; keys and defaults are those of `gms_fsm.Settings`."""
 
-    t_end: float | None = Field(None, description="s; by default the end of the record")
+    t_end: float | None = Field(
+        None, description="s; by default the end of the record; a duration if t_start is 0"
+    )
     t_start: float | None = Field(None, description="s; by default 0, or the start of the record")
     method: MethodName = Field(_DEFAULT.method_name, description="the solver")
     step: float | None = Field(_DEFAULT.step, gt=0, description="fixed time step dt, s")

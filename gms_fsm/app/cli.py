@@ -121,7 +121,7 @@ class _Verb(TyperCommand):
                 yield f"A key is changed by --set {each}"
             if "--law" in known and each in LAWS:
                 yield f"A law is chosen by --law {each}"
-        parted = re.search(r"--set ([\w.]+)(?: = ?|= )([^\s=]+)", " ".join(args))
+        parted = re.search(r"--set ([\w.]+)(?: = ?|= | (?=[-\d\[]))([^\s=]+)", " ".join(args))
         extra = re.search(r"unexpected extra argument.*\(([^\s=]+[./\\][^\s=]*)\)", message)
         if parted:
             yield f"A key is changed without blanks: --set {parted[1]}={parted[2]}"
@@ -135,8 +135,8 @@ class _Verb(TyperCommand):
         option = re.match(r"No such option:? '?(-+([\w-]+))", message)
         name = option[2].replace("-", "_") if option else ""
         keys = [each for each in RunTable.model_fields if name and each.startswith(name)]
-        if option and keys and "--set" in known:
-            value = dict(itertools.pairwise(args)).get(option[1], "...")
+        value = dict(itertools.pairwise(args)).get(option[1], "...") if option else "="
+        if keys and "--set" in known and "=" not in value:
             yield f"A key of the run is changed by --set run.{keys[0]}={value}"
         if {"-o", "--output"} & {*args} and "--output" not in known:
             yield f"It prints: gms-fsm {self.name} ... > FILE"

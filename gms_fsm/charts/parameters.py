@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import ChartError, GMSError, ParameterError, shown
 from gms_fsm.foundation.arguments import refusing, unknown
+from gms_fsm.foundation.quantities import in_si
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -220,7 +221,9 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
             raise TypeError
         number = float(value)
     except (TypeError, ValueError):
-        raise ParameterError("it must be a number", place=name, value=value) from None
+        plain = in_si(value) if isinstance(value, str) else ""
+        form = f", without quotes and in SI units: {plain}" if plain else ""
+        raise ParameterError(f"it must be a number{form}", place=name, value=value) from None
     except OverflowError:  # an integer too large for a float
         raise ParameterError("it is too large", place=name, advice="it must be finite") from None
     if not math.isfinite(number):
@@ -266,9 +269,7 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
     """Return a read-only copy, shape (n,), if every entry is finite and satisfies a rule."""
     array = as_numbers(name, values)
     if array.ndim != 1 or array.size == 0:
-        raise ParameterError(
-            f"{name} has shape {array.shape}", advice="it must be a flat list of numbers, not empty"
-        )
+        raise ParameterError(f"{name} has shape {array.shape}", advice=_flat(array))
     if n is not None and array.size != n:
         raise ParameterError(
             f"{name} has {array.size} entries, but there are {n} elements",
@@ -281,6 +282,14 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
             checked_scalar(f"{name}[{i}] (element {i + 1})", number, rule)
     array.setflags(write=False)
     return array
+
+
+def _flat(array: FloatArray) -> str:
+    """Return the advice on an array that is no flat list."""
+    if array.ndim == 0 and np.isfinite(array):
+        return f"it must be a list of numbers, such as [{array.item():g}, {array.item():g}]"
+    ravel = "; numpy.ravel makes one" if 0 < array.size == max(array.shape, default=0) else ""
+    return f"it must be a flat list of numbers, not empty{ravel}"
 
 
 def as_numbers(name: str, values: ArrayLike) -> FloatArray:

@@ -104,6 +104,9 @@ def export(
         error, word = unknown("format", format, known), str(format).lower()
         kinds = {each.name: re.findall(r"\w+", each.kind.lower()) for each in known.values()}
         serving = [name for name, words in kinds.items() if word in words]
+        if isinstance(folder, str) and folder in known:
+            advice = f"format and folder are swapped: export(..., {folder!r}, {shown(format)})"
+            raise error.replaced(advice=advice)
         if serving:
             raise error.replaced(advice=f"{shown(format)} is served by {either(serving)}")
         raise error

@@ -246,16 +246,20 @@ def pointing(ours: Mapping[str, str]) -> Callable[[Kind], Kind]:
 def nearest(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
     """Return the known name most like a wrong one, whatever its case; empty if none is.
 
-    A name of which the wrong one is the beginning is near, too.
+    A name of which the wrong one is the beginning is near, too, and one of which it is the end
+    behind a dot.
 
     Examples
     --------
+    >>> nearest("F_s", ["numbers.F_c", "bearing.F_s"])
+    'bearing.F_s'
     >>> nearest("SIGMA2", ["k", "sigma_2"]), nearest("mass", ["k"]), nearest("GMS", ["gms-signed"])
     ('sigma_2', '', 'gms-signed')
     """
     by_case = {each.casefold(): each for each in known}
     folded = str(name)[:100].casefold()
-    near = difflib.get_close_matches(folded, by_case, n=1, cutoff=cutoff)
+    inner = [each for each in by_case if each.endswith(f".{folded}")]
+    near = inner[:1] or difflib.get_close_matches(folded, by_case, n=1, cutoff=cutoff)
     if not near and len(folded) > 2:
         near = [each for each in by_case if each.startswith(folded)]
     return by_case[near[0]] if near else ""

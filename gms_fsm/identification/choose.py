@@ -173,7 +173,7 @@ def _checked_records(records: Any) -> list[Record]:
     if not given:
         raise ParameterError(f"it must be {wanted}", place="records", value=records)
     for each in given:
-        checked_kind("records", each, Record, "a Record, for example Record.from_csv(path)")
+        checked_kind("records", each, Record, "a Record, from Record.from_csv or from_dataframe")
         if "force" not in each.columns:
             raise RecordError(
                 "it has no force, with which to compare",

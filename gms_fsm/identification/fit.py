@@ -258,7 +258,7 @@ def task_of(
     if not every:
         raise ParameterError("there is none", place="records", advice="give at least one Record")
     for each in every:
-        checked_kind("records", each, Record, "a Record, for example Record.from_csv(path)")
+        checked_kind("records", each, Record, "a Record, from Record.from_csv or from_dataframe")
     subject = _with_fixed(mounted_alone(model), fixed, options.free)
     task = Task(subject, tuple(every), options, begin=options.begin or BEGINS[1])
     _ = task.unknowns  # raises errors of names and bounds

@@ -330,7 +330,7 @@ class Fit:
         SimulationError
             If the run fails.
         """
-        checked_kind("record", record, Record, "a Record, for example Record.from_csv(path)")
+        checked_kind("record", record, Record, "a Record, from Record.from_csv or from_dataframe")
         return at_all_rows(self.task.fine, self.point, self.task.course(record, None))
 
     def score(self, record: Record) -> dict[str, float]:
@@ -351,7 +351,7 @@ class Fit:
         RecordError
             If it has no force.
         """
-        checked_kind("record", record, Record, "a Record, for example Record.from_csv(path)")
+        checked_kind("record", record, Record, "a Record, from Record.from_csv or from_dataframe")
         column = self.task.measured.column
         if column not in record.columns:
             raise RecordError(

@@ -92,6 +92,7 @@ _INSTEAD: Mapping[str, str] = {
 _FOREIGN = re.compile(r"&&?|\|\|?|!(?!=)|(?<![<>=!:])=[<>]|(?<![<>=!:])=(?!=)|[∧∨¬≤≥^·×²³−]")
 _STATE = re.compile(r"\bstate\d*\s*(\(\s*\d+\s*\)\s*)?$")
 _WORDS = re.compile(r"\b(AND|OR|NOT)\b")
+_COMPARISON = "found a comparison where a number is needed"
 _DECIMAL_COMMA = re.compile(r"(?<![\w.])(\d+),(\d+)")
 _NO_SIGN_BETWEEN = re.compile(r"[\w.)]\s+[\w(]|\)[\w(]|\d[^\W\d_eE]")  # 2 pi, 2pi, (a)(b)
 _AFTER = re.compile(  # as in Stateflow: after(2, sec)
@@ -283,6 +284,8 @@ def _parsed(text: str) -> ast.expr:
         allowed = "a sign between factors, as in 2*pi*t, and no unit" if factors else _GRAMMAR
         if text.count("(") != text.count(")"):
             allowed = "as many ( as )"
+        if (comma := _DECIMAL_COMMA.search(text)) and comma.start(2) < column <= comma.end():
+            allowed = f"a decimal point: {comma[1]}.{comma[2]}"
         raise ExpressionError(reason, text, column, allowed) from None
     except (ValueError, RecursionError, MemoryError):
         raise ExpressionError("cannot be read (nested too deeply)", text, 1, _GRAMMAR) from None
@@ -359,18 +362,14 @@ class _Reader:
             ):
                 return Name(f"{LASTING}{spell(self.condition(test, depth))})")
             case ast.Call(func=ast.Name(id="after")) if "age" in self.names:
-                raise self.refuse(
-                    "found a comparison where a number is needed",
-                    node,
-                    "age, the time in the present state",
-                )
+                raise self.refuse(_COMPARISON, node, "age, the time in the present state")
             case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
                 self.known(node, function)
                 return self.call(node, function, arguments, depth)
             case ast.IfExp(test=test, body=yes, orelse=no):
                 return self.choice(node, [test, yes, no], depth)
             case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
-                raise self.refuse("found a comparison where a number is needed", node)
+                raise self.refuse(_COMPARISON, node)
         raise self.foreign(node)
 
     def foreign(self, node: ast.expr) -> ExpressionError:

@@ -244,6 +244,8 @@ def _check_words(origin: Origin, part: RecordRows, words: Words, missing: str) -
     row, quantity = min(wrong, key=lambda place: place[0])
     text = wrong[row, quantity]
     advice = "correct it, or exclude the row with where = ..., a condition that is false there"
+    if quantity == "time" and ":" in text:
+        advice = "give times in s, for example since the first row"
     if not text.strip():
         advice += ', or give missing = "drop" or "interpolate"'
     if origin.kind == "frame" and row == 0:

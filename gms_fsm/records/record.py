@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import RecordError, cut, shown
-from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing
+from gms_fsm.foundation.arguments import checked_kind, checked_path, meant, refusing
 from gms_fsm.records._columns import QUANTITIES, RENAME, Column, ColumnLike, columns_of
 from gms_fsm.records._selection import FEWEST, Origin, selected
 from gms_fsm.records._table import TextFormat, Words, number, read_cells
@@ -459,11 +459,12 @@ def _frame_column(
         raise RecordError(
             f"a {type(frame).__name__} is not a table of columns",
             place=place,
-            advice="give a pandas DataFrame, or use Record.from_arrays",
+            advice="give a pandas DataFrame; Record.from_csv takes a file, from_arrays arrays",
         ) from None
     if found is None:
         what = "several columns" if column.name in names else "no column"
-        right = f"name the right one: {quantity}=(name, unit)" + ", or None" * (quantity != "time")
+        right = f"{meant(column.name, map(str, names))}name the right one: {quantity}=(name, unit)"
+        right += ", or None" * (quantity != "time")
         raise RecordError(
             f"{what} {shown(column.name)} (for {quantity})",
             place=place,

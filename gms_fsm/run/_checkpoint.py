@@ -129,7 +129,9 @@ class Checkpointer:
             raise CheckpointError(
                 f"not a checkpoint, or damaged ({why(error)})",
                 place=str(self.path),
-                advice="remove it to restart the run",
+                advice="give the path of a file"
+                if self.path.is_dir()
+                else "remove it to restart the run",
             ) from None
         if head[:2] != ours[:2]:
             begun = cut(head[1]) if len(head) == 3 else "an older gms-fsm"

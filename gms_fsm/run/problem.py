@@ -259,6 +259,13 @@ def _recorded(chosen: Settings, atol: Setting, t_start: float, t_end: float) -> 
 
 def _times(t_start: float, t_end: float) -> tuple[float, float]:
     t_start = checked_scalar("t_start", t_start, "finite")
+    if np.ndim(t_end):
+        raise ParameterError(
+            "it must be a number",
+            place="t_end",
+            value=t_end,
+            advice="t_eval=... is for times",
+        )
     t_end = checked_scalar("t_end", t_end, "finite")
     for name, time in (("t_start", t_start), ("t_end", t_end)):
         if abs(time) > LATEST:

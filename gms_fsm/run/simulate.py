@@ -32,7 +32,7 @@ from integrators import Arc, HybridError, hybrid
 __all__ = ["Moment", "Run", "simulate"]
 
 
-@refusing()
+@refusing(rig="simulate(model, rig, t_end), or simulate(system, t_end)")
 def simulate(
     model: Model | System,
     rig: Rig | float,

@@ -115,6 +115,12 @@ def sweep(
     begin.start(what)  # errors common to all runs are raised once, here
     values = _values(what, given)
     runs = len(next(iter(values.values())))
+    if executor is not None and not hasattr(executor, "submit"):
+        raise ParameterError(
+            "it must be an executor, for example ProcessPoolExecutor(4) of concurrent.futures",
+            place="executor",
+            value=executor,
+        )
     collected = _Collected(what, runs, begin.settings.t_eval)
     size = max(1, min(AT_ONCE, runs // AT_ONCE))
     chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]

@@ -36,7 +36,7 @@ from gms_fsm.traces.system_scope import names_of
 __all__ = ["KINDS", "Branch", "BranchComparison", "Breakpoint", "Fired", "Here", "Session"]
 
 
-@refusing(SessionError)
+@refusing(SessionError, rig="Session(model, rig, t_end), or Session(system, t_end)")
 @pointing({"send": 'session.poke({"hot": 1}), where hot is the event'})
 @displayed("html")
 class Session:

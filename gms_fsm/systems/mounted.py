@@ -6,12 +6,14 @@ A model on a rig is a system with one contact and one body, which have no names 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import spell
+from gms_fsm.scenarios import shipped
 from gms_fsm.systems.models import Model, is_model
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.reading.assembly import Assembly
@@ -240,7 +242,12 @@ def contact_of(what: object, name: str) -> tuple[Contact, Assembly | None]:
         return what, None
     if not is_model(what):
         raise ParameterError(
-            "it must be a chart, a model, a contact or a system", place="chart", value=what
+            "it must be a chart, a model, a contact or a system",
+            place="chart",
+            value=what,
+            advice="gms_fsm.charts.CHARTS[...] has those of the package"
+            if isinstance(what, str)
+            else "",
         )
     model: Any = what
     return Contact("friction", model), None
@@ -248,6 +255,15 @@ def contact_of(what: object, name: str) -> tuple[Contact, Assembly | None]:
 
 def shifted(call: str, model: Model | System, rig: Any, *rest: Any) -> tuple[Any, ...]:
     """Return the rig and the arguments behind it; of a system they begin one earlier."""
+    if isinstance(model, str | os.PathLike) and (
+        str(model) in shipped() or str(model).endswith(".toml")
+    ):
+        raise ParameterError(
+            "it must be a model or a system",
+            place="model",
+            value=model,
+            advice=f"gms_fsm.app.scenario.load_scenario({str(model)!r}).simulate() runs a scenario",
+        )
     if not isinstance(model, System):
         return rig, *rest
     if rest[-1] is not None:

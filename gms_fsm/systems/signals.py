@@ -222,7 +222,7 @@ def as_signal(given: SignalLike) -> Signal:
             corners = np.empty(0)
         if corners.ndim == 2 and corners.shape[1] == 2:
             return Corners(corners[:, 0], corners[:, 1], held=True)
-    if callable(getattr(form, "motion", None)):
+    if callable(getattr(form, "motion", None)) or hasattr(form, "velocity"):
         raise SignalError(
             f"{shown(form)} is not a signal",
             place="signal",

@@ -51,6 +51,8 @@ def test_the_formats_are_named_from_one_table(tmp_path: Path, gms_fsm: CommandLi
         ("check pulled", "did you mean the file 'pulled.toml'?"),
         ("run a.toml --set rig.mass = 2", "without blanks: --set rig.mass=2"),
         ("run a.toml -t 2", "--set run.t_end=2"),
+        ("run a.toml --set run.t_end 2", "without blanks: --set run.t_end=2"),
+        ("run a.toml -s run.t_end=2", "No such option: -s. A key is changed by --set run.t_end=2"),
         ("run a.toml t_end=10", "changed by --set t_end=10"),
         ("run a.toml --law signed", "--set model.law=signed"),
         ("chart gms signed", "chosen by --law signed"),

@@ -117,7 +117,12 @@ class ChartTable(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _one_list(cls, given: Any) -> Any:
+    def _of_a_chart(cls, given: Any) -> Any:
+        if isinstance(given, dict) and given.keys() & {"model", "rig", "body", "contact"}:
+            raise ValueError(
+                "it is a scenario or a system, not a chart; `gms-fsm chart` draws the chart in it, "
+                "and gms_fsm.app.scenario.load_scenario reads it"
+            )
         if isinstance(given, dict) and {"parameters", "parameter"} <= given.keys():
             raise ValueError("it has parameters = [...] and [[parameter]]; give only one of them")
         return given
