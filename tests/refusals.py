@@ -69,7 +69,7 @@ from gms_fsm import (
 )
 from gms_fsm.app.cli import CliOptions, app
 from gms_fsm.app.scenario import load_system
-from gms_fsm.charts import CHARTS, gms_element
+from gms_fsm.charts import CHARTS, gms_element, timetable
 from gms_fsm.charts.registry import Demonstration, Entry, entry
 from gms_fsm.errors import (
     NOTHING,
@@ -1442,6 +1442,12 @@ rows = {
     "two names": ("edge 'go', action 'z', column 3", ..., edge(actions={"z": "s s"})),
     "unknown name in an output": ("output 'F', column 5", ..., {"outputs": {"F": "k * zz"}}),
     "contact's output": ("column 5", ..., {"contact_outputs": {"F": "F + k * z"}}),
+    "force in a condition that lasts": (
+        "edge 'go', guard, duration, column 1",
+        ...,
+        edge(guard="duration(F > 1) > 2"),
+    ),
+    "how long a number lasts": ("edge 'go', guard, column 10", ..., edge(guard="duration(z) > 2")),
     "bytes for a flow": ("state 'slip', flow of 'z', column 1", ..., state(flow={"z": b"v"})),
 }
 group("text of a chart", ExpressionError, chart, rows)
@@ -1932,6 +1938,29 @@ rows = {
     ),
 }
 group("run", ParameterError, lambda make: make(), rows)
+rows = {
+    "end without rows": ("until", ..., {"until": "v > 1", "output": "end"}),
+    "times of no events": ("timetable", ..., {"events": {}}),
+    "time of an event": ("times['oil'][1] (element 2)", NAN, {"events": {"oil": [0.0, NAN]}}),
+}
+rows |= {
+    f"end at {text}": ("until, column 1", ..., {"until": text})
+    for text in ("z1 > 0.1", "F", "count(friction.slid) > 1", "")
+}
+
+
+def ended(events: Any = None, **how: Any) -> None:
+    """Run to a condition, or to the events of a timetable."""
+    if events is not None:
+        timetable(events)
+    simulate(GIVEN, STILL, 1.0, **how)
+
+
+for name, row in rows.items():
+    error = {"until": ParameterError, "timetable": ChartError}.get(
+        row[0], ExpressionError if name.startswith("end at") else ParameterError
+    )
+    group("run", error, lambda given: ended(**given), {name: row})
 
 
 # --------------------------------------------------------------------------- sweeps
@@ -2017,6 +2046,7 @@ rows = {
     "long time": ("t", 10000000002.1, lambda f: f.advance(0.1, 0.1, 1e10)),
     "earlier time": ("t", 1.0, lambda f: f.advance_to(0.1, 0.1, 1.0)),
     "input": ("", ..., lambda f: f.advance(0.1, 0.1, 0.1, N=(1.0, 1.0))),
+    "event": ("", ..., lambda f: f.send("oil")),
     "snapshot of another model": (
         "snapshot",
         ...,
@@ -2837,6 +2867,9 @@ group("system", ParameterError, lambda given: made(**given), rows)
 rows = {
     "values beside a model": (
         "contact 'pad'", ..., lambda: Contact("pad", stick_slip("signed"), DRY)),
+    "delay of an expression": (
+        "sampled 'pid': updates", ..., lambda: pid(u="delay(2 * x, 3)")),
+    "delay by nothing": ("sampled 'pid'", ..., lambda: pid(u="delay(x, 0)")),
     "start of what is not updated": (
         "sampled 'pid'", ..., partial(Sampled, "pid", period=1, updates={"u": "1"}, initial=DRY)),
     "number of another rig of the same shape": ("system 'own': m", INF, other_number),

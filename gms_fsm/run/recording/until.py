@@ -24,7 +24,7 @@ from gms_fsm.run.recording.moment import Recording
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.parts import COUNTS, Supervisor
 from gms_fsm.traces.rows import Rows
-from gms_fsm.traces.system_scope import in_si
+from gms_fsm.traces.system_scope import in_si, names_of
 from gms_fsm.traces.trace import Trace
 
 NAME = "until"
@@ -131,6 +131,9 @@ def _waiting(what: Mounted, text: str, name: str) -> Supervisor:
     try:
         tree = parse_condition(text, [*system.readable, *alias])
     except ExpressionError as error:
+        if any(error.reason.startswith(f"unknown name {each!r}") for each in names_of(what)):
+            allowed = f"session.until({text!r}), which sees single elements"
+            error = ExpressionError(error.reason, error.text, error.column, allowed)
         raise error.at(NAME) from None
     inputs: Mapping[str, str] = {
         f"u{i}": alias.get(each, each) for i, each in enumerate(sorted(names_in(tree)), start=1)
