@@ -600,7 +600,7 @@ def loaded() -> System:
 
 
 def switched() -> System:
-    """A pad that is oiled at given times, and a sampler that sees its force late."""
+    """A pad that is oiled at given times; its force is seen late, its variable at once."""
     pad = Chart(
         "pad",
         parameters=("F_c", "b"),
@@ -614,11 +614,25 @@ def switched() -> System:
             Transition("dry_up", "oiled", "dry", guard="after(0.25)"),
         ),
     )
+    seer = Chart(
+        "seer",
+        inputs=("u",),
+        velocities=(),
+        variables=("n",),
+        states=(State("low", flow={"n": "u"}), State("high", entry={"n": "n + u"})),
+        transitions=(
+            Transition("rise", "low", "high", guard="u > 0.1"),
+            Transition("fall", "high", "low", guard="u < 0.1 + 0 * n"),
+        ),
+    )
     return System(
         "oiled by hand",
         bodies=(Body("slide", velocity="v"),),
         contacts=(Contact("pad", pad, {"F_c": 2.0, "b": 1.0}),),
-        supervisors=(Supervisor("hand", timetable({"oil": OILED})),),
+        supervisors=(
+            Supervisor("hand", timetable({"oil": OILED})),
+            Supervisor("seer", seer, inputs={"u": "pad.k"}),
+        ),
         signals={"v": "0.3 * sin(7 * t)"},
         sampled=(
             Sampled("late", period=0.01, updates={"F": "pad.F", "u": "delay(F, 3) + delay(x, 1)"}),

@@ -31,6 +31,26 @@ LIGHT = Chart(
         Transition("halt", "amber", "red", guard="after(5)", emit="red"),
     ),
 )
+DAY, NIGHT = {"red": 30.0, "green": 25.0, "amber": 5.0}, {"lit": 1.0, "dark": 1.0}  # s each
+LONG_DAY, LONG_NIGHT = 100.0, 20.5  # s
+TWO_LEVELS = Chart(  # by night it blinks; by day it goes on where it was
+    "light of two levels",
+    inputs=(),
+    velocities=(),
+    states=(
+        State("day", states=tuple(map(State, DAY)), history=True),
+        State("night", states=tuple(map(State, NIGHT))),
+    ),
+    transitions=(
+        *(
+            Transition(f"from_{one}", f"{around}.{one}", f"{around}.{other}", guard=f"after({T})")
+            for around, inside in (("day", DAY), ("night", NIGHT))
+            for (one, T), other in zip(inside.items(), [*inside][1:] + [*inside][:1], strict=True)
+        ),
+        Transition("evening", "day", "night", guard=f"after({LONG_DAY})"),
+        Transition("morning", "night", "day", guard=f"after({LONG_NIGHT})"),
+    ),
+)
 SIDE = Chart(  # goes while the main road waits
     "side",
     inputs=("free",),

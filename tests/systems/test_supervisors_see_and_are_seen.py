@@ -32,11 +32,16 @@ from tests.scenario_files import CommandLine
 from tests.supervisor_cases import (
     BRAKE,
     CHOUDHURY,
+    DAY,
     HEATING,
     KANO,
     LIGHT,
+    LONG_DAY,
+    LONG_NIGHT,
+    NIGHT,
     SIDE,
     THERMOSTAT,
+    TWO_LEVELS,
     clutches,
     crossing,
     gear_shift,
@@ -82,6 +87,28 @@ def test_ribbons_show_the_states_of_a_supervisor():
     _, green, _ = panels.ribbons(figure.Figure().subplots(), trace)
     ends = [end for path in green.get_paths() for end in path.get_extents().intervalx]
     assert ends == pytest.approx([30.0, 55.0, 90.0, 115.0, 150.0, 175.0])
+
+
+def test_a_light_of_two_levels_blinks_by_night_and_goes_on_by_day_where_it_was():
+    log = simulate(System("light", supervisors=(Supervisor("light", TWO_LEVELS),)), 600.0)
+    expected, now, active = [], 0.0, "red"
+    while now < 600.0:
+        for around, inside, length in (("day", DAY, LONG_DAY), ("night", NIGHT, LONG_NIGHT)):
+            first, at = (active if around == "day" else "lit"), now
+            names = [*inside]
+            here = names.index(first)
+            while at + inside[names[here]] < now + length:
+                at += inside[names[here]]
+                here = (here + 1) % len(names)
+                expected.append((at, f"{around}.{names[here]}"))
+            active = names[here] if around == "day" else active
+            now += length
+            expected.append((now, "night.lit" if around == "day" else f"day.{active}"))
+    entered = [(each.t, str(each.target)) for each in log.transitions]
+    expected = [(t, name) for t, name in expected if t < 600.0]
+    assert [name for _, name in entered] == [name for _, name in expected]
+    assert [t for t, _ in entered] == pytest.approx([t for t, _ in expected], rel=1e-9)
+    assert {name for _, name in entered} >= {"day.amber", "night.dark"}
 
 
 def test_a_drive_shifts_gears():
