@@ -47,8 +47,8 @@ def _loop(read: Assembly, found: str) -> ParameterError:
     return ParameterError(
         f"{found} (an algebraic loop)",
         place=f"system {read.system.name!r}",
-        advice="give one of them a period, or read it by a Sampled, and it is that of the last tick; "
-        "or put a further state between them",
+        advice="give one of them a period, or read it by a Sampled: then it is that of the last "
+        "tick; or put a further state between them",
     )
 
 
