@@ -18,19 +18,12 @@ PREFIXES = {3 * i - 12: prefix for i, prefix in enumerate([*"pnµm", "", *"kMGT"
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
 TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns)(?=$|[/*·])")
 LONGEST_NUMBER = 60  # characters, with its unit: the search takes quadratic time
-NOT_OF_SI = {"g": 1e-3, "min": 60.0, "h": 3600.0, "%": 0.01}  # factors to SI
+# Factors to SI.
+NOT_OF_SI = {"g": 1e-3, "min": 60.0, "h": 3600.0, "%": 0.01, "in": 0.0254, "lbf": 4.4482216152605}
 _ONE_UNIT = re.compile(r"([pnuµmckMGT]?)(Nm|Ns|Pa|Hz|rad|m|s|N|J|W|V|A|g)\^?(-?\d)?")
 _POWER_OF_TEN = re.compile(r"(?:([\d.,]+)\s*[*x×·]\s*)?\b10\s*(?:\^|\*\*)\s*\(?([+-]?\d+)\)?")
 _WITH_UNIT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 _THOUSANDS = re.compile(r"(?<!\d)[1-9]\d{0,2}(?:,\d{3})+(?!\d)")
-# quantity -> unit -> factor to SI
-UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
-    "position": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254},
-    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "nm/s": 1e-9},
-    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "lbf": 4.4482216152605},
-}
-UNITS["normal"] = UNITS["force"]
 BLOCKS = "▁▂▃▄▅▆▇█"
 DIGITS = 4
 SMALLEST = -4  # power of ten of a value in the unit of its place, below which it has an exponent
@@ -138,16 +131,7 @@ def in_si(text: str) -> str:
     found = _WITH_UNIT.fullmatch(re.sub(r"(?<=\d),(?=\d)", ".", plain))
     if found is None or _THOUSANDS.search(plain):
         return ""
-    scale, over = 1.0, False
-    unit = found[2].replace("μ", "µ").replace("²", "2").replace("³", "3")
-    for part in re.split(r"([/*·])", unit) if unit else []:
-        if part in "/*·":
-            over = part == "/"
-            continue
-        factor = _factor(part.strip())
-        if factor is None:
-            return ""
-        scale *= 1.0 / factor if over else factor
+    scale = _size(found[2].replace("μ", "µ").replace("²", "2").replace("³", "3"))
     number = float(found[1]) * scale
     if not math.isfinite(number):
         return ""
@@ -155,16 +139,40 @@ def in_si(text: str) -> str:
     return found[1] if as_given else f"{number:.12g}"
 
 
-def _factor(unit: str) -> float | None:
-    """Return the factor to SI of one unit, with its prefix and power."""
+def _size(unit: str) -> float:
+    """Return the factor to SI of a product of units; NaN if one is not known."""
+    scale, over = 1.0, False
+    for part in re.split(r"([/*·])", unit) if unit else []:
+        if part in "/*·":
+            over = part == "/"
+        else:
+            scale *= 1.0 / _factor(part.strip()) if over else _factor(part.strip())
+    return scale
+
+
+def _factor(unit: str) -> float:
+    """Return the factor to SI of one unit, with its prefix and power; NaN if it is not known."""
     if unit in NOT_OF_SI:
         return NOT_OF_SI[unit]
     found = _ONE_UNIT.fullmatch(unit)
     if found is None:
-        return None
+        return math.nan
     prefixes = {prefix: power for power, prefix in PREFIXES.items()} | {"u": -6, "c": -2}
     factor = 10.0 ** prefixes[found[1]] * NOT_OF_SI.get(found[2], 1.0)
     return float(factor ** int(found[3] or 1))
+
+
+# quantity -> unit -> factor to SI
+UNITS = {
+    quantity: {unit: _size(unit) for unit in units.split()}
+    for quantity, units in {
+        "time": "s ms us min h",
+        "position": "m cm mm um nm in",
+        "velocity": "m/s cm/s mm/s um/s nm/s",
+        "force": "N kN mN uN lbf",
+        "normal": "N kN mN uN lbf",
+    }.items()
+}
 
 
 def plain(unit: str) -> str:
