@@ -14,11 +14,11 @@ from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
-from gms_fsm.run.recording.moment import Moment
+from gms_fsm.run.recording.moment import Moment, Recording
 from gms_fsm.run.recording.own_machines import engine_of, own_machines
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.run.recording.recording import Recorder, check_end, explained, interference_error
-from gms_fsm.run.recording.until import Until
+from gms_fsm.run.recording.until import SeenUntil, Until
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import arguments_of
@@ -155,28 +155,27 @@ def simulate(
         run = CompiledRun(start, engine_of(start, own) if own else None)
     else:
         run = Run(start, own)
+    seen: Recording = run.recorder if stop is None else SeenUntil(stop, run.recorder)
     keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:
         while run.advance() and not (stop and stop.reached(run.recorder)):
             if keeper is not None:
                 keeper.look()
             if progress is not None:
-                progress(Moment(run.recorder))
+                progress(Moment(seen))
         if progress is not None:
-            progress(Moment(run.recorder))
+            progress(Moment(seen))
     except SimulationError as error:
         error.trace = error.trace if stop is None else stop.trace(error.trace)
         if watching:
             error.trace = watched(error.trace, watching, error)
         raise
     except KeyboardInterrupt as error:
-        trace = run.recorder.trace()
-        error.trace = trace if stop is None else stop.trace(trace)  # type: ignore[attr-defined]
+        error.trace = seen.trace()  # type: ignore[attr-defined]
         raise
     if keeper is not None:
         keeper.finish()
-    trace = run.recorder.trace()
-    trace = trace if stop is None else stop.trace(trace)
+    trace = seen.trace()
     return watched(trace, watching) if watching else trace
 
 

@@ -23,6 +23,7 @@ from gms_fsm import (
     Transition,
     simulate,
 )
+from gms_fsm.run.simulate import Moment
 from gms_fsm.traces.failures import SimulationError
 from tests.corpus import HEALS, OILED, switched
 from tests.helpers import FASTEST, bits, pulled_mass, stick_slip
@@ -114,6 +115,16 @@ def test_a_run_that_fails_before_its_condition_keeps_its_own_rows() -> None:
     trace = failed.value.trace
     assert trace.t[-1] == pytest.approx(1.0, abs=1e-3)
     assert trace.rows.mode.shape[1] == 1
+
+
+def test_listeners_of_a_run_do_not_see_what_ends_it() -> None:
+    seen: list[Moment] = []
+    trace = simulate(MODEL, RIG, END, until="count(slip) == 4", progress=seen.append)
+    last = seen[-1]
+    assert (last.t, last.states) == (trace.t[-1], trace.states[-1].tolist())
+    assert last.values["F"] == trace.F[-1]
+    assert [each.edge for each in last.transitions()] == trace.transitions.edge.tolist()
+    assert last.at(1.0).modes == [0, 0, 0, 0]
 
 
 # --------------------------------------------------------------------------- events

@@ -18,9 +18,10 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.language import Name, names_in, parse_condition, spell
 from gms_fsm.language.normal import renamed_in
+from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.lowering.scales import scales_of_system
 from gms_fsm.run.problem import Problem, with_waking_times
-from gms_fsm.run.recording.moment import Recording
+from gms_fsm.run.recording.moment import Place, Recording
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.parts import COUNTS, Supervisor
 from gms_fsm.traces.rows import Rows
@@ -116,6 +117,51 @@ class Until:
             rows.y[chosen],
             np.delete(rows.mode[chosen], self.place, axis=1),
         )
+
+
+@dataclass(frozen=True)
+class SeenUntil:
+    """A run in progress as its listeners see it: without the supervisor.
+
+    Parameters
+    ----------
+    until : Until
+        What ends it.
+    recording : Recording
+        What is recorded, with the supervisor.
+    """
+
+    until: Until
+    recording: Recording
+
+    @property
+    def start(self) -> Problem:
+        """The run without the supervisor."""
+        return self.until.plain
+
+    @property
+    def latest(self) -> Place:
+        """Time, state and modes reached."""
+        return self._seen(self.recording.latest)
+
+    def around(self, t: float) -> tuple[Place, Place | None]:
+        """Return the last row at or before a time, and the next one."""
+        before, after = self.recording.around(t)
+        return self._seen(before), after and self._seen(after)
+
+    def firings(self, after: int) -> list[LogRecord]:
+        """Return the records of the log from a number on."""
+        own, named = self.until.start.system.machines[-1].name, self.start.what.named
+        others = [each for each in self.recording.firings(0) if each.contact != own][after:]
+        return others if named else [each._replace(contact="") for each in others]
+
+    def trace(self) -> Trace:
+        """Return the trace of all recorded data."""
+        return self.until.trace(self.recording.trace())
+
+    def _seen(self, place: Place) -> Place:
+        t, y, mode = place
+        return t, y, (*mode[: self.until.place], *mode[self.until.place + 1 :])
 
 
 def _waiting(what: Mounted, text: str, name: str) -> Supervisor:
