@@ -87,6 +87,13 @@ def test_functions_that_jump_have_the_same_bits(tmp_path: Path) -> None:
     assert len(trace.transitions) > 10
 
 
+def test_events_and_conditions_that_last_have_the_same_bits(tmp_path: Path) -> None:
+    friction, rig = run("conditions that last").subject
+    (system,) = run("events at given times").subject
+    for name, each in (("lasting", system_of(friction, rig)), ("events", system)):
+        assert len(same(Case(name, each, 2.0, {}), tmp_path / name).transitions) > 5
+
+
 def test_columns_grow(tmp_path: Path) -> None:
     case = dataclasses.replace(scenario(SCENARIOS / "pulled_mass.toml"), t_end=6.0)
     trace = same(case, tmp_path)
