@@ -184,7 +184,7 @@ def places(drawn: Picture, chart: Chart, element: str, direction: str) -> dict[s
         for _, edge in chart.leaving(state.name):
             if edge.source == edge.target:
                 continue
-            guard = edge_id(chart, element, "guard", edge)
+            guard = edge_id(element, "guard", edge)
             texts = [box for name, box in drawn.texts if name == guard]
             (line,) = (p for n, p in drawn.lines if n == guard.replace("guard", "edge", 1))
             beyond = line[0][1 - AXIS[direction]] > middle[1 - AXIS[direction]]

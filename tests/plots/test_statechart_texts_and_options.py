@@ -352,7 +352,7 @@ def test_every_edge_is_in_the_cell_of_its_source_and_target() -> None:
     assert (len(xs), len(ys)) == (len(names) + 2, len(names) + 2)
     for state in chart.states:
         for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-            shown = found[edge_id(chart, "element1", "guard", edge)]
+            shown = found[edge_id("element1", "guard", edge)]
             number = re.fullmatch(rf"{priority}\[(g\d+)\]", squeezed(*shown.texts))
             assert number
             assert squeezed(f"{number[1]} = {chart.guard_text(edge.name)}") in found.legend()
@@ -379,7 +379,7 @@ def test_a_matrix_marks_the_default_state_and_only_long_guards_are_numbered() ->
     found = chart_picture(LONG_GUARDS)  # guards of six lines at most stand on the edges
     numbered = set(re.findall(r"g\d+(?==)", found.legend()))
     for edge in LONG_GUARDS.transitions:
-        texts = found[edge_id(LONG_GUARDS, "element1", "guard", edge)].texts
+        texts = found[edge_id("element1", "guard", edge)].texts
         number = re.search(r"\[(g\d+)\]", squeezed(*texts))
         assert not number or number[1] in numbered
         assert max(map(len, texts)) <= 36
