@@ -23,8 +23,8 @@ FONTS = "DejaVu Sans Mono, Menlo, Consolas, monospace"
 def main() -> None:
     """Write every picture."""
     fig_4 = "paper_fig4_stick_slip"
-    screen("debugger_why", fig_4, (124, 38), "goto 25", "why 1")
-    screen("debugger_small", fig_4, (80, 24), "goto 87.4", "next", "why 1")
+    screen("debugger_why", fig_4, (124, 38), "goto 100", "goto 25", "why 1")
+    screen("debugger_small", fig_4, (80, 24), "goto 100", "goto 87.4", "next", "why 1")
     screen(
         "debugger_branches",
         fig_4,
@@ -37,7 +37,8 @@ def main() -> None:
         "next",
         light=True,
     )
-    screen("debugger_brake", "brake_squeal", (124, 42), "element pad 1", "goto 5.2", "next")
+    steps = "element pad 1", "goto 20", "goto 5.2", "next"
+    screen("debugger_brake", "brake_squeal", (124, 42), *steps)
     live("live", "pulled_mass", 0.29)
 
 
@@ -53,7 +54,7 @@ def screen(
             app.give(*lines)
             while app.busy:
                 await pilot.pause(0.05)
-            await pilot.pause(0.2)
+            await pilot.pause(0.5)
             return app.export_screenshot(title="gms-fsm debug --tui")
 
     save(name, asyncio.run(show()))

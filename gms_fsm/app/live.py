@@ -238,8 +238,10 @@ class LiveView:
         still = all(map(math.isnan, values["z"]))  # a chart without variables
         table = Table("element", "state", title=title, title_justify="left", min_width=len(title))
         scale = f"0{1:>{BAR - 1}}"  # of the bar
-        for head in (*(() if bare else ("|z|/s", scale)), *(() if still else ("z",))):
+        for head in () if bare else ("|z|/s", scale):
             table.add_column(head)
+        if not still:
+            table.add_column("z", justify="right")
         rows = zip(states, values["z"], values["s"], strict=True)
         for i, ((state, place), z, s) in enumerate(rows):
             # Colours and bars are repeated as words and numbers; the default state is plain.
@@ -250,7 +252,7 @@ class LiveView:
                 filled = min(BAR, round(BAR * ratio))
                 bar = Text("█" * filled + "░" * (BAR - filled), style=look)
                 row += [Text(f"{ratio:.3f}"), bar]
-            table.add_row(*row, *([] if still else [f"{scales['z'].text(z):>9}"]))
+            table.add_row(*row, *([] if still else [scales["z"].text(z)]))
         return table
 
 

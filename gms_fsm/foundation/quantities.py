@@ -328,6 +328,8 @@ def wrapped(line: str, width: int = WIDTH, *, whole: bool = False) -> Iterator[s
     [True, True, True]
     >>> list(wrapped("v = 300 mm/s", 11))
     ['v =', '  300 mm/s']
+    >>> list(wrapped("  true  left 1      right 1    margin 0 m", 24))
+    ['  true  left 1  right 1', '        margin 0 m']
     >>> list(wrapped("  proved   never at the same time", 24))
     ['  proved   never at the', '           same time']
     """
@@ -336,10 +338,17 @@ def wrapped(line: str, width: int = WIDTH, *, whole: bool = False) -> Iterator[s
         return
     column = re.match(r" *\S+ {2,}", line)
     hanging = column.end() if column else len(line) - len(line.lstrip()) + 2
+    hanging = min(hanging, width // 2)
+    if column:  # a row of a table is broken between its cells
+        cells = re.split(r" {2,}", line[column.end() :].rstrip())
+        short = (len(cells) > 1 and len(cell) <= width - hanging for cell in cells)
+        pairs = zip(cells, short, strict=True)
+        kept = (cell.replace(" ", JOINED) if whole_cell else cell for cell, whole_cell in pairs)
+        line = column[0] + "  ".join(kept)
     for part in textwrap.wrap(
         NUMBER_AND_UNIT.sub(JOINED, line),
         width,
-        subsequent_indent=" " * min(hanging, width // 2),
+        subsequent_indent=" " * hanging,
         break_long_words=not whole,
         break_on_hyphens=not whole,
     ):

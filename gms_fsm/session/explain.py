@@ -41,6 +41,7 @@ __all__ = [
 ]
 
 ROUNDING = 1e-8  # relative to both sides; a smaller margin is due to the clock and floats
+NOTHING = 1e-12  # in SI units: where a side is zero, the same of any smaller margin
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class Clause:
         if math.isinf(self.margin):
             return math.copysign(1.0, self.margin)
         larger = max(abs(self.left), abs(self.right))
-        if abs(self.margin) <= ROUNDING * larger:
+        if abs(self.margin) <= max(ROUNDING * larger, NOTHING):
             return 0.0
         return self.margin / larger
 

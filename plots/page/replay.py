@@ -39,7 +39,7 @@ from gms_fsm.language import (
     SEVERAL,
     SHORT,
 )
-from gms_fsm.session.explain import ROUNDING
+from gms_fsm.session.explain import NOTHING, ROUNDING
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.prove import Report
 from integrators.machine_code.javascript import library_text
@@ -277,6 +277,7 @@ def page_data(
         },
         "hatches": HATCH_ANGLES,
         "rounding": ROUNDING,
+        "nothing": NOTHING,
     }
     return data, charts
 

@@ -2,7 +2,7 @@
 
 An edge leaves its source downwards and joins the lane of its target; where it only crosses
 another lane, the lines form a cross. The active state has a heavy frame and the word ACTIVE; the
-edge just taken is a heavy line with the word FIRED.
+edge just taken is a heavy line with the word FIRED, if there is room for it.
 """
 
 from __future__ import annotations
@@ -155,11 +155,13 @@ def _content(state: StateView, room: int) -> list[str]:
 def _texts(edge: EdgeView, room: int, names: bool) -> list[str]:
     """Return the priority, the name and the guard of an edge, with one mark per clause."""
     marks = "".join(MARKS[truth] for truth in edge.clauses)
-    fired = " FIRED" if edge.fired else ""
-    lead = f"{edge.priority} {edge.name}{fired} " if names else f"{edge.priority}{fired} "
+    name = f" {edge.name}" if names else ""
     guard = " ".join(each.replace(" ", JOINED) for each in re.split(r" (?=&& |\|\| )", edge.guard))
-    text = f"{lead}[{guard}]{f'{JOINED}{marks}' if marks else ''}"
-    found = textwrap.wrap(text, room, subsequent_indent="  ")
+    text = f"[{guard}]{f'{JOINED}{marks}' if marks else ''}"
+    # Without room for the word, the heavy line alone says that the edge has fired.
+    words = (" FIRED", "") if edge.fired else ("",)
+    leads = (f"{edge.priority}{name}{word} {text}" for word in words)
+    found = min((textwrap.wrap(each, room, subsequent_indent="  ") for each in leads), key=len)
     return [each.replace(JOINED, " ") for each in found]
 
 

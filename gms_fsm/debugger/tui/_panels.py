@@ -171,7 +171,7 @@ def event_rows(events: Sequence[EventView], cursor: int, width: int) -> list[Pan
     form, rows = next(fitting, len(forms[0]) - 1), list[PanelLine]()
     for i, each in enumerate(events):
         role = "head" if i == here else "dim" if each.row > cursor else ""
-        lead = f"{'▶' if i == here else ' '}{each.t:>11.9g} s  "
+        lead = f"{'▶' if i == here else ' '}{each.t:>#11.9g} s  "
         for part in textwrap.wrap(forms[i][form], max(8, room)):
             rows.append(PanelLine(line((lead + part, role)), _move(each.row - cursor)))
             lead = TIME

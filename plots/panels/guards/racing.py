@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from gms_fsm.foundation.quantities import trimmed
-from gms_fsm.session.explain import ROUNDING, Clause, Explanation, Why, explain
+from gms_fsm.session.explain import Clause, Explanation, Why, explain
 from gms_fsm.traces.trace import Trace
 from plots.charts.labels import FALSE, TRUE
 from plots.panels.parts.axes import Artists, note
@@ -30,12 +30,7 @@ def relative_margin(clause: Clause) -> float:
     >>> relative_margin(Clause("z >= s", False, 0.5, 2.0, -1.5))
     -0.75
     """
-    if math.isnan(clause.margin):
-        return math.nan
-    size = max(abs(clause.left), abs(clause.right))
-    if size == 0.0 or abs(clause.margin) <= ROUNDING * size:
-        return 0.0
-    return min(max(clause.margin / size, -1.0), 1.0)
+    return min(max(clause.relative, -1.0), 1.0)  # NaN stays
 
 
 def held_back_by(each: Explanation) -> Clause | None:
