@@ -292,7 +292,7 @@ def draw_howto() -> None:
     plots.render(plots.statechart(names_of("own-chart.md")["brake"]), FOLDER / "howto_nested.png")
     report = prove(BROKEN["memoryless"].chart)
     (finding,) = report.refuted
-    note = [*wrap(f"{finding.check}: {finding.text}", 38), *wrap(finding.example, 38)]
+    note = [*wrap(f"{finding.check}: {finding.text}", 42), *wrap(finding.example, 42)]
     marked = [part for part in finding.where if part in report.chart.guards]
     graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
     plots.render(graph, FOLDER / "howto_refuted.png")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from plots.charts.statechart import ChartSheet
 
 
-MARGIN = 7.0  # around what is in a region
+MARGIN = 10.0  # around what is in a region
 APART = 10.0  # between regions
 # Type of 10 points is at least 7 points high if this width is printed on 170 mm.
 PRINTED = 688.0
@@ -108,7 +108,7 @@ class _Region:
 
     @property
     def above(self) -> float:
-        return 0.0 if self.title is None else self.title.height + 2 + MARGIN / 2
+        return 0.0 if self.title is None else self.title.height + MARGIN
 
     @property
     def width(self) -> float:
@@ -183,7 +183,7 @@ class _Paper:
         self, cluster: graphviz.Digraph, corner: Point, size: tuple[float, float], title: Label
     ) -> None:
         low, high = self.at((0.0, size[1]), corner), self.at((size[0], 0.0), corner)
-        middle = (MARGIN / 2 + title.width / 2, 3 + title.height / 2)
+        middle = (MARGIN + title.width / 2, MARGIN / 2 + title.height / 2)
         cluster.attr(bb=f"{low},{high}", label=title.html, lp=self.at(middle, corner))
 
     def draw(self, graph: graphviz.Digraph, drawing: Drawing, corner: Point) -> None:

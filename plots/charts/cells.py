@@ -82,11 +82,13 @@ class CellWriter:
 
     def guard(self, rows: Sequence[Row], marked: bool = False) -> Label:
         """Set the label of an edge: the priority in a column of its own, then the lines."""
-        first = max(self._width(row[:1]) for row in rows) + 2
+        pad = SIDE - 1 if marked else 0
+        first = pad + max(self._width(row[:1]) for row in rows) + 2
         heights = [self._height(row) for row in rows]
-        wide = first + max(self._width(row[1:]) for row in rows) + (6 if marked else 2)
+        wide = first + max(self._width(row[1:]) for row in rows) + pad + 2
         body = "".join(
-            self._row(row, height, wide, first) for row, height in zip(rows, heights, strict=True)
+            self._row([Piece("", "pad"), *row] if marked else row, height, wide, first)
+            for row, height in zip(rows, heights, strict=True)
         )
         look = f'BGCOLOR="{self.colours.paper}" '
         tall = sum(heights) + 2
@@ -140,7 +142,7 @@ class CellWriter:
         cells, at = "", 0.0
         for i, piece in enumerate(self._pieces(row)):
             end = at + self._piece_width(piece)
-            if i == 0 and first:
+            if i == (row[0].role == "pad") and first:
                 end = first
             cells += self._cell(piece, max(round(end) - round(at), 1), height, ground)
             at = max(end, at + 1)

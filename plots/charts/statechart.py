@@ -274,7 +274,7 @@ class ChartSheet:
     tally : Tally, optional
         Counts to show.
     live : bool
-        Leave room for the dot of the active state and the marks of the clauses.
+        Leave room for the dot of the active state and, of one element, the marks of the clauses.
     marked : frozenset of str
         States and edges to highlight.
     names : bool
@@ -349,6 +349,11 @@ class ChartSheet:
             if len(lines) > MOST_LINES or widest > longest:
                 numbers[edge.name] = texts.setdefault(self.legend_text(edge), len(texts) + 1)
         return numbers
+
+    @property
+    def truths(self) -> bool:
+        """Whether clauses have marks; those of several elements would contradict each other."""
+        return self.live and not self.among
 
     @property
     def nested(self) -> bool:
@@ -461,7 +466,7 @@ class ChartSheet:
         ]
 
     def _number_row(self, edge: Transition) -> list[Row]:
-        marks = range(len(clauses(self.chart.guards[edge.name]))) if self.live else ()
+        marks = range(len(clauses(self.chart.guards[edge.name]))) if self.truths else ()
         number = Piece(f"g{self.numbered[edge.name]}", "clause")
         each = [Piece(TRUE, "mark", c) for c in marks]
         return [[Piece("[", "bracket"), number, *each, Piece("]", "bracket")]]
@@ -477,7 +482,7 @@ class ChartSheet:
         for i, (line, clause) in enumerate(lines):
             last = i + 1 == len(lines) or lines[i + 1][1] != clause
             row = [Piece("[" if i == 0 else " ", "bracket"), Piece(line, "clause", clause)]
-            if last and self.live and clause >= 0:
+            if last and self.truths and clause >= 0:
                 row.append(Piece(TRUE, "mark", clause))
             if last and i + 1 < len(lines):
                 # The space is a separate text: some SVG readers drop leading spaces.

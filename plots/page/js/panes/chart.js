@@ -376,7 +376,7 @@ class ChartPane {
     this.scrolls = w * scale > across + 1 || (isWide() && h * scale > high + 1);
   }
 }
-const SMALLEST = 11; // px of text
+const SMALLEST = 11.01; // px of text: browsers round lengths down
 const OVERVIEW = 0.85, LARGEST = 1.5; // px per point of the chart: of all elements on a wide screen, and of any chart
 const SHARE = 0.4; // of the height of a narrow screen
 PANES.push(ChartPane);
