@@ -344,11 +344,12 @@ def mujoco_figure() -> Figure:
         left.set(
             xlabel="angle [mrad]", ylabel="torque [N·m]", title="Loops below break-away, 1.5 N·m"
         )
-        left.legend(loc="upper left")
+        left.legend(loc="upper left", title="amplitude", title_fontsize=8)
         t = 1e-3 * np.arange(1, len(names["held"]) + 1)
         right.plot(t, 1e3 * names["native"], "--", color=TEXT_GREY, label="frictionloss of MuJoCo")
         right.plot(t, 1e3 * names["held"], color=INK, label="four elements")
         right.set(xlabel="$t$ [s]", ylabel="angle [mrad]", title="Angle under a constant 1 N·m")
+        right.set_xlim(0, t[-1])
         right.legend(loc="upper left")
     return figure
 

@@ -156,7 +156,6 @@ def fit_figure(
             axes.append(bars)
             names.append("parameters with 95 % intervals")
         letter_panels(axes, names)
-        figure.align_ylabels([over_time, residual])
         figure.suptitle(title or _title(fit, chosen, len(every), which), x=0.01, ha="left")
     return fitted(figure)
 

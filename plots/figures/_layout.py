@@ -55,6 +55,7 @@ def sheet(
 def fitted(figure: Figure) -> Figure:
     """Fold titles that are too wide, and thin out the numbers of axes, until nothing overlaps."""
     with rc_context(settings()):
+        aligned(figure)
         if current() is not SCREEN:
             _fit(figure)
         elif any(_rows(ax) > 1 for ax in figure.axes):
@@ -62,6 +63,17 @@ def fitted(figure: Figure) -> Figure:
             for ax in figure.axes:
                 _above_legend(ax, _renderer(figure))
     return figure
+
+
+def aligned(figure: Figure) -> None:
+    """Write the names of the y axes of panels that are below each other in one line."""
+    grids: dict[Any, list[Axes]] = {}
+    for ax in figure.axes:
+        place = ax.get_subplotspec()
+        if place is not None:
+            grids.setdefault(place.get_gridspec(), []).append(ax)
+    for first, *others in grids.values():
+        first.figure.align_ylabels([first, *others])
 
 
 def _rows(ax: Axes) -> int:

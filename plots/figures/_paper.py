@@ -63,7 +63,7 @@ def figure_3(
     Returns
     -------
     Figure
-        Panels a to d; b to d have the same range of x.
+        Panels a to d; b to d have the same axes.
 
     Raises
     ------
@@ -82,11 +82,12 @@ def figure_3(
         axes[0].set_xlim(*checked_window(chart, window))
         axes[0].set(xlabel="$t$ [s]", ylabel=r"$F_a$ [N]")
         runs = chart, ifelse, lugre
-        # Drift is compared: one unit and one range of x.
+        # Drift is compared: one unit and the same axes.
         scale = scaled(np.concatenate([trace.x - trace.x[0] for trace in runs]), "m")
         for ax, trace in zip(axes[1:], runs, strict=True):
             panels.hysteresis(ax, trace, phases, window=window, scale=scale)
             ax.sharex(axes[1])
+            ax.sharey(axes[1])
             peak = int(trace.F.argmax())
             x_peak = scale[0] * (trace.x[peak] - trace.x[0])
             if limit is not None and trace.F[peak] > limit:
@@ -130,9 +131,10 @@ def figure_4(
         figure = sheet(4.2, 10.0) if narrow() else sheet(10.5, 6.2)
         axes = figure.subplots(*(6, 1) if narrow() else (2, 3), sharex=True).ravel()
         panels.velocity(axes[0], chart)
-        panels.deflections(axes[1], chart, elements=elements)
+        scale = _common_scale(chart, lugre)
+        panels.deflections(axes[1], chart, elements=elements, scale=scale)
         element_legend(figure, axes[1])
-        panels.deflections(axes[2], lugre)
+        panels.deflections(axes[2], lugre, scale=scale)
         for ax, trace in zip(axes[3:], (chart, ifelse, lugre), strict=True):
             panels.force(ax, trace)
             _make_room(ax)
@@ -147,11 +149,15 @@ def figure_4(
 
 
 def _common_scale(*runs: Trace) -> tuple[float, str] | None:
-    """Return factor and title of the deflections of all runs; None if a chart has none."""
+    """Return factor and title of the deflections of all runs; None if a chart has none.
+
+    The unit suits their geometric mean: deflections of runs may differ by orders of magnitude.
+    """
     if not all(trace.model.chart.variables for trace in runs):
         return None
-    largest = max(runs, key=lambda trace: float(np.nanmax(np.abs(trace.z), initial=0.0)))
-    return first_variable(largest, largest.z)
+    largest = np.array([np.nanmax(np.abs(trace.z), initial=0.0) for trace in runs])
+    middle = np.exp(np.log(largest).mean(keepdims=True)) if largest.all() else largest
+    return first_variable(runs[0], middle)
 
 
 def _first_peak(trace: Trace) -> int:

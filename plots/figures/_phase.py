@@ -23,10 +23,12 @@ from plots.panels.parts.selection import (
     shown,
 )
 from plots.style import PAPER, VERMILION
-from plots.style.matplotlib import Axes, Figure, LineCollection, rc_context
+from plots.style.matplotlib import Annotation, Axes, Figure, LineCollection, rc_context
 from plots.style.presets import pt, settings
 from plots.views.traces import check_trace
 from plots.views.window import Window
+
+BESIDE = 0.25  # inches from the dot to the tip of an arrow, at least
 
 
 @refusing()
@@ -88,8 +90,10 @@ def phase(
         over_v = panels.portrait(portrait, trace, window=window, elements=elements, bar=False)
         x, v = trace.x[row] - trace.x[0], trace.v[row]
         part = shown(trace, window)
-        _dot(loop, x, part.x - trace.x[0], "m", float(trace.F[row]))
-        _dot(portrait, v, part.v, "m/s", float(trace.F[row]))
+        dots = [
+            _dot(loop, x, part.x - trace.x[0], "m", float(trace.F[row])),
+            _dot(portrait, v, part.v, "m/s", float(trace.F[row])),
+        ]
         (lines,) = over_v
         assert isinstance(lines, LineCollection)
         panels.slip_bar(lines, trace, [loop, portrait])
@@ -100,8 +104,8 @@ def phase(
         note = f"from {limits[0]:.6g} to {limits[1]:.6g} s, dot at {_place(trace, row)}"
         figure.suptitle(f"{head(trace, title)}\n{note}", x=0.01, ha="left")
         figure.draw_without_rendering()  # arrows are evenly spaced in the laid out picture
-        _arrows(loop, over_x)
-        _arrows(portrait, over_v)
+        for ax, drawn, dot in zip((loop, portrait), (over_x, over_v), dots, strict=True):
+            _arrows(ax, drawn, dot)
     return fitted(figure)
 
 
@@ -113,14 +117,20 @@ def _place(trace: Trace, row: int) -> str:
     return f"$t$ = {trace.t[row]:.6g} s{what}"
 
 
-def _dot(ax: Axes, here: float, values: np.ndarray, unit: str, F: float) -> None:
-    """Draw the dot in the unit of the axis, which is that of the values shown."""
+def _dot(ax: Axes, here: float, values: np.ndarray, unit: str, F: float) -> tuple[float, float]:
+    """Draw the dot in the unit of the axis, which is that of the values shown; return its place."""
     factor, _ = scaled(values, unit)
     look: Any = {"color": VERMILION, "markersize": pt(9), "markeredgecolor": PAPER}
     ax.plot(factor * here, F, "o", zorder=8, clip_on=False, **look)
+    return factor * here, F
 
 
-def _arrows(ax: Axes, drawn: Artists) -> None:
+def _arrows(ax: Axes, drawn: Artists, dot: tuple[float, float]) -> None:
+    """Draw arrows along the path, but not at the dot."""
     (lines,) = drawn
     assert isinstance(lines, LineCollection)
-    panels.arrows(ax, lines)
+    for arrow in panels.arrows(ax, lines):
+        assert isinstance(arrow, Annotation)
+        apart = np.subtract(*ax.transData.transform([arrow.xy, dot])) / ax.figure.dpi
+        if np.hypot(*apart) < BESIDE:
+            arrow.remove()

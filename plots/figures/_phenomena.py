@@ -59,11 +59,20 @@ def phenomenon_figure(table: PhenomenaTable, name: str) -> Figure | None:
         figure = sheet(*size, grows=True)
         grid = figure.subplots(rows, columns, squeeze=False)
         limits = [_common(shown, axis, phenomenon) for axis in ("x", "y")]
-        for ax, (model, found) in zip(grid.flat, shown, strict=False):
-            _panel(ax, model, found, phenomenon, limits)
+        left: set[str] = set()
+        for place, (model, found) in enumerate(shown):
+            ax = grid.flat[place]
+            own = _panel(ax, model, found, phenomenon, limits)
+            # Numbers are written once for neighbours with the same axes.
+            ax.tick_params(
+                labelbottom="x" in own or place + columns >= len(shown) or phenomenon.log,
+                labelleft="y" in own | left or place % columns == 0,
+            )
+            left = own
         for ax in grid.flat[len(shown) :]:
             ax.set_axis_off()
-        below = folded(_told(shown, phenomenon), int(LETTERS * room(size[0])))
+        letters = int(LETTERS * room(size[0]))
+        below = "\n".join(folded(each, letters) for each in _told(shown, phenomenon))
         look: Any = {"family": "DejaVu Sans", "fontsize": font(9.5)}
         figure.supxlabel(f"{phenomenon.axes[0]}\n\n{below}", **look)
         figure.supylabel(phenomenon.axes[1], fontsize=font(9.5))
@@ -74,13 +83,13 @@ def phenomenon_figure(table: PhenomenaTable, name: str) -> Figure | None:
     return fitted(figure)
 
 
-def _told(shown: Sequence[tuple[str, PhenomenonResult]], phenomenon: Phenomenon) -> str:
-    """Return what mark and number of a panel mean."""
+def _told(shown: Sequence[tuple[str, PhenomenonResult]], phenomenon: Phenomenon) -> tuple[str, str]:
+    """Return what mark and number of a panel mean, a line each."""
     seen = {found.verdict for _, found in shown}
     marks = ", ".join(f"{mark} {verdict}" for verdict, mark in MARKS.items() if verdict in seen)
     number = shown[0][1].numbers[0].name
     rule = f" (shows it if {phenomenon.shows_if})" if phenomenon.shows_if else ""
-    return f"Below each name: {marks}; {number}{rule}."
+    return f"Below each name: {marks};", f"{number}{rule}."
 
 
 def _panel(
@@ -89,7 +98,8 @@ def _panel(
     found: PhenomenonResult,
     phenomenon: Phenomenon,
     limits: Sequence[tuple[float, float] | None],
-) -> None:
+) -> set[str]:
+    """Draw the curves of a model; return which axes have a scale of their own."""
     for number, curve in enumerate(found.curves):
         marker = "o" if curve.x.size < 20 else ""
         ax.plot(
@@ -103,7 +113,7 @@ def _panel(
         )
     if phenomenon.log:
         ax.set_xscale("log")
-    own = False
+    own: set[str] = set()
     for axis, limit in zip(("x", "y"), limits, strict=True):
         if limit is None:
             continue
@@ -112,7 +122,7 @@ def _panel(
         if found.instead or (limit[0] <= low and high <= limit[1]):
             ax.set(**{f"{axis}lim": limit})
         else:
-            own = True
+            own.add(axis)
     if not phenomenon.log:
         ax.locator_params(axis="x", nbins=4)
     ax.locator_params(axis="y", nbins=4)
@@ -121,6 +131,7 @@ def _panel(
     brief = f"{MARKS[found.verdict]} {phenomenon.brief(found)}" + (", own scale" if own else "")
     look = {"xycoords": "axes fraction", "ha": "left", "va": "baseline", "family": "DejaVu Sans"}
     beside(ax, brief, (0.0, 1.0), (0, inches(4)), **look)
+    return own
 
 
 def _range(found: Sequence[PhenomenonResult], axis: str) -> tuple[float, float]:

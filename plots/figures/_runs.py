@@ -244,7 +244,6 @@ def ribbons_figure(
             panels.slip_bar(lines, trace, right)
             names += ["friction over velocity", "friction over position"]
         letter_panels([*left, *middle, *right], names)
-        figure.align_ylabels(left)
         figure.suptitle(f"{head(trace, title)}{_left_out(trace, limits)}", x=0.01, ha="left")
         element_legend(figure, *left[1:4:2])
     return fitted(figure)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from io import BytesIO
 
 from gms_fsm.foundation.text import visible_lines
+from plots.figures._layout import aligned
 from plots.style import RC
 from plots.style.matplotlib import Figure, Text, rc_context
 
@@ -17,6 +18,7 @@ def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
         written, shown = each.get_text(), visible_lines(each.get_text())
         if shown != written:  # matplotlib writes it into a comment of an SVG, too
             each.set(text=shown, parse_math=False)
+    aligned(figure)
     buffer = BytesIO()
     # A journal's PDF has fonts that can be selected and edited: TrueType, Type 42.
     with rc_context(RC | {"pdf.fonttype": 42}):

@@ -28,6 +28,7 @@ PHASES: tuple[dict[str, Any], ...] = (
 MOST_ARROWS = 500  # looked at along one path
 OVERLAP, REPEATED = 0.22, 0.7  # inches between arrows, and between those of the same direction
 SHAFT = 0.05  # inches of the path whose direction an arrow has
+STRAIGHT = 0.8  # cosine of the angle between an arrow and the path around it, at least
 
 
 def _by_slipping(ax: Axes, x: NDArray[np.float64], part: RunPart) -> LineCollection:
@@ -216,12 +217,15 @@ def arrows(ax: Axes, lines: LineCollection, *, apart: float = 1.1) -> Artists:
     known: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []  # tips, directions; inches
     for end in np.arange(apart / 2, length[-1], apart).tolist():
         # The arrow ends on the path, and begins where the path was just before.
-        tip, tail = (_at(path, length, at) for at in (end, end - SHAFT))
-        here, before = ax.transData.transform([tip, tail]) / ax.figure.dpi
-        size = float(np.hypot(*(here - before)))
-        if size < 0.5 * SHAFT:  # the path turns back here
+        near = [_at(path, length, end + step * SHAFT) for step in (-3, -2, -1, 0, 1)]
+        ways = np.diff(ax.transData.transform(near) / ax.figure.dpi, axis=0)
+        sizes = np.hypot(*ways.T)
+        if sizes[2] < 0.5 * SHAFT:  # the path turns back here
             continue
-        way = (here - before) / size
+        way, tail, tip = ways[2] / sizes[2], near[2], near[3]
+        here = ax.transData.transform(tip) / ax.figure.dpi
+        if (ways @ way < STRAIGHT * sizes).any():  # on a corner
+            continue
         if any(_alike(here - other, float(way @ theirs)) for other, theirs in known):
             continue
         known.append((here, way))

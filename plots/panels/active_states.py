@@ -45,8 +45,9 @@ def ribbons(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     Returns
     -------
     list of Artist
-        One collection per state and element, for a legend; then a band for each interval in which
-        a sign is held, for example on v = 0, or in which an element is between two states.
+        One collection per state and element, for a legend of the states that occur; then a band for
+        each interval in which a sign is held, for example on v = 0, or in which an element is
+        between two states.
     """
     this = selected(trace, **part, moving=False)
     chosen, (begin, end) = this.elements, this.window
@@ -55,11 +56,12 @@ def ribbons(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     sized = to_scale if len(chosen) <= MANY else dict
     looks: list[dict[str, Any]] = [sized(state_look(number)) for number in range(len(states))]
     drawn: Artists = []
-    for row, i in enumerate(chosen):
-        found = list(spans(trace, i, (begin, end)))
+    found = [list(spans(trace, i, (begin, end))) for i in chosen]
+    occurring = {name for each in found for name, _, _ in each}
+    for row, each in enumerate(found):
         for number, state in enumerate(states):
-            mine = [(a, b - a) for name, a, b in found if name == state]
-            look = looks[number] | {"label": state if row == 0 else None}
+            mine = [(a, b - a) for name, a, b in each if name == state]
+            look = looks[number] | {"label": state if row == 0 and state in occurring else None}
             look["rasterized"] = len(mine) > VECTOR_ROWS // 20
             drawn.append(ax.broken_barh(mine, (row + 1.0 - LANE / 2, LANE), **look))
     lanes(ax, chosen)

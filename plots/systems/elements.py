@@ -43,7 +43,7 @@ CONTACT = 0.5  # width of a contact
 GROUND = 0.36  # its extent below the middle of its row
 MOST = 12  # elements
 SHOWN = 0.6  # of SWING: the deflection of all elements where there is no run
-BODY, ARROW, NUMBERS = 0.9, 0.8, 1.45  # widths: of the slider, of its arrows, of their numbers
+BODY, ARROW, NUMBERS = 0.9, 0.8, 0.55  # widths: of the slider, of its arrows, of longer numbers
 LETTERS = 16.0  # of the caption, per inch
 INCHES, TALLEST = 0.82, 10.2  # of one unit of height; of all of them, on a page of A4
 
@@ -262,5 +262,5 @@ def _slider(ax: Axes, n: int, trace: Trace | None, row: int) -> list[Artist]:
     ):
         ends = ((edge + 0.1, height), (edge + ARROW, height))
         drawn.append(arrow_between(ax, *(ends if forward else ends[::-1]), size=11, lw=1.2))
-        drawn.append(ax.text(edge + ARROW + 0.1, height, text, ha="left", va="center", fontsize=9))
+        drawn.append(ax.text(edge + 0.1, height + 0.1, text, ha="left", va="bottom", fontsize=9))
     return drawn

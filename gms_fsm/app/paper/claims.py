@@ -415,6 +415,7 @@ def force_difference(a: Trace, b: Trace) -> tuple[FloatArray, FloatArray]:
 
 
 def _differences(a: Trace, b: Trace, name: str) -> tuple[FloatArray, FloatArray]:
-    grid = np.union1d(np.arange(a.t[0], a.t[-1], 1 / SAMPLES_PER_SECOND), b.transitions.t)
+    even = np.arange(a.t[0], a.t[-1], 1 / SAMPLES_PER_SECOND)
+    grid = np.union1d(even, [*b.transitions.t, a.t[-1]])
     difference: FloatArray = getattr(a.sample(grid), name) - getattr(b.sample(grid), name)
     return grid, difference

@@ -327,11 +327,16 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     ax.spines[:].set_visible(False)
     texts, upright, high = time_texts(part, wide)
     lower = 72 * high - 13 if upright else 0  # points: the times need more than a line
+    # The first time is often too long to stand between the others.
+    first = f"t = {part.times[0]:.9g} s"
+    long = BOLD * LETTER * (len(first) + len((*texts, "")[0]) / 2 + 2)
+    below = bool(texts) and (upright or long > wide * float(part.gaps[0]))
     ax.set_xlabel(
         "micro-step at each instant (0: before the first firing); time",
-        labelpad=inches(33 + lower if texts else 20),
+        labelpad=inches(33 + lower if below else 20),
     )
-    return [*cells, *drawn, *_times(ax, part, texts, upright, lower), *_breaks(ax, part)]
+    low = -31 - lower if below else -18
+    return [*cells, *drawn, *_times(ax, part, (first, low), texts, upright), *_breaks(ax, part)]
 
 
 def _cell(left: float, row: int, mode: int) -> Rectangle:
@@ -390,14 +395,13 @@ def time_texts(part: Unfolded, wide: float) -> tuple[list[str], bool, float]:
     return texts, upright, longest if upright else LINE
 
 
-def _times(ax: Axes, part: Unfolded, texts: Sequence[str], upright: bool, lower: float) -> Artists:
+def _times(
+    ax: Axes, part: Unfolded, first: tuple[str, float], texts: Sequence[str], upright: bool
+) -> Artists:
     """Write the time of the first instant, and the time between instants."""
     look: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "annotation_clip": False}
     look |= {"va": "top", "fontsize": font(8.5), "fontweight": "bold"}
-    # The first time is too long to stand between the others.
-    low = -31 - lower if texts else -18
-    first = f"t = {part.times[0]:.9g} s"
-    drawn = [beside(ax, first, (0.0, 0.0), (0, inches(low)), ha="left", **look)]
+    drawn = [beside(ax, first[0], (0.0, 0.0), (0, inches(first[1])), ha="left", **look)]
     look["rotation"] = 90 if upright else 0
     between = zip(part.gaps, texts, strict=True)
     return drawn + [beside(ax, text, (x, 0.0), (0, inches(-18)), **look) for x, text in between]

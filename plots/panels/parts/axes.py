@@ -66,7 +66,7 @@ def time_axis(ax: Axes, begin: float, end: float) -> None:
         return
     ax.set_xlim(begin, end)
     if width > 1e-4 * max(abs(begin), abs(end)):
-        ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+        ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
         return
     origin = round((begin + end) / 2, int(np.ceil(-np.log10(width))) + 1)
     factor, unit = scaled(np.array([width]), "s")
