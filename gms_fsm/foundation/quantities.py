@@ -12,6 +12,7 @@ from gms_fsm.errors import UnitError, shown
 
 WIDTH = 80  # columns, where there is no terminal
 JOINED = "\N{NO-BREAK SPACE}"
+NAME_AND_NUMBER = re.compile(r"[^ ]+ = -?\d[^ ]*")
 NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=[pnuµmkMGT]?(?:m/s|m|N|s)\b)")
 
 PREFIXES = {3 * i - 12: prefix for i, prefix in enumerate([*"pnµm", "", *"kMGT"])}
@@ -339,14 +340,16 @@ def wrapped(line: str, width: int = WIDTH, *, whole: bool = False) -> Iterator[s
     column = re.match(r" *\S+ {2,}", line)
     hanging = column.end() if column else len(line) - len(line.lstrip()) + 2
     hanging = min(hanging, width // 2)
+
+    def joined(text: str) -> str:
+        return text.replace(" ", JOINED) if len(text) <= width - hanging else text
+
     if column:  # a row of a table is broken between its cells
         cells = re.split(r" {2,}", line[column.end() :].rstrip())
-        short = (len(cells) > 1 and len(cell) <= width - hanging for cell in cells)
-        pairs = zip(cells, short, strict=True)
-        kept = (cell.replace(" ", JOINED) if whole_cell else cell for cell, whole_cell in pairs)
-        line = column[0] + "  ".join(kept)
+        line = column[0] + "  ".join(map(joined, cells) if len(cells) > 1 else cells)
+    line = NUMBER_AND_UNIT.sub(JOINED, line)
     for part in textwrap.wrap(
-        NUMBER_AND_UNIT.sub(JOINED, line),
+        NAME_AND_NUMBER.sub(lambda found: joined(found[0]), line),
         width,
         subsequent_indent=" " * hanging,
         break_long_words=not whole,
