@@ -218,15 +218,15 @@ def _sheet(parameters: int) -> tuple[Figure, Sequence[Axes], Axes | None]:
     above = 8.9 if narrow() else 4.9
     below = 0.75 + LANE * parameters if parameters else 0.0
     figure = sheet(4.2 if narrow() else 11.0, above + below, grows=True)
-    parts: list[Any] = [figure]
-    if below:  # a part of its own, because its labels are wider
-        rows = figure.add_gridspec(2, 1, height_ratios=(above, below))
-        parts = [figure.add_subfigure(rows[row, 0]) for row in (0, 1)]
-    if narrow():
-        axes = list(parts[0].subplots(4, 1, height_ratios=(1.7, 1.5, 2.0, 1.7)))
-    else:
-        axes = list(parts[0].subplots(2, 2, width_ratios=(1.5, 1)).T.ravel())
-    return figure, axes, parts[1].subplots() if below else None
+    tall = [
+        *((1.7, 1.5, 2.0, 1.7) if narrow() else (1.7, 1.7)),
+        *([LANE * parameters] * bool(below)),
+    ]
+    wide = (1.0,) if narrow() else (1.5, 1.0)
+    grid = figure.add_gridspec(len(tall), len(wide), height_ratios=tall, width_ratios=wide)
+    places = [(row, column) for column in range(len(wide)) for row in range(4 // len(wide))]
+    axes = [figure.add_subplot(grid[place]) for place in places]
+    return figure, axes, figure.add_subplot(grid[-1, 0]) if below else None
 
 
 def _over_time(ax: Axes, part: _Compared, shown: Window, test: Window | None) -> None:
@@ -333,6 +333,7 @@ def _parameters(ax: Axes, table: Sequence[Estimate], measured: tuple[str, Scale]
     if not narrow():
         scales = _scales(table, measured)
         values = ax.secondary_yaxis("right")
+        values.set_in_layout(False)  # there is nothing to the right of it
         values.set_yticks(rows, [_value(each, scales[each.unit]) for each in table])
         values.tick_params(axis="y", length=0, labelsize=font(8.5))
         values.spines["right"].set_visible(False)
