@@ -146,7 +146,7 @@ def _best_break(text: str, limit: int) -> int:
         before = (rank for rank, marks in enumerate(_BEFORE, 2) if words[i + 1] in marks)
         rank = min([*after, *before, len(_BEFORE) + 2])
         # A line that is nearly empty is worse than a break at a weaker operator.
-        short = at < min(limit / 4, len(text) / 7)
+        short = at < min(limit / 4, len(text) / 6)
         found.append((max(at - limit, 0), short, depth, rank, -at, at))
     return min(found)[-1] if found else -1
 
