@@ -88,7 +88,8 @@ class FilmChart:
         for entry, brightness in frame.fired:
             if log.element[entry] in self.elements:
                 colour = blend(self.colours.ink, self.colours.fired, brightness)
-                marks = self._taken_with(entry) if entry == frame.entry else None
+                marked = self.live is not None and entry == frame.entry
+                marks = self._taken_with(entry) if marked else None
                 edge = str(log.edge[entry]), str(log.source[entry])
                 self.parts.paint_edge(edge, True, marks, colour)
 
