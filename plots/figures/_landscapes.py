@@ -136,7 +136,10 @@ def landscape(
             handles.append(
                 Line2D([], [], color=LINE_GREY, linewidth=pt(5), alpha=0.45, label="$±s(v)$")
             )
-        close: Any = {"handlelength": 1.4 if low() else 1.8, "columnspacing": 1.0}
+        close: Any = {"handlelength": 1.8, "columnspacing": 1.0}
+        if low():  # no wider than the panel
+            close = {"handlelength": 1.0, "columnspacing": 0.5, "handletextpad": 0.3}
+            close |= {"borderaxespad": 0.1, "borderpad": 0.1}
         legend = left.legend(
             handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=4, **close
         )

@@ -188,7 +188,7 @@ def _zoom(ax: Axes, trace: Trace) -> None:
     inset.locator_params(axis="y", nbins=ticks, min_n_ticks=ticks)
     at = (0.02, INSET[1] + INSET[3] / 2)
     look: dict[str, Any] = {"va": "center", "fontsize": font(7), "color": TEXT_GREY}
-    ax.text(*at, "first peak,\n$F$ [N] over $t$ [s]", transform=ax.transAxes, **look)
+    ax.text(*at, "first\npeak", transform=ax.transAxes, **look)
     inset.spines[:].set(visible=True, color=LINE_GREY)
     bounds = (t0, bottom - edge, t1 - t0, high - bottom + 2 * edge)
     frame = ax.indicate_inset(bounds, inset, edgecolor=LINE_GREY, alpha=1.0)
