@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 ROUNDING = 1e-8  # relative to both sides; a smaller margin is due to the clock and floats
-NOTHING = 1e-12  # in SI units: where a side is zero, the same of any smaller margin
+NOTHING = 1e-12  # in SI units: the same where a side is zero
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Clause:
         if math.isinf(self.margin):
             return math.copysign(1.0, self.margin)
         larger = max(abs(self.left), abs(self.right))
-        if abs(self.margin) <= max(ROUNDING * larger, NOTHING):
+        if abs(self.margin) <= (ROUNDING * larger if self.left and self.right else NOTHING):
             return 0.0
         return self.margin / larger
 

@@ -263,7 +263,7 @@ function relative(clause) {
   return isZero(clause) ? 0 : clamp(margin / Math.max(Math.abs(left), Math.abs(right)), -1, 1);
 }
 // A margin due to the clock and floats is zero, as in the debugger.
-function isZero({ left, right, margin }) { return Number.isFinite(margin) && Math.abs(margin) <= Math.max(data.nothing, data.rounding * Math.max(Math.abs(left), Math.abs(right))); }
+function isZero({ left, right, margin }) { return Number.isFinite(margin) && Math.abs(margin) <= (left && right ? data.rounding * Math.max(Math.abs(left), Math.abs(right)) : data.nothing); }
 function marginText(clause) {
   const { margin } = clause;
   if (isZero(clause)) return "0";
