@@ -2181,6 +2181,7 @@ rows = {
     "break on an element too many": (lambda s: s.break_on("fires", "arrest", 4),),
     "break on an element below zero": (lambda s: s.break_on("fires", "arrest", -1),),
     "break after no hit": (lambda s: s.break_on("fires", "arrest", None, "", 0),),
+    "break on a change of an element": (lambda s: s.break_on("changes", "v", 1),),
     "poke of nothing": (lambda s: s.poke(),),
     "poke of no element": (lambda s: s.poke({"z": {}}, state={}),),
     "poke of an element too many": (lambda s: s.poke({"z": {4: 0.1}}),),
@@ -2255,6 +2256,10 @@ rows = {
 group("session", UnitError, unmoved, rows, "")
 rows = {
     "element too many": (lambda s: s.until("state(9) == slip"),),
+    "break on a change of what is unknown": (lambda s: s.break_on("changes", "z9 + 1"),),
+    "break on a change of a state of no element": (lambda s: s.break_on("changes", "state(9)"),),
+    "break on a change of a state without its number": (lambda s: s.break_on("changes", "state"),),
+    "way back to what is unknown": (lambda s: s.until("z9 > 0", back=True),),
     "condition of a breakpoint": (lambda s: s.break_on("fires", "arrest", None, "z9 > 0"),),
     "name without its contact": (lambda s: s.parse("F > 1"), a_system),
     "variable without its element": (lambda s: s.parse("bank.z > 1"), a_system),

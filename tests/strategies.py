@@ -278,7 +278,10 @@ def moves(t_end: float) -> st.SearchStrategy[tuple[str, Any]]:
         st.tuples(st.sampled_from(["step", "back"]), st.integers(1, 30)),
         st.tuples(st.sampled_from(["next", "prev"]), st.none()),
         st.tuples(st.just("goto"), st.floats(0.0, t_end)),
-        st.tuples(st.just("until"), st.sampled_from(["z1 > 0.1", "z1 < -0.05", "v > 0.2"])),
+        st.tuples(
+            st.sampled_from(["until", "last"]),
+            st.sampled_from(["z1 > 0.1", "z1 < -0.05", "v > 0.2"]),
+        ),
         st.tuples(st.just("switch"), st.integers(0, 5)),
         st.tuples(
             st.just("poke"), st.tuples(st.floats(-0.3, 0.3), st.sampled_from([None, "slip"]))

@@ -13,13 +13,14 @@ from gms_fsm.debugger import _text as text_of
 from gms_fsm.debugger._elements import Elements, completions, integer, read_edits, spelled
 from gms_fsm.debugger._help import ALIASES, COMMANDS, MOVES, help_of, overview
 from gms_fsm.debugger._over_time import events, ribbons
+from gms_fsm.debugger._script import command_of, count_of, nothing, remove, script_lines
 from gms_fsm.debugger._view import branches, chart_states, ending, view
 from gms_fsm.errors import ExpressionError, GMSError, SessionError
 from gms_fsm.foundation.arguments import meant, there_are
 from gms_fsm.foundation.quantities import WIDTH, in_words
 from gms_fsm.language import EVENT, evaluate
 from gms_fsm.session.explain import holds
-from gms_fsm.session.session import KINDS, Breakpoint, Session
+from gms_fsm.session.session import KINDS, Session
 from gms_fsm.traces.system_scope import asked_unit, in_si, units_of
 
 
@@ -59,17 +60,17 @@ class Commands:
         self.last_move = ""  # the line that moved last, which an empty line repeats
         self.left = False  # whether the last line was `quit`
         self.refused = 0  # lines that were answered by an error
+        self.sourced: list[Path] = []  # the files of commands that are being read
 
     def reply(self, line: str) -> Iterator[str]:
         """Execute a line as a person types it; a mistake is answered and changes nothing."""
-        name, rest = ([*line.split(None, 1), "", ""])[:2]
-        name, self.left = ALIASES.get(name, name), False
-        if not name or name.startswith("#"):
+        (name, rest), self.left = command_of(line), False
+        if not name:
             return
         if name in MOVES:
             self.last_move = line
         try:
-            yield from self.answer(name, rest.strip())
+            yield from self.answer(name, rest)
         except KeyboardInterrupt:
             yield "stopped"
             yield from self.here()
@@ -81,8 +82,6 @@ class Commands:
         except Exception as error:  # losing the session would be worse than an unclear message
             self.refused += 1
             yield f"error: {type(error).__name__}: {error}"
-        else:
-            self.left = name == "quit"
 
     def answer(self, name: str, arg: str) -> Iterator[str]:
         """Execute a command."""
@@ -122,6 +121,8 @@ class Commands:
                 return [*KINDS, *edges, *states, "element", "if", "hits", *names]
             case "until" | "print" | "watch":
                 return [*names, *states]
+            case "back":
+                return ["until", "continue", *names, *states]
             case "poke":
                 return [f"{name}=" for name in values]
             case "why":
@@ -189,19 +190,27 @@ class Commands:
 
     def do_step(self, arg: str) -> Iterator[str]:
         """Go forward."""
-        count = _count("step", arg)
+        count = count_of("step", arg)
         self._ahead()
         self.session.step(count)
         yield from self.here()
 
     def do_back(self, arg: str) -> Iterator[str]:
-        """Go back."""
-        self.session.back(_count("back", arg))
-        yield from self.here()
+        """Go back: by rows, to where a condition was true last, or to a breakpoint."""
+        word, _, rest = arg.partition(" ")
+        match ALIASES.get(word, word):
+            case "until":
+                yield from self._until(rest.strip(), back=True)
+            case "continue":
+                nothing("back continue", rest.strip())
+                yield from self._continue(back=True)
+            case _:
+                self.session.back(count_of("back", arg))
+                yield from self.here()
 
     def do_next(self, arg: str) -> Iterator[str]:
         """Go to the next transition."""
-        _nothing("next", arg)
+        nothing("next", arg)
         self._ahead()
         if self.session.next_transition().fired is None:
             yield "no transition before the end"
@@ -209,7 +218,7 @@ class Commands:
 
     def do_prev(self, arg: str) -> Iterator[str]:
         """Go to the previous transition."""
-        _nothing("prev", arg)
+        nothing("prev", arg)
         self.session.prev_transition()
         yield from self.here()
 
@@ -234,21 +243,31 @@ class Commands:
 
     def do_until(self, arg: str) -> Iterator[str]:
         """Go to the next point where a condition becomes true."""
+        yield from self._until(arg, back=False)
+
+    def _until(self, arg: str, *, back: bool) -> Iterator[str]:
         if not arg:
-            raise SessionError("a condition is missing", advice=f"{self._usage('until')}")
+            usage = self._usage("back" if back else "until")
+            raise SessionError("a condition is missing", advice=usage)
         condition, session, branch = self._with_states(arg), self.session, self.session.branch
         already = holds(session.parse(condition), session.values())
-        self._ahead()
+        if not back:
+            self._ahead()
         start = branch.cursor, branch.between
-        if not session.reaches(condition):
+        if not session.reaches(condition, back=back):
             if already:
                 branch.cursor, branch.between = start
                 yield (
-                    "it is already true here and does not become true again; until stops where "
-                    "it becomes true"
+                    "it is true here and from the start on"
+                    if back
+                    else "it is already true here and does not become true again; until stops "
+                    "where it becomes true"
                 )
             else:
-                yield f"it does not become true before the end{self._units_in(arg)}"
+                never = (
+                    "it was not true before" if back else "it does not become true before the end"
+                )
+                yield f"{never}{self._units_in(arg)}"
         yield from self.here()
 
     def _unit(self, name: str) -> str:
@@ -272,9 +291,12 @@ class Commands:
 
     def do_continue(self, arg: str) -> Iterator[str]:
         """Go to the next breakpoint."""
-        _nothing("continue", arg)
+        nothing("continue", arg)
         self._ahead()
-        _, point = self.session.proceed()
+        yield from self._continue(back=False)
+
+    def _continue(self, *, back: bool) -> Iterator[str]:
+        _, point = self.session.proceed(back=back)
         if point is None:
             yield "no breakpoint was hit" if self.session.breakpoints else "no breakpoint is set"
         else:
@@ -284,7 +306,7 @@ class Commands:
 
     def do_run(self, arg: str) -> Iterator[str]:
         """Compute to the end."""
-        _nothing("run", arg)
+        nothing("run", arg)
         self.session.branch.complete()
         current = next(each for each in branches(self.session) if each.current)
         yield f"branch {current.number}: {text_of.progress(current)}"
@@ -292,7 +314,7 @@ class Commands:
     # ------------------------------------------------------------------ looking
     def do_where(self, arg: str) -> Iterator[str]:
         """Show everything."""
-        _nothing("where", arg)
+        nothing("where", arg)
         seen = view(self.session)
         states = ribbons(self.session, text_of.ribbon_parts(seen, self.width))
         yield from text_of.screen_lines(seen, states, self.element, self.marks, self.width)
@@ -316,7 +338,7 @@ class Commands:
 
     def do_list(self, arg: str) -> Iterator[str]:
         """Draw the chart."""
-        _nothing("list", arg)
+        nothing("list", arg)
         session, elements = self.session, self.elements
         count, chart = elements.bank(self.element).n, elements.chart(self.element)
         yield f"{elements.name(self.element)} of {count}: {chart.name}, t = {session.here.t:.9g} s"
@@ -325,7 +347,7 @@ class Commands:
 
     def do_log(self, arg: str) -> Iterator[str]:
         """Show the last transitions."""
-        count, found = _count("log", arg, 10), events(self.session)
+        count, found = count_of("log", arg, 10), events(self.session)
         if not found:
             yield "no transition so far"
         for each in found[-count:]:
@@ -335,7 +357,7 @@ class Commands:
 
     def do_trust(self, arg: str) -> Iterator[str]:
         """Show the findings about the branch."""
-        _nothing("trust", arg)
+        nothing("trust", arg)
         yield from self.session.tree.trace().trust().text.splitlines()
 
     def do_print(self, arg: str) -> Iterator[str]:
@@ -374,7 +396,7 @@ class Commands:
 
     def do_unwatch(self, arg: str) -> Iterator[str]:
         """Remove watches."""
-        _remove(self.session.watches, "unwatch", arg)
+        remove(self.session.watches, "unwatch", arg)
         yield from self.do_watch("")
 
     def do_element(self, arg: str) -> Iterator[str]:
@@ -398,6 +420,10 @@ class Commands:
         if not arg:
             yield from self.do_breaks("")
             return
+        if changes := re.fullmatch(r"changes\s+(.+?)(?:\s+if\s+(.+?))?(?:\s+hits\s+(\d+))?", arg):
+            text, condition, hits = changes.groups()
+            yield self._set("changes", self._with_states(text), None, condition, hits)
+            return
         form = re.fullmatch(
             rf"(?:({'|'.join(KINDS)})\s+)?(\w[\w.]*)(?:\s+(?:element\s+)?({self.elements.pattern}))?"
             r"(?:\s+if\s+(.+?))?(?:\s+hits\s+(\d+))?",
@@ -406,9 +432,10 @@ class Commands:
         if form is None:
             usage = self._usage("break")
             if re.search("[<>]", arg):
+                text = arg.removeprefix("if ")
                 usage = (
-                    f"until {arg.removeprefix('if ')} goes there; of a breakpoint, a condition "
-                    f"follows if: {usage}"
+                    f"until {text} goes there, break changes {text} stops where it changes; of a "
+                    f"breakpoint, a condition follows if: {usage}"
                 )
             raise SessionError(f"{arg!r} is not a breakpoint", advice=usage)
         kind, name, element, condition, hits = form.groups()
@@ -421,18 +448,22 @@ class Commands:
                 advice=f"{meant(name, states + edges)}edges: {', '.join(edges) or 'none'}; "
                 f"states: {', '.join(states)}",
             )
-        point = self.session.break_on(
-            kind or ("enter" if name in states else "fires"),
-            name,
-            None if element in (None, "all") else self.elements.address_of("break", element),
-            self._with_states(condition or ""),
-            integer(hits, "hits K") if hits else 1,
-        )
-        yield f"breakpoint {len(self.session.breakpoints)}: {text_of.breakpoint_text(point)}"
+        where = None if element in (None, "all") else self.elements.address_of("break", element)
+        kind = kind or ("enter" if name in states else "fires")
+        yield self._set(kind, name, where, condition, hits)
+
+    def _set(
+        self, kind: str, name: str, where: int | str | None, condition: str | None, hits: str | None
+    ) -> str:
+        """Set a breakpoint, and return what is said about it."""
+        count = integer(hits, "hits K") if hits else 1
+        condition = self._with_states(condition or "")
+        point = self.session.break_on(kind, name, where, condition, count)
+        return f"breakpoint {len(self.session.breakpoints)}: {text_of.breakpoint_text(point)}"
 
     def do_breaks(self, arg: str) -> Iterator[str]:
         """Show breakpoints."""
-        _nothing("breaks", arg)
+        nothing("breaks", arg)
         for number, point in enumerate(self.session.breakpoints, start=1):
             yield f"  {number}  {text_of.breakpoint_text(point)}; hits: {point.seen}"
         if not self.session.breakpoints:
@@ -440,7 +471,7 @@ class Commands:
 
     def do_clear(self, arg: str) -> Iterator[str]:
         """Remove breakpoints."""
-        _remove(self.session.breakpoints, "clear", arg)
+        remove(self.session.breakpoints, "clear", arg)
         yield from self.do_breaks("")
 
     # ------------------------------------------------------------------ branches
@@ -466,7 +497,7 @@ class Commands:
 
     def do_branches(self, arg: str) -> Iterator[str]:
         """Show branches."""
-        _nothing("branches", arg)
+        nothing("branches", arg)
         yield from text_of.branch_lines(branches(self.session))
 
     def do_branch(self, arg: str) -> Iterator[str]:
@@ -517,43 +548,29 @@ class Commands:
         yield f"{self.session.title}; {count} branch{'es' if count > 1 else ''}"
         yield from self.here()
 
+    def do_source(self, arg: str) -> Iterator[str]:
+        """Execute the commands in a file, up to the first error."""
+        path = self._path("source", arg)
+        if path.resolve() in self.sourced:
+            raise SessionError("it is a file of commands that sources itself", place=str(path))
+        self.sourced.append(path.resolve())
+        try:
+            for line in script_lines(path):
+                yield f"{self.prompt}{line.text}"
+                try:
+                    yield from self.answer(line.name, line.rest)
+                except GMSError as error:
+                    raise error.inside(f"{path}, line {line.number}") from None
+                if self.left:
+                    return
+        finally:
+            self.sourced.pop()
+
     def do_quit(self, arg: str) -> Iterator[str]:
         """Do nothing: the interface ends the loop."""
-        _nothing("quit", arg)
+        nothing("quit", arg)
+        self.left = True
         yield from ()
 
 
 _MEANT = {"delete": "clear", "switch": "branch", "exit": "quit", "quit": "quit", "help": "help"}
-_BACKWARD = {"step": "back", "back": "step"}
-
-
-def _count(name: str, text: str, default: int = 1) -> int:
-    usage = COMMANDS[name].usage
-    if name in _BACKWARD:
-        usage += f"; {_BACKWARD[name]} [N] goes the other way"
-    count = integer(text, usage) if text else default
-    if count < 1:
-        raise SessionError(
-            f"{name} {count}: the count must be at least 1", advice=f"usage: {COMMANDS[name].usage}"
-        )
-    return count
-
-
-_REMOVED = {"clear": "breakpoint", "unwatch": "watch"}
-
-
-def _nothing(name: str, arg: str) -> None:
-    if arg:
-        cure = f"goto {arg} goes to a time" if name == "run" else ""
-        raise SessionError(f"{name} takes no argument, but got {arg!r}", advice=cure)
-
-
-def _remove(where: list[Breakpoint] | list[str], name: str, arg: str) -> None:
-    if arg == "all":
-        where.clear()
-        return
-    number = integer(arg, COMMANDS[name].usage)
-    if not 1 <= number <= len(where):
-        there = f"there are 1 to {len(where)}" if where else "none is set"
-        raise SessionError(f"there is no {_REMOVED[name]} {number}", advice=there)
-    del where[number - 1]

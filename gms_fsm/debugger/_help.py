@@ -81,7 +81,13 @@ COMMANDS = {
         ("step", "s 10"),
         "s",
     ),
-    "back": Command("move", "back [N]", "Go back N rows (default 1).", ("back 10",)),
+    "back": Command(
+        "move",
+        "back [N], back until CONDITION, or back continue",
+        "Go back N rows (default 1); to the last point before this one where a condition was true, "
+        "also between rows; or to the breakpoint before this row.",
+        ("back 10", "back continue", "back until abs({z}1) > 0.9*{s}1"),
+    ),
     "next": Command("move", "next", "Go forward to the next transition.", ("next",), "n"),
     "prev": Command("move", "prev", "Go back to the previous transition.", ("prev",)),
     "goto": Command(
@@ -112,12 +118,18 @@ COMMANDS = {
     "break": Command(
         "stop",
         "break [tested|valid|fires] EDGE [{at}] [if CONDITION] [hits K], or "
-        "break [enter|leave] STATE ...",
+        "break [enter|leave] STATE ..., or break changes EXPRESSION ...",
         "Make continue stop where the guard of an edge is evaluated (tested) or becomes true "
         "(valid), or where the edge is taken (fires, the default); where a state is entered (the "
-        "default) or left. The condition is evaluated after the event; with hits K, stop from the "
-        "K-th hit on. Without an argument, show all breakpoints.",
-        ("break fires {edge} {where}", "b enter {state} if {lead}{v} < 0 hits 3"),
+        "default) or left; or at a row where an expression is not what it was at the row before. "
+        "The condition is evaluated after the event; with hits K, stop from the K-th hit on. "
+        "Without an argument, show all breakpoints.",
+        (
+            "break fires {edge} {where}",
+            "break changes sgn({lead}{v})",
+            "b changes {lead}state({n})",
+            "b enter {state} if {lead}{v} < 0 hits 3",
+        ),
         "b",
     ),
     "breaks": Command("stop", "breaks", "Show all breakpoints and their hits.", ("breaks",)),
@@ -156,6 +168,12 @@ COMMANDS = {
     ),
     "save": Command("file", "save FILE", "Write the session to a file.", ("save mine.json",)),
     "load": Command("file", "load FILE", "Load a session from a file.", ("load mine.json",)),
+    "source": Command(
+        "file",
+        "source FILE",
+        "Execute the commands in a file, one on each line, up to the first error.",
+        ("source mine.txt",),
+    ),
     "help": Command(
         "file", "help [COMMAND]", "Show all commands, or the help on one.", ("help break",), "h"
     ),

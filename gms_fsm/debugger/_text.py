@@ -221,7 +221,8 @@ def breakpoint_text(point: Breakpoint) -> str:
         who = point.contact if point.element is None else f"{point.contact} {point.element + 1}"
     condition = f", if {point.condition}" if point.condition else ""
     hits = f", from hit {point.hits} on" if point.hits > 1 else ""
-    return f"{point.kind} {point.name}, {who}{condition}{hits}"
+    where = "" if point.kind == "changes" else f", {who}"
+    return f"{point.kind} {point.name}{where}{condition}{hits}"
 
 
 def short(text: str, wide: int) -> str:

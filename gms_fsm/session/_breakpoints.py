@@ -8,13 +8,13 @@ from typing import Literal
 from gms_fsm.errors import SessionError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.run.problem import Problem
-from gms_fsm.session._conditions import holds_at, read
+from gms_fsm.session._conditions import holds_at, read, seen_by
 from gms_fsm.session.elements import chart_of, contact_named, machine_of, source_of
 from gms_fsm.session.explain import holds
 from gms_fsm.session.tree.branch import Branch
 
-Kind = Literal["tested", "valid", "fires", "enter", "leave"]
-KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave")
+Kind = Literal["tested", "valid", "fires", "enter", "leave", "changes"]
+KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave", "changes")
 
 
 @dataclass
@@ -23,10 +23,11 @@ class Breakpoint:
 
     Parameters
     ----------
-    kind : {"tested", "valid", "fires", "enter", "leave"}
-        Guard of an edge evaluated, guard becoming true, edge taken; state entered or left.
+    kind : {"tested", "valid", "fires", "enter", "leave", "changes"}
+        Guard of an edge evaluated, guard becoming true, edge taken; state entered or left; a row
+        at which an expression is not what it was at the row before.
     name : str
-        Name of the edge or state.
+        Name of the edge or state; the expression, which is a number, a condition or ``state(2)``.
     element : int or None
         Element index, from 0; None for all elements.
     condition : str
@@ -54,6 +55,15 @@ def new_breakpoint(
     """Return a breakpoint; raise an error if one of its parts is invalid."""
     if kind not in KINDS:
         raise unknown("kind of breakpoint", kind, KINDS, SessionError)
+    if hits < 1:
+        raise SessionError(f"hits is {hits}", advice="it must be at least 1")
+    if condition:
+        read(start, condition)
+    if kind == "changes":
+        if element is not None:
+            raise SessionError("an expression names its elements", advice="leave the element out")
+        seen_by(start, name)
+        return Breakpoint(kind, name, None, condition, hits)
     banks = start.program.layout.banks
     contact, index = "", None
     if isinstance(element, str) and element in [bank.name for bank in banks]:
@@ -72,17 +82,17 @@ def new_breakpoint(
             other, verb = ("an edge", "fires") if name in edges else ("a state", "enter")
             error = error.replaced(advice=f"{name} is {other}: break {verb} {name}")
         raise error
-    if hits < 1:
-        raise SessionError(f"hits is {hits}", advice="it must be at least 1")
-    if condition:
-        read(start, condition)
     return Breakpoint(kind, name, index, condition, hits, contact=contact)
 
 
 def hits(point: Breakpoint, branch: Branch, row: int) -> bool:
     """Return whether a breakpoint hits at a row."""
     start = branch.start
-    if not any(_happens(point, branch, row, machine) for machine in _machines(point, start)):
+    if point.kind == "changes":
+        seen = seen_by(start, point.name)
+        if row == 0 or seen(branch, branch.raw(row - 1)) == seen(branch, branch.raw(row)):
+            return False
+    elif not any(_happens(point, branch, row, machine) for machine in _machines(point, start)):
         return False
     return not point.condition or holds_at(read(start, point.condition), branch, branch.raw(row))
 

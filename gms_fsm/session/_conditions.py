@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from gms_fsm.errors import ExpressionError, SessionError
-from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
+from gms_fsm.language import Condition, InState, Value, evaluate, parse_condition, parse_value
 from gms_fsm.run.problem import Problem
 from gms_fsm.session.explain import holds
 from gms_fsm.session.tree.branch import Branch, BranchRow
 from gms_fsm.traces.system_scope import in_si, names_of, owners_of
+
+_STATE = re.compile(r"\s*(?:(\w+)\.)?state(?:\s*\(\s*\d{1,9}\s*\))?\s*")
 
 
 def read(start: Problem, text: str) -> Condition:
@@ -35,14 +38,49 @@ def holds_at(condition: Condition, branch: Branch, row: BranchRow) -> bool:
     return holds(condition, branch.watches(row))
 
 
+def seen_by(start: Problem, text: str) -> Callable[[Branch, BranchRow], object]:
+    """Return what an expression is at a row: a number, a truth, or the state in ``state(2)``.
+
+    What cannot be computed is None.
+    """
+    if (state := _STATE.fullmatch(text)) and text.strip() not in names_of(start.what):
+        contact = start.system.contact(state[1]) if state[1] in _contacts(start) else None
+        chart = (contact or start.system.machines[0]).chart
+        tree = read(start, f"{text} == {chart.states[0].name}")
+        assert isinstance(tree, InState)
+        return lambda branch, row: branch.watches(row)[f"state({tree.element})"]
+    if re.search(r"[<>]|==|!=|\b(and|or|not)\b", text):
+        condition = read(start, text)
+        return lambda branch, row: holds_at(condition, branch, row)
+    value = _value(start, text)
+
+    def computed(branch: Branch, row: BranchRow) -> float | None:
+        try:
+            return float(evaluate(value, branch.watches(row)))
+        except (ArithmeticError, ValueError):
+            return None
+
+    return computed
+
+
+def _contacts(start: Problem) -> list[str]:
+    """Return the names of contacts that a text can have in front."""
+    return [each.name for each in start.system.machines] if start.what.named else []
+
+
 def value_of(start: Problem, text: str, values: Mapping[str, Any]) -> float:
     """Return the value of a watch expression, given the values of its names."""
-    with _explained(start):
-        tree = parse_value(in_si(start.what, text), names_of(start.what))
+    tree = _value(start, text)
     try:
         return float(evaluate(tree, values))
     except (ArithmeticError, ValueError) as error:
         raise SessionError(f"{text!r} cannot be computed here: {error}") from None
+
+
+def _value(start: Problem, text: str) -> Value:
+    """Parse a text that stands for a number."""
+    with _explained(start):
+        return parse_value(in_si(start.what, text), names_of(start.what))
 
 
 @contextmanager

@@ -280,34 +280,25 @@ class Session:
         """
         return _conditions.value_of(self.start, text, self.values())
 
-    def until(self, condition: str) -> Here:
-        """Go forward as `reaches` does.
-
-        Parameters
-        ----------
-        condition : str
-            See `parse`.
-
-        Returns
-        -------
-        Here
-            The point (``located`` is set if it is between rows), or the end of the run.
-        """
-        self.reaches(condition)
+    def until(self, condition: str, *, back: bool = False) -> Here:
+        """Go as `reaches` does, and return the point reached, or the end or start of the run."""
+        self.reaches(condition, back=back)
         return self.here
 
-    def reaches(self, condition: str) -> bool:
+    def reaches(self, condition: str, *, back: bool = False) -> bool:
         """Go forward to the next point where a condition becomes true, located between rows.
 
         Parameters
         ----------
         condition : str
             See `parse`. If it is already true, it must first become false.
+        back : bool
+            Go back instead, to the last point before this one where the condition was true.
 
         Returns
         -------
         bool
-            False if the end of the run was reached.
+            False if the end of the run was reached, or going back its start.
 
         Examples
         --------
@@ -318,9 +309,12 @@ class Session:
         (True, 15.403)
         >>> session.reaches("t > 1"), session.here.t  # it is, and stays so
         (False, 20.0)
+        >>> session.reaches("v > 0.1", back=True), round(session.here.t, 3)  # the last time
+        (True, 9.597)
         """
-        tree = self.parse(condition)
-        return walker.reaches(self.branch, lambda row: holds_at(tree, self.branch, row))
+        tree, branch = self.parse(condition), self.branch
+        walk = walker.reached if back else walker.reaches
+        return walk(branch, lambda row: holds_at(tree, branch, row))
 
     # ------------------------------------------------------------------ breakpoints
     def break_on(
@@ -335,10 +329,10 @@ class Session:
 
         Parameters
         ----------
-        kind : {"tested", "valid", "fires", "enter", "leave"}
+        kind : {"tested", "valid", "fires", "enter", "leave", "changes"}
             See `Breakpoint`.
         name : str
-            An edge (tested, valid, fires) or a state (enter, leave).
+            An edge (tested, valid, fires), a state (enter, leave) or an expression (changes).
         element : int or str, optional
             Element index, from 0; in a system ``"gear 1"``, or ``"gear"`` for all elements of the
             contact. All elements if omitted.
@@ -363,19 +357,19 @@ class Session:
         self.breakpoints.append(found)
         return found
 
-    def proceed(self) -> tuple[Here, Breakpoint | None]:
-        """Go forward to the next breakpoint that hits, or the end.
+    def proceed(self, *, back: bool = False) -> tuple[Here, Breakpoint | None]:
+        """Go forward to the next breakpoint that hits, or the end; or back, without counting hits.
 
         Returns
         -------
         (Here, Breakpoint or None)
-            The row reached and the breakpoint; None at the end of the run.
+            The row reached and the breakpoint; None at the end of the run, or at its start.
         """
-        for row in walker.forward(self.branch):
+        for row in (walker.backward if back else walker.forward)(self.branch):
             for point in self.breakpoints:
                 if _breakpoints.hits(point, self.branch, row):
-                    point.seen += 1
-                    if point.seen >= point.hits:
+                    point.seen += not back
+                    if back or point.seen >= point.hits:
                         return self.here, point
         return self.here, None
 

@@ -26,6 +26,7 @@ def test_the_examples_of_every_command_work(
     made: Callable[[], Session], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    Path("mine.txt").write_text("step 2\nback\n")
     overview = debugger(made()).reply("help")
     assert len(overview.splitlines()) < 24
     for name, command in COMMANDS.items():
@@ -50,6 +51,8 @@ def test_the_examples_of_every_command_work(
         (fig4, "", "b", "back break breaks branches branch"),
         (fig4, "b fires ", "break_", "break_away_forward break_away_backward"),
         (fig4, "break ", "sl", "slip"),
+        (fig4, "b ", "ch", "changes"),
+        (fig4, "back ", "un", "until"),
         (fig4, "until ", "z", "z1 z2 z3 z4"),
         (fig4, "p ", "state(", "state(1) state(2) state(3) state(4)"),
         (fig4, "poke ", "state1", "state1="),

@@ -25,6 +25,7 @@ def walked() -> Session:
     session.switch(1)
     session.break_on("fires", "arrest", 1, "z1 > 0", 2)
     session.break_on("leave", "slip")
+    session.break_on("changes", "sgn(v)", condition="z1 > 0")
     session.watches.append("z1 / s1")
     return session
 

@@ -1,6 +1,7 @@
 """Rows that were seen stay, parents never change, and each branch is a run of its own.
 
-Random walks of step, back, next, prev, goto, until, switch and poke on random small models.
+Random walks of step, back, next, prev, goto, until (both ways), switch and poke on random small
+models.
 """
 
 from __future__ import annotations
@@ -56,6 +57,7 @@ def test_random_walks(
         "prev": lambda _: session.prev_transition(),
         "goto": session.goto,
         "until": session.until,
+        "last": lambda condition: session.until(condition, back=True),
         "switch": lambda number: session.switch(number % len(session.branches)),
     }
     for move, given_ in walk:

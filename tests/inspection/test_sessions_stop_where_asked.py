@@ -6,6 +6,7 @@ import math
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 from scipy.optimize import brentq
 
@@ -125,6 +126,40 @@ def test_breakpoints_of_one_contact_leave_out_those_of_others_with_the_same_name
     assert [session.at(row).t for row, _ in stops(session)] == wanted
 
 
+def test_changes_stops_at_every_row_that_differs_from_the_one_before() -> None:
+    trace = whole()
+    seen = {
+        "state(2)": trace.states[:, 1],
+        "sgn(v)": np.sign(trace.v),
+        "z1 > 0.3 and v > 0": (trace.z[:, 0] > 0.3) & (trace.v > 0),
+    }
+    for text, values in seen.items():
+        session = fig4()
+        session.break_on("changes", text)
+        rows = [row for row in range(1, len(trace)) if values[row] != values[row - 1]]
+        assert [row for row, _ in stops(session)] == rows != []
+
+
+def test_changes_takes_a_state_of_a_contact_and_a_condition() -> None:
+    session = a_system()
+    session.break_on("changes", "pad.state", condition="pad.state == forward")
+    here, point = session.proceed()
+    assert point is not None
+    assert (here.fired.edge, here.contact("pad").states) == ("release_forward", ("forward",))
+
+
+def test_back_is_at_the_breakpoints_that_were_passed_and_counts_no_hit() -> None:
+    session = fig4()
+    point = session.break_on("fires", "arrest", hits=3)
+    rows = [row for row, r in fired() if r.edge == "arrest"]
+    session.goto(100.0)
+    back = []
+    while (stop := session.proceed(back=True))[1] is not None:
+        back.append(stop[0].row)
+    assert back == rows[::-1]
+    assert (point.seen, session.here.row) == (0, 0)
+
+
 # --------------------------------------------------------------------------- until
 def stuck(**options: float) -> Session:
     """One element that sticks: z = x = 0.1 (1 - cos t), v = 0.1 sin t."""
@@ -187,3 +222,57 @@ def test_conditions_use_the_names_of_a_system_and_of_its_contacts() -> None:
     F = here.contact("pad").F + here.contact("bank").F_elements[0]
     assert session.watch("pad.F + bank.F1") == F
     assert session.watch("r") == 0.1 * math.sin(here.t)
+
+
+# --------------------------------------------------------------------------- back until
+@pytest.mark.parametrize(("name", "level"), [("z1", 0.003), ("z1", 0.1999), ("x", 0.05)])
+def test_the_last_point_of_a_closed_form(name: str, level: float) -> None:
+    session = stuck(max_step=0.01)
+    session.goto(6.0)
+    here = session.until(f"{name} < {level}", back=True)  # 0.1 (1 - cos t) falls after pi
+    rising = brentq(lambda t: 0.1 * (1 - math.cos(t)) - level, 0.0, math.pi, xtol=1e-15)
+    exact = rising if here.t < math.pi else 2 * math.pi - rising
+    assert here.t == pytest.approx(exact, abs=1e-10)
+    assert here.located
+    assert session.watch(name) < level  # the last point at which it was true
+
+
+def test_back_finds_what_until_found_to_the_width_of_the_clock() -> None:
+    session = stuck()
+    there = session.until("v < -0.05")
+    session.goto(6.0)
+    last = session.until("v > -0.05", back=True)
+    assert last.t < there.t
+    assert there.t - last.t < 1e-14
+    assert session.at(last.row).t <= last.t < session.at(last.row + 1).t
+
+
+def test_back_a_condition_that_is_true_must_first_become_false() -> None:
+    session = stuck(max_step=0.1)
+    session.goto(2.0)
+    assert not session.reaches("v > 0.05", back=True)  # true here since 0.52 s, and never before
+    assert (session.here.row, session.here.located) == (0, False)
+    assert not session.reaches("v > 0.05", back=True)  # there is nothing before the start
+
+
+def test_back_goes_on_from_a_located_place() -> None:
+    session = stuck()
+    session.goto(3.0)
+    later = session.until("z1 < 0.0501", back=True)
+    earlier = session.until("z1 < 0.05", back=True)
+    assert later.t - earlier.t == pytest.approx(0.0001 / earlier.v, rel=1e-3)
+
+
+def test_back_a_state_was_last_before_the_micro_step_that_left_it() -> None:
+    session = fig4()
+    session.goto(13.0)
+    here = session.until("state(2) == slip", back=True)
+    row, left = next((row, r) for row, r in fired() if r.element == 1 and r.edge == "arrest")
+    assert (here.row, here.located, here.t) == (row - 1, False, left.t)
+
+
+def test_back_nothing_is_between_the_rows_of_a_jump() -> None:
+    session = a_system()
+    session.goto(0.32)
+    here = session.until("count < 6.5", back=True)  # the tick at 0.3 s makes it 7
+    assert (here.located, session.at(here.row + 1).values["count"]) == (False, 7.0)

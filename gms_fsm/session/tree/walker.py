@@ -15,6 +15,17 @@ from gms_fsm.traces.between import first_true
 LOOKS = 16  # points between two rows at which a condition is evaluated
 
 
+def backward(branch: Branch) -> Iterator[int]:
+    """Move back by rows to the start, and yield the number of each row reached."""
+    if branch.between is not None:
+        branch.between = None
+        yield branch.cursor
+    while branch.cursor > 0:
+        branch.on_row()
+        branch.cursor -= 1
+        yield branch.cursor
+
+
 def forward(branch: Branch) -> Iterator[int]:
     """Move forward by rows to the end, and yield the number of each new row."""
     branch.between = None
@@ -88,7 +99,7 @@ def reaches(branch: Branch, holds: Callable[[BranchRow], bool]) -> bool:
             branch.between = None
             branch.cursor = len(branch) - 1
             return False
-        place, truth = _first_true(branch, row, begin, holds, truth)
+        place, truth = _first_true(branch, row, begin, 1, holds, truth)
         begin = None
         branch.between = place
         if place is not None:
@@ -100,26 +111,60 @@ def reaches(branch: Branch, holds: Callable[[BranchRow], bool]) -> bool:
         truth = now
 
 
-def _first_true(
-    branch: Branch, row: int, begin: float | None, holds: Callable[[BranchRow], bool], truth: bool
-) -> tuple[BranchRow | None, bool]:
-    """Search between a row and the next for the point where a condition becomes true.
+def reached(branch: Branch, holds: Callable[[BranchRow], bool]) -> bool:
+    """Go back to the last point where a condition was true, located between rows."""
+    truth = holds(branch.here)
+    begin = None if branch.between is None else branch.between.t
+    row = branch.cursor - (begin is None)  # the row before where we are
+    while row >= 0:
+        branch.on_row()
+        place, truth = _first_true(branch, row, begin, -1, holds, truth)
+        begin = None
+        branch.cursor, branch.between = row, place
+        if place is not None:
+            return True
+        now = holds(branch.here)
+        if now and not truth:
+            return True
+        truth, row = now, row - 1
+    branch.cursor, branch.between = 0, None
+    return False
 
-    The next row itself is left to the caller. Returns the point, and the last truth value.
+
+def _first_true(
+    branch: Branch,
+    row: int,
+    begin: float | None,
+    way: int,
+    holds: Callable[[BranchRow], bool],
+    truth: bool,
+) -> tuple[BranchRow | None, bool]:
+    """Search between a row and the next for the first point on the way where a condition is true.
+
+    The way is 1 forward and -1 back. The row at its end is left to the caller. Returns the point,
+    and the last truth value.
     """
     before, after = branch.raw(row), branch.raw(row + 1)
-    start = before.t if begin is None else begin
-    if after.microstep > 0 or after.t <= start or branch.start.program.ticks.at(after.t):
+    if after.microstep > 0 or branch.start.program.ticks.at(after.t):
         return None, truth  # at a tick values jump: nothing is between the rows
-    low, place = start, branch.behind(row)
+    first, last = (before, after) if way > 0 else (after, before)
+    low = start = way * (first.t if begin is None else begin)  # time as it passes on the way
+    end = way * last.t
+    if end <= start:
+        return None, truth
+    between = branch.behind(row)
+
+    def place(passed: float) -> BranchRow:
+        return between(way * passed)
+
     for look in range(1, LOOKS + 1):
         at_end = look == LOOKS
-        t = after.t if at_end else start + (after.t - start) * look / LOOKS
-        now = holds(after if at_end else place(t))
+        passed = end if at_end else start + (end - start) * look / LOOKS
+        now = holds(last if at_end else place(passed))
         if now and not truth:
-            found = first_true(low, t, lambda t: holds(place(t)))
-            if at_end and found == after.t:
+            found = first_true(low, passed, lambda passed: holds(place(passed)))
+            if at_end and found == end:
                 break
             return place(found), True
-        low, truth = t, now
+        low, truth = passed, now
     return None, truth
