@@ -68,9 +68,11 @@ from gms_fsm import (
     sweep,
 )
 from gms_fsm.app.cli import CliOptions, app
-from gms_fsm.app.scenario import load_system
+from gms_fsm.app.scenario import launched, load_system
 from gms_fsm.charts import CHARTS, gms_element, timetable
 from gms_fsm.charts.registry import Demonstration, Entry, entry
+from gms_fsm.debugger.dap._adapter import Adapter
+from gms_fsm.debugger.dap._wire import read_message
 from gms_fsm.errors import (
     NOTHING,
     ChartError,
@@ -2209,6 +2211,7 @@ group("session", SessionError, unmoved, rows, "")
 rows = {
     "poke of a variable by its name": ("Session.poke", ..., lambda s: s.poke(z1=0.1)),
     "poke of all elements at once": ("z", 0.1, lambda s: s.poke({"z": 0.1})),
+    "break on a change of a number": ("name", 3, lambda s: s.break_on("changes", 3)),
     "poke of a text": ("variables", "z", lambda s: s.poke("z")),
     "poke of a state as a text": ("state", "slip", lambda s: s.poke(state="slip")),
     "steps below zero": ("count", -1, lambda s: s.step(-1)),
@@ -2293,6 +2296,40 @@ rows = {
     "break on a missing contact": (lambda s: s.break_on("fires", "arrest", "gear 1"), a_system),
 }
 group("session", SessionError, unmoved, rows, "")
+
+
+def editing(request: str, *, launched_first: bool = True, **given: object) -> object:
+    """Make a request of an editor."""
+    adapter = Adapter(launched, lambda *_: None, lambda: False)
+    if launched_first:
+        adapter.answer("launch", {"program": "pulled_mass"})
+    return adapter.answer(request, given)
+
+
+def framed(body: bytes) -> object:
+    """Read a message with this body."""
+    return read_message(io.BytesIO(b"Content-Length: %d\r\n\r\n%b" % (len(body), body)))
+
+
+early = partial(editing, launched_first=False)
+rows = {
+    "no scenario": ("program", None, partial(early, "launch")),
+    "settings that are no list": (
+        "set", "a=1", partial(early, "launch", program="servo", set="a=1")),
+}  # fmt: skip
+group("editor", ScenarioError, called, rows)
+rows = {
+    "unknown request": ("", ..., partial(editing, "restart")),
+    "request before the launch": ("", ..., partial(early, "stackTrace")),
+    "paths that are URIs": ("pathFormat", ..., partial(early, "initialize", pathFormat="uri")),
+    "expression that is no text": ("expression", 3, partial(editing, "evaluate", expression=3)),
+    "file without a path": ("path", None, partial(editing, "setBreakpoints", source={})),
+    "frame of no row": ("", ..., partial(editing, "scopes", frameId=99)),
+    "scope of before": ("", ..., partial(editing, "variables", variablesReference=9)),
+    "message that is not JSON": ("", ..., lambda: framed(b"x")),
+    "message that is no object": ("", [], lambda: framed(b"[]")),
+}  # fmt: skip
+group("editor", SessionError, called, rows)
 
 
 def damaged(**changes: Any) -> None:

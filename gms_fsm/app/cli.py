@@ -32,6 +32,7 @@ from gms_fsm.app.verbs.export import export_command
 from gms_fsm.app.verbs.fit import fit_command
 from gms_fsm.app.verbs.runs import (
     copy_command,
+    dap_command,
     debug_command,
     lesson_command,
     paper_command,
@@ -216,6 +217,7 @@ app.command("plot", cls=_Verb)(plot_command)
 app.command("animate", cls=_Drawing)(animate_command)
 app.command("replay", cls=_Drawing)(replay_command)
 app.command("debug", cls=_Verb)(debug_command)
+app.command("dap", cls=_Verb)(dap_command)
 app.command("lesson", cls=_Verb)(lesson_command)
 app.command("code", cls=_Verb)(code_command)
 app.command("export", cls=_Verb)(export_command)

@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -42,6 +42,9 @@ from gms_fsm.systems.signals import Corners, SignalLike, as_signal
 from gms_fsm.systems.system import System
 from gms_fsm.traces.monitors import Monitor, checked
 from gms_fsm.traces.trace import Trace
+
+if TYPE_CHECKING:
+    from gms_fsm.debugger.dap import Launched
 
 __all__ = [
     "DATA_VARIABLE",
@@ -458,3 +461,23 @@ def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | N
     from gms_fsm.debugger import Debugger
 
     return Debugger(session_of(loaded), loaded.title, stdin, stdout).run()
+
+
+def launched(given: Mapping[str, Any]) -> Launched:
+    """Return the session that a launch request of an editor asks for."""
+    from gms_fsm.debugger.dap import Launched
+
+    program, settings = given.get("program"), given.get("set") or []
+    if not isinstance(program, str) or not program:
+        raise ScenarioError(
+            "give a scenario file, or the name of a scenario of the package",
+            place="program",
+            value=program,
+        )
+    if not isinstance(settings, list) or not all(isinstance(each, str) for each in settings):
+        raise ScenarioError(
+            'give a list of texts, for example ["model.law=signed"]', place="set", value=settings
+        )
+    engine = [f"run.engine={given['engine']}"] if given.get("engine") else []
+    loaded = load_scenario(program, [*settings, *engine])
+    return Launched(session_of(loaded), loaded.title, loaded.path)

@@ -20,7 +20,7 @@ from gms_fsm.foundation.arguments import meant, there_are
 from gms_fsm.foundation.quantities import WIDTH, in_words
 from gms_fsm.language import EVENT, evaluate
 from gms_fsm.session.explain import holds
-from gms_fsm.session.session import KINDS, Session
+from gms_fsm.session.session import KINDS, Breakpoint, Session
 from gms_fsm.traces.system_scope import asked_unit, in_si, units_of
 
 
@@ -60,6 +60,7 @@ class Commands:
         self.last_move = ""  # the line that moved last, which an empty line repeats
         self.left = False  # whether the last line was `quit`
         self.refused = 0  # lines that were answered by an error
+        self.hit: Breakpoint | None = None  # where `continue` stopped last
         self.sourced: list[Path] = []  # the files of commands that are being read
 
     def reply(self, line: str) -> Iterator[str]:
@@ -297,6 +298,7 @@ class Commands:
 
     def _continue(self, *, back: bool) -> Iterator[str]:
         _, point = self.session.proceed(back=back)
+        self.hit = point
         if point is None:
             yield "no breakpoint was hit" if self.session.breakpoints else "no breakpoint is set"
         else:

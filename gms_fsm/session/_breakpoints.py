@@ -55,15 +55,13 @@ def new_breakpoint(
     """Return a breakpoint; raise an error if one of its parts is invalid."""
     if kind not in KINDS:
         raise unknown("kind of breakpoint", kind, KINDS, SessionError)
-    if hits < 1:
-        raise SessionError(f"hits is {hits}", advice="it must be at least 1")
-    if condition:
-        read(start, condition)
     if kind == "changes":
         if element is not None:
             raise SessionError("an expression names its elements", advice="leave the element out")
+        if not isinstance(name, str):
+            raise SessionError("it must be a text", place="name", value=name)
         seen_by(start, name)
-        return Breakpoint(kind, name, None, condition, hits)
+        return _counting(start, Breakpoint("changes", name, None, condition, hits))
     banks = start.program.layout.banks
     contact, index = "", None
     if isinstance(element, str) and element in [bank.name for bank in banks]:
@@ -82,7 +80,16 @@ def new_breakpoint(
             other, verb = ("an edge", "fires") if name in edges else ("a state", "enter")
             error = error.replaced(advice=f"{name} is {other}: break {verb} {name}")
         raise error
-    return Breakpoint(kind, name, index, condition, hits, contact=contact)
+    return _counting(start, Breakpoint(kind, name, index, condition, hits, contact=contact))
+
+
+def _counting(start: Problem, point: Breakpoint) -> Breakpoint:
+    """Return a breakpoint; raise an error if its hits or its condition is invalid."""
+    if point.hits < 1:
+        raise SessionError(f"hits is {point.hits}", advice="it must be at least 1")
+    if point.condition:
+        read(start, point.condition)
+    return point
 
 
 def hits(point: Breakpoint, branch: Branch, row: int) -> bool:

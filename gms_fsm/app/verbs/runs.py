@@ -7,6 +7,7 @@ import contextlib
 import enum
 import json
 import math
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -282,6 +283,14 @@ def debug_command(
         if tui:
             raise typer.Exit(run_tui(session_of(loaded), loaded.title, light=light))
     raise typer.Exit(run_debugger(loaded))
+
+
+def dap_command() -> None:
+    """Serve the debugger to an editor: the Debug Adapter Protocol on standard input and output."""
+    from gms_fsm.app.scenario import launched
+    from gms_fsm.debugger.dap import serve
+
+    raise typer.Exit(serve(launched, sys.stdin.buffer, sys.stdout.buffer))
 
 
 def lesson_command(
