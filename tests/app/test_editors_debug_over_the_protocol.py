@@ -7,17 +7,22 @@ element 1 does not arrest.
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from gms_fsm.app.cli import app
 from gms_fsm.app.scenario import load_scenario, session_of
 from gms_fsm.debugger import Debugger
 from gms_fsm.scenarios import scenario_path
 from gms_fsm.session.session import Session
 from tests.app.dap_client import PATIENCE, DapClient, adapter, process
+from tests.helpers import ROOT
 from tests.inspection.sessions import debugger
+from tests.page_blocks import blocks_of
 
 SQUEAL = "brake_squeal"
 
@@ -514,3 +519,35 @@ def test_the_process_leaves_when_its_client_is_gone() -> None:
         started.stdin.write(b"Content-Length: 12\r\n\r\n" + json.dumps({"a": 1}).encode()[:5])
         started.stdin.close()
         assert started.wait(PATIENCE) == 1
+
+
+# --------------------------------------------------------------------------- the page
+def page(name: str) -> Any:
+    """Return a JSON file of the page on VS Code."""
+    blocks = blocks_of((ROOT / "docs/howto/vscode.md").read_text(encoding="utf-8"))
+    return json.loads(next(each.body for each in blocks if each.file == name))
+
+
+def test_the_launch_file_of_the_page_launches_what_the_extension_declares() -> None:
+    (declared,) = page("package.json")["contributes"]["debuggers"]
+    keys = declared["configurationAttributes"]["launch"]
+    for each in page("launch.json")["configurations"]:
+        given = {
+            name: value for name, value in each.items() if name not in ("type", "request", "name")
+        }
+        assert (each["type"], each["request"]) == (declared["type"], "launch")
+        assert {*keys["required"]} <= {*given} <= {*keys["properties"]}
+        given["program"] = given["program"].replace("${file}", str(scenario_path(SQUEAL)))
+        with adapter() as client:
+            client.enter(**given)
+
+
+def test_the_extension_starts_the_verb() -> None:
+    (declared,) = page("package.json")["contributes"]["debuggers"]
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+        "scripts"
+    ]
+    assert declared["runtime"] in scripts
+    verbs = [each.name for each in app.registered_commands]
+    assert declared["runtimeArgs"] == ["dap"]
+    assert "dap" in verbs
