@@ -313,7 +313,7 @@ def _contact(session: Session, bank: BankPlaces) -> ContactView:
     start, here = session.start, session.here.contacts[bank.name]
     part = start.system.contact(bank.name)
     name, title = (bank.name, part.title) if start.what.named else ("", "")
-    elements = tuple(_element(session, bank.first + i) for i in range(bank.n))
+    elements = tuple(element_view(session, bank.first + i) for i in range(bank.n))
     return ContactView(
         name,
         title,
@@ -351,7 +351,8 @@ def _outcome(branch: Branch) -> str:
     return "end" if branch.ended else ""
 
 
-def _element(session: Session, machine: int) -> ElementView:
+def element_view(session: Session, machine: int) -> ElementView:
+    """Return one element, counted over all contacts, at the cursor."""
     start, branch = session.start, session.branch
     bank = start.program.layout.bank(machine)
     chart, i = chart_of(start, bank), machine - bank.first
@@ -383,7 +384,7 @@ def _element(session: Session, machine: int) -> ElementView:
 
 def chart_states(session: Session, machine: int) -> tuple[StateView, ...]:
     """Return the chart for an element: the active state, and the guards evaluated."""
-    start, element = session.start, _element(session, machine)
+    start, element = session.start, element_view(session, machine)
     chart = chart_of(start, start.program.layout.bank(machine))
     asked = {each.name: each for each in element.edges}
     active = element.state

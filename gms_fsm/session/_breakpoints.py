@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -92,16 +93,22 @@ def _counting(start: Problem, point: Breakpoint) -> Breakpoint:
     return point
 
 
-def hits(point: Breakpoint, branch: Branch, row: int) -> bool:
-    """Return whether a breakpoint hits at a row."""
+def hitting(point: Breakpoint, branch: Branch) -> Callable[[int], bool]:
+    """Return a function that says whether a breakpoint hits at a row."""
     start = branch.start
-    if point.kind == "changes":
-        seen = seen_by(start, point.name)
-        if row == 0 or seen(branch, branch.raw(row - 1)) == seen(branch, branch.raw(row)):
+    condition = read(start, point.condition) if point.condition else None
+    seen = seen_by(start, point.name) if point.kind == "changes" else None
+    machines = _machines(point, start)
+
+    def hits(row: int) -> bool:
+        if seen is not None:
+            if row == 0 or seen(branch, branch.raw(row - 1)) == seen(branch, branch.raw(row)):
+                return False
+        elif not any(_happens(point, branch, row, machine) for machine in machines):
             return False
-    elif not any(_happens(point, branch, row, machine) for machine in _machines(point, start)):
-        return False
-    return not point.condition or holds_at(read(start, point.condition), branch, branch.raw(row))
+        return condition is None or holds_at(condition, branch, branch.raw(row))
+
+    return hits
 
 
 def _machines(point: Breakpoint, start: Problem) -> list[int]:

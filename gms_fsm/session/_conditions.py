@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -56,9 +57,10 @@ def seen_by(start: Problem, text: str) -> Callable[[Branch, BranchRow], object]:
 
     def computed(branch: Branch, row: BranchRow) -> float | None:
         try:
-            return float(evaluate(value, branch.watches(row)))
+            found = float(evaluate(value, branch.watches(row)))
         except (ArithmeticError, ValueError):
             return None
+        return None if math.isnan(found) else found
 
     return computed
 

@@ -365,9 +365,10 @@ class Session:
         (Here, Breakpoint or None)
             The row reached and the breakpoint; None at the end of the run, or at its start.
         """
+        points = [(each, _breakpoints.hitting(each, self.branch)) for each in self.breakpoints]
         for row in (walker.backward if back else walker.forward)(self.branch):
-            for point in self.breakpoints:
-                if _breakpoints.hits(point, self.branch, row):
+            for point, hits in points:
+                if hits(row):
                     point.seen += not back
                     if back or point.seen >= point.hits:
                         return self.here, point

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from gms_fsm.app.scenario import load_scenario, session_of
 from gms_fsm.debugger import Debugger
 from gms_fsm.scenarios import scenario_path
 from gms_fsm.session.session import Session
-from tests.app.dap_client import PATIENCE, DapClient, adapter, process
+from tests.app.dap_client import DapClient, adapter
 from tests.helpers import ROOT
 from tests.inspection.sessions import debugger
 from tests.page_blocks import blocks_of
@@ -413,112 +412,12 @@ def test_lines_from_0_are_understood() -> None:
         assert (found["verified"], found["line"]) == (True, head)
 
 
-# --------------------------------------------------------------------------- mistakes
-WRONG: dict[str, tuple[Callable[[DapClient], str], str]] = {
-    "unknown request": (lambda c: c.fail("restart"), "there is no request 'restart'"),
-    "unknown scenario": (
-        lambda c: c.fail("launch", program="pulledmass"),
-        "there is no file or scenario 'pulledmass'; did you mean 'pulled_mass'?",
-    ),
-    "no scenario": (lambda c: c.fail("launch"), "program is None; give a scenario file"),
-    "run that cannot be": (
-        lambda c: c.fail("launch", program="pulled_mass", set=["run.t_end=-1"]),
-        "run.t_end",
-    ),
-    "setting that is no list": (
-        lambda c: c.fail("launch", program="pulled_mass", set="a=1"),
-        "set is 'a=1'; give a list of texts",
-    ),
-    "unknown engine": (
-        lambda c: c.fail("launch", program="pulled_mass", engine="steam"),
-        "run.engine",
-    ),
-    "request before the launch": (lambda c: c.fail("stackTrace"), "stackTrace comes before launch"),
-    "paths that are URIs": (
-        lambda c: c.fail("initialize", pathFormat="uri"),
-        "paths are wanted, not URIs",
-    ),
-}
-WRONG_IN_A_RUN: dict[str, tuple[Callable[[DapClient], str], str]] = {
-    "unknown name": (
-        lambda c: c.fail("evaluate", expression="z9", context="watch"),
-        "unknown name 'z9'",
-    ),
-    "command that is wrong": (
-        lambda c: c.fail("evaluate", expression="why 9", context="repl"),
-        "no element 9; there are 1 to 4",
-    ),
-    "scope of before": (
-        lambda c: c.fail("variables", variablesReference=99),
-        "there is no scope 99; ask for the scopes again",
-    ),
-    "frame of no row": (lambda c: c.fail("scopes", frameId=999), "there is no frame 999"),
-    "value of no number": (
-        lambda c: c.fail(
-            "setVariable", variablesReference=c.scope("element 1"), name="z1", value="much"
-        ),
-        "unknown name 'much'",
-    ),
-    "edge as a value": (
-        lambda c: c.fail(
-            "setVariable", variablesReference=c.scope("element 1"), name="arrest", value="1"
-        ),
-        "'arrest' cannot be poked",
-    ),
-    "expression that is no text": (lambda c: c.fail("evaluate", expression=3), "expression is 3"),
-}
-
-
-@pytest.mark.parametrize("case", WRONG)
-def test_a_mistake_is_answered_by_its_message(case: str) -> None:
+def test_a_bank_of_many_elements_is_shown_one_by_one() -> None:
+    many = [f"model.{name}={[number] * 300}" for name, number in (("k", 1e5), ("sigma", 25.0))]
+    shares = f"model.shares={[1 / 300] * 300}"
     with adapter() as client:
-        call, said = WRONG[case]
-        assert said in call(client)
-
-
-def test_a_mistake_in_a_run_leaves_it_as_it_was() -> None:
-    with adapter() as client:
-        client.enter("pulled_mass")
-        client.said("goto 0.05")
-        before = client.frames()
-        for case, (call, said) in WRONG_IN_A_RUN.items():
-            assert said in call(client), case
-        assert client.frames() == before
-        assert client.said("branches").count("rows") == 1
-
-
-def test_what_is_no_request_is_passed_over() -> None:
-    with adapter() as client:
-        client.raw([1, 2])
-        client.raw({"type": "event", "event": "output"})
-        assert "a message is not a JSON object" in client.event("output")["output"]
-        client.enter("pulled_mass")
-
-
-# --------------------------------------------------------------------------- the process
-@pytest.mark.slow
-def test_the_verb_writes_nothing_but_the_protocol_and_leaves_with_the_client() -> None:
-    with process() as started:
-        assert started.stdin is not None
-        assert started.stdout is not None
-        client = DapClient(started.stdout, started.stdin)  # which reads nothing else
-        client.enter("pulled_mass", set=["model.law=published", "model.stribeck.F_s=1"])
-        client.go("continue")
-        client.ask("disconnect")
-        assert started.wait(PATIENCE) == 0
-        client.close()
-        said = [each["body"] for each in client.seen if each.get("event") == "output"]
-        notes = [each["output"] for each in said if each["category"] == "important"]
-        assert ["note: " in each for each in notes] == [True]  # without drop it never arrests
-
-
-@pytest.mark.slow
-def test_the_process_leaves_when_its_client_is_gone() -> None:
-    with process() as started:
-        assert started.stdin is not None
-        started.stdin.write(b"Content-Length: 12\r\n\r\n" + json.dumps({"a": 1}).encode()[:5])
-        started.stdin.close()
-        assert started.wait(PATIENCE) == 1
+        client.enter("pulled_mass", set=[*many, shares])
+        assert client.values("element 300")["state300"] == "stick"
 
 
 # --------------------------------------------------------------------------- the page

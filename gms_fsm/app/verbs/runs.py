@@ -23,7 +23,7 @@ from gms_fsm.app.verbs.options import (
     PresetName,
     ScenarioFile,
 )
-from gms_fsm.errors import OutputError, ParameterError
+from gms_fsm.errors import OutputError, ParameterError, SessionError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.files import write_text
 from gms_fsm.scenarios import shipped, titles
@@ -290,6 +290,11 @@ def dap_command() -> None:
     from gms_fsm.app.scenario import launched
     from gms_fsm.debugger.dap import serve
 
+    if sys.stdin.isatty():
+        raise SessionError(
+            "it answers an editor, and this is a terminal",
+            advice="gms-fsm debug SCENARIO takes commands here",
+        )
     raise typer.Exit(serve(launched, sys.stdin.buffer, sys.stdout.buffer))
 
 

@@ -238,7 +238,8 @@ class Adapter:
     def _end(self) -> None:
         if not self.over:
             self.over = True
-            self.send("exited", {"exitCode": 0})
+            failed = self.commands is not None and self._session.branch.failure is not None
+            self.send("exited", {"exitCode": int(failed)})
             self.send("terminated", {})
 
     # ------------------------------------------------------------------ breakpoints
@@ -296,9 +297,9 @@ class Adapter:
     # ------------------------------------------------------------------ looking
     def stack(self, given: Arguments) -> Body:
         """Return this row, and those before it in the same cascade."""
-        session = self._session
-        rows = [session.here.row]
-        while session.here.located is False and session.at(rows[-1]).microstep > 0:
+        branch = self._session.branch
+        rows = [branch.cursor]
+        while branch.between is None and branch.raw(rows[-1]).microstep > 0:
             rows.append(rows[-1] - 1)
         first, levels = int(given.get("startFrame") or 0), int(given.get("levels") or 0)
         shown = rows[first : first + levels] if levels > 0 else rows[first:]

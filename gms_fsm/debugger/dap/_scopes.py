@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from gms_fsm.debugger._commands import Commands
-from gms_fsm.debugger._view import view
+from gms_fsm.debugger._view import element_view
 from gms_fsm.errors import GMSError
-from gms_fsm.lowering.layout import BankPlaces
 
 
 class ShownValue(NamedTuple):
@@ -29,60 +28,47 @@ class ShownScope(NamedTuple):
 def scopes_of(commands: Commands) -> Iterator[ShownScope]:
     """Yield the scopes at the cursor."""
     session, elements = commands.session, commands.elements
+    known = dict.fromkeys(session.names)
     if elements.named:
-        yield ShownScope("system", lambda: _printed(commands, ["t", *session.system.names]))
+        yield _scope(commands, "system", ["t", *session.system.names])
     for bank in elements.banks:
-        yield _of_contact(commands, bank)
-        for machine in range(bank.first, bank.first + bank.n):
-            yield _of_element(commands, machine)
+        lead = f"{bank.name}." if elements.named else ""
+        variables = elements.chart(bank.first).variables
+        inside = {f"{lead}{name}" for name in variables}  # of a single element, without its number
+        own = {}
+        for i in range(bank.n):
+            numbered = [f"{lead}{name}{i + 1}" for name in (*variables, "s", "F")]
+            own[bank.first + i] = [name for name in numbered if name in known]
+            inside.update(own[bank.first + i])
+        names = [name for name in known if name.startswith(lead) and name not in inside]
+        yield _scope(commands, bank.name if elements.named else "friction", names)
+        for machine, names in own.items():
+            state = f"{lead}state{machine - bank.first + 1}"
+            yield _of_element(commands, machine, state, names)
 
 
-def _of_contact(commands: Commands, bank: BankPlaces) -> ShownScope:
-    session, named = commands.session, commands.elements.named
-    lead = f"{bank.name}." if named else ""
-    inside = {*commands.elements.chart(bank.first).variables}
-    for i in range(bank.n):
-        inside.update(_numbered(commands, bank.first + i))
-    own = [name for name in session.names if name.startswith(lead) and name not in inside]
-    own = [name for name in own if name.removeprefix(lead) not in inside]
-    return ShownScope(bank.name if named else "friction", lambda: _printed(commands, own))
+def _scope(commands: Commands, title: str, names: list[str]) -> ShownScope:
+    return ShownScope(title, lambda: _printed(commands, names))
 
 
-def _of_element(commands: Commands, machine: int) -> ShownScope:
-    elements = commands.elements
-    bank = elements.bank(machine)
-    lead = f"{bank.name}." if elements.named else ""
-
+def _of_element(commands: Commands, machine: int, state: str, names: list[str]) -> ShownScope:
     def values() -> Iterator[ShownValue]:
-        here = view(commands.session).elements[machine]
-        yield ShownValue(f"{lead}state{machine - bank.first + 1}", here.state, printed=False)
-        yield from _printed(commands, _numbered(commands, machine))
+        here = element_view(commands.session, machine)
+        yield ShownValue(state, here.state, printed=False)
+        yield from _printed(commands, names)
         for edge in here.edges:
             fired = "FIRED " if edge.fired else ""
             truths = " ".join("true" if holds else "false" for holds in edge.clauses)
             yield ShownValue(edge.name, f"{fired}[{edge.guard}]  {truths}", printed=False)
 
-    return ShownScope(elements.name(machine), values)
-
-
-def _numbered(commands: Commands, machine: int) -> list[str]:
-    """Return the names of the values of an element, as they are typed."""
-    elements = commands.elements
-    bank = elements.bank(machine)
-    lead = f"{bank.name}." if elements.named else ""
-    known, number = commands.session.names, machine - bank.first + 1
-    bases = (*elements.chart(machine).variables, "s", "F")
-    return [name for base in bases if (name := f"{lead}{base}{number}") in known]
+    return ShownScope(commands.elements.name(machine), values)
 
 
 def _printed(commands: Commands, names: list[str]) -> Iterator[ShownValue]:
+    """Yield values as `print` answers, or why they cannot be computed here."""
     for name in names:
-        yield ShownValue(name, printed(commands, name))
-
-
-def printed(commands: Commands, expression: str) -> str:
-    """Return what `print` answers, or why it cannot be computed here."""
-    try:
-        return "\n".join(commands.answer("print", expression))
-    except GMSError as error:
-        return error.reason
+        try:
+            text = "\n".join(commands.answer("print", name))
+        except GMSError as error:
+            text = error.reason
+        yield ShownValue(name, text)

@@ -54,7 +54,10 @@ def serve(
     adapter = Adapter(launch, event, stop.is_set)
     reader = threading.Thread(target=read, daemon=True)
     reader.start()
-    with contextlib.redirect_stdout(sys.stderr):  # whatever a library prints is no message
+    with (
+        contextlib.redirect_stdout(sys.stderr),  # whatever a library prints is no message
+        contextlib.suppress(BrokenPipeError),  # the client is gone
+    ):
         while (message := waiting.get()) is not None:
             if isinstance(message, GMSError):
                 adapter.output(str(message), "stderr")
