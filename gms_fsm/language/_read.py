@@ -21,6 +21,7 @@ from gms_fsm.foundation.parser import PARSER
 from gms_fsm.foundation.quantities import in_si
 from gms_fsm.language._print import spell
 from gms_fsm.language.functions import (
+    ALIASES,
     CONSTANTS,
     ELSEWHERE,
     FUNCTIONS,
@@ -98,21 +99,6 @@ _NO_SIGN_BETWEEN = re.compile(r"[\w.)]\s+[\w(]|\)[\w(]|\d[^\W\d_eE]")  # 2 pi, 2
 _AFTER = re.compile(  # as in Stateflow: after(2, sec)
     r"\bafter\(\s*([\d.]+(?:[eE][+-]?\d+)?)\s*,?\s*([mnuµ]?s(?=ec|\W)|min)(?:ec)?\s*\)"
 )
-_QUANTITIES = {"time": "t", "position": "x", "velocity": "v", "force": "F"}  # of records, of runs
-_ALIASES: Mapping[str, str] = {
-    "quantize": "quantise",
-    "clip": "saturate",
-    "clamp": "saturate",
-    "nearest": "round",
-    "rint": "round",
-    "sign": "sgn",
-    "signum": "sgn",
-    "fabs": "abs",
-    "π": "pi",
-    "speed": "v",
-    **_QUANTITIES,
-    **{short: name for name, short in _QUANTITIES.items()},
-}
 _CALLED = (*FUNCTIONS, *SHORT)
 _GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(_CALLED) + " pi"
 # A call of if: nothing, an operator, a bracket, a comma or a word of conditions stands before it.
@@ -298,7 +284,7 @@ def _parsed(text: str) -> ast.expr:
 
 def _suggestion(name: str, known: Iterable[str]) -> str:
     """Return a question that suggests the known name closest to a wrong one."""
-    near = nearest(_ALIASES.get(name, name), known, 0.75)
+    near = nearest(ALIASES.get(name, name), known, 0.75)
     return f" (did you mean {near!r}?)" if near else ""
 
 

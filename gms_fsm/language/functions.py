@@ -68,10 +68,28 @@ CHOICES: Mapping[str, str] = {"if_lt": "<", "if_le": "<=", "if_gt": ">", "if_ge"
 # Words that are younger than files which use them as names: a declared name wins.
 YIELDING = ("floor", "round", *SHORT)
 CONSTANTS: Mapping[str, float] = {"pi": math.pi}
+# What others call them, and what they call the names of texts.
+_QUANTITIES = {"time": "t", "position": "x", "velocity": "v", "force": "F"}  # of records, of runs
+ALIASES: Mapping[str, str] = {
+    "quantize": "quantise",
+    "clip": "saturate",
+    "clamp": "saturate",
+    "nearest": "round",
+    "rint": "round",
+    "sign": "sgn",
+    "signum": "sgn",
+    "fabs": "abs",
+    "π": "pi",
+    "speed": "v",
+    **_QUANTITIES,
+    **{short: name for name, short in _QUANTITIES.items()},
+}
 # Conditions that stand only in some texts, and in which.
 ELSEWHERE: Mapping[str, str] = {
     "is_in": "is_in(pad.stuck) in the texts of a system; state(1) == stuck in a session",
     "count": "count(pad.slip) in the texts of a system",
+    "delay": "delay(u, 3) in the updates of a Sampled",
+    "duration": "duration(v > 0), in s, in the guards of edges and the texts of states",
     "after": "after(2), in s, alone or joined by and, in the guard of an edge",
 }
 SEVERAL = ("min", "max")  # functions of two or more arguments; the others take one

@@ -5,13 +5,13 @@ from __future__ import annotations
 import keyword
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, check_names, checked_values
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError, Part, shown
 from gms_fsm.language import (
     CONSTANTS,
     FUNCTIONS,
@@ -21,10 +21,16 @@ from gms_fsm.language import (
     Negative,
     Number,
     Value,
+    derivative,
     evaluate,
     names_in,
+    renamed,
 )
 
+if TYPE_CHECKING:
+    from gms_fsm.systems.parts import Body
+
+ZERO = Number(0.0)
 Text: TypeAlias = str | float  # an expression, or just a number
 
 
@@ -128,6 +134,30 @@ def derivative_free(rest: Value) -> bool:
         case Binary("/", a, _):
             return derivative_free(a)
     return False
+
+
+def coefficients(
+    tree: Value, moved: Mapping[str, Body], text: str, owner: Part
+) -> Mapping[str, Value]:
+    """Return the coefficients of a velocity that is linear in the bodies' velocities."""
+    row: dict[str, Value] = {}
+    rest = renamed(tree, dict.fromkeys(moved, ZERO))
+    constant = derivative_free(rest)
+    for v, body in moved.items():
+        slope = derivative(tree, v)
+        if slope is None or names_in(slope) & {*moved}:
+            constant = False
+        elif slope != ZERO:
+            row[body.name] = slope
+    if not constant or not row:
+        raise ParameterError(
+            f"v = {text!r} is not linear in the velocities {', '.join(moved)}",
+            place=owner.words,
+            advice="write it for example as 'v_1 - ratio * v_2'; what moves as prescribed is a "
+            'driven body: velocity = "0.1" instead of its inertia',
+            key=(*owner.key, "v"),
+        )
+    return row
 
 
 def rank_of(banks: Iterable[Any], free: list[str], numbers: Mapping[str, float]) -> int:

@@ -184,11 +184,7 @@ def subject_of(facts: ContactFacts) -> ChartSubject:
     moves = driven or (facts.free and bool(read & {"x", *chart.velocities}))
     moves = moves and bool(chart.velocities)  # a supervisor does not
     load, mobility = _fresh("H", declared), _fresh("W", declared)
-    flows = {
-        key: renamed(tree, lets)
-        for key, tree in chart.flows.items()
-        if key[1] not in chart.durations
-    }
+    flows = {key: renamed(chart.flows[key], lets) for key in chart.flows if key[1] in variables}
     rest = {
         force: _fresh(force_name("R", chart, force), declared)
         for force in chart.force_names

@@ -11,7 +11,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from gms_fsm.language import Binary, Call, Name, Node, Value, frozen, names_in, spell
+from gms_fsm.language import (
+    Binary,
+    Call,
+    Comparison,
+    Name,
+    Node,
+    Requirement,
+    Split,
+    Value,
+    frozen,
+    names_in,
+    spell,
+)
 from gms_fsm.language.functions import ROUGH
 from gms_fsm.language.tree import walk
 from gms_fsm.lowering.places import Places, total
@@ -433,3 +445,16 @@ class ProgramWriter(ABC):
         """Spell the corners of a signal: their times and values."""
         places = (self.plan.tables.text((name, column)) for column in ("times", "values"))
         return ", ".join(f"tables[{place}]" for place in places)
+
+
+def comparisons_of(part: Split) -> list[Comparison]:
+    """Return the comparisons in a split condition."""
+    if isinstance(part, Requirement):
+        return [part.comparison]
+    return [each for inner in part[1] for each in comparisons_of(inner)]
+
+
+def numbered(constants: Iterable[str]) -> str:
+    """Write an assignment of the numbers from 0 to constants."""
+    names = [*constants]
+    return f"{', '.join(names)} = {', '.join(str(number) for number in range(len(names)))}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.foundation.text import visible
@@ -26,7 +26,9 @@ from gms_fsm.lowering.printing.lines import (
     Phase,
     Signs,
     chosen,
+    comparisons_of,
     indented,
+    numbered,
     reads_of,
 )
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
@@ -73,9 +75,9 @@ def python(plan: ProgramPlan) -> str:
     ]
     for bank, states in zip(plan.banks, plan.names.states, strict=True):
         whose = "" if len(plan.banks) == 1 else f" of {bank.bank.name}"
-        lines.append(f"{_numbered(states.values())}  # states{whose}")
+        lines.append(f"{numbered(states.values())}  # states{whose}")
     if any(plan.names.edges):
-        lines.append(f"{_numbered(edge for each in plan.names.edges for edge in each)}  # edges")
+        lines.append(f"{numbered(edge for each in plan.names.edges for edge in each)}  # edges")
     for function in (
         printer.switch(),
         printer.act(),
@@ -390,7 +392,7 @@ class _PythonPrinter(LockFunctions):
         watched = [*self.plan.always]
         for bank in self.read.banks:
             for edge in bank.edges if not bank.periodic else ():
-                watched += _comparisons(split(edge.guard))
+                watched += comparisons_of(split(edge.guard))
         lines = self.before_guards(
             computed_names(side) for each in watched for side in (each.left, each.right)
         )
@@ -465,7 +467,7 @@ class _PythonPrinter(LockFunctions):
             else:
                 reads = frozenset(
                     name
-                    for r in _comparisons(each)
+                    for r in comparisons_of(each)
                     for side in (r.left, r.right)
                     for name in computed_names(side)
                 )
@@ -593,15 +595,3 @@ class _PythonPrinter(LockFunctions):
             lines,
             "live",
         )
-
-
-def _comparisons(part: Split) -> list[Comparison]:
-    if isinstance(part, Requirement):
-        return [part.comparison]
-    return [each for inner in part[1] for each in _comparisons(inner)]
-
-
-def _numbered(constants: Iterable[str]) -> str:
-    """Write an assignment of the numbers from 0 to constants."""
-    names = [*constants]
-    return f"{', '.join(names)} = {', '.join(str(number) for number in range(len(names)))}"

@@ -23,13 +23,12 @@ from gms_fsm.language import (
     Name,
     Number,
     Value,
-    derivative,
     names_in,
     parse_value,
     renamed,
 )
 from gms_fsm.language.normal import chosen, renamed_in
-from gms_fsm.systems.given import derivative_free, is_positive, rank_of
+from gms_fsm.systems.given import coefficients, is_positive, rank_of
 from gms_fsm.systems.parts import COUNTS, LEAST_LOAD, LOAD, Body, Contact
 from gms_fsm.systems.reading.definitions import ContactEdge, Definition
 from gms_fsm.systems.reading.order import check_loops, in_order
@@ -235,15 +234,15 @@ class Assembly:
     @property
     def events_bit(self) -> int:
         """The bit, among all that ticks, with which events are forgotten; 0 if there are none."""
-        periodic = sum(each.periodic for each in self.banks)
-        return 1 << (len(self.system.sampled) + periodic) if self.system.events else 0
+        return self._behind(0) if self.system.events else 0
 
     @property
     def lasting_bit(self) -> int:
         """The bit with which the times of conditions that do not hold are set to 0, or 0."""
-        if not any(each.lasting for each in self.banks):
-            return 0
-        return 2 << (len(self.system.sampled) + sum(each.periodic for each in self.banks))
+        return self._behind(1) if any(each.lasting for each in self.banks) else 0
+
+    def _behind(self, number: int) -> int:
+        return 1 << (len(self.system.sampled) + sum(each.periodic for each in self.banks) + number)
 
     def bank_of(self, tree: Value | Condition) -> int | None:
         """Return the bank whose elements have one value of a tree each; None if there is one."""
@@ -383,9 +382,9 @@ class SystemReader:
     def bank(self, index: int, contact: Contact) -> Bank:
         """Return a contact with the texts of its chart read."""
         chart, model, c = contact.chart, contact.model, contact.name
-        i = index - len(self.system.contacts)  # below 0 but for supervisors
-        kind, i = ("contact", index) if i < 0 else ("supervisor", i)
-        owner = self.here.of(f"{kind} {c!r}", f"{kind}s", i)
+        i = index - len(self.system.contacts)
+        kind = "contact" if i < 0 else "supervisor"
+        owner = self.here.of(f"{kind} {c!r}", f"{kind}s", index if i < 0 else i)
         names: dict[str, Value] = {"t": Name("t"), **{u: Name(of(c, u)) for u in contact.values}}
         self.check_inputs(contact, owner)
         own_names: dict[str, str] = {}  # of what an action can set
@@ -394,7 +393,7 @@ class SystemReader:
         velocities, at = [], ""
         for text, name in zip(contact.v, chart.velocities, strict=True):
             tree = self.value(text, [*moved, *self.system.numbers], owner.of("v", "v"))
-            jacobian.append(self.coefficients(tree, moved, text, owner))
+            jacobian.append(coefficients(tree, moved, text, owner))
             known = self.defined(of(c, name), tree)
             names[name], own_names[name] = known, known.id
             velocities.append(known.id)
@@ -457,9 +456,7 @@ class SystemReader:
             totals=totals,
             edges=tuple(
                 ContactEdge(
-                    edge.name,
-                    edge.source,
-                    edge.target,
+                    *(edge.name, edge.source, edge.target),
                     renamed_in(chart.guards[edge.name], names),
                     steps(edge),
                     edge.target in locked,
@@ -468,10 +465,7 @@ class SystemReader:
                 for number, edge in enumerate(chart.transitions)
             ),
             start=steps(),
-            lasting={
-                of(c, name): chosen(renamed_in(condition, names), Name(of(c, name)), ZERO)
-                for name, condition in chart.durations.items()
-            },
+            lasting=_lasting(chart, c, names),
             means=names,
         )
 
@@ -529,29 +523,6 @@ class SystemReader:
                         advice="leave one of them out, or give its chart a state that is not "
                         "locked",
                     )
-
-    def coefficients(
-        self, tree: Value, moved: Mapping[str, Body], text: str, owner: Part
-    ) -> Mapping[str, Value]:
-        """Return the coefficients of a velocity that is linear in the bodies' velocities."""
-        row: dict[str, Value] = {}
-        rest = renamed(tree, dict.fromkeys(moved, ZERO))
-        constant = derivative_free(rest)
-        for v, body in moved.items():
-            slope = derivative(tree, v)
-            if slope is None or names_in(slope) & {*moved}:
-                constant = False
-            elif slope != ZERO:
-                row[body.name] = slope
-        if not constant or not row:
-            raise ParameterError(
-                f"v = {text!r} is not linear in the velocities {', '.join(moved)}",
-                place=owner.words,
-                advice="write it for example as 'v_1 - ratio * v_2'; what moves as prescribed is a "
-                'driven body: velocity = "0.1" instead of its inertia',
-                key=(*owner.key, "v"),
-            )
-        return row
 
     def defined(self, name: str, tree: Value) -> Name:
         """Return the name of a value: its own, or that of what it is just equal to."""
@@ -611,3 +582,11 @@ class SystemReader:
                 Definition(of(c, name), renamed(tree, names), index if per_element else None)
             )
             names[name] = Name(of(c, name))
+
+
+def _lasting(chart: Chart, contact: str, names: Mapping[str, Value]) -> dict[str, Value]:
+    """Return what the times are for which conditions have held: as before, or 0."""
+    return {
+        of(contact, name): chosen(renamed_in(condition, names), Name(of(contact, name)), ZERO)
+        for name, condition in chart.durations.items()
+    }
