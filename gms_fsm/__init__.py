@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from gms_fsm.coupling.bank import FrictionBank as FrictionBank
     from gms_fsm.coupling.equations import FrictionEquations as FrictionEquations
     from gms_fsm.coupling.stepping import FrictionState as FrictionState
+    from gms_fsm.difference.diff import Diff as Diff
+    from gms_fsm.difference.diff import diff as diff
     from gms_fsm.errors import ChartError as ChartError
     from gms_fsm.errors import CheckpointError as CheckpointError
     from gms_fsm.errors import ExpressionError as ExpressionError
@@ -93,6 +95,7 @@ _HOMES = {
     "charts.chart": "Chart State Transition",
     "charts.parameters": "Parameter",
     "charts.stribeck": "Stribeck",
+    "difference.diff": "Diff diff",
     "errors": "ChartError CheckpointError ExpressionError GMSError MissingExtraError OutputError "
     "ParameterError RecordError ScenarioError SessionError SignalError TraceFileError UnitError",
     "exporters": "export",

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.extras import require
+from plots.charts.difference import chart_diff
 from plots.charts.live_chart import LiveChart, live_statechart
 from plots.charts.statechart import layout, statechart
 from plots.output.mermaid import mermaid
@@ -38,6 +39,7 @@ __all__ = [
     "LiveChart",
     "animate",
     "block_diagram",
+    "chart_diff",
     "explore",
     "handout",
     "landscape",

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import zip_longest
 from typing import TypeVar
 
 import numpy as np
@@ -294,9 +293,11 @@ def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> BranchCom
     """Compare two branches that have been computed to their ends."""
     t = min(float(first.t[-1]), float(second.t[-1]))
     logs = [trace.transitions[trace.transitions.t <= t] for trace in (first, second)]
-    pairs = ([each for each in pair if each is not None] for pair in zip_longest(*logs))
-    unlike = (pair for pair in pairs if len({_who(each) for each in pair}) > 1 or len(pair) == 1)
-    differs = min((float(each.t) for each in next(unlike, [])), default=None)
+    fired, moments = [[*map(_who, log)] for log in logs], [log.t.tolist() for log in logs]
+    number = first_unlike(fired, moments)
+    differs = None
+    if number is not None:
+        differs = min(float(each[number]) for each in moments if number < len(each))
     times = np.linspace(float(first.t[0]), t, SAMPLES)
     columns = [_compared_columns(trace.sample(times)) for trace in (first, second)]
     differences = {
@@ -305,9 +306,31 @@ def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> BranchCom
     return BranchComparison(numbers, t, (len(logs[0]), len(logs[1])), differs, differences)
 
 
+def first_unlike(
+    fired: Sequence[Sequence[object]], times: Sequence[Sequence[float]], within: float = 0.0
+) -> int | None:
+    """Return the number, from 0, of the first firing that two logs do not share; None if all.
+
+    Examples
+    --------
+    >>> first_unlike((["slip", "stick"], ["slip", "stick"]), ([1.0, 2.0], [1.0, 2.5]))
+    1
+    >>> first_unlike((["slip", "stick"], ["slip"]), ([1.0, 2.0], [1.01]), within=0.1)
+    1
+    """
+    pairs = enumerate(zip(*fired, strict=False))
+    unlike = (i for i, (one, other) in pairs if one != other or _apart(times, i) > within)
+    shorter, longer = sorted(map(len, fired))
+    return next(unlike, None if shorter == longer else shorter)
+
+
+def _apart(times: Sequence[Sequence[float]], number: int) -> float:
+    return abs(times[0][number] - times[1][number])
+
+
 def _who(record: np.record) -> tuple[object, ...]:
     columns = record.dtype.names or ()
-    names = [name for name in ("t", "contact", "element", "edge") if name in columns]
+    names = [name for name in ("contact", "element", "edge") if name in columns]
     return tuple(record[name].item() for name in names)
 
 

@@ -285,6 +285,10 @@ class ChartSheet:
         Size of the texts, 1 for the usual one.
     among : int
         Leave room in each state for "3 of 4": how many of so many elements are in it.
+    removed : frozenset of str
+        States and edges that another chart does not have any more: drawn dashed, without a text.
+    was : mapping of str to sequence of str
+        What another chart has on an edge, line by line, below its guard.
     """
 
     chart: Chart
@@ -299,6 +303,8 @@ class ChartSheet:
     numbered: Mapping[str, int] = field(default_factory=dict)
     scale: float = 1.0
     among: int = 0
+    removed: frozenset[str] = frozenset()
+    was: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         one_of("notation", self.notation, NOTATIONS)
@@ -346,7 +352,8 @@ class ChartSheet:
         for _, edge in self.edges():
             lines = self._lines_of(edge)
             widest = max(sum(len(piece.text) for piece in row) for row in lines)
-            if len(lines) > MOST_LINES or widest > longest:
+            long = len(lines) > MOST_LINES or widest > longest
+            if long and edge.name not in self.removed:
                 numbers[edge.name] = texts.setdefault(self.legend_text(edge), len(texts) + 1)
         return numbers
 
@@ -372,7 +379,7 @@ class ChartSheet:
         return (nested_drawing if self.nested else graph_drawing)(self, number)
 
     def _lines_of(self, edge: Transition) -> list[Row]:
-        return replace(self, tally=None, names=False, numbered={}).guard_rows(edge, 1, 0)
+        return replace(self, tally=None, names=False, numbered={}, was={}).guard_rows(edge, 1, 0)
 
     def graph(
         self,
@@ -434,6 +441,8 @@ class ChartSheet:
     def state_rows(self, state: State, number: int) -> list[Row]:
         """Return the text in a state's box."""
         title = [Piece(state.name, "title")]
+        if state.name in self.removed:
+            return [title, [Piece("removed", "never")]]
         if self.among:
             title += [Piece("  ", "note"), Piece(f"{self.among} of {self.among}", "among")]
         if self.live:  # last: a hidden dot leaves no gap
@@ -449,6 +458,8 @@ class ChartSheet:
     def level_rows(self, level: Level) -> list[Row]:
         """Return the text in the box of a state that may have states inside."""
         title = [Piece(level.state.name, "title")]
+        if level.path in self.removed:
+            return [title, [Piece("removed", "never")]]
         if level.state.history:
             title.append(Piece("  history", "note"))
         return [title, *map(self._indexed, _rows(level_texts(self.write, level)))]
@@ -456,12 +467,25 @@ class ChartSheet:
     def guard_rows(self, edge: Transition, priority: int, number: int) -> list[Row]:
         """Return the text on an edge, clause by clause."""
         rows: list[Row] = [[Piece(edge.name, "word")]] if self.names else []
-        rows += self._number_row(edge) if edge.name in self.numbered else self._guard_lines(edge)
+        head = "was "
+        if edge.name in self.removed:
+            head, rows = "", [*rows, [Piece("removed", "never")]]
+        elif edge.name in self.numbered:
+            rows += self._number_row(edge)
+        else:
+            rows += self._guard_lines(edge)
+        for text in self.was.get(edge.name, ()):
+            for line in wrapped(text, LONGEST_LABEL):
+                rows.append(
+                    [*([Piece(head, "word")] if head else []), *self._indexed([Piece(line)])]
+                )
+                head = " " * len(head)
         if self.tally is not None:
             taken = bool(self.tally.times(number, edge))
             rows.append([Piece(self.tally.of_edge(number, edge), "count" if taken else "never")])
+        shown = edge.name not in self.removed
         return [
-            [Piece(str(priority) if i == 0 else " ", "priority"), *row]
+            [Piece(str(priority) if i == 0 and shown else " ", "priority"), *row]
             for i, row in enumerate(rows)
         ]
 

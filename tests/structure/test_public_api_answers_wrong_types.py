@@ -246,7 +246,9 @@ def _by_entry() -> dict[str, dict[str, Any]]:
         "System.body": {"name": "mass"},
         "System.contact": {"name": "pad"},
         "animate": {"path": Path("a.gif"), "frames": 2},
+        "chart_diff": {"a": MODEL.chart, "b": MODEL.chart},
         "choose": {"candidates": {"bank": (MODEL, ["k"])}, "fold": "cycles", "cycles": 5.0},
+        "diff": {"a": MODEL, "b": MODEL},
         "explore": {"initial": None, "settings": None, "t_start": 0.0, "t_end": 1.0}
         | {"sliders": {"v_c": (1e-9, 2.0)}},
         "export": {"folder": Path("c99"), "format": "c99", "name": "friction"},

@@ -1,0 +1,1 @@
+"""What two charts, models, systems or runs differ in."""
