@@ -10,7 +10,7 @@
 #   make bench   speed and error compared with C, numba, SciPy, CVODE and PathSim
 #   make regressions  speed compared with an older commit, in interleaved rounds; OLD=main
 #   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
-#                reference, 500 systems in all engines, verdicts about 400; SOAK_MINUTES=10 for each
+#                reference, 500 systems in all engines, verdicts about 400, 1,000 pairs; SOAK_MINUTES=10 for each
 #                fuzzer
 #   make foreign the widget, driven in JupyterLab and marimo by their own user interfaces, in Chromium,
 #                whole runs of friction in other simulators, the exports in the tools they are for, and

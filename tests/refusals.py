@@ -58,6 +58,7 @@ from gms_fsm import (
     Trace,
     Transition,
     choose,
+    diff,
     excite,
     export,
     fit,
@@ -632,6 +633,15 @@ rows = {
     "replay of a scenario": ("pulled.toml", ..., "replay pulled.toml"),
     "replay of a scenario of the package": ("servo", ..., "replay servo"),
 }
+group("command", TraceFileError, command, rows)
+rows = {
+    "diff of a chart and a trace": ("diff", ..., "diff own.toml none.npz"),
+    "diff of a chart with laws": ("diff", ..., "diff gms lugre"),
+    "diff of an unknown law": ("diff", ..., "diff gms:sigend lugre"),
+    "diff of a contact of a chart": ("--contact pad", ..., "diff lugre dahl --contact pad"),
+}
+group("command", ParameterError, command, rows)
+rows = {"diff with a missing trace": ("none.npz", ..., "diff none.npz none.npz")}
 group("command", TraceFileError, command, rows)
 rows = {"data that are missing": ("nowhere", ..., "benchmark --data nowhere -o out")}
 group("command", RecordError, command, rows)
@@ -2428,6 +2438,13 @@ rows = {
     "unknown contact": ("", ..., lambda: prove(TWO_PADS, contact="pat")),
 }
 group("prove", ParameterError, lambda call: call(), rows)
+rows = {
+    "no chart": ("a", 3, lambda: diff(3, gms_element("signed"))),  # type: ignore[arg-type]
+    "path": ("b", "a.toml", lambda: diff(gms_element("signed"), "a.toml")),  # type: ignore[arg-type]
+    "chart and system": ("b", ..., lambda: diff(gms_element("signed"), TWO_PADS)),
+    "model and run": ("b", ..., lambda: diff(FIG4[0], simulate(*FIG4, 1.0))),
+}
+group("diff", ParameterError, lambda call: call(), rows)
 
 
 # --------------------------------------------------------------------------- tables of results

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, TypeAlias
@@ -22,6 +23,8 @@ from gms_fsm.systems.rigs import Prescribed
 from gms_fsm.systems.system import System
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.sameness.same import Verdict
+
+FILES = "Chart.load and Trace.load read files; gms-fsm diff takes their names"
 
 __all__ = ["Diff", "PartChange", "RunsDiff", "diff"]
 
@@ -96,7 +99,10 @@ def _read(given: Any, place: str) -> Readable:
         return mounted_alone(given)
     except ParameterError:
         raise ParameterError(
-            "it must be a chart, a model, a system or a run", place=place, value=given
+            "it must be a chart, a model, a system or a run",
+            place=place,
+            value=given,
+            advice=FILES if isinstance(given, (str, os.PathLike)) else "",
         ) from None
 
 
@@ -113,9 +119,10 @@ def _chart(given: Chart | Mounted) -> Chart:
 # --------------------------------------------------------------------------- runs
 def _of_runs(a: Trace, b: Trace, names: tuple[str, str]) -> Diff:
     """Compare two runs, and what ran."""
-    made, settings = made_diff(a.what, b.what, names), settings_changes(a, b)
-    about = f"{made.about}{', other settings' * bool(settings)}"
+    made = made_diff(a.what, b.what, names)
     same = made.diff.verdict == "equal"
+    settings = settings_changes(a, b, same)
+    about = f"{made.about}{', other settings' * bool(settings)}"
     runs = runs_diff(a, b, about, same=same, names=made.names)
     changes = (*made.diff.changes, *settings)
     if runs.apart:

@@ -34,9 +34,10 @@ class Translation:
         return self.edges.get(contact, {}).get(edge, edge)
 
 
-def settings_changes(a: Trace, b: Trace) -> tuple[PartChange, ...]:
-    """Return the settings that two runs differ in."""
-    names = dict.fromkeys([*a.settings, *b.settings])
+def settings_changes(a: Trace, b: Trace, same: bool) -> tuple[PartChange, ...]:
+    """Return the settings that two runs, of the same charts and numbers or not, differ in."""
+    # Absolute tolerances follow from charts and numbers.
+    names = [name for name in {**a.settings, **b.settings} if same or name != "atol"]
     values = ((n, a.settings.get(n), b.settings.get(n)) for n in names)
     return tuple(
         PartChange("changed", "setting", name, _said(one), _said(other))

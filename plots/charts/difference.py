@@ -162,11 +162,11 @@ def _free(name: str, taken: set[str]) -> str:
 def _filled(states: Iterable[State], path: str, more: dict[str, list[State]]) -> tuple[State, ...]:
     """Return states with further states inside."""
     found = []
-    for state in states:
+    for state in (*states, *more.get(path, ())):
         own = f"{path}.{state.name}" if path else state.name
         inside = _filled(state.states, own, more)
         found.append(replace(state, states=inside) if inside else state)
-    return (*found, *more.get(path, ()))
+    return tuple(found)
 
 
 def _with(chart: Chart, states: tuple[State, ...], edges: list[Transition]) -> Chart:

@@ -208,10 +208,12 @@ PARTS = (
     "exact",
     "doubts",
     "verdicts",
+    "pairs",
 )
 COUNTS = {
     "kills": 200, "examples": 300, "transitions": 1_000_000, "trials": 2000, "records": 1000,
     "systems": 500, "exact": 1000, "doubts": 400, "verdicts": 400,
+    "pairs": 1000,
 }  # fmt: skip
 
 
@@ -246,6 +248,7 @@ def main() -> None:
         "exact": ("tests.soak.exact_systems", str(given.exact)),
         "doubts": ("tests.soak.doubts", str(given.doubts)),
         "verdicts": ("tests.soak.verdicts", str(given.verdicts)),
+        "pairs": ("tests.soak.pairs", str(given.pairs)),
     }
     none_differs = f"0 of {given.records} differ"
 

@@ -124,13 +124,13 @@ def _chart(name: str, own: OwnFile | None, contact: str) -> Chart:
     if own is not None:
         return own.only_chart(contact)
     start, _, law = name.rpartition(":")
-    if start in registered():
-        return chosen("diff", start, law)[1]
-    laws = registered()[name].laws if name in registered() else ()
-    if laws:
+    named = start if start in registered() else name
+    law = law if named == start else ""
+    laws = registered()[named].laws if named in registered() else ()
+    if laws and law not in laws:
         raise ParameterError(
-            f"{name} has several laws",
+            f"{named} has no law {law!r}" if law else f"{named} has several laws",
             place="diff",
-            advice=f"write {' or '.join(f'{name}:{each}' for each in laws)}",
+            advice=f"write {' or '.join(f'{named}:{each}' for each in laws)}",
         )
-    return chosen("diff", name, "")[1]
+    return chosen("diff", named, law)[1]
