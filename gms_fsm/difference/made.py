@@ -179,6 +179,8 @@ def _by_name(kind: str, mine: Mapping[str, Any], its: Mapping[str, Any]) -> Iter
 
 
 def _said(value: Any) -> str:
+    if value is None:
+        return "none"
     if isinstance(value, np.ndarray) and value.ndim:
         return cut(", ".join(f"{each:.9g}" for each in value.ravel().tolist()))
     if isinstance(value, (float, np.ndarray)):

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.difference.result import Diff
 from gms_fsm.errors import GMSError, MissingExtraError
 from gms_fsm.foundation.display import Form, Log
 from gms_fsm.foundation.quantities import trimmed
@@ -209,7 +210,7 @@ def session_html(session: Session) -> str:
     return "".join(parts)
 
 
-def text_html(result: Here | BranchComparison) -> str:
+def text_html(result: Here | BranchComparison | Diff) -> str:
     """Return a result as the text of the debugger."""
     return listing(str(result))
 
@@ -277,6 +278,7 @@ FORMS: Mapping[tuple[type | str, Form], Callable[[Any], Any]] = {
     (Session, "html"): session_html,
     (Here, "html"): text_html,
     (BranchComparison, "html"): text_html,
+    (Diff, "html"): text_html,
     (Explanation, "html"): explanation_html,
     (Why, "html"): why_html,
     (Report, "html"): report_html,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import random
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -23,7 +24,7 @@ from gms_fsm.language import (
     names_in,
     parse_condition,
 )
-from gms_fsm.language.tree import rebuilt
+from gms_fsm.language.tree import rebuilt, walk
 from gms_fsm.verification._prover import NICE, Prover, Reading, Undecided
 from gms_fsm.verification._subject import subject_of
 from gms_fsm.verification.facts import ContactFacts
@@ -36,6 +37,7 @@ CLEARLY = 1e-7, 1e-9  # the same, where that is not known
 NUDGE = 1e-7  # a difference that ends so near by is one of rounding
 Point: TypeAlias = dict[str, float]
 Limits: TypeAlias = tuple[float, float]
+Sides: TypeAlias = tuple[Sequence[Value | Condition], Sequence[Value | Condition]]
 Differs: TypeAlias = Callable[[Point, Limits], str]
 
 
@@ -103,9 +105,10 @@ class Questioner:
             if name in known and ruled
             for bound in each.bounds
         )
-        self.prover = self._prover()
 
-    def _prover(self) -> Prover | MissingExtraError:
+    @functools.cached_property
+    def prover(self) -> Prover | MissingExtraError:
+        """What asks z3; or why there is none."""
         subject = subject_of(ContactFacts(self.chart))
         plain = replace(subject, inputs=tuple(self.names), variables=(), rest={}, moves=False)
         try:
@@ -134,7 +137,7 @@ class Questioner:
             )
             return u != w
 
-        self._settle((one, other), formula, differ, what, locked)
+        self.settle(((one,), (other,)), formula, differ, what, locked)
 
     def same_truth(self, one: Condition, other: Condition, what: str) -> None:
         """Raise `Differ` or `Undecided` unless two conditions hold at the same points."""
@@ -148,7 +151,7 @@ class Questioner:
             u, w = (self.truth(each, prover, reading) for each in (one, other))
             return u != w
 
-        self._settle((one, other), formula, differ, what, False)
+        self.settle(((one,), (other,)), formula, differ, what, False)
 
     def truth(self, tree: Condition, prover: Prover, reading: Reading) -> Any:
         """Return a condition as a formula."""
@@ -156,23 +159,17 @@ class Questioner:
 
     def settle(
         self,
-        trees: Iterable[Value | Condition],
+        sides: Sides,
         formula: Callable[[Prover, Reading], Any],
         differ: Differs,
         what: str,
         locked: bool,
     ) -> None:
-        """Raise `Differ` where a formula can hold, and floats agree; `Undecided` if not known."""
-        self._settle(tuple(trees), formula, differ, what, locked)
+        """Raise `Differ` where a formula can hold, and floats agree; `Undecided` if not known.
 
-    def _settle(
-        self,
-        trees: tuple[Value | Condition, ...],
-        formula: Callable[[Prover, Reading], Any],
-        differ: Differs,
-        what: str,
-        locked: bool,
-    ) -> None:
+        `sides` are the texts of both charts that the formula is made of.
+        """
+        trees = (*sides[0], *sides[1])
         names = frozenset[str]().union(*map(names_in, trees))
         hidden = frozenset[str]().union(
             *(names_in(rewritten(tree, self.opaque.hidden)) for tree in trees)
@@ -181,10 +178,10 @@ class Questioner:
             prover, reading = self.asked(), Reading()
             asked = [formula(prover, reading), *self._within(prover, names, locked)]
             if prover.find(*asked) is None:
+                self._defined(prover, sides, asked[1:])
                 return
             if names & self.loose:
-                which = ", ".join(sorted(names & self.loose))
-                raise Undecided(f"{which} is compared by its text only")
+                raise Undecided("histories and durations are compared by their texts only")
             if not hidden & self.opaque.parts.keys():
                 self._example(prover, reading, names, asked, differ)
         except Undecided as reason:
@@ -193,6 +190,34 @@ class Questioner:
         self._tried(names, differ, locked)
         some = ", ".join(sorted(hidden & self.opaque.parts.keys()))
         raise Undecided(f"{what}: {some} is not encoded, and the texts differ")
+
+    def _defined(self, prover: Prover, sides: Sides, within: list[Any]) -> None:
+        """Raise `Undecided` if only one of the charts divides by what can be 0."""
+        one, other = (
+            {canonical(node): node for tree in side for node in self._partial(tree)}
+            for side in sides
+        )
+        for text in one.keys() ^ other.keys():
+            node, reading = (one | other)[text], Reading()
+            if text not in self.opaque.parts:
+                below = reading.value(self.opaque.hidden(node), prover.still).value
+                if prover.find(below == 0, *within) is None:
+                    continue
+            raise Undecided(f"only one of them has {text}, which may be undefined or a divisor 0")
+
+    def _partial(self, tree: Value | Condition) -> Iterator[Value]:
+        """Yield what a tree divides by, and what of it is not encoded."""
+        for node in walk(tree):
+            match node:
+                case Binary("/", _, below):
+                    yield below
+                case Binary("**", base, exponent):
+                    if (integer_power(exponent) or 0) < 0:
+                        yield base
+                    if canonical(node) in self.opaque.parts:
+                        yield node
+                case Call() if canonical(node) in self.opaque.parts:
+                    yield node
 
     def _example(
         self,

@@ -269,9 +269,11 @@ class _Pair:
                     some.append(z3.And(*both))
             return z3.Or(some)
 
-        trees: list[Value | Condition] = [each.guard for each in (*one, *other)]
-        trees += [tree for values in pairs.values() for _, u, w in values or [] for tree in (u, w)]
-        self.quiz.settle(trees, formula, differ, what, locked)
+        left = [each for values in pairs.values() for each in values or []]
+        mine: list[Value | Condition] = [each.guard for each in one]
+        its: list[Value | Condition] = [each.guard for each in other]
+        sides = [*mine, *(u for _, u, _ in left)], [*its, *(w for _, _, w in left)]
+        self.quiz.settle(sides, formula, differ, what, locked)
 
     def _outcomes(
         self, one: EdgeMeaning | None, other: EdgeMeaning | None
