@@ -82,11 +82,12 @@ def made(seed: int) -> Chart:
         )
         for name in names
     ]
+    units = dice.choice((("N/m", "m/s"), ("", "")))
     return Chart(
         f"random {seed}",
         INPUTS,
         ("z", "w"),
-        (Parameter("k", "N/m", "> 0"), Parameter("v_c", "m/s", "> 0")),
+        [Parameter(name, unit, "> 0") for name, unit in (("k", units[0]), ("v_c", units[1]))],
         states,
         edges,
         {"F": dice.choice(FORCES)},
