@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from gms_fsm.run.simulate import simulate as simulate
     from gms_fsm.run.sweep import Sweep as Sweep
     from gms_fsm.run.sweep import sweep as sweep
+    from gms_fsm.session.coverage import coverage as coverage
     from gms_fsm.session.session import Session as Session
     from gms_fsm.systems.gms_parameters import GMSParameters as GMSParameters
     from gms_fsm.systems.models import GMS as GMS
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
     from gms_fsm.systems.system import Spring as Spring
     from gms_fsm.systems.system import Supervisor as Supervisor
     from gms_fsm.systems.system import System as System
+    from gms_fsm.traces.coverage.total import Coverage as Coverage
     from gms_fsm.traces.failures import CallbackError as CallbackError
     from gms_fsm.traces.failures import LivelockError as LivelockError
     from gms_fsm.traces.failures import LockError as LockError
@@ -105,6 +107,7 @@ _HOMES = {
     "identification.fit": "fit",
     "identification.result": "Fit",
     "verification.prove": "Finding Report prove",
+    "session.coverage": "coverage",
     "session.session": "Session",
     "phenomena.measure": "Bench PhenomenaTable measure_phenomena",
     "records.record": "Record",
@@ -120,6 +123,7 @@ _HOMES = {
     "systems.rigs": "Prescribed PulledSlider Rig Slider",
     "systems.signals": "Signal",
     "systems.system": "Body Contact Sampled Spring Supervisor System",
+    "traces.coverage.total": "Coverage",
     "traces.failures": "CallbackError LivelockError LockError NotFiniteError NotUniqueError "
     "SignalEndError SimulationError StepLimitError StepSizeError",
     "traces.trace": "Trace",

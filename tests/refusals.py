@@ -97,7 +97,7 @@ from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.signals import as_signal
 from gms_fsm.systems.system import with_model
 from gms_fsm.traces.failures import SimulationError
-from gms_fsm.traces.monitors import Chattering, Coverage, Passivity
+from gms_fsm.traces.monitors import Chattering, CoverageMonitor, Passivity
 from tests import older_files, own_files, systems_cases
 from tests.corpus import run, trace
 from tests.helpers import FIG4_SINE, ROOT, pulled_mass, stick_slip
@@ -3134,7 +3134,10 @@ group(
     rows,
     "run.npz",
 )
-rows = {"unknown contact": ("gear: all",), "unknown contact of an object": (Coverage("gear"),)}
+rows = {
+    "unknown contact": ("gear: all",),
+    "unknown contact of an object": (CoverageMonitor("gear"),),
+}
 group("monitors of a system", ParameterError, watched, rows, "")
 rows = {"no contact": ("F < 2",), "name of the system for a contact": ("pad: q1 < 2",)}
 group("monitors of a system", ExpressionError, watched, rows, "invariant, column 1")

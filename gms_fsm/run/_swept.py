@@ -19,6 +19,7 @@ from gms_fsm.foundation.extras import require
 from gms_fsm.foundation.files import write_whole
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.systems.numbers import column_name
+from gms_fsm.traces.coverage.total import Coverage
 from gms_fsm.traces.files.archives import member, write_arrays
 
 if TYPE_CHECKING:
@@ -72,6 +73,9 @@ class Sweep:
         Of a system: for each element the name of its contact. With several contacts, elements
         count over all of them, ``x, v, F`` have one column per contact, and `edges` are named
         ``gear.touch``; `contact` returns the results of one.
+    coverage : Coverage or None
+        What the runs have tried of the charts: states and edges, and with ``coverage=True`` clauses
+        too. Files do not keep it.
     """
 
     parameters: Mapping[str, FloatArray]
@@ -89,6 +93,7 @@ class Sweep:
     rows: Mapping[str, FloatArray]
     ends: Mapping[str, FloatArray] = field(default_factory=dict)
     owners: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, dtype=np.str_))
+    coverage: Coverage | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -152,6 +157,7 @@ class Sweep:
             edges=tuple(self.edges[k].removeprefix(f"{name}.") for k in edges),
             rows=rows,
             owners=self.owners[mine],
+            coverage=self.coverage and Coverage({name: self.coverage.contact(name)}),
         )
 
     def sequence(self, run: int) -> list[tuple[int, str]]:

@@ -9,7 +9,7 @@ import threading
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -33,6 +33,8 @@ from gms_fsm.systems.mounted import Mounted, mounted, shifted
 from gms_fsm.systems.numbers import column_name, known_in, varied
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
+from gms_fsm.traces.coverage.counting import Fired, of_log, of_trace
+from gms_fsm.traces.coverage.total import Coverage
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
@@ -57,6 +59,7 @@ def sweep(
     initial: Mapping[str, Any] | None = None,
     settings: Settings | None = None,
     progress: bool | None = None,
+    coverage: bool = False,
     **options: Unpack[SettingOptions],
 ) -> Sweep:
     """Run a model on a rig once for each set of parameters, or a system.
@@ -85,6 +88,9 @@ def sweep(
         the extra ``fast``.
     progress : bool, optional
         Show a progress bar on standard error; by default if that is a terminal.
+    coverage : bool
+        Whether `Sweep.coverage` counts the clauses of guards, too. Every run then keeps its rows
+        until they are counted.
     **options
         Fields of `Settings` by name, which override those of `settings`.
 
@@ -108,7 +114,8 @@ def sweep(
     (['ok', 'ok'], [4, 4])
     """
     on, end, given = shifted("sweep(system, t_end, parameters)", model, rig, t_end, parameters)
-    begin = _Common(end, t_start, initial, _chosen(settings, options))
+    checked_kind("coverage", coverage, bool, "True or False")
+    begin = _Common(end, t_start, initial, _chosen(settings, options), coverage)
     what = mounted(model, on, begin.settings.held_period)
     if begin.settings.engine == "compiled":
         check_llvmlite()
@@ -233,6 +240,7 @@ class _Result:
     log: NDArray[Any]
     rows: Mapping[str, FloatArray] | None
     ends: Mapping[str, float] = field(default_factory=dict)  # of bodies, states, sampled values
+    coverage: Coverage | None = None  # if it was asked for
 
 
 @dataclass(frozen=True)
@@ -243,11 +251,13 @@ class _Common:
     t_start: float
     initial: Mapping[str, Any] | None
     settings: Settings
+    coverage: bool = False
 
     def start(self, what: Mounted) -> Problem:
-        return Problem.on(
-            what, self.t_end, self.settings, t_start=self.t_start, initial=self.initial
-        )
+        settings = self.settings
+        if self.coverage and settings.output == "end":
+            settings = replace(settings, output="all")
+        return Problem.on(what, self.t_end, settings, t_start=self.t_start, initial=self.initial)
 
 
 def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
@@ -301,11 +311,13 @@ def _run_chunk(
                 pass
         except GMSError as error:
             outcome, message = type(error).__name__, cut(str(error), LONGEST - 10)
-        results.append(_result(run, outcome, message))
+        results.append(_result(run, outcome, message, begin.coverage))
     return results
 
 
-def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Result:
+def _result(
+    run: Run | CompiledRun | None, outcome: str, message: str, watched: bool = False
+) -> _Result:
     """Return values of each contact, and of everything else that the user has named."""
     if run is None:
         return _Result(outcome, message, None, np.empty(0, dtype=LOG), None)
@@ -321,7 +333,8 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
         rows = {row_name(name): values for name, values in _of_parts(trace).items()}
         rows |= _of_contacts(trace)
     end = _end_of_contacts(start.program, t, y, mode)
-    return _Result(outcome, message, end, _log_of(trace.firings), rows, ends)
+    counts = of_trace(trace) if watched else None
+    return _Result(outcome, message, end, _log_of(trace.firings), rows, ends, counts)
 
 
 def _end_of_contacts(
@@ -415,6 +428,7 @@ class _Collected:
         self.mode = np.full((runs, n), -1, dtype=np.int64)
         self.logs: list[NDArray[Any]] = [np.empty(0, dtype=LOG)] * runs
         rows = runs, self.times.size
+        self.coverage: list[Coverage] = []
         self.rows: dict[str, FloatArray] = {}
         if t_eval is not None:
             self.rows = {name: np.full((*rows, *columns), np.nan) for name in ("x", "v", "F")}
@@ -427,6 +441,8 @@ class _Collected:
             self.outcome[run], self.message[run] = result.outcome, result.message
             result.log["run"] = run
             self.logs[run] = result.log
+            if result.coverage is not None:
+                self.coverage.append(result.coverage)
             if result.end is not None:
                 self.t[run], self.mode[run] = result.end["t"], result.end["mode"]
                 for name, values in self.end.items():
@@ -446,6 +462,7 @@ class _Collected:
             owners += [each.name] * each.n
             lead = f"{each.name}." if len(contacts) > 1 else ""
             edges += [f"{lead}{edge.name}" for edge in each.chart.transitions]
+        log = np.concatenate(self.logs)
         return Sweep(
             parameters,
             np.array(self.outcome),
@@ -453,13 +470,26 @@ class _Collected:
             self.t,
             **self.end,
             states=np.concatenate(states, axis=1),
-            transitions=np.concatenate(self.logs).view(Log),
+            transitions=log.view(Log),
             edges=tuple(edges),
             times=self.times,
             rows=self.rows,
             ends=self.ends,
             owners=np.array(owners if self.what.named else [], dtype=np.str_),
+            coverage=Coverage.merged(self.coverage) if self.coverage else self._covered(log),
         )
+
+    def _covered(self, log: NDArray[Any]) -> Coverage:
+        """Return what the logs show of each chart."""
+        parts, element, edge = {}, 0, 0
+        for each in self.what.system.machines:
+            chart, n = each.chart, each.n
+            mine = log[(log["element"] >= element) & (log["element"] < element + n)]
+            last = self.mode[:, element : element + n]
+            fired = Fired(mine["run"], mine["element"] - element, mine["edge"] - edge, last)
+            parts[each.name if self.what.named else ""] = of_log(chart, fired)
+            element, edge = element + n, edge + len(chart.transitions)
+        return Coverage(parts)
 
 
 # --------------------------------------------------------------------------- helpers

@@ -22,10 +22,9 @@ from gms_fsm.language import (
     awaited,
     clauses,
     evaluate,
-    names_in,
     spell,
 )
-from gms_fsm.traces.scope import Scope, unit_of
+from gms_fsm.traces.scope import Scope, clause_unit
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 
@@ -33,7 +32,6 @@ __all__ = [
     "Clause",
     "Explanation",
     "Why",
-    "clause_unit",
     "explain",
     "explain_state",
     "holds",
@@ -366,28 +364,6 @@ def _clause(chart: Chart, part: Condition, values: Mapping[str, float]) -> Claus
         return Clause(text, False, math.nan, math.nan, math.nan, computable=False)
     margin = left - right if part.op in (">", ">=") else right - left
     return Clause(text, truth, left, right, margin, unit=clause_unit(chart, part, text))
-
-
-def clause_unit(chart: Chart, part: Condition, text: str) -> str:
-    """Return the unit of both sides of a comparison: that of its names, if all agree.
-
-    Parameters
-    ----------
-    chart : Chart
-        The chart, which knows the units of names.
-    part : Condition
-        A clause of a guard.
-    text : str
-        The clause as shown.
-
-    Returns
-    -------
-    str
-        Empty if the names do not determine it.
-    """
-    units = {unit_of(chart, name) for name in names_in(part)} - {""}
-    plain = not set(text) & set("*/^()")
-    return units.pop() if plain and len(units) == 1 else ""
 
 
 def holds(condition: Condition, values: Mapping[str, float]) -> bool:

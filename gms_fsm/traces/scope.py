@@ -23,6 +23,7 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SignalError
+from gms_fsm.language import Condition, names_in
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program
@@ -59,6 +60,28 @@ def unit_of(chart: Chart, name: str) -> str:
         known |= dict.fromkeys(chart.force_names, "N") | dict.fromkeys(chart.rate_names, "m/s^2")
         known |= dict.fromkeys(chart.velocities, "m/s") | {"x": "m"}
     return chart.unit(name) or known.get(name, "")
+
+
+def clause_unit(chart: Chart, part: Condition, text: str) -> str:
+    """Return the unit of both sides of a comparison: that of its names, if all agree.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart, which knows the units of names.
+    part : Condition
+        A clause of a guard.
+    text : str
+        The clause as shown.
+
+    Returns
+    -------
+    str
+        Empty if the names do not determine it.
+    """
+    units = {unit_of(chart, name) for name in names_in(part)} - {""}
+    plain = not set(text) & set("*/^()")
+    return units.pop() if plain and len(units) == 1 else ""
 
 
 def parameter_values(model: Model, element: int) -> dict[str, float]:

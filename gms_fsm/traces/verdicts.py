@@ -190,7 +190,7 @@ class ClauseSeen:
 @short_repr
 @dataclass(frozen=True)
 class CoverageVerdict:
-    """Verdict of `gms_fsm.traces.monitors.Coverage`.
+    """Verdict of `gms_fsm.traces.monitors.CoverageMonitor`.
 
     Parameters
     ----------

@@ -20,9 +20,8 @@ from gms_fsm.language import (
     spell,
     values_of,
 )
-from gms_fsm.session.explain import clause_unit
 from gms_fsm.systems.system import loaded
-from gms_fsm.traces.scope import Scope, guard_columns, unit_of, watch_names
+from gms_fsm.traces.scope import Scope, clause_unit, guard_columns, unit_of, watch_names
 from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of

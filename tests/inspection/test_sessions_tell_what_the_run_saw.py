@@ -21,8 +21,9 @@ from gms_fsm import (
 from gms_fsm.charts import CHARTS
 from gms_fsm.debugger import Debugger
 from gms_fsm.errors import SessionError
-from gms_fsm.session.explain import Clause, clause_unit, explain
+from gms_fsm.session.explain import Clause, explain
 from gms_fsm.session.session import Fired
+from gms_fsm.traces.scope import clause_unit
 from tests.helpers import pulled_mass
 from tests.inspection.sessions import a_system, debugger, fig4, locked, pulled, pushed, warming
 from tests.systems_cases import DRY

@@ -7,7 +7,7 @@ import pytest
 from gms_fsm import Body, Chart, Contact, Prescribed, State, System, Trace, Transition, simulate
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.traces.failures import LivelockError
-from gms_fsm.traces.monitors import Coverage, Invariant, Passivity, checked, examine
+from gms_fsm.traces.monitors import CoverageMonitor, Invariant, Passivity, checked, examine
 from gms_fsm.traces.verdicts import ChatteringVerdict, CoverageVerdict, PassivityVerdict
 from tests.helpers import stick_slip
 from tests.systems_cases import CASES, DRY, STICTION
@@ -38,7 +38,7 @@ KINDS = ("chattering", "passivity", "coverage")
 def test_one_contact_is_chosen_by_text_or_field_and_all_stands_for_each() -> None:
     every = checked(["all"], mounted(mixed()))
     assert list(every) == [f"{c}: {kind}" for c in ("pad", "bank") for kind in KINDS]
-    found = checked(["bank: all", Coverage("pad"), "pad: F < 2"], mounted(mixed()))
+    found = checked(["bank: all", CoverageMonitor("pad"), "pad: F < 2"], mounted(mixed()))
     assert [*found] == [
         *(f"bank: {kind}" for kind in KINDS),
         "pad: coverage",

@@ -30,7 +30,7 @@ from gms_fsm.language import parse_condition
 from gms_fsm.session.explain import holds, values_at
 from gms_fsm.systems.mounted import mounted_alone
 from gms_fsm.traces.failures import LivelockError, SimulationError
-from gms_fsm.traces.monitors import Chattering, Coverage, Invariant, Passivity, checked
+from gms_fsm.traces.monitors import Chattering, CoverageMonitor, Invariant, Passivity, checked
 from gms_fsm.traces.verdicts import ChatteringVerdict, InvariantVerdict
 from tests.helpers import (
     FIG4_SINE,
@@ -293,9 +293,9 @@ def test_all_means_these_three() -> None:
     model = stick_slip("signed")
     what = mounted_alone(model)
     assert list(checked("all", what)) == ["chattering", "passivity", "coverage"]
-    assert checked(["z <= s", Coverage()], what) == {
+    assert checked(["z <= s", CoverageMonitor()], what) == {
         "z <= s": Invariant("z <= s"),
-        "coverage": Coverage(),
+        "coverage": CoverageMonitor(),
     }
     assert checked("passivity", what) == {"passivity": Passivity()}
     assert checked(Chattering(3, 0.5), what) == {"chattering": Chattering(3, 0.5)}

@@ -7,11 +7,17 @@ log only, which suffices for `Chattering` alone.
 """
 
 from gms_fsm.traces.monitors._examining import checked, examine, watched
-from gms_fsm.traces.monitors._kinds import Chattering, Coverage, Invariant, Monitor, Passivity
+from gms_fsm.traces.monitors._kinds import (
+    Chattering,
+    CoverageMonitor,
+    Invariant,
+    Monitor,
+    Passivity,
+)
 
 __all__ = [
     "Chattering",
-    "Coverage",
+    "CoverageMonitor",
     "Invariant",
     "Monitor",
     "Passivity",

@@ -1,43 +1,27 @@
-"""The coverage monitor: states, edges and guard clauses that a run has exercised."""
+"""The coverage monitor: the verdict on what one run has tried of a chart."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Iterable, Mapping
 
 from gms_fsm.charts.chart import Transition
-from gms_fsm.language import MATLAB_LIKE, Condition, clauses, names_in, spell, truths
-from gms_fsm.traces.scope import guard_columns
+from gms_fsm.language import MATLAB_LIKE, Condition, spell
+from gms_fsm.traces.coverage.counting import of_view
+from gms_fsm.traces.coverage.decisions import Decision
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import ClauseSeen, CoverageVerdict
 
 
 def coverage(trace: Trace) -> CoverageVerdict:
-    chart, log, mode = trace.model.chart, trace.transitions, trace.modes.T
-    inside = {state.name: mode == m for m, state in enumerate(chart.states)}
-    states = {name: _each(places) for name, places in inside.items()}
-    edges = {
-        _called(edge): tuple(
-            np.bincount(
-                log["element"][(log["edge"] == edge.name) & (log["source"] == edge.source)],
-                minlength=trace.n,
-            ).tolist()
-        )
-        for edge in chart.transitions
-    }
-    columns = guard_columns(trace, frozenset[str]().union(*map(names_in, chart.guards.values())))
-    known: dict[Condition, NDArray[np.bool_]] = {}
-    seen = []
-    for edge in chart.transitions:
-        for part in clauses(chart.guards[edge.name]):
-            if part not in known:
-                values = {name: columns[name] for name in names_in(part)}
-                known[part] = truths(part, values, mode.shape)
-            truth, here = known[part], inside[edge.source]
-            sides = _each(truth & here), _each(here & ~truth)
-            seen.append(ClauseSeen(_called(edge), spell(part, MATLAB_LIKE), *sides))
+    part = of_view(trace)
+    states = {each.name: each.seen for each in part.states}
+    edges, seen = dict[str, tuple[int, ...]](), list[ClauseSeen]()
+    for edge, each in zip(part.chart.transitions, part.edges, strict=True):
+        edges[_called(edge)] = each.taken
+        decision = part.decisions[edge.name]
+        for tree in decision.clauses:
+            sides = (_ever(each.asked, decision, tree, side, part.n) for side in (True, False))
+            seen.append(ClauseSeen(_called(edge), spell(tree, MATLAB_LIKE), *sides))
     never = [f"state {name}" for name, been in states.items() if not any(been)]
     never += [f"edge {name}" for name, taken in edges.items() if not any(taken)]
     for clause in seen:
@@ -59,6 +43,14 @@ def coverage(trace: Trace) -> CoverageVerdict:
     return CoverageVerdict(not never, text, states, edges, tuple(seen), tuple(never))
 
 
+def _ever(
+    asked: Mapping[str, tuple[int, ...]], decision: Decision, clause: Condition, side: bool, n: int
+) -> tuple[bool, ...]:
+    """Return for each element whether a clause was ever true, or ever false."""
+    rows = [u for vector, u in asked.items() if decision.holds(vector, clause) == side]
+    return tuple(any(each) for each in zip(*rows, strict=True)) if rows else (False,) * n
+
+
 def _called(edge: Transition) -> str:
     """Return the name of an edge; of one that leaves several states also which one it leaves."""
     return edge.name if len(edge.sources) == 1 else f"{edge.name} from {edge.source}"
@@ -67,8 +59,3 @@ def _called(edge: Transition) -> str:
 def _count(found: Iterable[Iterable[object]]) -> str:
     seen = [any(by_element) for by_element in found]
     return f"{sum(seen)} of {len(seen)}"
-
-
-def _each(places: NDArray[np.bool_]) -> tuple[bool, ...]:
-    """Return for each element whether a condition holds at any row."""
-    return tuple(bool(found) for found in np.any(places, axis=1))

@@ -15,7 +15,7 @@ from gms_fsm.traces.monitors._kinds import (
     ALL,
     KNOWN,
     Chattering,
-    Coverage,
+    CoverageMonitor,
     Invariant,
     Monitor,
     Passivity,
@@ -176,7 +176,7 @@ def examine(
                 found[name] = invariant_verdict(monitor, rows)
             case Passivity():
                 found[name] = passivity(monitor, rows)
-            case Coverage():
+            case CoverageMonitor():
                 found[name] = coverage(rows)
     return found
 

@@ -117,7 +117,7 @@ class Passivity:
 
 
 @dataclass(frozen=True)
-class Coverage:
+class CoverageMonitor:
     """The states, edges and guard clauses (true and false) that the run has exercised.
 
     Parameters
@@ -134,6 +134,6 @@ class Coverage:
         return named(self.contact, "coverage")
 
 
-Monitor: TypeAlias = Chattering | Invariant | Passivity | Coverage
-ALL: tuple[Monitor, ...] = (Chattering(), Passivity(), Coverage())
+Monitor: TypeAlias = Chattering | Invariant | Passivity | CoverageMonitor
+ALL: tuple[Monitor, ...] = (Chattering(), Passivity(), CoverageMonitor())
 KNOWN: Mapping[str, Monitor] = {monitor.name: monitor for monitor in ALL}

@@ -1,0 +1,166 @@
+"""Counting the coverage of runs: of one from its rows and its log, of many from their log alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.language import Relation, names_in, truths, values_of
+from gms_fsm.traces.coverage.counts import ChartCoverage, EdgeCoverage, StateCoverage
+from gms_fsm.traces.coverage.decisions import Decision, decisions
+from gms_fsm.traces.coverage.total import Coverage
+from gms_fsm.traces.scope import guard_columns
+from gms_fsm.traces.trace import Trace
+
+Asked = tuple[Mapping[str, tuple[int, ...]], Mapping[str, tuple[float, ...]]]
+
+
+def of_trace(trace: Trace) -> Coverage:
+    """Return what a run has tried.
+
+    It sees every accepted step and both sides of every firing; with requested rows these and both
+    sides of every stop; of a run that kept its end only, the log.
+    """
+    whole = trace.whole()
+    views = {name: whole.contact(name) for name in trace.subject.machines}
+    return Coverage({name: of_view(view) for name, view in (views or {trace.which: whole}).items()})
+
+
+def of_view(trace: Trace) -> ChartCoverage:
+    """Return what a run has tried of the chart of one contact, as whose view it is given."""
+    chart, places, mode = trace.model.chart, trace.places, trace.modes.T
+    element, edge = trace.firings.machine - places.first, trace.firings.edge - places.first_edge
+    log = Fired(np.zeros_like(element), element, edge, mode[:, -1:].T)
+    if len(trace) == 1:
+        return of_log(chart, log)
+    taken = log.taken(chart)
+    values = _Values(trace, chart, mode)
+    asked = [values.asked(row, not taken[row].any()) for row in range(len(taken))]
+    return _made(chart, log, _per_element(mode, len(chart.states)), asked, watched=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Fired:
+    """The log of some runs.
+
+    Parameters
+    ----------
+    run, element, edge : ndarray of int, shape (firings,)
+        In order of time within each run.
+    last : ndarray of int, shape (runs, n)
+        Number of the state of each element at the end; negative if the run could not start.
+    """
+
+    run: NDArray[Any]
+    element: NDArray[Any]
+    edge: NDArray[Any]
+    last: NDArray[Any]
+
+    def taken(self, chart: Chart) -> NDArray[np.int64]:
+        """Return how often each element took each edge, shape (edges, n)."""
+        edges, n = len(chart.transitions), self.last.shape[1]
+        return np.bincount(self.edge * n + self.element, minlength=edges * n).reshape(edges, n)
+
+    def entered(self, chart: Chart) -> NDArray[np.int64]:
+        """Return how often each element entered each state, shape (states, n)."""
+        numbers = {state.name: number for number, state in enumerate(chart.states)}
+        first, n = self.last.copy(), self.last.shape[1]
+        places, firing = np.unique(self.run * n + self.element, return_index=True)
+        sources = np.array([numbers[edge.source] for edge in chart.transitions], dtype=np.int64)
+        first.flat[places] = sources[self.edge[firing]]
+        found = _per_element(first[(first >= 0).all(axis=1)].T, len(numbers))
+        for edge, times in zip(chart.transitions, self.taken(chart), strict=True):
+            found[numbers[edge.target]] += times
+        return found
+
+
+def of_log(chart: Chart, log: Fired) -> ChartCoverage:
+    """Return what is known of runs that kept no rows: states and edges."""
+    rows = np.zeros((len(chart.states), log.last.shape[1]), dtype=np.int64)
+    return _made(chart, log, rows, [({}, {})] * len(chart.transitions), watched=0)
+
+
+def _made(
+    chart: Chart, log: Fired, rows: NDArray[np.int64], asked: Sequence[Asked], watched: int
+) -> ChartCoverage:
+    states = zip(chart.states, rows.tolist(), log.entered(chart).tolist(), strict=True)
+    edges = zip(chart.transitions, log.taken(chart).tolist(), asked, strict=True)
+    return ChartCoverage(
+        chart,
+        tuple(StateCoverage(state.name, tuple(a), tuple(b)) for state, a, b in states),
+        tuple(EdgeCoverage(edge.name, edge.source, tuple(a), *b) for edge, a, b in edges),
+        runs=int((log.last >= 0).all(axis=1).sum()),
+        watched=watched,
+    )
+
+
+class _Values:
+    """The comparisons of a chart at the rows of a run, each computed once."""
+
+    def __init__(self, trace: Trace, chart: Chart, mode: NDArray[Any]) -> None:
+        self.chart, self.mode = chart, mode
+        self.decisions = decisions(chart)
+        self.states = [state.name for state in chart.states]
+        parts = {part for each in self.decisions.values() for part in each.comparisons}
+        names = frozenset[str]().union(*map(names_in, parts))
+        self.columns = guard_columns(trace, names)
+        self.truth = {part: truths(part, self._of(part), mode.shape) for part in parts}
+
+    def _of(self, part: Relation) -> dict[str, Any]:
+        return {name: self.columns[name] for name in names_in(part)}
+
+    def asked(self, row: int, margins: bool) -> Asked:
+        """Return the truth vectors seen by the guard of an edge, and how close it came."""
+        edge = self.chart.transitions[row]
+        decision = self.decisions[edge.name]
+        element, at = np.nonzero(self.mode == self.states.index(edge.source))
+        if not element.size:
+            return {}, {}
+        found = [self.truth[part][element, at] for part in decision.comparisons]
+        vectors, which = _vectors(found, element.size)
+        n = len(self.mode)
+        rows = np.bincount(which * n + element, minlength=len(vectors) * n).reshape(-1, n)
+        asked = dict(zip(vectors, map(tuple, rows.tolist()), strict=True))
+        return asked, self._closest(decision, vectors, which, (element, at)) if margins else {}
+
+    def _closest(
+        self, decision: Decision, vectors: Sequence[str], which: NDArray[Any], at: Any
+    ) -> dict[str, tuple[float, ...]]:
+        """Return for each truth vector how close its false comparisons came to being true."""
+        least = np.zeros((len(vectors), len(decision.comparisons)))
+        for number, part in enumerate(decision.comparisons):
+            own = np.full(len(vectors), np.inf)
+            left, right = (self._side(part, side)[at] for side in (part.left, part.right))
+            with np.errstate(invalid="ignore"):
+                distance = np.abs(left - right)
+            np.fmin.at(own, which, distance)
+            false = np.array([vector[number] == "0" for vector in vectors])
+            least[:, number] = np.where(false, own, 0.0)
+        return dict(zip(vectors, map(tuple, least.tolist()), strict=True))
+
+    def _side(self, part: Relation, side: Any) -> NDArray[np.float64]:
+        columns = {name: np.broadcast_to(u, self.mode.shape) for name, u in self._of(part).items()}
+        return values_of(side, columns) if columns else np.zeros(self.mode.shape)
+
+
+def _vectors(found: Sequence[NDArray[np.bool_]], size: int) -> tuple[list[str], NDArray[Any]]:
+    """Return the truth vectors that occur, in order, and of each place which one it has."""
+    if not found:
+        return [""], np.zeros(size, dtype=np.int64)
+    code = np.zeros(size, dtype=object if len(found) > 62 else np.int64)
+    for truth in found:
+        code = 2 * code + truth
+    codes, which = np.unique(code, return_inverse=True)
+    return [f"{int(each):0{len(found)}b}" for each in codes], which
+
+
+def _per_element(mode: NDArray[Any], states: int) -> NDArray[np.int64]:
+    """Return how often each state occurs for each element, shape (states, n)."""
+    n = len(mode)
+    places = mode * n + np.arange(n)[:, np.newaxis]
+    return np.bincount(places.ravel(), minlength=states * n).reshape(states, n)

@@ -1,0 +1,181 @@
+"""Coverage: what runs have tried of the charts in them, as counts that can be added."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing, unknown
+from gms_fsm.foundation.display import short_repr
+from gms_fsm.traces.coverage.counts import ChartCoverage, Score
+from gms_fsm.traces.coverage.files import read_parts, write_parts
+from gms_fsm.traces.coverage.reasons import lines
+
+
+@refusing()
+@short_repr
+@dataclass(frozen=True)
+class Coverage:
+    """What runs have tried of a chart, or of each chart of a system; `gms_fsm.coverage` counts it.
+
+    Parameters
+    ----------
+    parts : mapping of str to ChartCoverage
+        By contact and supervisor; of a model on a rig one, called ``""``.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, coverage, simulate
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> there, back = (simulate(model, Prescribed(v), 3.0) for v in ("0.2", "-0.2"))
+    >>> both = coverage(there) + coverage(back)
+    >>> both.scores["edges"].seen, both == coverage([there, back])
+    (2, True)
+    >>> print(both)
+    states    2 of 2   100 %
+    edges     2 of 3    67 %
+    clauses  9 of 12    75 %
+    MC/DC     2 of 6    33 %
+    never taken:
+      arrest from slip: `|v| <= v_c` was never true (closest: -200 mm/s)
+      arrest from slip: `|z| < s` was never true (closest: 0 m)
+    never seen to decide alone:
+      break_away_forward from stick: `v > v_c` was false, `z >= s` was not true then
+      break_away_backward from stick: `v < -v_c` was false, `z <= -s` was not true then
+    """
+
+    parts: Mapping[str, ChartCoverage]
+
+    def __add__(self, other: Coverage) -> Coverage:
+        checked_kind("other", other, Coverage, "a Coverage")
+        if self.parts.keys() != other.parts.keys():
+            raise ParameterError(
+                f"it is of {_names(other.parts)}",
+                advice=f"what is added must be of {_names(self.parts)}",
+            )
+        return Coverage({name: part + other.parts[name] for name, part in self.parts.items()})
+
+    def __str__(self) -> str:
+        return self.text
+
+    @classmethod
+    def merged(cls, several: Iterable[Coverage]) -> Coverage:
+        """Return the sum of several, at least one.
+
+        Parameters
+        ----------
+        several : iterable of Coverage
+            Of the same charts.
+
+        Returns
+        -------
+        Coverage
+            As if all had been counted together.
+
+        Raises
+        ------
+        ParameterError
+            If there is none, or charts differ.
+        """
+        found = list(several)
+        if not found:
+            raise ParameterError("there is nothing to merge", advice="give at least one Coverage")
+        return functools.reduce(lambda a, b: a + b, found)
+
+    def contact(self, name: str) -> ChartCoverage:
+        """Return the counts of one contact or supervisor.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+
+        Returns
+        -------
+        ChartCoverage
+            Its counts.
+
+        Raises
+        ------
+        ParameterError
+            If there is none of this name.
+        """
+        if name not in self.parts:
+            raise unknown("contact", name, self.parts)
+        return self.parts[name]
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return next(iter(self.parts.values())).runs
+
+    @property
+    def scores(self) -> dict[str, Score]:
+        """The scores of all charts together, by name; see `ChartCoverage.scores`."""
+        found: dict[str, Score] = {}
+        for part in self.parts.values():
+            for name, score in part.scores.items():
+                seen, of = found.get(name, Score(0, 0))
+                found[name] = Score(seen + score.seen, of + score.of)
+        return found
+
+    @property
+    def lowest(self) -> tuple[str, float]:
+        """The lowest of the scores: its name, and percent."""
+        name = min(self.scores, key=lambda each: self.scores[each].percent)
+        return name, self.scores[name].percent
+
+    @property
+    def text(self) -> str:
+        """The scores, what was never taken, and why not."""
+        return "\n".join(lines(self.parts, self.scores))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the counts and the charts to a JSON file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        return write_parts(checked_path("path", path), self.parts)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Coverage:
+        """Read a file written by `save`.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Coverage
+            With the same counts.
+
+        Raises
+        ------
+        TraceFileError
+            If the file is missing, damaged, or not a coverage file.
+        """
+        return cls(read_parts(checked_path("path", path)))
+
+
+def _names(parts: Mapping[str, ChartCoverage]) -> str:
+    """Say whose counts these are."""
+    names = [name for name in parts if name]
+    return ", ".join(names) or "a model on a rig"
