@@ -28,6 +28,7 @@ from gms_fsm.app.verbs.charts import (
     handout_command,
 )
 from gms_fsm.app.verbs.console import error_line, note, put
+from gms_fsm.app.verbs.cover import cover_command
 from gms_fsm.app.verbs.difference import diff_command
 from gms_fsm.app.verbs.export import export_command
 from gms_fsm.app.verbs.fit import fit_command
@@ -66,6 +67,7 @@ _MEANT = {
     "identify": "fit",
     "teach": "lesson",
     "trust": "run --trust",
+    "coverage": "cover",
     "list": "run --list",
     "scenarios": "run --list",
 }
@@ -214,6 +216,7 @@ app.command("schema", cls=_Verb)(schema_command)
 app.command("chart", cls=_Drawing)(chart_command)
 app.command("check", cls=_Verb)(check_command)
 app.command("diff", cls=_Drawing)(diff_command)
+app.command("cover", cls=_Drawing)(cover_command)
 app.command("blocks", cls=_Drawing)(blocks_command)
 app.command("handout", cls=_Drawing)(handout_command)
 app.command("plot", cls=_Verb)(plot_command)

@@ -22,7 +22,7 @@ from gms_fsm.run.sweep import Sweep, sweep
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in
 
-__all__ = ["Axis", "axis", "sweep_scenario", "sweep_summary"]
+__all__ = ["Axis", "axis", "sweep_scenario", "sweep_summary", "swept"]
 
 MOST_RUNS = 1_000_000
 LONGEST_TABLE = 100  # runs in a summary; all are in runs.csv
@@ -139,23 +139,49 @@ def sweep_scenario(
     folder = output_folder(folder, names)
     for name in names:
         refuse_input(folder / name, *loaded.inputs)
-    grid = np.meshgrid(*(each.values for each in axes), indexing="ij")
-    parameters = {each.name: values.ravel() for each, values in zip(axes, grid, strict=True)}
-    options: dict[str, Any] = dict(loaded.arguments)
-    for name in ("engine", "monitors"):  # a sweep keeps no rows for monitors
-        options.pop(name, None)
-    if loaded.scenario.output.every is None:
-        options.pop("t_eval", None)
-    else:
-        options["output"] = "t_eval"
-    options.pop("t_end")
-    result = sweep(*(*loaded.subject, parameters), engine=engine, **options)
+    result = swept(loaded, axes, engine=engine)
     saved = result.save(folder / "sweep.npz")  # first, so that no later failure can lose the runs
     return result, [
         write_text(folder / "summary.md", sweep_summary(loaded, axes, result, engine)),
         write_text(folder / "runs.csv", _csv(result)),
         saved,
     ]
+
+
+def swept(
+    loaded: Loaded, axes: Sequence[Axis], *, engine: str = "compiled", coverage: bool = False
+) -> Sweep:
+    """Run a scenario over a grid of parameters.
+
+    Parameters
+    ----------
+    loaded, axes, engine
+        As in `sweep_scenario`.
+    coverage : bool
+        As in `gms_fsm.sweep`.
+
+    Returns
+    -------
+    Sweep
+        One run for every combination of values, the last axis varying fastest.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, or there are too many runs.
+    """
+    _check(axes, _known(loaded))
+    grid = np.meshgrid(*(each.values for each in axes), indexing="ij")
+    parameters = {each.name: values.ravel() for each, values in zip(axes, grid, strict=True)}
+    options: dict[str, Any] = dict(loaded.arguments)
+    for name in ("engine", "monitors"):  # a sweep keeps no rows for monitors
+        options.pop(name, None)
+    if loaded.scenario.output.every is None or coverage:
+        options.pop("t_eval", None)
+    else:
+        options["output"] = "t_eval"
+    options.pop("t_end")
+    return sweep(*(*loaded.subject, parameters), engine=engine, coverage=coverage, **options)
 
 
 def _known(loaded: Loaded) -> tuple[Parameter, ...]:

@@ -139,8 +139,11 @@ def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
 def edge_look(sheet: ChartSheet, number: int, edge: Transition) -> dict[str, str]:
     """Return the attributes of an edge's line: never taken or removed is dashed, marked is wide."""
     look = {"style": "dashed"} if edge.name in sheet.removed else {}
-    if sheet.tally is not None and not sheet.tally.times(number, edge):
-        look = {"style": "dashed"}
+    if sheet.tally is not None:
+        if not sheet.tally.times(number, edge):
+            look = {"style": "dashed"}
+        elif width := sheet.tally.width(number, edge):
+            look = {"penwidth": f"{width:.2f}"}
     if edge.name in sheet.marked:
         look |= {"class": "marked", "penwidth": MARKED}
     return look

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import re
 import warnings
 from collections import Counter
@@ -11,12 +12,14 @@ from dataclasses import dataclass, replace
 from gms_fsm.charts.chart import Transition
 from gms_fsm.charts.nesting import spelled
 from gms_fsm.foundation.text import visible
+from gms_fsm.traces.coverage.counts import ChartCoverage
 from gms_fsm.traces.trace import Trace, dwell_times
 from plots.charts.contents import chart_texts, state_texts
 from plots.charts.notation import ChartWriter
 from plots.style import MONO_FONT
 from plots.style.fonts import missing_glyphs
 
+THIN, THICK = 1.1, 3.5  # points, of the lines of edges taken once, and most often
 SAID = 5  # missing characters in a warning
 LONGEST_LINE = 52  # characters; longer texts are wrapped
 DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"
@@ -76,10 +79,55 @@ class Tally:
 
     def of_edge(self, element: int, edge: Transition) -> str:
         """Write how often an edge was taken."""
-        times = self.times(element, edge)
-        if not times:
-            return "never taken"
-        return "taken once" if times == 1 else f"taken {times} times"
+        return times_said("taken", self.times(element, edge))
+
+    def width(self, element: int, edge: Transition) -> float | None:
+        """Return None: the lines of one run have the usual width."""
+
+
+class CoverageTally:
+    """How often states were entered and edges taken, by all elements of all runs together.
+
+    Parameters
+    ----------
+    coverage : ChartCoverage
+        The counts.
+    """
+
+    def __init__(self, coverage: ChartCoverage) -> None:
+        self.entries = {each.name: sum(each.entries) for each in coverage.states}
+        self.seen = {each.name for each in coverage.states if any(each.seen)}
+        self.taken = {(each.edge, each.source): sum(each.taken) for each in coverage.edges}
+
+    def of_state(self, _: int, state: str) -> str:
+        """Write how often a state was entered."""
+        return times_said("entered", self.entries[state] or int(state in self.seen))
+
+    def times(self, _: int, edge: Transition) -> int:
+        """Return how often an edge was taken from its source."""
+        return self.taken[edge.name, edge.source]
+
+    def of_edge(self, element: int, edge: Transition) -> str:
+        """Write how often an edge was taken."""
+        return times_said("taken", self.times(element, edge))
+
+    def width(self, element: int, edge: Transition) -> float | None:
+        """Return the width of an edge's line, points: it grows with the logarithm of the count."""
+        times, most = self.times(element, edge), max(self.taken.values())
+        if times < 2:
+            return None
+        return THIN + (THICK - THIN) * math.log(times) / math.log(most)
+
+
+def times_said(verb: str, times: int) -> str:
+    """Return how often something happened.
+
+    >>> times_said("taken", 0), times_said("taken", 1), times_said("entered", 2)
+    ('never taken', 'taken once', 'entered 2 times')
+    """
+    if not times:
+        return f"never {verb}"
+    return f"{verb} once" if times == 1 else f"{verb} {times} times"
 
 
 # The index of a name; what stands before the first underscore is its symbol. Raised digits, which

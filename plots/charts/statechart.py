@@ -21,6 +21,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, listed, one_of, refusing
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import Both, Condition, Either, clauses
+from gms_fsm.traces.coverage.counts import ChartCoverage
 from gms_fsm.traces.trace import Trace
 from plots.charts.arrange import arrange
 from plots.charts.cells import CellWriter
@@ -39,6 +40,7 @@ from plots.charts.labels import (
     DOT,
     LONGEST_LINE,
     TRUE,
+    CoverageTally,
     Piece,
     Row,
     Tally,
@@ -83,7 +85,7 @@ def statechart(
     notation: str = "stateflow",
     direction: str = "TB",
     theme: str = "light",
-    counts: Trace | None = None,
+    counts: Trace | ChartCoverage | None = None,
     marked: Iterable[str] = (),
     names: bool = False,
     note: str = "",
@@ -105,9 +107,11 @@ def statechart(
         States from top to bottom, or from left to right.
     theme : {"light", "dark"}
         Colours; what they mean is also shown by shapes.
-    counts : Trace, optional
+    counts : Trace or ChartCoverage, optional
         A run of this chart. The picture then shows how long each element was in each state and how
-        often it took each edge; an edge never taken is dashed.
+        often it took each edge; an edge never taken is dashed. Or what several runs have tried, of
+        all elements together: ``coverage(runs).contact()``; edges are the wider the more often they
+        were taken.
     marked : iterable of str, optional
         Names of states and edges to highlight: drawn thick, with a frame around the guard.
     names : bool, optional
@@ -147,18 +151,11 @@ def statechart(
     """
     _check_chart(chart)
     checked_kind("note", note, str, "a text")
-    if counts is not None:
-        checked_kind("counts", counts, Trace, "a Trace, a run of this chart")
-    if counts is not None and counts.model.chart != chart:
-        raise ParameterError(
-            f"counts is a run of the chart {counts.model.chart.name!r}",
-            advice=f"it must be one of the chart that is drawn, {chart.name!r}",
-        )
+    tally, n = _tally(counts, chart, elements)
     pointed = tuple(listed("marked", marked, "names of states and edges"))
     parts = [*chart.nesting.levels, *(edge.name for edge in chart.transitions)]
     for name in pointed:
         one_of("marked", name, parts)
-    tally = Tally(counts) if counts else None
     sheet = ChartSheet(
         chart,
         notation,
@@ -170,10 +167,33 @@ def statechart(
         names=names,
     )
     warn_of_missing_glyphs(sheet.write, note)
-    numbers = chosen(elements, None if counts is None else counts.n)
-    bare = elements == 1 and (counts is None or counts.n == 1)
+    numbers = chosen(elements, n)
+    bare = elements == 1 and n in (None, 1)
     folded = counts is None and not isinstance(elements, Sequence)
     return sheet.graph(numbers, bare=bare, folded=folded, foot=note)
+
+
+def _tally(
+    counts: Trace | ChartCoverage | None, chart: Chart, elements: int | Sequence[int]
+) -> tuple[Tally | CoverageTally | None, int | None]:
+    """Return the counts to show, and of how many elements they tell."""
+    if counts is None:
+        return None, None
+    said = "a Trace, a run of this chart; or a ChartCoverage"
+    checked_kind("counts", counts, (Trace, ChartCoverage), said)
+    its = counts.chart if isinstance(counts, ChartCoverage) else counts.model.chart
+    if its != chart:
+        raise ParameterError(
+            f"counts is a run of the chart {its.name!r}",
+            advice=f"it must be one of the chart that is drawn, {chart.name!r}",
+        )
+    if not isinstance(counts, ChartCoverage):
+        return Tally(counts), counts.n
+    if elements != 1:
+        raise ParameterError(
+            "coverage is drawn of all elements together", place="elements", advice="leave it out"
+        )
+    return CoverageTally(counts), 1
 
 
 def _check_chart(chart: object) -> None:
@@ -271,7 +291,7 @@ class ChartSheet:
         The chart.
     notation, direction, theme, form : str
         See `statechart`.
-    tally : Tally, optional
+    tally : Tally or CoverageTally, optional
         Counts to show.
     live : bool
         Leave room for the dot of the active state and, of one element, the marks of the clauses.
@@ -296,7 +316,7 @@ class ChartSheet:
     direction: str = "TB"
     theme: str = "light"
     form: str = "auto"
-    tally: Tally | None = None
+    tally: Tally | CoverageTally | None = None
     live: bool = False
     marked: frozenset[str] = frozenset()
     names: bool = False

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.language import Relation, names_in, truths, values_of
+from gms_fsm.language import Relation, Value, names_in, truths, values_of
 from gms_fsm.traces.coverage.counts import ChartCoverage, EdgeCoverage, StateCoverage
 from gms_fsm.traces.coverage.decisions import Decision, decisions
 from gms_fsm.traces.coverage.total import Coverage
 from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
+
+BITS = 63  # comparisons that fit a whole number of numpy
+FEW = 10  # comparisons of a guard up to which a table of all truth vectors is small
 
 Asked = tuple[Mapping[str, tuple[int, ...]], Mapping[str, tuple[float, ...]]]
 
@@ -107,56 +110,71 @@ class _Values:
         self.decisions = decisions(chart)
         self.states = [state.name for state in chart.states]
         parts = {part for each in self.decisions.values() for part in each.comparisons}
-        names = frozenset[str]().union(*map(names_in, parts))
-        self.columns = guard_columns(trace, names)
-        self.truth = {part: truths(part, self._of(part), mode.shape) for part in parts}
+        self.columns = guard_columns(trace, frozenset[str]().union(*map(names_in, parts)))
+        self.truth = {
+            part: truths(part, self._of(part), mode.shape).ravel().astype(np.int64)
+            for part in parts
+        }
+        self._inside: dict[str, tuple[NDArray[Any], NDArray[Any]]] = {}
 
     def _of(self, part: Relation) -> dict[str, Any]:
         return {name: self.columns[name] for name in names_in(part)}
+
+    def inside(self, state: str) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the places in a state, among those of all elements, and the elements."""
+        if state not in self._inside:
+            at = np.flatnonzero(self.mode == self.states.index(state))
+            self._inside[state] = at, at // self.mode.shape[1]
+        return self._inside[state]
 
     def asked(self, row: int, margins: bool) -> Asked:
         """Return the truth vectors seen by the guard of an edge, and how close it came."""
         edge = self.chart.transitions[row]
         decision = self.decisions[edge.name]
-        element, at = np.nonzero(self.mode == self.states.index(edge.source))
-        if not element.size:
+        at, element = self.inside(edge.source)
+        if not at.size:
             return {}, {}
-        found = [self.truth[part][element, at] for part in decision.comparisons]
-        vectors, which = _vectors(found, element.size)
+        found = [self.truth[part][at] for part in decision.comparisons]
+        vectors, which = _vectors(found, at.size)
         n = len(self.mode)
         rows = np.bincount(which * n + element, minlength=len(vectors) * n).reshape(-1, n)
         asked = dict(zip(vectors, map(tuple, rows.tolist()), strict=True))
-        return asked, self._closest(decision, vectors, which, (element, at)) if margins else {}
+        return asked, self._closest(decision, vectors, which, at) if margins else {}
 
     def _closest(
-        self, decision: Decision, vectors: Sequence[str], which: NDArray[Any], at: Any
+        self, decision: Decision, vectors: Sequence[str], which: NDArray[Any], at: NDArray[Any]
     ) -> dict[str, tuple[float, ...]]:
         """Return for each truth vector how close its false comparisons came to being true."""
         least = np.zeros((len(vectors), len(decision.comparisons)))
+        own = [which == place for place in range(len(vectors))]
         for number, part in enumerate(decision.comparisons):
-            own = np.full(len(vectors), np.inf)
             left, right = (self._side(part, side)[at] for side in (part.left, part.right))
             with np.errstate(invalid="ignore"):
                 distance = np.abs(left - right)
-            np.fmin.at(own, which, distance)
-            false = np.array([vector[number] == "0" for vector in vectors])
-            least[:, number] = np.where(false, own, 0.0)
+            distance[np.isnan(distance)] = np.inf
+            for place, vector in enumerate(vectors):
+                if vector[number] == "0":
+                    least[place, number] = distance[own[place]].min()
         return dict(zip(vectors, map(tuple, least.tolist()), strict=True))
 
-    def _side(self, part: Relation, side: Any) -> NDArray[np.float64]:
+    def _side(self, part: Relation, side: Value) -> NDArray[np.float64]:
         columns = {name: np.broadcast_to(u, self.mode.shape) for name, u in self._of(part).items()}
-        return values_of(side, columns) if columns else np.zeros(self.mode.shape)
+        return values_of(side, columns).ravel() if columns else np.zeros(self.mode.size)
 
 
-def _vectors(found: Sequence[NDArray[np.bool_]], size: int) -> tuple[list[str], NDArray[Any]]:
+def _vectors(found: Sequence[NDArray[np.int64]], size: int) -> tuple[list[str], NDArray[Any]]:
     """Return the truth vectors that occur, in order, and of each place which one it has."""
-    if not found:
-        return [""], np.zeros(size, dtype=np.int64)
-    code = np.zeros(size, dtype=object if len(found) > 62 else np.int64)
+    code = np.zeros(size, dtype=np.int64 if len(found) < BITS else object)
     for truth in found:
         code = 2 * code + truth
-    codes, which = np.unique(code, return_inverse=True)
-    return [f"{int(each):0{len(found)}b}" for each in codes], which
+    if len(found) <= FEW:  # sorting takes longer
+        codes = np.flatnonzero(np.bincount(code, minlength=1))
+        numbers = np.zeros(2 ** len(found), dtype=np.int64)
+        numbers[codes] = np.arange(codes.size)
+        which = numbers[code]
+    else:
+        codes, which = np.unique(code, return_inverse=True)
+    return [format(int(each), f"0{len(found)}b") if found else "" for each in codes], which
 
 
 def _per_element(mode: NDArray[Any], states: int) -> NDArray[np.int64]:

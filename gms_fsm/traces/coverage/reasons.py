@@ -16,11 +16,12 @@ def lines(parts: Mapping[str, ChartCoverage], scores: Mapping[str, Score]) -> li
     """Return the scores of all charts, and for each one what is missing and why."""
     counts = {name: f"{score.seen} of {score.of}" for name, score in scores.items()}
     width = max(map(len, counts.values()))
-    found = [
+    some = next(iter(parts.values()))
+    found = list(wrapped(f"{some.runs} run{'s' * (some.runs != 1)} of {_whose(parts)}"))
+    found += [
         f"{name:<8} {counts[name]:>{width}}   {math.floor(score.percent):>3} %"
         for name, score in scores.items()
     ]
-    some = next(iter(parts.values()))
     if some.watched < some.runs:
         of = "no run" if not some.watched else f"{some.watched} of {some.runs} runs"
         found.append(f"clauses and MC/DC: {of} kept rows, and only these know them")
@@ -33,6 +34,13 @@ def lines(parts: Mapping[str, ChartCoverage], scores: Mapping[str, Score]) -> li
             own = [line for item in items for line in wrapped(f"  {item}")]
             found += [f"{lead}{heading}:", *own] if own else []
     return found
+
+
+def _whose(parts: Mapping[str, ChartCoverage]) -> str:
+    """Name the charts, those of a system with their contacts."""
+    return ", ".join(
+        f"{name} ({u.chart.name})" if name else u.chart.name for name, u in parts.items()
+    )
 
 
 def _never_taken(part: ChartCoverage) -> Iterator[str]:

@@ -85,13 +85,13 @@ class Coverage:
             raise ParameterError("there is nothing to merge", advice="give at least one Coverage")
         return functools.reduce(lambda a, b: a + b, found)
 
-    def contact(self, name: str) -> ChartCoverage:
+    def contact(self, name: str = "") -> ChartCoverage:
         """Return the counts of one contact or supervisor.
 
         Parameters
         ----------
         name : str
-            Its name.
+            Its name; not needed if there is only one.
 
         Returns
         -------
@@ -101,8 +101,10 @@ class Coverage:
         Raises
         ------
         ParameterError
-            If there is none of this name.
+            If there is none of this name, or several and no name is given.
         """
+        if not name and len(self.parts) == 1:
+            return next(iter(self.parts.values()))
         if name not in self.parts:
             raise unknown("contact", name, self.parts)
         return self.parts[name]
