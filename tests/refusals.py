@@ -35,6 +35,7 @@ from gms_fsm import (
     Chart,
     ChartModel,
     Contact,
+    Coverage,
     Element,
     ElementMachines,
     FrictionBank,
@@ -54,10 +55,12 @@ from gms_fsm import (
     State,
     Stribeck,
     Supervisor,
+    Sweep,
     System,
     Trace,
     Transition,
     choose,
+    coverage,
     diff,
     excite,
     export,
@@ -3151,6 +3154,74 @@ rows = {
     )
 }
 group("monitors", ParameterError, called, rows)
+
+
+# --------------------------------------------------------------------------- coverage
+def counted(v: str = "0.2", law: str = "signed") -> Coverage:
+    """Count the coverage of a short run."""
+    return coverage(simulate(stick_slip(law), Prescribed(v), 1.0))
+
+
+def swept_and_saved() -> Sweep:
+    """Read a sweep from its file."""
+    given: Any = (stick_slip("signed"), Prescribed("0.2"), 1.0, {"F_s": [1.5]})
+    return Sweep.load(sweep(*given, engine="machines").save("swept.npz"))
+
+
+def covering(*words: str) -> None:
+    """Call ``gms-fsm cover`` beside counts of another chart, and counts that are damaged."""
+    own_files.write(Path())
+    Path("a.toml").write_text(OPEN_LOOP)
+    counted(law="published").save("other.json")
+    Path("damaged.json").write_text("{}")
+    coverage(ran(BELT)).save("system.json")
+    ran().save("run.npz")
+    verb("cover", *words)
+
+
+rows = {
+    "other chart": ("", ..., lambda: counted() + counted(law="published")),
+    "system and model": ("", ..., lambda: coverage([counted(), ran(BELT)])),
+    "number for a run": ("what", 3, lambda: coverage(3)),
+    "name for a run": ("what", "pulled_mass", lambda: coverage("pulled_mass")),
+    "no runs": ("", ..., lambda: coverage([])),
+    "number to add": ("other", 1, lambda: counted() + 1),
+    "sweep of a file": ("what", ..., lambda: coverage(swept_and_saved())),
+    "word for clauses": ("coverage", "all", lambda: sweeping({"F_s": [1.5]}, coverage="all")),
+    "unknown contact": ("", ..., lambda: counted().contact("gear")),
+    "which of several contacts": ("", ..., lambda: coverage(ran(BELT)).contact()),
+}
+group("coverage", ParameterError, called, rows)
+rows = {
+    "no file": ("gone.json", ..., lambda: Coverage.load("gone.json")),
+    "folder for a file": (".", ..., lambda: Coverage.load(".")),
+}
+group("coverage", TraceFileError, called, rows)
+rows = {"into no folder": ("", ..., lambda: counted().save("gone/counts.json"))}
+group("coverage", OutputError, called, rows)
+rows = {
+    "counts of another chart": ("other.json", ..., "a.toml", "--merge", "other.json"),
+    "counts of a system": ("system.json", ..., "a.toml", "--merge", "system.json"),
+    "scenarios of two charts": ("servo", ..., "a.toml", "servo"),
+    "picture of several charts": ("-o", ..., "pair.toml", "-o", "c.svg"),
+    "missing contact": ("--contact pad", ..., "pair.toml", "-o", "c.svg", "--contact", "pad"),
+    "contact of a model": ("--contact pad", ..., "a.toml", "-o", "c.svg", "--contact", "pad"),
+    "override of a trace": ("run.npz", ..., "run.npz", "--set", "run.t_end=1"),
+    "sweep of a trace": ("run.npz", ..., "run.npz", "--over", "F_s=1:2:2"),
+    "grid that is none": ("--over F_s", ..., "a.toml", "--over", "F_s"),
+    "ending of a picture": ("path", "c.jpg", "a.toml", "-o", "c.jpg"),
+}
+group("cover", ParameterError, covering, rows)
+rows = {"damaged counts": ("damaged.json", ..., "a.toml", "--merge", "damaged.json")}
+group("cover", TraceFileError, covering, rows)
+rows = {"scenario that is missing": ("gone.toml", ..., "gone.toml")}
+group("cover", ScenarioError, covering, rows)
+rows = {
+    "counts over the scenario": ("a.toml", ..., "a.toml", "--merge", "a.toml"),
+    "picture over the scenario": ("a.toml", ..., "a.toml", "-o", "a.toml"),
+    "counts into no folder": ("gone/c.json", ..., "a.toml", "--merge", "gone/c.json"),
+}
+group("cover", OutputError, covering, rows)
 
 
 # --------------------------------------------------------------------------- cells and data sets

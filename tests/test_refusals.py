@@ -11,6 +11,7 @@ INPUTS = {"a.toml", "own.csv", "in/a.toml", "in/own.csv", "own.toml", "pulled.to
 INPUTS |= {f"test{number:02d}.csv" for number in range(13)}
 TRACES = {"run.npz", ".npz", "run.txt", "run.csv", "run.transitions.csv", "out/own/trace.npz"}
 SESSIONS = {"s.json", "odd.json"}
+COUNTS = {"other.json", "system.json", "damaged.json", "swept.npz"}
 
 
 @pytest.mark.parametrize("name", REFUSALS)
@@ -22,7 +23,7 @@ def test_it_is_refused_at_its_place(name: str) -> None:
     assert type(error) is row.error
     assert place_of(error).endswith(row.place)
     assert shown(error.value) == shown(row.value)
-    assert files <= INPUTS | TRACES | SESSIONS
+    assert files <= INPUTS | TRACES | SESSIONS | COUNTS
     assert len(str(error)) < 2000
     assert "np." not in str(error)
     assert told(error) == approved()[name], "python -m tests.refusals approves what is new"

@@ -19,6 +19,7 @@ from gms_fsm.errors import ExpressionError, GMSError, SessionError
 from gms_fsm.foundation.arguments import meant, there_are
 from gms_fsm.foundation.quantities import WIDTH, in_words
 from gms_fsm.language import EVENT, evaluate
+from gms_fsm.session.coverage import coverage
 from gms_fsm.session.explain import holds
 from gms_fsm.session.session import KINDS, Breakpoint, Session
 from gms_fsm.traces.system_scope import asked_unit, in_si, units_of
@@ -361,6 +362,11 @@ class Commands:
         """Show the findings about the branch."""
         nothing("trust", arg)
         yield from self.session.tree.trace().trust().text.splitlines()
+
+    def do_coverage(self, arg: str) -> Iterator[str]:
+        """Show what the branches have tried."""
+        _nothing("coverage", arg)
+        yield from coverage(self.session).text.splitlines()
 
     def do_print(self, arg: str) -> Iterator[str]:
         """Show a value."""

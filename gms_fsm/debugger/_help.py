@@ -53,6 +53,14 @@ COMMANDS = {
         "places without a unique answer, values outside the chart's domain. Runs it to its end.",
         ("trust",),
     ),
+    "coverage": Command(
+        "look",
+        "coverage",
+        "Show what all branches together have tried: states, edges, clauses of guards, and those "
+        "that decided a guard alone (MC/DC); below, what was never taken and why not. Runs them to "
+        "their ends.",
+        ("coverage",),
+    ),
     "print": Command(
         "look",
         "print EXPRESSION",

@@ -33,7 +33,7 @@ from gms_fsm.systems.mounted import Mounted, mounted, shifted
 from gms_fsm.systems.numbers import column_name, known_in, varied
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
-from gms_fsm.traces.coverage.counting import Fired, of_log, of_trace
+from gms_fsm.traces.coverage.counting import FiredEdges, of_log, of_trace
 from gms_fsm.traces.coverage.total import Coverage
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
@@ -486,7 +486,7 @@ class _Collected:
             chart, n = each.chart, each.n
             mine = log[(log["element"] >= element) & (log["element"] < element + n)]
             last = self.mode[:, element : element + n]
-            fired = Fired(mine["run"], mine["element"] - element, mine["edge"] - edge, last)
+            fired = FiredEdges(mine["run"], mine["element"] - element, mine["edge"] - edge, last)
             parts[each.name if self.what.named else ""] = of_log(chart, fired)
             element, edge = element + n, edge + len(chart.transitions)
         return Coverage(parts)

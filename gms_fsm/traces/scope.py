@@ -65,19 +65,7 @@ def unit_of(chart: Chart, name: str) -> str:
 def clause_unit(chart: Chart, part: Condition, text: str) -> str:
     """Return the unit of both sides of a comparison: that of its names, if all agree.
 
-    Parameters
-    ----------
-    chart : Chart
-        The chart, which knows the units of names.
-    part : Condition
-        A clause of a guard.
-    text : str
-        The clause as shown.
-
-    Returns
-    -------
-    str
-        Empty if the names do not determine it.
+    Empty if they do not determine it; `text` is the comparison as shown.
     """
     units = {unit_of(chart, name) for name in names_in(part)} - {""}
     plain = not set(text) & set("*/^()")

@@ -10,7 +10,7 @@ import typer
 
 from gms_fsm.app.verbs.console import note, put, say
 from gms_fsm.app.verbs.options import INTERRUPTED, ContactName, Overrides
-from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.errors import GMSError, OutputError, ParameterError
 from gms_fsm.foundation.files import refuse_input
 
 if TYPE_CHECKING:
@@ -72,11 +72,17 @@ def cover_command(
     """
     from gms_fsm import Coverage
     from gms_fsm.app.sweeps import axis
+    from plots.output import formats
 
     axes = [axis(text) for text in over or []]
-    for path in (merge, output):
-        if path is not None:
-            refuse_input(path, *scenarios)
+    for path in filter(None, (merge, output)):  # before anything runs
+        refuse_input(path, *scenarios)
+        if not path.parent.is_dir():
+            raise OutputError(
+                f"there is no folder {path.parent}", place=str(path), advice="create it first"
+            )
+    if output is not None:
+        formats.chosen(output, "graph", "chart")
     before = Coverage.load(merge) if merge is not None and merge.exists() else None
     found: Coverage | None = None
     try:
@@ -124,7 +130,8 @@ def _counted(path: Path, overrides: Sequence[str], axes: Sequence[Axis]) -> Cove
     try:
         return coverage(loaded.simulate(monitors=(), t_eval=None))
     except SimulationError as error:
-        note(f"{error.inside(path)}; the run counts as far as it came")
+        failed = error.replaced(kept="").inside(path)
+        note(f"{failed}; it counts as far as it came")
         return coverage(error.trace)
 
 
@@ -138,12 +145,6 @@ def _sum(found: Coverage | None, other: Coverage, path: Path) -> Coverage:
 
 def _part(found: Coverage, contact: str) -> ChartCoverage:
     """Return the counts of the chart to draw."""
-    if contact and [*found.parts] == [""]:
-        raise ParameterError(
-            "a model on a rig has one contact",
-            place=f"--contact {contact}",
-            advice="leave it out",
-        )
     if not contact and len(found.parts) > 1:
         names = [*found.parts]
         raise ParameterError(
@@ -151,4 +152,7 @@ def _part(found: Coverage, contact: str) -> ChartCoverage:
             place="-o",
             advice=f"say which one to draw: --contact {names[0]}",
         )
-    return found.contact(contact)
+    try:
+        return found.contact(contact)
+    except GMSError as error:
+        raise error.inside(f"--contact {contact}") from None

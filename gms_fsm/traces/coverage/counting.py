@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,9 +38,10 @@ def of_view(trace: Trace) -> ChartCoverage:
     """Return what a run has tried of the chart of one contact, as whose view it is given."""
     chart, places, mode = trace.model.chart, trace.places, trace.modes.T
     element, edge = trace.firings.machine - places.first, trace.firings.edge - places.first_edge
-    log = Fired(np.zeros_like(element), element, edge, mode[:, -1:].T)
+    log = FiredEdges(np.zeros_like(element), element, edge, mode[:, -1:].T)
     if len(trace) == 1:
         return of_log(chart, log)
+    log = replace(log, first=mode[:, :1].T)
     taken = log.taken(chart)
     values = _Values(trace, chart, mode)
     asked = [values.asked(row, not taken[row].any()) for row in range(len(taken))]
@@ -48,7 +49,7 @@ def of_view(trace: Trace) -> ChartCoverage:
 
 
 @dataclass(frozen=True, eq=False)
-class Fired:
+class FiredEdges:
     """The log of some runs.
 
     Parameters
@@ -57,12 +58,15 @@ class Fired:
         In order of time within each run.
     last : ndarray of int, shape (runs, n)
         Number of the state of each element at the end; negative if the run could not start.
+    first : ndarray of int, shape (runs, n), optional
+        The same at the start. If it is unknown it is what the element first leaves, or its last.
     """
 
     run: NDArray[Any]
     element: NDArray[Any]
     edge: NDArray[Any]
     last: NDArray[Any]
+    first: NDArray[Any] | None = None
 
     def taken(self, chart: Chart) -> NDArray[np.int64]:
         """Return how often each element took each edge, shape (edges, n)."""
@@ -72,24 +76,26 @@ class Fired:
     def entered(self, chart: Chart) -> NDArray[np.int64]:
         """Return how often each element entered each state, shape (states, n)."""
         numbers = {state.name: number for number, state in enumerate(chart.states)}
-        first, n = self.last.copy(), self.last.shape[1]
-        places, firing = np.unique(self.run * n + self.element, return_index=True)
-        sources = np.array([numbers[edge.source] for edge in chart.transitions], dtype=np.int64)
-        first.flat[places] = sources[self.edge[firing]]
+        first = self.first
+        if first is None:
+            first, n = self.last.copy(), self.last.shape[1]
+            places, firing = np.unique(self.run * n + self.element, return_index=True)
+            sources = np.array([numbers[edge.source] for edge in chart.transitions], dtype=np.int64)
+            first.flat[places] = sources[self.edge[firing]]
         found = _per_element(first[(first >= 0).all(axis=1)].T, len(numbers))
         for edge, times in zip(chart.transitions, self.taken(chart), strict=True):
             found[numbers[edge.target]] += times
         return found
 
 
-def of_log(chart: Chart, log: Fired) -> ChartCoverage:
+def of_log(chart: Chart, log: FiredEdges) -> ChartCoverage:
     """Return what is known of runs that kept no rows: states and edges."""
     rows = np.zeros((len(chart.states), log.last.shape[1]), dtype=np.int64)
     return _made(chart, log, rows, [({}, {})] * len(chart.transitions), watched=0)
 
 
 def _made(
-    chart: Chart, log: Fired, rows: NDArray[np.int64], asked: Sequence[Asked], watched: int
+    chart: Chart, log: FiredEdges, rows: NDArray[np.int64], asked: Sequence[Asked], watched: int
 ) -> ChartCoverage:
     states = zip(chart.states, rows.tolist(), log.entered(chart).tolist(), strict=True)
     edges = zip(chart.transitions, log.taken(chart).tolist(), asked, strict=True)

@@ -49,7 +49,7 @@ class _ChartCounts(_Counts):
     edges: tuple[_EdgeCounts, ...]
 
 
-class _File(_Counts):
+class _CoverageFile(_Counts):
     format: Literal["gms-fsm coverage 1"]
     parts: dict[str, _ChartCounts] = Field(min_length=1)
 
@@ -63,7 +63,7 @@ def write_parts(path: Path, parts: Mapping[str, ChartCoverage]) -> Path:
 def read_parts(path: Path) -> dict[str, ChartCoverage]:
     """Read them; the file must be whole, and its counts those of its charts."""
     try:
-        file = _File.model_validate_json(path.read_bytes())
+        file = _CoverageFile.model_validate_json(path.read_bytes())
         return {name: _read(part) for name, part in file.parts.items()}
     except FileNotFoundError:
         raise no_file(path, TraceFileError) from None

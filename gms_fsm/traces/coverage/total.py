@@ -7,11 +7,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing, unknown
 from gms_fsm.foundation.display import short_repr
 from gms_fsm.traces.coverage.counts import ChartCoverage, Score
-from gms_fsm.traces.coverage.files import read_parts, write_parts
 from gms_fsm.traces.coverage.reasons import lines
 
 
@@ -35,16 +34,19 @@ class Coverage:
     >>> both.scores["edges"].seen, both == coverage([there, back])
     (2, True)
     >>> print(both)
-    states    2 of 2   100 %
-    edges     2 of 3    67 %
-    clauses  9 of 12    75 %
-    MC/DC     2 of 6    33 %
+    2 runs of GMS element, signed law
+    states     2 of 2   100 %
+    edges      2 of 3    66 %
+    clauses  10 of 12    83 %
+    MC/DC      2 of 6    33 %
     never taken:
       arrest from slip: `|v| <= v_c` was never true (closest: -200 mm/s)
-      arrest from slip: `|z| < s` was never true (closest: 0 m)
-    never seen to decide alone:
-      break_away_forward from stick: `v > v_c` was false, `z >= s` was not true then
-      break_away_backward from stick: `v < -v_c` was false, `z <= -s` was not true then
+      arrest from slip: `|z| < s` was never true (closest: equal)
+    never seen to decide:
+      break_away_forward from stick: `v > v_c` was never false while `z >= s` was
+        true
+      break_away_backward from stick: `v < -v_c` was never false while `z <= -s` was
+        true
     """
 
     parts: Mapping[str, ChartCoverage]
@@ -53,8 +55,8 @@ class Coverage:
         checked_kind("other", other, Coverage, "a Coverage")
         if self.parts.keys() != other.parts.keys():
             raise ParameterError(
-                f"it is of {_names(other.parts)}",
-                advice=f"what is added must be of {_names(self.parts)}",
+                f"it counts {_names(other.parts)}",
+                advice=f"what is added must count {_names(self.parts)}",
             )
         return Coverage({name: part + other.parts[name] for name, part in self.parts.items()})
 
@@ -105,8 +107,18 @@ class Coverage:
         """
         if not name and len(self.parts) == 1:
             return next(iter(self.parts.values()))
-        if name not in self.parts:
-            raise unknown("contact", name, self.parts)
+        names = [each for each in self.parts if each]
+        if not names:
+            raise ParameterError(
+                f"there is no contact {shown(name)}",
+                advice="a model on a rig has one contact, so leave its name out",
+            )
+        if not name:
+            raise ParameterError(
+                f"there are the contacts {', '.join(names)}", advice=f"give one: {names[0]!r}"
+            )
+        if name not in names:
+            raise unknown("contact", name, names)
         return self.parts[name]
 
     @property
@@ -153,6 +165,8 @@ class Coverage:
         OutputError
             If it cannot be written.
         """
+        from gms_fsm.traces.coverage.files import write_parts  # needs pydantic
+
         return write_parts(checked_path("path", path), self.parts)
 
     @classmethod
@@ -174,6 +188,8 @@ class Coverage:
         TraceFileError
             If the file is missing, damaged, or not a coverage file.
         """
+        from gms_fsm.traces.coverage.files import read_parts
+
         return cls(read_parts(checked_path("path", path)))
 
 
