@@ -27,6 +27,7 @@ from gms_fsm import (
     Sweep,
     Trace,
     Transition,
+    coverage,
     prove,
     simulate,
     sweep,
@@ -290,6 +291,8 @@ def draw_howto() -> None:
     """Write the pictures of the how-to pages."""
     plots.render(plots.statechart(AGEING), FOLDER / "howto_own_chart.png")
     plots.render(plots.statechart(names_of("own-chart.md")["brake"]), FOLDER / "howto_nested.png")
+    tried = coverage(run("pulled_mass")).contact()
+    plots.render(plots.statechart(tried.chart, counts=tried), FOLDER / "howto_coverage.png")
     report = prove(BROKEN["memoryless"].chart)
     (finding,) = report.refuted
     note = [*wrap(f"{finding.check}: {finding.text}", 42), *wrap(finding.example, 42)]

@@ -27,6 +27,7 @@ from gms_fsm.session.session import Session
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, ChartModel, LuGre, Model
 from gms_fsm.systems.system import Contact, System
+from gms_fsm.traces.coverage.total import Coverage
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import (
     ChatteringVerdict,
@@ -210,7 +211,7 @@ def session_html(session: Session) -> str:
     return "".join(parts)
 
 
-def text_html(result: Here | BranchComparison | Diff) -> str:
+def text_html(result: Here | BranchComparison | Diff | Coverage) -> str:
     """Return a result as the text of the debugger."""
     return listing(str(result))
 
@@ -279,6 +280,7 @@ FORMS: Mapping[tuple[type | str, Form], Callable[[Any], Any]] = {
     (Here, "html"): text_html,
     (BranchComparison, "html"): text_html,
     (Diff, "html"): text_html,
+    (Coverage, "html"): text_html,
     (Explanation, "html"): explanation_html,
     (Why, "html"): why_html,
     (Report, "html"): report_html,

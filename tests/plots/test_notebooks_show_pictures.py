@@ -56,6 +56,7 @@ SHOWN = {
     "trace": PNG,
     "trace.transitions": HTML,
     "trace.monitors['coverage']": HTML,
+    "__import__('gms_fsm').coverage(trace)": HTML,
     "session": HTML,
     "here": HTML,
     "session.why(0)": HTML,

@@ -86,7 +86,7 @@ FEWER = {
 # These take long to draw; landscape, animate and the methods of LiveChart stand for them.
 DRAWN = {"handout", "phase", "LiveChart", "live_statechart", "explore"}
 # Classes that only the package creates, for users to read.
-RECORDS = {"Finding", "Fit", "PhenomenaTable", "Record", "Report", "Sweep", "Trace"}
+RECORDS = {"Coverage", "Finding", "Fit", "PhenomenaTable", "Record", "Report", "Sweep", "Trace"}
 RECORDS |= {"Model", "Rig", "Signal"}  # protocols
 
 
@@ -128,6 +128,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Trace": _trace,
     "Session": lambda: Session(MODEL, RIG, 1.0),
     "Sweep": _swept,
+    "Coverage": lambda: gms_fsm.coverage(_trace()),
     "Chart": lambda: CHART,
     "Parameter": lambda: Parameter("k"),
     "Stribeck": lambda: PARAMETERS.stribeck,
@@ -212,6 +213,7 @@ def _by_name() -> dict[str, Any]:
         "v_c": 1.0,
         "values": {"z": {0: 0.1}},
         "weights": [1.0],
+        "what": _trace(),
         "whose": "simulate",
         "y": FrictionEquations(MODEL).initial,
         "C": 0.1,
@@ -222,6 +224,8 @@ def _by_entry() -> dict[str, dict[str, Any]]:
     return {
         "Chart.guard_text": {"edge": "go"},
         "Chart.state_index": {"name": "on"},
+        "Coverage.contact": {"name": ""},
+        "Coverage.merged": {"several": [gms_fsm.coverage(_trace())]},
         "Fit.bootstrap": {"draws": 2},
         "Fit.compare": {"others": _fit()},
         "Fit.predict": {"record": _rubbed()},

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing, unknown
-from gms_fsm.foundation.display import short_repr
+from gms_fsm.foundation.arguments import checked_kind, checked_path, listed, refusing, unknown
+from gms_fsm.foundation.display import displayed
 from gms_fsm.traces.coverage.counts import ChartCoverage, Score
 from gms_fsm.traces.coverage.reasons import lines
 
 
 @refusing()
-@short_repr
+@displayed("html")
 @dataclass(frozen=True)
 class Coverage:
     """What runs have tried of a chart, or of each chart of a system; `gms_fsm.coverage` counts it.
@@ -60,6 +60,10 @@ class Coverage:
             )
         return Coverage({name: part + other.parts[name] for name, part in self.parts.items()})
 
+    def __repr__(self) -> str:
+        said = (f"{name} {score.seen} of {score.of}" for name, score in self.scores.items())
+        return f"<Coverage: {self.runs} run{'s' * (self.runs != 1)}; {', '.join(said)}>"
+
     def __str__(self) -> str:
         return self.text
 
@@ -82,7 +86,9 @@ class Coverage:
         ParameterError
             If there is none, or charts differ.
         """
-        found = list(several)
+        found: list[Coverage] = listed("several", several, "an iterable of Coverage")
+        for each in found:
+            checked_kind("several", each, Coverage, "an iterable of Coverage")
         if not found:
             raise ParameterError("there is nothing to merge", advice="give at least one Coverage")
         return functools.reduce(lambda a, b: a + b, found)
