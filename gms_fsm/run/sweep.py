@@ -428,7 +428,7 @@ class _Collected:
         self.mode = np.full((runs, n), -1, dtype=np.int64)
         self.logs: list[NDArray[Any]] = [np.empty(0, dtype=LOG)] * runs
         rows = runs, self.times.size
-        self.coverage: list[Coverage] = []
+        self.coverage: Coverage | None = None  # so far: logs of all runs at once would take memory
         self.rows: dict[str, FloatArray] = {}
         if t_eval is not None:
             self.rows = {name: np.full((*rows, *columns), np.nan) for name in ("x", "v", "F")}
@@ -441,8 +441,6 @@ class _Collected:
             self.outcome[run], self.message[run] = result.outcome, result.message
             result.log["run"] = run
             self.logs[run] = result.log
-            if result.coverage is not None:
-                self.coverage.append(result.coverage)
             if result.end is not None:
                 self.t[run], self.mode[run] = result.end["t"], result.end["mode"]
                 for name, values in self.end.items():
@@ -451,6 +449,23 @@ class _Collected:
                 self.ends[name][run] = value
             for name, values in (result.rows or {}).items():
                 self.rows[name][run, : len(values)] = values
+        found = [each.coverage for each in results if each.coverage is not None]
+        found = found or [self._covered(chunk)]
+        self.coverage = Coverage.merged([*filter(None, [self.coverage]), *found])
+
+    def _covered(self, chunk: range) -> Coverage:
+        """Return what the logs of some runs show of each chart."""
+        log = np.concatenate(self.logs[chunk.start : chunk.stop])
+        parts, element, edge = {}, 0, 0
+        for each in self.what.system.machines:
+            chart, n = each.chart, each.n
+            mine = log[(log["element"] >= element) & (log["element"] < element + n)]
+            last = self.mode[chunk.start : chunk.stop, element : element + n]
+            run = mine["run"] - chunk.start
+            fired = FiredEdges(run, mine["element"] - element, mine["edge"] - edge, last)
+            parts[each.name if self.what.named else ""] = of_log(chart, fired)
+            element, edge = element + n, edge + len(chart.transitions)
+        return Coverage(parts)
 
     def sweep(self, parameters: Mapping[str, FloatArray]) -> Sweep:
         """Return the sweep with all results."""
@@ -462,7 +477,6 @@ class _Collected:
             owners += [each.name] * each.n
             lead = f"{each.name}." if len(contacts) > 1 else ""
             edges += [f"{lead}{edge.name}" for edge in each.chart.transitions]
-        log = np.concatenate(self.logs)
         return Sweep(
             parameters,
             np.array(self.outcome),
@@ -470,26 +484,14 @@ class _Collected:
             self.t,
             **self.end,
             states=np.concatenate(states, axis=1),
-            transitions=log.view(Log),
+            transitions=np.concatenate(self.logs).view(Log),
             edges=tuple(edges),
             times=self.times,
             rows=self.rows,
             ends=self.ends,
             owners=np.array(owners if self.what.named else [], dtype=np.str_),
-            coverage=Coverage.merged(self.coverage) if self.coverage else self._covered(log),
+            coverage=self.coverage,
         )
-
-    def _covered(self, log: NDArray[Any]) -> Coverage:
-        """Return what the logs show of each chart."""
-        parts, element, edge = {}, 0, 0
-        for each in self.what.system.machines:
-            chart, n = each.chart, each.n
-            mine = log[(log["element"] >= element) & (log["element"] < element + n)]
-            last = self.mode[:, element : element + n]
-            fired = FiredEdges(mine["run"], mine["element"] - element, mine["edge"] - edge, last)
-            parts[each.name if self.what.named else ""] = of_log(chart, fired)
-            element, edge = element + n, edge + len(chart.transitions)
-        return Coverage(parts)
 
 
 # --------------------------------------------------------------------------- helpers

@@ -53,6 +53,21 @@ GUARDED = Chart(
 )
 
 
+LONG = Chart(
+    "guards of many comparisons",
+    states=(State("a"), State("b")),
+    transitions=(
+        Transition("go", "a", "b", guard=" and ".join(f"v > {0.01 * i}" for i in range(12))),
+        Transition("back", "b", "a", guard=" or ".join(f"v < {-0.01 * i}" for i in range(70))),
+    ),
+    outputs={"F": "0"},
+)
+
+
+def many_comparisons() -> Trace:
+    return simulate(ChartModel(LONG, {}, n=2), Prescribed("0.2*sin(t)"), 9.0)
+
+
 def several_states() -> Trace:
     model = ChartModel(GUARDED, {"a": [0.05, 0.1, 0.19]}, n=3)
     return simulate(model, Prescribed("0.2*sin(t)"), 9.0)
@@ -64,6 +79,7 @@ def of_elements(law: str, v: str, t_end: float, **options: Any) -> Callable[[], 
 
 RUNS: dict[str, Callable[[], Trace]] = {
     "several states": several_states,
+    "many comparisons": many_comparisons,
     "four elements": of_elements("signed", FIG4_SINE, 30.0),
     "one direction": of_elements("published", "0.2", 2.3),
     "requested rows": of_elements("signed", FIG4_SINE, 30.0, t_eval=[0.0, 11.0, 30.0]),

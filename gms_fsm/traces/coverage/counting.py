@@ -117,10 +117,7 @@ class _Values:
         self.states = [state.name for state in chart.states]
         parts = {part for each in self.decisions.values() for part in each.comparisons}
         self.columns = guard_columns(trace, frozenset[str]().union(*map(names_in, parts)))
-        self.truth = {
-            part: truths(part, self._of(part), mode.shape).ravel().astype(np.int64)
-            for part in parts
-        }
+        self.truth = {part: truths(part, self._of(part), mode.shape).ravel() for part in parts}
         self._inside: dict[str, tuple[NDArray[Any], NDArray[Any]]] = {}
 
     def _of(self, part: Relation) -> dict[str, Any]:
@@ -140,19 +137,27 @@ class _Values:
         at, element = self.inside(edge.source)
         if not at.size:
             return {}, {}
-        found = [self.truth[part][at] for part in decision.comparisons]
-        vectors, which = _vectors(found, at.size)
-        n = len(self.mode)
-        rows = np.bincount(which * n + element, minlength=len(vectors) * n).reshape(-1, n)
+        size = len(decision.comparisons)
+        code = np.zeros(at.size, dtype=np.int64 if size < BITS else object)
+        for part in decision.comparisons:
+            code *= 2
+            code += self.truth[part][at]
+        codes, rows = _rows(code, element, len(self.mode), size)
+        vectors = [f"{each:0{size}b}" if size else "" for each in codes.tolist()]
         asked = dict(zip(vectors, map(tuple, rows.tolist()), strict=True))
-        return asked, self._closest(decision, vectors, which, at) if margins else {}
+        if not margins:
+            return asked, {}
+        return asked, self._closest(decision, vectors, [code == each for each in codes], at)
 
     def _closest(
-        self, decision: Decision, vectors: Sequence[str], which: NDArray[Any], at: NDArray[Any]
+        self,
+        decision: Decision,
+        vectors: Sequence[str],
+        own: Sequence[NDArray[np.bool_]],
+        at: NDArray[Any],
     ) -> dict[str, tuple[float, ...]]:
         """Return for each truth vector how close its false comparisons came to being true."""
         least = np.zeros((len(vectors), len(decision.comparisons)))
-        own = [which == place for place in range(len(vectors))]
         for number, part in enumerate(decision.comparisons):
             left, right = (self._side(part, side)[at] for side in (part.left, part.right))
             with np.errstate(invalid="ignore"):
@@ -168,19 +173,19 @@ class _Values:
         return values_of(side, columns).ravel() if columns else np.zeros(self.mode.size)
 
 
-def _vectors(found: Sequence[NDArray[np.int64]], size: int) -> tuple[list[str], NDArray[Any]]:
-    """Return the truth vectors that occur, in order, and of each place which one it has."""
-    code = np.zeros(size, dtype=np.int64 if len(found) < BITS else object)
-    for truth in found:
-        code = 2 * code + truth
-    if len(found) <= FEW:  # sorting takes longer
-        codes = np.flatnonzero(np.bincount(code, minlength=1))
-        numbers = np.zeros(2 ** len(found), dtype=np.int64)
-        numbers[codes] = np.arange(codes.size)
-        which = numbers[code]
-    else:
-        codes, which = np.unique(code, return_inverse=True)
-    return [format(int(each), f"0{len(found)}b") if found else "" for each in codes], which
+def _rows(
+    code: NDArray[Any], element: NDArray[Any], n: int, size: int
+) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    """Return the truth vectors that occur, as numbers, and for each the rows of each element."""
+    codes = None
+    if size > FEW:  # too many to have a row for each
+        codes, code = np.unique(code, return_inverse=True)
+    count = 2**size if codes is None else len(codes)
+    rows = np.bincount(code * n + element, minlength=count * n).reshape(-1, n)
+    if codes is None:
+        codes = np.flatnonzero(rows.any(axis=1))
+        rows = rows[codes]
+    return codes, rows
 
 
 def _per_element(mode: NDArray[Any], states: int) -> NDArray[np.int64]:
