@@ -365,7 +365,7 @@ class Commands:
 
     def do_coverage(self, arg: str) -> Iterator[str]:
         """Show what the branches have tried."""
-        _nothing("coverage", arg)
+        nothing("coverage", arg)
         yield from coverage(self.session).text.splitlines()
 
     def do_print(self, arg: str) -> Iterator[str]:
