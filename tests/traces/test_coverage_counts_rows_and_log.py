@@ -10,6 +10,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -182,6 +183,14 @@ def test_a_run_without_rows_is_known_by_its_log() -> None:
         assert c.entries == d.entries
     assert "no run kept rows" in found.text
     assert "1 of 2 runs kept rows" in (found + all_of_it).text
+
+
+def test_a_run_that_ends_at_its_first_row_has_this_row() -> None:
+    trace = simulate(stick_slip("signed"), Prescribed("0.2"), 3.0)
+    first = replace(trace, rows=trace.rows.at(slice(1)), stops=trace.rows.at(slice(1)))
+    found = coverage(replace(first, firings=trace.firings.at(slice(0)))).contact()
+    assert found.watched == 1
+    check(found, replace(first, firings=trace.firings.at(slice(0))))
 
 
 def test_what_cannot_be_computed_has_no_margin() -> None:

@@ -39,7 +39,7 @@ def of_view(trace: Trace) -> ChartCoverage:
     chart, places, mode = trace.model.chart, trace.places, trace.modes.T
     element, edge = trace.firings.machine - places.first, trace.firings.edge - places.first_edge
     log = FiredEdges(np.zeros_like(element), element, edge, mode[:, -1:].T)
-    if len(trace) == 1:
+    if len(trace) == 1 and trace.t[0] != trace.settings.get("t_start"):  # the end alone
         return of_log(chart, log)
     log = replace(log, first=mode[:, :1].T)
     taken = log.taken(chart)
