@@ -455,14 +455,19 @@ class _Collected:
 
     def _covered(self, chunk: range) -> Coverage:
         """Return what the logs of some runs show of each chart."""
-        log = np.concatenate(self.logs[chunk.start : chunk.stop])
+        logs = self.logs[chunk.start : chunk.stop]
+        # Column by column: numpy compares the names of all columns at each step.
+        run, owner, which = (
+            np.concatenate([log[name] for log in logs]) for name in ("run", "element", "edge")
+        )
         parts, element, edge = {}, 0, 0
         for each in self.what.system.machines:
             chart, n = each.chart, each.n
-            mine = log[(log["element"] >= element) & (log["element"] < element + n)]
+            mine = (owner >= element) & (owner < element + n)
             last = self.mode[chunk.start : chunk.stop, element : element + n]
-            run = mine["run"] - chunk.start
-            fired = FiredEdges(run, mine["element"] - element, mine["edge"] - edge, last)
+            fired = FiredEdges(
+                run[mine] - chunk.start, owner[mine] - element, which[mine] - edge, last
+            )
             parts[each.name if self.what.named else ""] = of_log(chart, fired)
             element, edge = element + n, edge + len(chart.transitions)
         return Coverage(parts)
