@@ -64,7 +64,8 @@ def chart_diff(
         checked_kind(name, chart, Chart, "a Chart, of a model its .chart")
     found, pair = compared(a, b, (a.name, b.name))
     merged = _merged(pair)
-    note = [*textwrap.wrap(found.summary, NOTE), *([LEGEND] if found.changes else [])]
+    said = "the charts are equal" if found.equal else found.summary
+    note = [*textwrap.wrap(said, NOTE), *([LEGEND] if found.changes else [])]
     sheet = ChartSheet(
         merged.chart,
         notation,

@@ -56,7 +56,7 @@ class Coverage:
         if self.parts.keys() != other.parts.keys():
             raise ParameterError(
                 f"it counts {_names(other.parts)}",
-                advice=f"what is added must count {_names(self.parts)}",
+                advice=f"the others count {_names(self.parts)}; count each kind by itself",
             )
         return Coverage({name: part + other.parts[name] for name, part in self.parts.items()})
 
