@@ -419,6 +419,10 @@ def _given(
     for name in layout.y.shared:
         if name in given:
             y[name] = checked_scalar(f"initial[{name!r}]", given[name], "finite")
+    for each in system.sampled:
+        for name, source in each.delayed.items():
+            if source in given and name not in given:
+                y[name] = y[source]
     for bank, part in zip(layout.banks, system.machines, strict=True):
         for variable in bank.variables:
             start = part.chart.initial.get(variable, 0.0)

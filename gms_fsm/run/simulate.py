@@ -158,7 +158,7 @@ def simulate(
     seen: Recording = run.recorder if stop is None else SeenUntil(stop, run.recorder)
     keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:
-        while run.advance() and not (stop and stop.reached(run.recorder)):
+        while run.advance() and not (stop and stop.over(run.recorder)):
             if keeper is not None:
                 keeper.look()
             if progress is not None:

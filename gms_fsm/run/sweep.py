@@ -462,14 +462,14 @@ class _Collected:
         )
         parts, element, edge = {}, 0, 0
         for each in self.what.system.machines:
-            chart, n = each.chart, each.n
-            mine = (owner >= element) & (owner < element + n)
-            last = self.mode[chunk.start : chunk.stop, element : element + n]
+            chart, end = each.chart, element + each.n
+            mine = (owner >= element) & (owner < end)
+            last = self.mode[chunk.start : chunk.stop, element:end]
             fired = FiredEdges(
                 run[mine] - chunk.start, owner[mine] - element, which[mine] - edge, last
             )
             parts[each.name if self.what.named else ""] = of_log(chart, fired)
-            element, edge = element + n, edge + len(chart.transitions)
+            element, edge = end, edge + len(chart.transitions)
         return Coverage(parts)
 
     def sweep(self, parameters: Mapping[str, FloatArray]) -> Sweep:

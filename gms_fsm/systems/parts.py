@@ -353,7 +353,7 @@ class Sampled:
     updates : mapping of str to str
         For each value its text over the names of the system and ``period``; they run in this order
         and see the results before them. ``delay(u, 3)`` is what u was three ticks before, kept in
-        the further values ``u__1``, ``u__2`` and ``u__3``.
+        further values, of a sampler called pid ``pid__u__1``, ``pid__u__2`` and ``pid__u__3``.
     initial : mapping of str to float, optional
         Values before the first tick; 0 where not given, what is delayed as what it comes from.
     offset : float
@@ -378,7 +378,8 @@ class Sampled:
         put = object.__setattr__
         put(self, "period", checked_scalar(f"{here}: period", self.period, "> 0"))
         put(self, "offset", checked_scalar(f"{here}: offset", self.offset, ">= 0"))
-        put(self, "updates", _with_delays(texts_of(self.updates, f"{here}: updates"), here))
+        given = texts_of(self.updates, f"{here}: updates")
+        put(self, "updates", _with_delays(given, self.name, here))
         put(self, "initial", mapping_of(self.initial, f"{here}: initial"))
         if not self.updates:
             raise ParameterError("it updates nothing", place=here)
@@ -400,11 +401,20 @@ class Sampled:
 
     def _before(self, name: str) -> float:
         """Return a value before the first tick."""
-        source = name.rpartition("__")[0] if name not in self.initial else name
-        return self.initial.get(source, 0.0)
+        return self.initial.get(name, self.initial.get(self.delayed.get(name, name), 0.0))
+
+    @property
+    def delayed(self) -> dict[str, str]:
+        """The values that are kept of others, each with what it is kept of."""
+        lead = f"{self.name}__"
+        return {
+            name: name.removeprefix(lead).rpartition("__")[0]
+            for name in self.updates
+            if name.startswith(lead)
+        }
 
 
-def _with_delays(updates: Mapping[str, str], here: str) -> Mapping[str, str]:
+def _with_delays(updates: Mapping[str, str], sampler: str, here: str) -> Mapping[str, str]:
     """Return updates in which delayed values have names, and are handed on after all others."""
     longest: dict[str, int] = {}
 
@@ -415,7 +425,10 @@ def _with_delays(updates: Mapping[str, str], here: str) -> Mapping[str, str]:
                 f"{found[0]} has {ticks} ticks", place=here, advice=f"1 to {MOST_DELAY:,} are kept"
             )
         longest[name] = max(ticks, longest.get(name, 0))
-        return _kept(name, ticks)
+        return kept(name, ticks)
+
+    def kept(name: str, ticks: int) -> str:
+        return f"{sampler}__{name.replace('.', '__')}__{ticks}"
 
     texts = {name: DELAY.sub(named, text) for name, text in updates.items()}
     for name, text in texts.items():
@@ -426,11 +439,6 @@ def _with_delays(updates: Mapping[str, str], here: str) -> Mapping[str, str]:
                 advice="delay takes a name and a number of ticks: delay(u, 3)",
             )
     for name, ticks in longest.items():
-        texts |= {_kept(name, k): _kept(name, k - 1) for k in range(ticks, 1, -1)}
-        texts[_kept(name, 1)] = name
+        texts |= {kept(name, k): kept(name, k - 1) for k in range(ticks, 1, -1)}
+        texts[kept(name, 1)] = name
     return texts
-
-
-def _kept(name: str, ticks: int) -> str:
-    """Return what a value of some ticks before is called."""
-    return f"{name.replace('.', '__')}__{ticks}"

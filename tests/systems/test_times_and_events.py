@@ -11,7 +11,9 @@ import pytest
 from scipy.optimize import brentq
 
 from gms_fsm import (
+    Body,
     Chart,
+    Contact,
     FrictionBank,
     FrictionState,
     PulledSlider,
@@ -23,6 +25,7 @@ from gms_fsm import (
     Transition,
     simulate,
 )
+from gms_fsm.charts import CHARTS, timetable
 from gms_fsm.run.simulate import Moment
 from gms_fsm.traces.failures import SimulationError
 from tests.corpus import HEALS, OILED, switched
@@ -107,6 +110,35 @@ def test_a_system_with_supervisors_ends_at_a_condition_on_one_of_them() -> None:
     begins_like(trace, simulate(system, 2.0))
 
 
+def test_a_run_ends_behind_the_whole_instant_of_its_condition() -> None:
+    chart = Chart(
+        "two at once",
+        inputs=("t",),
+        velocities=(),
+        states=(State("a"), State("b"), State("c")),
+        transitions=(
+            Transition("first", "a", "b", guard="t >= 1"),
+            Transition("second", "b", "c", guard="t >= 1"),
+        ),
+    )
+    system = System("two", supervisors=(Supervisor("m", chart),))
+    trace = simulate(system, 2.0, until="t >= 1")
+    assert trace.transitions.edge.tolist() == ["first", "second"]
+    assert (trace.states[-1, 0], trace.microstep.tolist()[-3:]) == ("c", [0, 1, 2])
+    assert trace.trust(again=True).warnings == ()
+
+
+def test_the_state_of_a_contact_on_a_driven_body_ends_a_run() -> None:
+    bodies = (
+        Body("mass", inertia=1.0, x="xm", v="vm"),
+        Body("belt", velocity="if(t < 1, 0, 0.2)", x="xb", v="vb"),
+    )
+    pad = Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.0}, v="vm - vb")
+    system = System("belt", bodies=bodies, contacts=(pad,))
+    assert simulate(system, 5.0, until="is_in(pad.backward)").t[-1] == 1.0
+    assert simulate(system, 5.0, until="is_in(pad.stuck)").t[-1] == pytest.approx(1.2)
+
+
 def test_a_run_that_fails_before_its_condition_keeps_its_own_rows() -> None:
     chart = Chart("grows", (), velocities=(), variables=("z",), states=(State("on", {"z": "z*z"}),))
     system = System("grows", supervisors=(Supervisor("s", chart),))
@@ -172,6 +204,40 @@ def test_a_bank_sends_an_event_to_all_joints_that_wait_for_it() -> None:
     assert [states[0] for states in bank.states] == ["oiled", "stick", "oiled"]
 
 
+def test_a_timetable_with_a_period_sends_at_its_ticks() -> None:
+    hand = Supervisor("hand", timetable({"oil": 1.0}), period=0.3)
+    log = simulate(System("by hand", supervisors=(hand,)), 3.0).transitions
+    assert log.t.tolist() == [pytest.approx(1.2)]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_guard_that_follows_time_alone_misses_no_crossing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b, c = rng.uniform(0.3, 1.0), rng.uniform(0.2, 0.6), rng.uniform(1.5, 4.0)
+    level = 0.4 * (a + b)
+    signal = f"{a!r} * sin(t) + {b!r} * sin({c!r} * t)"
+    chart = Chart(
+        "relay",
+        inputs=("v",),
+        velocities=(),
+        states=(State("low"), State("high")),
+        transitions=(
+            Transition("rise", "low", "high", guard=f"v > {level!r}"),
+            Transition("fall", "high", "low", guard=f"v < {-level!r}"),
+        ),
+    )
+    system = System("relay", supervisors=(Supervisor("relay", chart),), signals={"v": signal})
+    expected, high = [], False
+    times = np.linspace(0.0, 100.0, 200_001)
+    for t, v in zip(times, a * np.sin(times) + b * np.sin(c * times), strict=True):
+        if (v < -level) if high else (v > level):
+            high = not high
+            expected.append(t)
+    log = simulate(system, 100.0).transitions
+    assert len(expected) > 10, f"seed {seed}"
+    assert log.t == pytest.approx(expected, abs=1e-3), f"seed {seed}"
+
+
 # --------------------------------------------------------------------------- late values
 def test_a_delayed_value_is_the_one_of_so_many_ticks_before() -> None:
     late = Sampled(
@@ -190,7 +256,30 @@ def test_a_delayed_value_is_the_one_of_so_many_ticks_before() -> None:
     assert trace.value("w") == pytest.approx(np.maximum(ticks - 2, 0) * 0.1, abs=1e-12)
 
 
+def test_samplers_delay_the_same_value_and_begin_with_its_start() -> None:
+    one = Sampled("one", period=0.1, updates={"u": "u + 1", "w": "delay(u, 1)"})
+    two = Sampled("two", period=0.1, updates={"q": "delay(u, 2)"})
+    system = System("late", supervisors=(IDLE,), sampled=(one, two))
+    trace = simulate(system, 0.45, t_eval=0.1 * np.arange(5) + 0.04, initial={"u": 7.0})
+    assert trace.value("w").tolist() == [7.0, 8.0, 9.0, 10.0, 11.0]
+    assert trace.value("q").tolist() == [7.0, 7.0, 8.0, 9.0, 10.0]
+
+
 # --------------------------------------------------------------------------- lasting conditions
+def test_the_output_of_another_machine_lasts() -> None:
+    other = Chart("wave", ("t",), velocities=(), states=(State("on", outputs={"o": "sin(t)"}),))
+    chart = Chart(
+        "waits",
+        ("o",),
+        velocities=(),
+        states=(State("a"), State("b")),
+        transitions=(Transition("go", "a", "b", guard="duration(o > 0.5) >= 1"),),
+    )
+    machines = Supervisor("wave", other), Supervisor("waits", chart, inputs={"o": "wave.o"})
+    log = simulate(System("two", supervisors=machines), 5.0).transitions
+    assert log.t.tolist() == [pytest.approx(math.pi / 6 + 1, abs=1e-8)]
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_condition_has_lasted_as_long_as_its_signal_says(seed: int) -> None:
     rng = np.random.default_rng(seed)

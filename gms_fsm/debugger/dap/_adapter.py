@@ -301,8 +301,9 @@ class Adapter:
         rows = [branch.cursor]
         while branch.between is None and branch.raw(rows[-1]).microstep > 0:
             rows.append(rows[-1] - 1)
-        first, levels = int(given.get("startFrame") or 0), int(given.get("levels") or 0)
-        shown = rows[first : first + levels] if levels > 0 else rows[first:]
+        shown = rows[int(given.get("startFrame") or 0) :]
+        if (levels := int(given.get("levels") or 0)) > 0:
+            shown = shown[:levels]
         return {"stackFrames": [self._frame(row) for row in shown], "totalFrames": len(rows)}
 
     def _frame(self, row: int) -> Body:
@@ -324,8 +325,8 @@ class Adapter:
             contact, wanted = here.fired.contact, ("edge", here.fired.edge)
         else:
             contact = bank.name if commands.elements.named else ""
-            state = here.contacts[bank.name].states[commands.element - bank.first]
-            wanted = ("state", state)
+            element = commands.element - bank.first
+            wanted = ("state", here.contacts[bank.name].states[element])
         for kind, name in (wanted, ("contact", contact), ("supervisor", contact), ("model", "")):
             for each in self.tables:
                 if (each.kind, each.name, each.contact) == (kind, name, contact):

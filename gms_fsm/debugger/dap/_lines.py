@@ -48,14 +48,14 @@ def tables_of(path: Path, contact: str = "") -> Iterator[TableLines]:
     text = _LONG_TEXT.sub(lambda found: '""' + "\n" * found[0].count("\n"), text_of(path))
     lines = text.split("\n")
     heads = [(i, found[1]) for i, line in enumerate(lines) if (found := _HEAD.fullmatch(line))]
-    for (first, head), (end, _) in itertools.pairwise([*heads, (len(lines), "")]):
+    for (begin, head), (end, _) in itertools.pairwise([*heads, (len(lines), "")]):
         kind = head.rpartition(".")[2].strip("\"' ")
-        own = _keys("\n".join(lines[first + 1 : end]))
+        own = _keys("\n".join(lines[begin + 1 : end]))
         if head in OWNERS:
             contact = str(own.get("name", ""))
         while not lines[end - 1].strip():  # blank lines belong to no table
             end -= 1
-        yield TableLines(path, first + 1, end, kind, str(own.get("name", "")), contact)
+        yield TableLines(path, begin + 1, end, kind, str(own.get("name", "")), contact)
         chart = path.parent / str(own.get("chart", ""))
         if head in OWNERS and chart.suffix == ".toml" and chart.is_file():
             yield from tables_of(chart, contact)

@@ -36,10 +36,11 @@ def scopes_of(commands: Commands) -> Iterator[ShownScope]:
         variables = elements.chart(bank.first).variables
         inside = {f"{lead}{name}" for name in variables}  # of a single element, without its number
         own = {}
-        for i in range(bank.n):
-            numbered = [f"{lead}{name}{i + 1}" for name in (*variables, "s", "F")]
-            own[bank.first + i] = [name for name in numbered if name in known]
-            inside.update(own[bank.first + i])
+        machines = range(bank.elements.start, bank.elements.stop)
+        for number, machine in enumerate(machines, start=1):
+            numbered = [f"{lead}{name}{number}" for name in (*variables, "s", "F")]
+            own[machine] = [name for name in numbered if name in known]
+            inside.update(own[machine])
         names = [name for name in known if name.startswith(lead) and name not in inside]
         yield _scope(commands, bank.name if elements.named else "friction", names)
         for machine, names in own.items():

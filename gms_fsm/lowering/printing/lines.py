@@ -191,6 +191,23 @@ class ProgramWriter(ABC):
         return FOR_A_SIGN | (WAITING if alone else 0)
 
     # ------------------------------------------------------------------ what elements read first
+    def follows_time(self, tree: Node) -> bool:
+        """Return whether a tree depends on time though nothing moves: not by way of a motion."""
+        found = {name for body in self.read.system.bodies for name in (body.x, body.v)}
+        found |= {name for bank in self.read.banks for name in bank.velocities}
+        waiting = [*names_in(tree)]
+        while waiting:
+            name = waiting.pop()
+            if name in found:
+                continue
+            found.add(name)
+            definition = self.read.defined.get(name)
+            if name == "t" or (definition is not None and definition.signal is not None):
+                return True
+            if definition is not None and definition.tree is not None:
+                waiting += names_in(definition.tree)
+        return False
+
     def element(self, bank: int, reads: frozenset[str], signs: Signs) -> list[CodeLine]:
         """Assign what lines read of an element: its variables, and what is computed from them."""
         needed = self.closure(reads)
@@ -367,7 +384,9 @@ class ProgramWriter(ABC):
         needed = self.closure(reads | reads_of(followed or ())) - self.late
         values: list[CodeLine] = []
         for name in self.read.defined:
-            if followed and ("." in name or name in self.read.system.let):  # may read a velocity
+            # May read a velocity; how many elements are in a state does not.
+            of_a_part = "." in name and "(" not in name
+            if followed and (of_a_part or name in self.read.system.let):
                 values, followed = values + followed, None
             if name in needed and name not in self.read.owner:
                 values += self.defined(name, signs)

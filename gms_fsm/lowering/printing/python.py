@@ -393,9 +393,8 @@ class _PythonPrinter(LockFunctions):
         for bank in self.read.banks:
             for edge in bank.edges if not bank.periodic else ():
                 watched += comparisons_of(split(edge.guard))
-        lines = self.before_guards(
-            computed_names(side) for each in watched for side in (each.left, each.right)
-        )
+        sides = [side for each in watched for side in (each.left, each.right)]
+        lines = self.before_guards(map(computed_names, [*sides, *held.shared, *held.own]))
         lines += [self.watch(relation, self.why(relation.left)) for relation in self.plan.always]
         lines += [self.hold(u) for u in held.shared]
         for bank, rough in zip(self.read.banks, self.plan.rough, strict=True):
@@ -451,6 +450,7 @@ class _PythonPrinter(LockFunctions):
         if isinstance(part, Requirement):
             # Not the opposite comparison: of NaN neither is true, and it has to be watched.
             reads = computed_names(part.relation)
+            waits = waits or self.follows_time(part.relation)
             return [
                 CodeLine(f"if not {self.spell(part.relation)}:", reads),
                 *indented([self.watch(part.comparison, FOR_A_GUARD | (WAITING if waits else 0))]),
@@ -573,7 +573,8 @@ class _PythonPrinter(LockFunctions):
         for plan in self.plan.banks:
             if bit := self.read.bit(plan.bank):
                 lines += [CodeLine(f"if bits & {bit}:  # {plan.bank.name}")]
-                lines += indented(self.bank_forces(plan, "live", True, held=True))
+                body = self.bank_forces(plan, "live", True, held=True)
+                lines += indented(body or [CodeLine("pass")])
         if bit := self.read.events_bit:
             lines.append(CodeLine(f"if bits & {bit}:  # all machines were asked"))
             lines += [CodeLine(f"    y[{y.text(name)}] = 0.0") for name in self.read.system.events]

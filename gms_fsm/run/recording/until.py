@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ExpressionError, ParameterError
+from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.language import Name, names_in, parse_condition, spell
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.lowering.log_columns import LogRecord
@@ -52,6 +53,7 @@ class Until:
     def of(cls, plain: Problem, text: str) -> Until:
         """Read a condition; raise an `ExpressionError` if it is none."""
         system = plain.system
+        checked_kind(NAME, text, str, "a condition, such as 'v > 0.2'")
         if plain.output == "end":
             raise ParameterError(
                 "output is 'end'", place="until", advice="leave output out, and read the last row"
@@ -78,9 +80,18 @@ class Until:
         """Where its state is among the modes, and its number among all machines."""
         return self.plain.program.layout.n
 
-    def reached(self, recording: Recording) -> bool:
-        """Return whether the run has come to its end."""
-        return recording.latest[2][self.place] == REACHED
+    def over(self, recording: Recording) -> bool:
+        """Return whether the instant at which the condition has become true is over."""
+        t, _, mode = recording.latest
+        if mode[self.place] != REACHED:
+            return False
+        fired = (each.t for each in recording.firings(0) if each.contact == self.name)
+        return t > max(fired)
+
+    @property
+    def name(self) -> str:
+        """What the supervisor is called."""
+        return self.start.system.machines[-1].name
 
     def trace(self, found: Trace) -> Trace:
         """Return the run up to there, without the supervisor."""
@@ -89,8 +100,8 @@ class Until:
         plain, end = self.plain, np.inf
         ended = np.flatnonzero(found.stops.mode[:, self.place] == REACHED)
         if ended.size:
-            end, last = float(own.t[-1]), int(np.flatnonzero(mine)[-1])
-            others = others.at(slice(0, last - (len(own) - 1)))  # what it fired before is taken off
+            end = float(own.t[-1])
+            others = others.at(others.t <= end)
             plain = replace(plain, t_end=end, last=end, settings={**plain.settings, "t_end": end})
         rows = self._without(found.rows, end)
         stops = rows if found.stops is found.rows else self._without(found.stops, end)
@@ -101,7 +112,7 @@ class Until:
     def _without(self, rows: Rows, end: float) -> Rows:
         """Return the rows up to a time, without those of the supervisor."""
         own = rows.mode[:, self.place]
-        kept: NDArray[np.bool_] = (rows.t <= end) & (own != REACHED)
+        kept: NDArray[np.bool_] = rows.t <= end
         fired = (rows.microstep > 0) & (np.diff(own, prepend=own[:1]) != 0)
         # Of one instant those after it are earlier by one.
         later = np.zeros(len(rows), dtype=np.int64)
@@ -141,8 +152,11 @@ class SeenUntil:
 
     @property
     def latest(self) -> Place:
-        """Time, state and modes reached."""
-        return self._seen(self.recording.latest)
+        """Time, state and modes reached; machine code may have gone past the end."""
+        if not self.until.over(self.recording):
+            return self._seen(self.recording.latest)
+        rows = self.trace().whole().rows
+        return float(rows.t[-1]), rows.y[-1].tolist(), tuple(rows.mode[-1].tolist())
 
     def around(self, t: float) -> tuple[Place, Place | None]:
         """Return the last row at or before a time, and the next one."""
@@ -151,8 +165,9 @@ class SeenUntil:
 
     def firings(self, after: int) -> list[LogRecord]:
         """Return the records of the log from a number on."""
-        own, named = self.until.start.system.machines[-1].name, self.start.what.named
-        others = [each for each in self.recording.firings(0) if each.contact != own][after:]
+        named = self.start.what.named
+        every = self.recording.firings(0)
+        others = [each for each in every if each.contact != self.until.name][after:]
         return others if named else [each._replace(contact="") for each in others]
 
     def trace(self) -> Trace:

@@ -71,15 +71,16 @@ class FiredEdges:
     def taken(self, chart: Chart) -> NDArray[np.int64]:
         """Return how often each element took each edge, shape (edges, n)."""
         edges, n = len(chart.transitions), self.last.shape[1]
-        return np.bincount(self.edge * n + self.element, minlength=edges * n).reshape(edges, n)
+        return _table((self.edge, self.element), (edges, n))
 
     def entered(self, chart: Chart) -> NDArray[np.int64]:
         """Return how often each element entered each state, shape (states, n)."""
         numbers = {state.name: number for number, state in enumerate(chart.states)}
         first = self.first
         if first is None:
-            first, n = self.last.copy(), self.last.shape[1]
-            places, firing = np.unique(self.run * n + self.element, return_index=True)
+            first = self.last.copy()
+            runs = np.ravel_multi_index((self.run, self.element), first.shape)
+            places, firing = np.unique(runs, return_index=True)
             sources = np.array([numbers[edge.source] for edge in chart.transitions], dtype=np.int64)
             first.flat[places] = sources[self.edge[firing]]
         found = _per_element(first[(first >= 0).all(axis=1)].T, len(numbers))
@@ -181,7 +182,7 @@ def _rows(
     if size > FEW:  # too many to have a row for each
         codes, code = np.unique(code, return_inverse=True)
     count = 2**size if codes is None else len(codes)
-    rows = np.bincount(code * n + element, minlength=count * n).reshape(-1, n)
+    rows = _table((code, element), (count, n))
     if codes is None:
         codes = np.flatnonzero(rows.any(axis=1))
         rows = rows[codes]
@@ -190,6 +191,11 @@ def _rows(
 
 def _per_element(mode: NDArray[Any], states: int) -> NDArray[np.int64]:
     """Return how often each state occurs for each element, shape (states, n)."""
-    n = len(mode)
-    places = mode * n + np.arange(n)[:, np.newaxis]
-    return np.bincount(places.ravel(), minlength=states * n).reshape(states, n)
+    elements = np.broadcast_to(np.arange(len(mode))[:, np.newaxis], mode.shape)
+    return _table((mode.ravel(), elements.ravel()), (states, len(mode)))
+
+
+def _table(places: tuple[NDArray[Any], NDArray[Any]], shape: tuple[int, int]) -> NDArray[np.int64]:
+    """Return how often each place occurs."""
+    numbers = np.ravel_multi_index(places, shape)
+    return np.bincount(numbers, minlength=shape[0] * shape[1]).reshape(shape)
