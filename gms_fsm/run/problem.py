@@ -192,7 +192,7 @@ class Problem:
             relaxing=scales.relaxing,
         )
         last = _covered(system, t_start, t_end)
-        program = with_waking_times(system, t_start, last)
+        program = with_waking_times(program, system, t_start, last)
         origin = t_start if ticks_from is None else ticks_from
         if clocks := clocks_of(system):
             program = replace(program, ticks=ticks_of(clocks, origin, t_start, last))
@@ -344,9 +344,8 @@ def _component(layout: SystemLayout, key: object, owner: str) -> str:
     return layout.keys[key]
 
 
-def with_waking_times(system: System, t_start: float, t_end: float) -> Program:
-    """Return its program with the times at which formulas jump or start to change as knots."""
-    program = lower(system)
+def with_waking_times(program: Program, system: System, t_start: float, t_end: float) -> Program:
+    """Return the program with the times at which formulas jump or start to change as knots."""
     times = {
         time
         for signal in system.signals.values()

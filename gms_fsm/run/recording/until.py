@@ -20,6 +20,7 @@ from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.language import Name, names_in, parse_condition, spell
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.lowering.log_columns import LogRecord
+from gms_fsm.lowering.program import lower
 from gms_fsm.lowering.scales import scales_of_system
 from gms_fsm.run.problem import Problem, with_waking_times
 from gms_fsm.run.recording.moment import Place, Recording
@@ -64,7 +65,8 @@ class Until:
             name += "_"
         machine = _waiting(plain.what, text, name)
         what = mounted(replace(system, supervisors=(*system.supervisors, machine)))
-        program = with_waking_times(what.system, plain.t_start, plain.last)
+        program = lower(what.system)
+        program = with_waking_times(program, what.system, plain.t_start, plain.last)
         program = replace(program, ticks=plain.program.ticks)
         start = replace(
             plain,
