@@ -548,7 +548,7 @@ class Trace:
             parts.stops,
             parts.firings,
             parts.ran.what,
-            parts.header.settings,
+            parts.header.chosen,
             parts.stored,
             parts.header.monitors,
             parts.header.heading,

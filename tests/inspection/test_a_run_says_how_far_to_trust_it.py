@@ -225,6 +225,13 @@ def test_a_switch_that_the_tolerances_decide_is_another_one_with_finer_ones():
         assert found.severity == ("note" if same else "warning"), f"seed {seed}: {found}"
 
 
+@pytest.mark.parametrize("ending", [".npz", ".csv"])
+def test_a_run_read_from_a_file_can_be_repeated(ending: str, tmp_path: Path):
+    ran = simulate(stick_slip("signed"), Prescribed("0.2"), 3.0)
+    read = Trace.load(ran.save(tmp_path / f"run{ending}"))
+    assert read.trust(again=True).of("repeat") == ran.trust(again=True).of("repeat")
+
+
 def test_a_repeated_run_says_how_far_its_times_and_its_end_move():
     model, rig = pulled_mass()
     (found,) = simulate(model, rig, 20.0).trust(again=True).of("repeat")

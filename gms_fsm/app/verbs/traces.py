@@ -10,7 +10,7 @@ import typer
 
 from gms_fsm.app.verbs.console import progress_bars, put
 from gms_fsm.app.verbs.options import ContactName, End, OutputFolder, PresetName, Start, TraceFile
-from gms_fsm.errors import TraceFileError
+from gms_fsm.errors import ParameterError, TraceFileError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.files import output_folder, refuse_input
 
@@ -23,6 +23,13 @@ def _of_contact(path: Path, contact: str) -> Trace:
     from gms_fsm.app._own_files import contacts_error
 
     run = _loaded(path)
+    if not run.contacts:
+        raise ParameterError(
+            "it has supervisors and no contact, whose force is shown",
+            place=str(path),
+            advice=f"`gms-fsm replay {path}` steps through it, and `gms-fsm chart` with its "
+            "system's file draws a chart",
+        )
     if contact and contact not in run.contacts:
         raise unknown("contact", contact, run.contacts).inside(path)
     if not contact and len(run.contacts) > 1:

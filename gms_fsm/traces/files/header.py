@@ -109,6 +109,13 @@ class Header(BaseModel):
             return cls(system=SystemTable.of(what.system), **rest)
         return cls(model=ModelTable.of(what.model), rig=RigTable.of(what.rig), **rest)
 
+    @property
+    def chosen(self) -> dict[str, Setting]:
+        """The settings as the run had them; in the file every number is a float."""
+        steps: Any = self.settings.get("max_steps")
+        whole = isinstance(steps, float) and steps.is_integer()
+        return {**self.settings, "max_steps": int(steps)} if whole else {**self.settings}
+
     def to_mounted(self) -> Mounted:
         """Return an equivalent of what ran, in which a Python function becomes one that raises."""
         if self.system is not None:
