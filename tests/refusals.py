@@ -1953,6 +1953,20 @@ rows = {
     ),
 }
 group("run", ParameterError, lambda make: make(), rows)
+
+
+def showing(words: str) -> None:
+    """Call a verb that shows a trace, beside one of supervisors alone."""
+    simulate(ROOM, 1.0).save("run.npz")
+    verb(*words.split())
+
+
+rows = {
+    "plot": ("plot run.npz",),
+    "film": ("animate run.npz",),
+    "replay of one contact": ("replay run.npz --contact mode",),
+}
+group("supervisors alone", ParameterError, showing, rows, "run.npz")
 rows = {
     "end without rows": ("until", ..., {"until": "v > 1", "output": "end"}),
     "times of no events": ("timetable", ..., {"events": {}}),
