@@ -1463,6 +1463,14 @@ rows = {
         edge(guard="duration(F > 1) > 2"),
     ),
     "how long a number lasts": ("edge 'go', guard, column 10", ..., edge(guard="duration(z) > 2")),
+    "how long two last": ("guard, column 1", ..., edge(guard="duration(v > 0, 1) > 1")),
+    "how long, without a comparison": ("guard, column 1", ..., edge(guard="duration(v > 0)")),
+    "how long, denied": ("guard, column 5", ..., edge(guard="not duration(v > 0)")),
+    "duration that is a parameter": (
+        "guard, column 1",
+        ...,
+        {"parameters": (*K, "duration"), **edge(guard="duration(v > 0) > 1")},
+    ),
     "bytes for a flow": ("state 'slip', flow of 'z', column 1", ..., state(flow={"z": b"v"})),
 }
 group("text of a chart", ExpressionError, chart, rows)

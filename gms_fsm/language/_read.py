@@ -343,9 +343,7 @@ class _Reader:
                 )
             case ast.Call(ast.Name("is_in" | "count" as f), [ast.Attribute() as of]) if self.dotted:
                 return self.name(node, f"{f}({ast.unparse(of)})")
-            case ast.Call(func=ast.Name(id="duration"), args=[test], keywords=[]) if (
-                "age" in self.names and "duration" not in self.names
-            ):
+            case ast.Call(ast.Name("duration"), [test], []) if self.lasting:
                 return Name(f"{LASTING}{spell(self.condition(test, depth))})")
             case ast.Call(func=ast.Name(id="after")) if "age" in self.names:
                 raise self.refuse(_COMPARISON, node, "age, the time in the present state")
@@ -398,12 +396,19 @@ class _Reader:
         """Whether names with a dot may occur."""
         return any("." in name for name in self.names)
 
+    @functools.cached_property
+    def lasting(self) -> bool:
+        """Whether ``duration(v > 0)`` stands here; a declared name hides it."""
+        return "age" in self.names and "duration" not in self.names
+
     def known(self, node: ast.expr, function: str) -> None:
-        if function in self.names and function in YIELDING:
+        if function in self.names and function in (*YIELDING, *ELSEWHERE):
             raise self.refuse(f"{function!r} is a declared name here", node, "another name for it")
         if function in ELSEWHERE:
             if here := [name for name in self.names if name.startswith(f"{function}(")]:
                 raise self.refuse(f"{function} takes a state of a machine", node, some_of(here))
+            if function == "duration" and self.lasting:
+                raise self.refuse("duration takes one condition", node, "duration(v > 0) >= 1")
             raise self.refuse(f"{function} does not stand here", node, ELSEWHERE[function])
         if function not in NAMESPACE and function not in SHORT:
             raise self.refuse(
@@ -526,6 +531,8 @@ class _Reader:
                 return Relation(">=", Name("age"), self.value(time, depth))
             case ast.Call(func=ast.Name(id="is_in"), args=[ast.Attribute() as of]):
                 return Relation(">", self.name(node, f"is_in({ast.unparse(of)})"), Number(0.5))
+            case ast.Call(ast.Name("duration"), [_], []) if self.lasting:
+                raise self.refuse("a comparison is missing", node, f"{ast.unparse(node)} >= 1")
             case ast.Call(func=ast.Name(id="after"), args=given) if "age" in self.names:
                 wanted = "one time in seconds, for example after(0.2)"
                 raise self.refuse(f"after got {len(given)} arguments", node, wanted)
