@@ -102,7 +102,7 @@ from gms_fsm.systems.system import with_model
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.monitors import Chattering, CoverageMonitor, Passivity
 from tests import older_files, own_files, systems_cases
-from tests.corpus import run, trace
+from tests.corpus import HEALS, run, trace
 from tests.helpers import FIG4_SINE, ROOT, pulled_mass, stick_slip
 from tests.inspection.sessions import a_system, fig4, locked
 from tests.scenario_files import MEASURED, OPEN_LOOP, changed, sine_table, table
@@ -2200,6 +2200,17 @@ def on_a_belt() -> Session:
     return Session(System("belt", bodies=(belt,), contacts=(Contact("pad", GIVEN, v="w"),)), 1.0)
 
 
+def rubber() -> Session:
+    """Return a session of elements that heal after a rest."""
+    return Session(HEALS, STILL, 1.0)
+
+
+def rubber_pads() -> Session:
+    """Return the same in a system."""
+    belt = Body("belt", velocity="0.1", x="x", v="w")
+    return Session(System("belt", bodies=(belt,), contacts=(Contact("pad", HEALS, v="w"),)), 1.0)
+
+
 def unmoved(move: Callable[[Session], object], made: Callable[[], Session] = fig4) -> None:
     """Ask a session for a move; it stays where it is, with its branches and breakpoints."""
     session = made()
@@ -2227,6 +2238,8 @@ rows = {
     "poke of the state of an element below zero": (lambda s: s.poke(state={-1: "slip"}),),
     "poke of a prescribed velocity": (lambda s: s.poke(v=0.1),),
     "poke of a parameter": (lambda s: s.poke({"F_s": {0: 2.0}}),),
+    "poke of how long a condition has held": (lambda s: s.poke({"duration": {0: 1.0}}), rubber),
+    "poke of it in a system": (lambda s: s.poke({"pad.duration1": 1.0}), rubber_pads),
     "branch below zero": (lambda s: s.switch(-1),),
     "branch that is missing": (lambda s: s.switch(1),),
     "comparison without a parent": (lambda s: s.compare(b=0),),

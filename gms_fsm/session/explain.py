@@ -16,15 +16,13 @@ from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.foundation.quantities import Scale, scale_of, trimmed
 from gms_fsm.language import (
-    MATLAB_LIKE,
     Condition,
     Relation,
     awaited,
     clauses,
     evaluate,
-    spell,
 )
-from gms_fsm.traces.scope import Scope, clause_unit
+from gms_fsm.traces.scope import Scope, clause_text, clause_unit
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 
@@ -353,7 +351,7 @@ def _only_slides(trace: Trace, row: int) -> bool:
 
 
 def _clause(chart: Chart, part: Condition, values: Mapping[str, float]) -> Clause:
-    text = spell(part, MATLAB_LIKE)
+    text = clause_text(chart, part)
     try:
         truth = bool(evaluate(part, values))
         event = awaited(part)
@@ -363,7 +361,7 @@ def _clause(chart: Chart, part: Condition, values: Mapping[str, float]) -> Claus
     except (ArithmeticError, ValueError):
         return Clause(text, False, math.nan, math.nan, math.nan, computable=False)
     margin = left - right if part.op in (">", ">=") else right - left
-    return Clause(text, truth, left, right, margin, unit=clause_unit(chart, part, text))
+    return Clause(text, truth, left, right, margin, unit=clause_unit(chart, part))
 
 
 def holds(condition: Condition, values: Mapping[str, float]) -> bool:

@@ -22,8 +22,10 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.reader import called
 from gms_fsm.errors import SignalError
-from gms_fsm.language import Condition, names_in
+from gms_fsm.language import MATLAB_LIKE, Condition, names_in, spell
+from gms_fsm.language.normal import renamed_in
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program
@@ -55,20 +57,25 @@ def invariant_names(model: Model) -> list[str]:
 
 def unit_of(chart: Chart, name: str) -> str:
     """Return the unit of a name in guards; empty if it is unknown."""
-    known = {"t": "s", "age": "s"}
+    known = {"t": "s", "age": "s"} | dict.fromkeys(chart.durations, "s")
     if chart.velocities:
         known |= dict.fromkeys(chart.force_names, "N") | dict.fromkeys(chart.rate_names, "m/s^2")
         known |= dict.fromkeys(chart.velocities, "m/s") | {"x": "m"}
     return chart.unit(name) or known.get(name, "")
 
 
-def clause_unit(chart: Chart, part: Condition, text: str) -> str:
+def clause_text(chart: Chart, part: Condition) -> str:
+    """Return a clause of a guard as charts show it."""
+    return spell(renamed_in(part, called(chart.durations)), MATLAB_LIKE)
+
+
+def clause_unit(chart: Chart, part: Condition) -> str:
     """Return the unit of both sides of a comparison: that of its names, if all agree.
 
-    Empty if they do not determine it; `text` is the comparison as shown.
+    Empty if they do not determine it.
     """
     units = {unit_of(chart, name) for name in names_in(part)} - {""}
-    plain = not set(text) & set("*/^()")
+    plain = not set(spell(part, MATLAB_LIKE)) & set("*/^()")
     return units.pop() if plain and len(units) == 1 else ""
 
 

@@ -10,18 +10,23 @@ import numpy as np
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import TraceFileError
 from gms_fsm.language import (
-    MATLAB_LIKE,
     Condition,
     Relation,
     awaited,
     clauses,
     names_in,
     parse_value,
-    spell,
     values_of,
 )
 from gms_fsm.systems.system import loaded
-from gms_fsm.traces.scope import Scope, clause_unit, guard_columns, unit_of, watch_names
+from gms_fsm.traces.scope import (
+    Scope,
+    clause_text,
+    clause_unit,
+    guard_columns,
+    unit_of,
+    watch_names,
+)
 from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
@@ -136,13 +141,12 @@ def _edges(chart: Chart, stored: Stored) -> list[dict[str, Any]]:
 
 
 def _clause(chart: Chart, part: Condition, stored: Stored) -> dict[str, Any]:
-    text = spell(part, MATLAB_LIKE)
     return {
-        "text": text,
+        "text": clause_text(chart, part),
         "tree": tree_of(part, stored),
         "event": awaited(part),
         "compares": isinstance(part, Relation) and not awaited(part),
-        "unit": clause_unit(chart, part, text),
+        "unit": clause_unit(chart, part),
     }
 
 

@@ -24,6 +24,7 @@ from gms_fsm.errors import SessionError
 from gms_fsm.session.explain import Clause, explain
 from gms_fsm.session.session import Fired
 from gms_fsm.traces.scope import clause_unit
+from tests.corpus import HEALS
 from tests.helpers import pulled_mass
 from tests.inspection.sessions import a_system, debugger, fig4, locked, pulled, pushed, warming
 from tests.systems_cases import DRY
@@ -255,5 +256,10 @@ def test_a_clause_about_forces_has_their_unit() -> None:
         Transition("let_go", "on", "off", guard="F > 2"),
     )
     chart = Chart("pad", inputs=inputs, states=states, transitions=edges, outputs={"F": "0.5 * N"})
-    for edge, text in (("lift", "N <= 0"), ("let_go", "F > 2")):
-        assert clause_unit(chart, chart.guards[edge], text) == "N"
+    for edge in chart.guards.values():
+        assert clause_unit(chart, edge) == "N"
+
+
+def test_how_long_a_condition_has_held_is_asked_as_the_chart_shows_it() -> None:
+    (clause,) = Session(HEALS, pulled_mass()[1], 0.4).why(0, "heal").edges[0].clauses
+    assert (clause.text, clause.margin, clause.unit) == ("duration(|v| < 0.3) >= T", -0.1, "s")

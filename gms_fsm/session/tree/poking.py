@@ -109,6 +109,8 @@ def _of_model(start: Problem, given: Mapping[str, Any]) -> dict[str, float | Map
     for name, values in given.items():
         if name in parameter_names(start.model):
             raise _constant(name, "parameter", "model")
+        if name in chart.hidden:
+            raise _made(name)
         if name not in known:
             raise unknown("variable", name, known, SessionError)
         if not isinstance(values, Mapping):
@@ -155,6 +157,8 @@ def _resolved(start: Problem, key: object) -> tuple[str, int | None]:
             plain = key.removeprefix(f"{contact.name}.")
             if plain in contact.chart.parameter_names:
                 raise _constant(key, "parameter", "system")
+            if {plain, plain.rstrip("0123456789")} & {*contact.chart.hidden}:
+                raise _made(key)
         _check_free(start, key)
     raise SessionError(f"{shown(key)} cannot be poked", advice=there_are(key, known))
 
@@ -165,6 +169,10 @@ def _check_free(start: Problem, key: str) -> None:
         if body.driven and key in (body.v, f"{body.name}.v"):
             whose = f"velocity of {body.name}" if start.what.named else "velocity v"
             raise SessionError(f"the {whose} is given", advice="it cannot be poked")
+
+
+def _made(name: str) -> SessionError:
+    return SessionError(f"{name} is made by the chart", advice="it cannot be poked")
 
 
 def _constant(name: str, kind: str, whole: str) -> SessionError:

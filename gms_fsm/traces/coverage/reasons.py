@@ -101,7 +101,7 @@ def _closest(
     least = min((each.closest[vector][number] for vector in of), default=math.inf)
     if not math.isfinite(least):
         return ""
-    unit = clause_unit(part.chart, clause, text(clause))
+    unit = clause_unit(part.chart, clause)
     return f" (closest: {in_words(-least, unit, 3)})" if least else " (closest: equal)"
 
 
