@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
+from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.quantities import in_words, wrapped
-from gms_fsm.language import MATLAB_LIKE, Condition, Relation, spell
+from gms_fsm.language import Condition, Relation, awaited
 from gms_fsm.traces.coverage.counts import ChartCoverage, EdgeCoverage, Score
 from gms_fsm.traces.coverage.decisions import Decision
-from gms_fsm.traces.scope import clause_unit
+from gms_fsm.traces.scope import clause_text, clause_unit
 
 
 def lines(parts: Mapping[str, ChartCoverage], scores: Mapping[str, Score]) -> list[str]:
@@ -75,7 +76,9 @@ def _reasons(part: ChartCoverage, each: EdgeCoverage) -> Iterator[str]:
         if all(clause in missing for missing in false.values())
     ]
     for clause in always:
-        yield f"`{text(clause)}` was never true{_closest(part, each, decision, clause, [*false])}"
+        close = _closest(part, each, decision, clause, [*false])
+        where = f" while it was in {each.source}" if awaited(clause) else ""
+        yield f"{_never(part.chart, clause)}{where}{close}"
     if always:
         return
     fewest = min(map(len, false.values()))
@@ -85,17 +88,17 @@ def _reasons(part: ChartCoverage, each: EdgeCoverage) -> Iterator[str]:
         return
     for clause in dict.fromkeys(missing[0] for missing in nearest.values()):
         own = [vector for vector, missing in nearest.items() if missing[0] == clause]
-        others = [f"`{text(other)}`" for other in decision.clauses if other != clause]
-        held = f"{_listed(others)} {'was' if len(others) == 1 else 'were'}"
+        held = _held(part.chart, (other for other in decision.clauses if other != clause))
+        held += " true" * bool(awaited(clause))
         close = _closest(part, each, decision, clause, own)
-        yield f"`{text(clause)}` was never true while {held}{close}"
+        yield f"{_never(part.chart, clause)} while {held}{close}"
 
 
 def _closest(
     part: ChartCoverage, each: EdgeCoverage, decision: Decision, clause: Condition, of: list[str]
 ) -> str:
     """Return how close a clause came to being true, if it is one comparison."""
-    if not isinstance(clause, Relation) or not each.closest:
+    if not isinstance(clause, Relation) or awaited(clause) or not each.closest:
         return ""
     number = decision.comparisons.index(clause)
     least = min((each.closest[vector][number] for vector in of), default=math.inf)
@@ -120,23 +123,36 @@ def _undecided(part: ChartCoverage) -> Iterator[str]:
                 if not seen:
                     bit = "1" if side == "true" else "0"
                     ever = any(vector[number] == bit for vector in each.asked)
-                    why = f" while {_rest(decision, number)}" if ever else ""
-                    yield f"{where}: `{text(comparison)}` was never {side}{why}"
+                    why = f" while {_rest(part.chart, decision, number)}" if ever else ""
+                    yield f"{where}: {_never(part.chart, comparison, side)}{why}"
 
 
-def _rest(decision: Decision, number: int) -> str:
+def _rest(chart: Chart, decision: Decision, number: int) -> str:
     """Return what has to hold besides a comparison, so that it decides."""
     plain = all(isinstance(clause, Relation) for clause in decision.clauses)
-    others = [f"`{text(u)}`" for i, u in enumerate(decision.comparisons) if i != number]
+    others = [each for i, each in enumerate(decision.comparisons) if i != number]
     if not plain or not others:
         return "it decided"
-    return f"{_listed(others)} {'was' if len(others) == 1 else 'were'} true"
+    held = _held(chart, others)
+    return held if awaited(others[0]) else f"{held} true"
+
+
+def _never(chart: Chart, clause: Condition, side: str = "true") -> str:
+    """Say that a clause was never true, or never false; an event comes or is missing."""
+    if event := awaited(clause):
+        return f"the event {event} {'never came' if side == 'true' else 'was never missing'}"
+    return f"`{clause_text(chart, clause)}` was never {side}"
+
+
+def _held(chart: Chart, clauses: Iterable[Condition]) -> str:
+    """Say that clauses held, to stand before "true"; an event, which is the first, comes."""
+    first, *others = clauses
+    if event := awaited(first):
+        came = f"the event {event} came"
+        return f"{_held(chart, others)} true and {came}" if others else came
+    texts = [f"`{clause_text(chart, each)}`" for each in (first, *others)]
+    return f"{_listed(texts)} {'was' if len(texts) == 1 else 'were'}"
 
 
 def _listed(words: list[str]) -> str:
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
-
-
-def text(condition: Condition) -> str:
-    """Return a condition as charts show it."""
-    return spell(condition, MATLAB_LIKE)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from gms_fsm.charts.chart import Transition
-from gms_fsm.language import MATLAB_LIKE, Condition, spell
+from gms_fsm.language import Condition
 from gms_fsm.traces.coverage.counting import of_view
 from gms_fsm.traces.coverage.decisions import Decision
+from gms_fsm.traces.scope import clause_text
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import ClauseSeen, CoverageVerdict
 
@@ -21,7 +22,7 @@ def coverage(trace: Trace) -> CoverageVerdict:
         decision = part.decisions[edge.name]
         for tree in decision.clauses:
             sides = (_ever(each.asked, decision, tree, side, part.n) for side in (True, False))
-            seen.append(ClauseSeen(_called(edge), spell(tree, MATLAB_LIKE), *sides))
+            seen.append(ClauseSeen(_called(edge), clause_text(part.chart, tree), *sides))
     never = [f"state {name}" for name, been in states.items() if not any(been)]
     never += [f"edge {name}" for name, taken in edges.items() if not any(taken)]
     for clause in seen:
