@@ -3241,6 +3241,8 @@ rows = {
     "picture of several charts": ("-o", ..., "pair.toml", "-o", "c.svg"),
     "missing contact": ("--contact pad", ..., "pair.toml", "-o", "c.svg", "--contact", "pad"),
     "contact of a model": ("--contact pad", ..., "a.toml", "-o", "c.svg", "--contact", "pad"),
+    "missing contact, in words": ("--contact pad", ..., "pair.toml", "--contact", "pad"),
+    "contact of a model, in words": ("--contact pad", ..., "a.toml", "--contact", "pad"),
     "override of a trace": ("run.npz", ..., "run.npz", "--set", "run.t_end=1"),
     "sweep of a trace": ("run.npz", ..., "run.npz", "--over", "F_s=1:2:2"),
     "grid that is none": ("--over F_s", ..., "a.toml", "--over", "F_s"),

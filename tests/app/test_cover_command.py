@@ -9,6 +9,7 @@ import pytest
 
 from gms_fsm import Coverage, coverage, sweep
 from gms_fsm.app.scenario import load_scenario
+from tests import own_files
 from tests.scenario_files import OPEN_LOOP, CommandLine
 
 BACK = "rig.velocity=-2.0"
@@ -52,6 +53,14 @@ def test_counts_of_several_calls_add_up(cover: CommandLine) -> None:
     total = Coverage.merged([counted(FORTH), counted(BACK), counted(FORTH)])
     assert Coverage.load("counts.json") == total
     assert answer.out == f"{total}\ncounts.json\n"
+
+
+def test_of_a_system_one_contact_can_be_told(cover: CommandLine) -> None:
+    own_files.write(Path())
+    whole = coverage(load_scenario("pair.toml").simulate())
+    answer = cover("pair.toml", "--contact", "gear")
+    assert (answer.code, answer.err) == (0, "")
+    assert answer.out == f"{Coverage({'gear': whole.contact('gear')})}\n"
 
 
 @pytest.mark.parametrize(("wanted", "code"), [("0", 0), ("15", 0), ("90", 1)])

@@ -68,7 +68,8 @@ def cover_command(
 
     Counts states, edges from each of their sources, clauses of guards, true
     and false, and MC/DC: clauses that decided a guard alone. With --merge
-    the counts of several calls add up.
+    the counts of several calls add up. With --contact only this one is
+    judged and told; the file of counts has all.
     """
     from gms_fsm import Coverage
     from gms_fsm.app.sweeps import axis
@@ -94,15 +95,16 @@ def cover_command(
     assert found is not None  # there is at least one
     if before is not None and merge is not None:
         found = _sum(found, before, merge)
-    part = None if output is None else _part(found, contact)
-    put(str(found))
+    part = _part(found, contact) if output is not None or contact else None
+    told = found if part is None or not contact else Coverage({contact: part})
+    put(str(told))
     if merge is not None:
         put(str(found.save(merge)))
     if output is not None and part is not None:
         import plots
 
         put(str(plots.render(plots.statechart(part.chart, counts=part), output)))
-    name, percent = found.lowest
+    name, percent = told.lowest
     if fail_under is not None and percent < fail_under:
         say(f"the lowest is {name}: {percent:.1f} %, below {fail_under:g} %")
         raise typer.Exit(1)
@@ -144,7 +146,7 @@ def _sum(found: Coverage | None, other: Coverage, path: Path) -> Coverage:
 
 
 def _part(found: Coverage, contact: str) -> ChartCoverage:
-    """Return the counts of the chart to draw."""
+    """Return the counts of one chart: the one chosen, or the only one."""
     if not contact and len(found.parts) > 1:
         names = [*found.parts]
         raise ParameterError(
