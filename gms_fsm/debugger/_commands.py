@@ -451,6 +451,9 @@ class Commands:
         asked = {None: states + edges, "enter": states, "leave": states}.get(kind, edges)
         name = spelled(name, asked)
         if name not in states + edges:
+            if arg == "changes":
+                example = help_of("break", self.session).examples[1]
+                raise SessionError("an expression is missing", advice=f"for example {example}")
             raise SessionError(
                 f"there is no edge or state {name!r}",
                 advice=f"{meant(name, states + edges)}edges: {', '.join(edges) or 'none'}; "
