@@ -27,6 +27,7 @@ from gms_fsm import (
     simulate,
     sweep,
 )
+from gms_fsm.traces.failures import LivelockError
 from tests.helpers import FASTEST
 from tests.scenario_files import CommandLine
 from tests.supervisor_cases import (
@@ -477,3 +478,14 @@ def test_an_event_is_sent_to_a_session():
     session.goto(3.0)
     session.poke({"red": 1.0})
     assert str(session.next_transition().fired) == "cycles 1: counting -> counting by count_one"
+
+
+@pytest.mark.parametrize(("variables", "values"), [((), ""), (("z",), r" \(z = 0\)")])
+def test_switching_without_end_shows_no_velocity(variables: tuple[str, ...], values: str) -> None:
+    edges = (Transition("go", "a", "b", "v > 0.5"), Transition("back", "b", "a", "v > 0.4"))
+    chart = Chart(
+        "w", ("v",), variables, velocities=(), states=(State("a"), State("b")), transitions=edges
+    )
+    system = System("s", supervisors=(Supervisor("m", chart, inputs={"v": "t"}),))
+    with pytest.raises(LivelockError, match=f"last by 'back' from b to a{values}: guard"):
+        simulate(system, 1.0)

@@ -288,9 +288,11 @@ def _livelock(error: Livelock, start: Problem, trace: Trace) -> LivelockError:
     bank = layout.bank(machine)
     i, chart = machine - bank.first, start.system.contact(bank.name).chart
     scope = scope_of(start, error.t, error.y, error.mode, bank.name)
-    z = f"{chart.variables[0]} = {scope.z[i]:.6g}, " if chart.variables else ""
-    s = f"s = {scope.s[i]:.6g}, " if "s" in chart.inputs else ""
-    values = f"{z}{s}v = {scope.v:.6g}"
+    z = {chart.variables[0]: scope.z[i]} if chart.variables else {}
+    s = {"s": scope.s[i]} if "s" in chart.inputs and chart.velocities else {}
+    v = {"v": scope.v} if chart.velocities else {}
+    shown = ", ".join(f"{name} = {value:.6g}" for name, value in {**z, **s, **v}.items())
+    values = f" ({shown})" if shown else ""
     place = start.what.element(bank.name, i)
     if error.machine is not None:
         log = trace.transitions
@@ -320,8 +322,8 @@ def _livelock(error: Livelock, start: Problem, trace: Trace) -> LivelockError:
             )
         return LivelockError(
             f"switched {len(taken)} times{f' in {time:.3g} s' if time else ''}, "
-            f"last by {str(last.edge)!r} from {last.source} to {last.target} "
-            f"({values}): {cause}",
+            f"last by {str(last.edge)!r} from {last.source} to {last.target}"
+            f"{values}: {cause}",
             trace,
             t=error.t,
             place=place,
@@ -331,7 +333,7 @@ def _livelock(error: Livelock, start: Problem, trace: Trace) -> LivelockError:
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
         f"{' and '.join(error.relations)} changed {error.times} times: "
-        f"the element is in {state.name} ({values}), its flow pushes back on both sides, "
+        f"the element is in {state.name}{values}, its flow pushes back on both sides, "
         f"no edge leaves ({edges or 'it has none'}), and no value of the sign between -1 and 1 "
         f"holds it there",
         trace,
