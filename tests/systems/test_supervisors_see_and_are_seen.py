@@ -27,7 +27,7 @@ from gms_fsm import (
     simulate,
     sweep,
 )
-from gms_fsm.traces.failures import LivelockError
+from gms_fsm.traces.failures import LivelockError, NotFiniteError
 from tests.helpers import FASTEST
 from tests.scenario_files import CommandLine
 from tests.supervisor_cases import (
@@ -488,4 +488,14 @@ def test_switching_without_end_shows_no_velocity(variables: tuple[str, ...], val
     )
     system = System("s", supervisors=(Supervisor("m", chart, inputs={"v": "t"}),))
     with pytest.raises(LivelockError, match=f"last by 'back' from b to a{values}: guard"):
+        simulate(system, 1.0)
+
+
+def test_a_flow_that_is_not_finite_is_not_called_a_velocity() -> None:
+    states = (State("on", {"z": "log(u)"}),)
+    chart = Chart("g", ("u",), ("z",), velocities=(), states=states)
+    system = System("s", supervisors=(Supervisor("m", chart, inputs={"u": "t - 1"}),))
+    with pytest.raises(
+        NotFiniteError, match=r"the flow of z in state on, \[log\(u\)\], is not finite"
+    ):
         simulate(system, 1.0)

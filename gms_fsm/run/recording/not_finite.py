@@ -61,7 +61,7 @@ def _contacts(start: Problem, error: HybridError) -> Iterator[str]:
         chart = start.system.contact(bank.name).chart
         scope = scope_of(start, error.t, error.y, error.mode, bank.name)
         whose = f" of {bank.name}" if start.what.named else ""
-        if not math.isfinite(scope.v):
+        if chart.velocities and not math.isfinite(scope.v):
             yield f"the velocity v{whose} is not finite here"
         states = {state.name: state for state in chart.states}
         for i, name in enumerate(scope.states):
@@ -70,7 +70,8 @@ def _contacts(start: Problem, error: HybridError) -> Iterator[str]:
                 if not math.isfinite(y[bank.of(variable)][i]):
                     texts = some_of(f"[{text}]" for text in _assigned(chart, variable))
                     yield f"{variable} of {place} is not finite here; assigned to it: {texts}"
-            F = 0.0 if states[name].locked else scope.each(FORCE)[i]  # a lock gives what is asked
+            known = states[name].locked or not chart.velocities  # a lock gives what is asked
+            F = 0.0 if known else scope.each(FORCE)[i]
             if not math.isfinite(F):
                 values = parameter_values(scope.model, i)
                 yield f"the force of {place} {_infinite_force(chart, states[name], F, values)}"
