@@ -10,6 +10,7 @@ from functools import cached_property
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.reader import called
 from gms_fsm.difference.result import PartChange
+from gms_fsm.difference.wording import both
 from gms_fsm.language import MATLAB_LIKE, Condition, Name, Value, renamed, spell
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.verification.sameness.matching import Matching
@@ -163,9 +164,7 @@ def _parameters(pair: ChartPair) -> Iterator[PartChange]:
     for name, its in found.variables.items():
         start, other_start = a.initial.get(name, 0.0), b.initial.get(its, 0.0)
         if start != other_start:
-            yield PartChange(
-                "changed", "initial value of", name, f"{start:.9g}", f"{other_start:.9g}"
-            )
+            yield PartChange("changed", "initial value of", name, *both(start, other_start))
     for name in a.let:
         if name in b.let and not pair.same(a.lets[name], b.lets[name]):
             yield PartChange("changed", "let", name, a.let[name], b.let[name])
@@ -278,9 +277,8 @@ def _edges(pair: ChartPair) -> Iterator[PartChange]:
             yield PartChange("changed", "guard of edge", name, *guards)
         yield from _assigned(pair, "action of edge", name, ("action", name), ("action", other.name))
         if edge.impulse != other.impulse:
-            yield PartChange(
-                "changed", "impulse of edge", name, str(edge.impulse), str(other.impulse)
-            )
+            texts = both(edge.impulse, other.impulse)
+            yield PartChange("changed", "impulse of edge", name, *texts)
     for name, edge in its.items():
         if name not in pairs.values():
             yield PartChange("added", "edge", name, "", described(b, edge))

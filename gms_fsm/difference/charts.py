@@ -20,6 +20,6 @@ def chart_diff(a: Chart, b: Chart, names: tuple[str, str]) -> tuple[Diff, ChartP
     found, matching = sameness(a, b)
     pair = ChartPair(a, b, matching)
     changes = changes_of(pair)
-    if not changes and found.verdict == "equivalent":
+    if not changes and found.verdict == "equivalent" and a == b:
         return Diff(names, (), "equal", "", states=matching.states), pair
     return Diff(names, changes, found.verdict, found.reason, found.point, matching.states), pair

@@ -62,7 +62,8 @@ def diff(
     Notes
     -----
     *Equivalent* is proved with z3 (extra ``check``), over the reals; without it texts are compared
-    only. It is about charts: bodies, springs and signals of systems are compared by their texts.
+    only. It is about charts: bodies, springs and signals of systems are compared by their texts, and
+    another order of parts is *undecided*, unless a run shows a difference.
 
     Examples
     --------
@@ -130,8 +131,11 @@ def _of_runs(a: Trace, b: Trace, names: tuple[str, str]) -> Diff:
             made.diff, changes=changes, verdict="different", reason=runs.headline, runs=runs
         )
     verdict: Verdict = "equivalent"
-    reason = "the runs agree as well as their tolerances tell"
-    if not changes and not any(runs.largest.values()):
+    until = f" until t = {runs.t_end:.9g} s" if a.t[-1] != b.t[-1] else ""
+    reason = f"the runs agree{until} as well as their tolerances tell"
+    if not runs.compared:
+        verdict, reason = "undecided", "the runs have no quantity, or no time, in common"
+    elif not changes and not any(runs.largest.values()):
         verdict, reason = "equal", ""
     return replace(made.diff, changes=changes, verdict=verdict, reason=reason, point={}, runs=runs)
 
@@ -150,6 +154,9 @@ def with_runs(found: Diff, a: Trace, b: Trace, motion: str = "") -> Diff:
 def _of_made(a: Mounted, b: Mounted, names: tuple[str, str]) -> Diff:
     """Compare models or systems; models that are not equivalent are moved until they differ."""
     found = made_diff(a, b, names).diff
+    if found.equal and a.named and a.system != b.system:
+        reason = "they are not equal, but no part is found that differs"
+        found = replace(found, verdict="undecided", reason=reason)
     if found.equivalent or a.named or b.named:
         return found
     for velocity, t_end in motions(a.model):

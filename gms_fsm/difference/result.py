@@ -6,12 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
+from gms_fsm.difference.wording import point_text
 from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.foundation.quantities import in_words, wrapped
-from gms_fsm.verification.findings import listed
 from gms_fsm.verification.sameness.same import Verdict
 
 WIDTH = 80  # characters of a line
+MOST_NAMED = 4  # quantities in a sentence
 UNITS = {"x": "m", "v": "m/s", "F": "N"}  # of what is compared of two runs
 ChangeKind: TypeAlias = Literal["added", "removed", "renamed", "changed"]
 SIGNS: Mapping[ChangeKind, str] = {"added": "+", "removed": "-", "renamed": "=", "changed": "~"}
@@ -74,11 +75,15 @@ class RunsDiff:
     within : float
         s: differences of times that the tolerances explain.
     largest : mapping of str to float
-        Largest differences of x, v and F up to the first transition that differs.
+        Largest differences of all quantities compared, up to the first transition that differs.
     apart : bool
-        Whether a transition, x, v or F differ by more than the tolerances explain.
+        Whether a transition or a quantity differs by more than the tolerances explain.
     motion : str
         The velocity with which both were moved, m/s, if the runs were made for the comparison.
+    beyond : tuple of str
+        The quantities that differ by more than the tolerances explain.
+    compared : int
+        How many quantities were compared, the states of each contact as one.
     """
 
     about: str
@@ -91,6 +96,8 @@ class RunsDiff:
     largest: Mapping[str, float]
     apart: bool
     motion: str = ""
+    beyond: tuple[str, ...] = ()
+    compared: int = 0
 
     @property
     def headline(self) -> str:
@@ -98,9 +105,15 @@ class RunsDiff:
         if self.number is not None:
             return f"{self.about}: first difference at transition {self.number}"
         count = self.transitions[0]
-        values = ", but x, v or F differ" if self.apart else ""
+        values = f", but {self._beyond} differ" if self.apart else ""
         same = f"the same {count} transitions" if count else "no transition"
         return f"{self.about}: {same}{values}"
+
+    @property
+    def _beyond(self) -> str:
+        more = len(self.beyond) - MOST_NAMED
+        *some, last = [*self.beyond[:MOST_NAMED], *[f"{more} more"] * (more > 0)]
+        return f"{', '.join(some)} and {last}" if some else f"the values of {last}"
 
     def __str__(self) -> str:
         lines = [f"with v = {self.motion}"] if self.motion else []
@@ -111,10 +124,10 @@ class RunsDiff:
         values = ", ".join(
             f"{name} {in_words(each, UNITS.get(name.rsplit('.', 1)[-1], ''), 3)}"
             for name, each in self.largest.items()
+            if name in self.beyond or name.rsplit(".", 1)[-1] in UNITS
         )
-        lines.append(
-            f"  largest difference until t = {until:.9g} s: {values or 'nothing compared'}"
-        )
+        none = f"none in {self.compared} quantities" if self.compared else "nothing compared"
+        lines.append(f"  largest difference until t = {until:.9g} s: {values or none}")
         if self.within:
             lines.append(f"  times within {self.within:.2g} s count as the same")
         return "\n".join(lines)
@@ -179,7 +192,7 @@ class Diff:
             yield from f"  {change}".splitlines()
         yield self.summary
         if self.point:
-            yield f"  for example at {listed(self.point)}"
+            yield f"  for example at {point_text(self.point)}"
         if self.runs is not None:
             lines = str(self.runs).splitlines()
             yield from (line for line in lines if line != self.reason)

@@ -9,25 +9,32 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.difference.result import PartChange, RunsDiff
+from gms_fsm.difference.wording import both
 from gms_fsm.session.results import SAMPLES, first_unlike
 from gms_fsm.traces.trace import Trace
 
 SLACK = 100.0  # times the relative tolerance, of what runs computed differently may differ by
-DECIDING = ("method", "rtol", "atol", "step", "max_step", "events")
+# What the bits of a run depend on: steps depend on its length, too.
+DECIDING = ("method", "rtol", "atol", "step", "max_step", "events", "t_start", "t_end")
 Names = Mapping[str, Mapping[str, str]]
 
 
 @dataclass(frozen=True)
 class Translation:
-    """What the first run's contacts call their states and edges, in the second.
+    """What the first run's contacts, their edges, quantities and states are called in the second.
 
     Parameters
     ----------
-    edges : mapping of str to mapping of str to str
-        By contact, those that have another name.
+    contacts : mapping of str to str
+        The contacts and supervisors.
+    edges, names, states : mapping of str to mapping of str to str
+        By contact of the first run, those that have another name.
     """
 
+    contacts: Mapping[str, str] = field(default_factory=dict)
     edges: Names = field(default_factory=dict)
+    names: Names = field(default_factory=dict)
+    states: Names = field(default_factory=dict)
 
     def of(self, contact: str, edge: str) -> str:
         """Return what an edge of a contact is called in the second run."""
@@ -40,16 +47,22 @@ def settings_changes(a: Trace, b: Trace, same: bool) -> tuple[PartChange, ...]:
     names = [name for name in {**a.settings, **b.settings} if same or name != "atol"]
     values = ((n, a.settings.get(n), b.settings.get(n)) for n in names)
     return tuple(
-        PartChange("changed", "setting", name, _said(one), _said(other))
+        PartChange("changed", "setting", name, *_told_apart(one, other))
         for name, one, other in values
         if one != other
     )
 
 
-def _said(value: object) -> str:
+def _told_apart(one: object, other: object) -> tuple[str, str]:
+    least = _least(one), _least(other)
+    return both(*least) if least[0] != least[1] else both(one, other)
+
+
+def _least(value: object) -> object:
+    """Return tolerances with the smallest of each component, with a few digits."""
     if isinstance(value, Mapping):
-        return ", ".join(f"{name} {float(np.min(each)):.3g}" for name, each in value.items())
-    return f"{value:.9g}" if isinstance(value, float) else str(value)
+        return {name: float(f"{float(np.min(each)):.3g}") for name, each in value.items()}
+    return value
 
 
 def within(a: Trace, b: Trace, same: bool) -> float:
@@ -86,57 +99,130 @@ def runs_diff(
     if number is not None:
         t = min(each[number] for each in times if number < len(each))
     until = end if t is None else t
-    largest, apart = _largest(a, b, until, slack == 0.0)
+    start = max(float(a.t[0]), float(b.t[0]))
+    found = _Compared()
+    if start <= until:
+        grid = np.linspace(start, until, SAMPLES)
+        near = sorted(t for each in times for t in each) if slack and number is None else []
+        found = _compared(a, b, grid[_clear(grid, near, slack)], called, slack == 0.0)
     return RunsDiff(
         about,
         None if number is None else number + 1,
         t,
-        (_told(a, logs[0], number), _told(b, logs[1], number)),
+        _told(a, b, logs, number),
         (len(logs[0]), len(logs[1])),
         end,
         slack,
-        largest,
-        number is not None or apart,
+        found.largest,
+        number is not None or bool(found.beyond),
+        beyond=tuple(found.beyond),
+        compared=found.count,
     )
 
 
 def _who(record: Any, called: Translation, run: Trace) -> tuple[object, ...]:
     columns = record.dtype.names or ()
     contact = str(record.contact) if "contact" in columns else run.what.system.machines[0].name
-    return contact, int(record.element), called.of(contact, str(record.edge))
+    its = called.contacts.get(contact, contact)
+    return its, int(record.element), called.of(contact, str(record.edge))
 
 
-def _told(run: Trace, log: Sequence[Any], number: int | None) -> str:
-    """Return what fires at a place of the log, in words."""
-    if number is None or number >= len(log):
-        return "nothing"
-    record = log[number]
-    contact = str(record.contact) if "contact" in (record.dtype.names or ()) else ""
-    who = run.what.element(contact or run.what.system.machines[0].name, int(record.element))
-    return f"{record.edge} of {who} at t = {float(record.t):.9g} s"
-
-
-def _largest(a: Trace, b: Trace, until: float, exact: bool) -> tuple[dict[str, float], bool]:
-    """Return the largest differences of x, v and F until a time, and whether one is too large."""
-    times = np.linspace(max(float(a.t[0]), float(b.t[0])), until, SAMPLES)
-    columns = [_columns(run.sample(times)) for run in (a, b)]
-    rtol = max(float(run.settings["rtol"]) for run in (a, b))  # type: ignore[arg-type]
-    found, apart = {}, False
-    for name, one in columns[0].items():
-        if name not in columns[1]:
+def _told(a: Trace, b: Trace, logs: Sequence[Sequence[Any]], number: int | None) -> tuple[str, str]:
+    """Return what fires at a place of both logs, in words."""
+    records = [None if number is None or number >= len(log) else log[number] for log in logs]
+    known = [0.0 if each is None else float(each.t) for each in records]
+    digits = both(*known) if known[0] != known[1] else (f"{known[0]:.9g}",) * 2
+    texts = []
+    for run, record, t in zip((a, b), records, digits, strict=True):
+        if record is None:
+            texts.append("nothing")
             continue
-        other = columns[1][name]
+        contact = str(record.contact) if "contact" in (record.dtype.names or ()) else ""
+        who = run.what.element(contact or run.what.system.machines[0].name, int(record.element))
+        texts.append(f"{record.edge} of {who} at t = {t} s")
+    return texts[0], texts[1]
+
+
+# --------------------------------------------------------------------------- quantities
+@dataclass
+class _Compared:
+    """What was compared, its largest differences, and what differs by too much."""
+
+    count: int = 0
+    largest: dict[str, float] = field(default_factory=dict)
+    beyond: list[str] = field(default_factory=list)
+
+
+def _clear(grid: Any, near: Sequence[float], slack: float) -> Any:
+    """Return which times are not so near a transition that only one run may have made it."""
+    if not near:
+        return np.ones(grid.size, dtype=bool)
+    after = np.searchsorted(near, grid + slack, side="right")
+    clear = after == np.searchsorted(near, grid - slack, side="left")
+    return clear if clear.any() else ~clear
+
+
+def _compared(a: Trace, b: Trace, times: Any, called: Translation, exact: bool) -> _Compared:
+    """Compare all quantities that both runs have, at some times."""
+    runs = [run.sample(times) for run in (a, b)]
+    columns = [_columns(runs[0], called), _columns(runs[1], Translation())]
+    rtol = max(float(run.settings["rtol"]) for run in (a, b))  # type: ignore[arg-type]
+    found = _Compared()
+    for name, (one, least) in columns[0].items():
+        other, also = columns[1].get(name, (None, 0.0))
+        if other is None or one.shape != other.shape:
+            continue
+        if one.dtype.kind == "U":
+            found.count += 1
+            found.beyond += [name] * bool((one != other).any())
+            continue
         known = np.isfinite(one) & np.isfinite(other)
-        found[name] = float(np.abs(one - other)[known].max(initial=0.0))
+        uneven = bool((np.isfinite(one) != np.isfinite(other)).any())
+        if not known.any() and not uneven:
+            continue
+        found.count += 1
+        found.largest[name] = float(np.abs(one - other)[known].max(initial=0.0))
         size = max(float(np.abs(u[known]).max(initial=0.0)) for u in (one, other))
-        apart |= found[name] > (0.0 if exact else SLACK * rtol * size)
-    return found, apart
-
-
-def _columns(run: Trace) -> dict[str, Any]:
-    named = len(run.contacts) > 1
-    found: dict[str, Any] = {}
-    for contact in run.contacts:
-        seen, lead = run.contact(contact), f"{contact}." if named else ""
-        found |= {f"{lead}x": seen.x, f"{lead}v": seen.v, f"{lead}F": seen.F}
+        allowed = 0.0 if exact else SLACK * (rtol * size + max(least, also))
+        found.beyond += [name] * (uneven or found.largest[name] > allowed)
     return found
+
+
+def _columns(run: Trace, called: Translation) -> dict[str, tuple[Any, float]]:
+    """Return what a run has, by the names of the second, each with its absolute tolerance."""
+    layout, system = run.program.layout, run.what.system
+    named = len(layout.banks) > 1
+    found: dict[str, tuple[Any, float]] = {}
+    for machine in system.machines:
+        bank, seen = layout.contact(machine.name), run.contact(machine.name)
+        lead = f"{called.contacts.get(bank.name, bank.name)}." if named else ""
+        new, states = (each.get(bank.name, {}) for each in (called.names, called.states))
+        if bank.velocity:
+            found |= {f"{lead}x": (seen.x, 0.0), f"{lead}v": (seen.v, 0.0)}
+            found |= {f"{lead}F": (seen.F, 0.0)}
+        chart = machine.chart
+        for name in chart.variables:
+            if name not in chart.hidden:
+                least = _tolerance(run, bank.of(name))
+                found[f"{lead}{new.get(name, name)}"] = seen.variable(name), least
+        for name in (*chart.velocities[1:], *chart.force_names):
+            if bank.of(name) in layout.observed.shared:
+                found.setdefault(f"{lead}{new.get(name, name)}", (run.seen[bank.of(name)], 0.0))
+        paths = np.array([states.get(each.name, each.name) for each in chart.states])
+        found[f"{lead}state"] = paths[seen.modes], 0.0
+    if run.what.named:
+        moved: dict[str, Any] = {u.v: run.body(u.name).v for u in system.bodies if u.driven}
+        own = {*layout.events} | {n for n in layout.y.shared if "." in n}
+        moved |= {n: run.value(n) for n in layout.y.shared if n not in own}
+        for name, column in moved.items():
+            key = f"{name} of the system" if name in found else name
+            found[key] = column, _tolerance(run, name)
+    return found
+
+
+def _tolerance(run: Trace, name: str) -> float:
+    """Return the absolute tolerance of a component of the state vector; 0 of anything else."""
+    given: Any = run.settings.get("atol")
+    if isinstance(given, Mapping):
+        given = given.get(run.program.layout.label(name))
+    return 0.0 if given is None else float(np.max(given))

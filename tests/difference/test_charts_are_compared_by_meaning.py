@@ -197,3 +197,23 @@ def test_without_z3_texts_are_compared_only(monkeypatch: pytest.MonkeyPatch) -> 
 def test_without_z3_a_point_still_shows_a_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "z3", None)
     assert compared("z > c", "z > c + 1").verdict == "different"
+
+
+@pytest.mark.usefixtures("z3")
+def test_events_at_a_point_are_called_by_name() -> None:
+    def awaiting(event: str) -> Chart:
+        edge = Transition("go", "stick", "slip", "z > c", event=event)
+        return Chart("one", ("v",), ("z",), ("c",), STATES, (edge,), {"F": "z"})
+
+    last = diff(awaiting("hot"), awaiting("cold")).text.splitlines()[-1]
+    assert last == "  for example at c = 1, event cold has come, event hot has not come, z = 2"
+
+
+def test_charts_that_differ_in_their_names_only_are_equivalent() -> None:
+    other = Chart("two", ("v",), ("z",), ("c",), STATES, chart().transitions, {"F": "z"})
+    assert diff(chart(), other).verdict == "equivalent"
+
+
+def test_initial_values_that_differ_look_different() -> None:
+    found = diff(chart(initial={"z": 1.0}), chart(initial={"z": 1.0 + 2**-52}))
+    assert "  ~ initial value of z: 1 -> 1.0000000000000002" in found.text.splitlines()

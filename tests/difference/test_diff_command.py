@@ -91,3 +91,64 @@ def test_one_picture_shows_both(gms_fsm: CommandLine) -> None:
     text = Path("d.svg").read_text(encoding="utf-8")
     assert "was" in text
     assert "different" in text
+
+
+RUN = """\
+name = "s"
+[[body]]
+name = "a"
+inertia = 1.0
+force = "1"
+[[contact]]
+name = "pad"
+chart = "stiction"
+values = { F_c = 1.0, F_s = 1.5, b = 0.0 }
+[run]
+t_end = 1.0
+[initial]
+a.x = 0.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("a.x = 0.0", "a.x = 0.5", "  ~ initial a.x: 0 -> 0.5"),
+        ("t_end = 1.0", "t_end = 2.0", "  ~ setting t_end: 1 -> 2"),
+        ("t_end = 1.0", "t_end = 1.0\nrtol = 1e-8", "  ~ setting rtol: 1e-06 -> 1e-08"),
+        ("t_end = 1.0", 't_end = 1.0\nmonitors = ["coverage"]',
+         "  ~ setting monitors: none -> coverage"),
+    ],
+)  # fmt: skip
+def test_scenarios_that_are_run_differently_differ(
+    gms_fsm: CommandLine, old: str, new: str, line: str
+) -> None:
+    Path("a.toml").write_text(RUN, encoding="utf-8")
+    Path("b.toml").write_text(RUN.replace(old, new), encoding="utf-8")
+    answer = gms_fsm("diff", "a.toml", "b.toml", "--no-run")
+    assert answer.out.splitlines()[1] == line
+    assert answer.out.splitlines()[2].startswith("different: same system, other run: ")
+    assert answer.code == 1
+
+
+def test_an_initial_value_that_is_the_default_is_no_difference(gms_fsm: CommandLine) -> None:
+    Path("a.toml").write_text(RUN, encoding="utf-8")
+    Path("b.toml").write_text(RUN.replace("a.x = 0.0", ""), encoding="utf-8")
+    assert gms_fsm("diff", "a.toml", "b.toml").out.splitlines()[1] == "equal"
+
+
+def test_a_system_without_a_run_is_the_same_system(gms_fsm: CommandLine) -> None:
+    Path("a.toml").write_text(RUN, encoding="utf-8")
+    Path("b.toml").write_text(RUN.split("[run]")[0], encoding="utf-8")
+    assert gms_fsm("diff", "a.toml", "b.toml").out.splitlines()[1:] == [
+        "  - run of the first",
+        "equivalent: same system, only the first says how it is run",
+    ]
+
+
+def test_a_scenario_with_monitors_is_equal_to_itself(gms_fsm: CommandLine) -> None:
+    gms_fsm("copy", "pulled_mass", "-o", "a.toml")
+    text = Path("a.toml").read_text(encoding="utf-8")
+    text = text.replace("[run]\n", '[run]\nmonitors = ["all", "abs(z) <= 2*s"]\n')
+    Path("a.toml").write_text(text, encoding="utf-8")
+    assert gms_fsm("diff", "a.toml", "a.toml").out.splitlines()[1] == "equal"

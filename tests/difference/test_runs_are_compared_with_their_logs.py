@@ -4,22 +4,29 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gms_fsm import (
     GMS,
+    Body,
     Chart,
     ChartModel,
+    Contact,
     GMSParameters,
     Prescribed,
+    Sampled,
     State,
+    Supervisor,
+    System,
     Trace,
     Transition,
     diff,
     simulate,
 )
+from gms_fsm.charts import CHARTS
 from tests.helpers import FIG4_SINE, pulled_mass
 
 PAPER = GMSParameters.paper("stick-slip")
@@ -180,3 +187,83 @@ def test_runs_of_a_system_name_the_contact() -> None:
     found = diff(one, other)
     assert found.runs is not None
     assert found.runs.fired[0].split(" at ")[0].endswith("of friction 1")
+
+
+def test_runs_of_other_lengths_agree_within_their_tolerances() -> None:
+    found = diff(ran(t_end=20.0), ran(t_end=20.0 + 1 / 3))
+    assert found.runs is not None
+    assert found.runs.within > 0.0
+    assert str(found).splitlines()[1:3] == [
+        "  ~ setting t_end: 20 -> 20.3333333",
+        "equivalent: the runs agree until t = 20 s as well as their tolerances tell",
+    ]
+
+
+IDLE = Supervisor("idle", Chart("idle", inputs=(), velocities=(), states=(State("one"),)))
+
+
+def alone(**more: Any) -> Trace:
+    return simulate(System("s", supervisors=(IDLE,), **more), 1.0)
+
+
+def differing(one: Trace, other: Trace) -> tuple[str, ...]:
+    found = diff(one, other)
+    assert found.verdict == "different"
+    assert found.runs is not None
+    return found.runs.beyond
+
+
+def test_further_states_are_compared() -> None:
+    runs = [alone(flow={"q": rate}) for rate in ("1", "2")]
+    assert differing(*runs) == ("q",)
+
+
+def test_sampled_values_are_compared() -> None:
+    runs = [alone(sampled=(Sampled("A", period=0.1, updates={"u": u}),)) for u in ("u + 1", "2")]
+    assert differing(*runs) == ("u",)
+
+
+def test_free_bodies_are_compared() -> None:
+    runs = [alone(bodies=(Body("m", inertia=1.0, force=force),)) for force in ("1", "2")]
+    assert differing(*runs) == ("x", "v")
+
+
+def supervised(rate: str, output: str) -> Trace:
+    state = State("one", {"z": rate}, outputs={"u": output})
+    chart = Chart("clock", variables=("z",), inputs=(), velocities=(), states=(state,))
+    return simulate(System("s", supervisors=(Supervisor("clock", chart),)), 1.0)
+
+
+def test_variables_of_supervisors_are_compared() -> None:
+    assert differing(supervised("1", "0"), supervised("2", "0")) == ("z",)
+
+
+def test_outputs_of_supervisors_are_compared() -> None:
+    assert differing(supervised("1", "0"), supervised("1", "z")) == ("u",)
+
+
+def test_states_are_compared() -> None:
+    states = (State("one"), State("two"))
+    system = System(
+        "s", supervisors=(Supervisor("idle", Chart("i", inputs=(), velocities=(), states=states)),)
+    )
+    runs = [simulate(system, 1.0, initial={"states": [name]}) for name in ("one", "two")]
+    assert differing(*runs) == ("state",)
+
+
+def test_runs_without_a_common_time_are_undecided() -> None:
+    system = System("s", supervisors=(IDLE,))
+    runs = [simulate(system, start + 1.0, t_start=start) for start in (0.0, 5.0)]
+    assert diff(*runs).verdict == "undecided"
+
+
+def test_a_renamed_contact_makes_no_difference_of_runs() -> None:
+    one, other = (
+        System(
+            "s",
+            bodies=(Body("mass", inertia=1.0, force="5 * sin(t)"),),
+            contacts=(Contact(name, CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.0}),),
+        )
+        for name in ("pad", "shoe")
+    )
+    assert diff(simulate(one, 5.0), simulate(other, 5.0)).verdict == "equivalent"

@@ -81,6 +81,7 @@ def _files(first: str, second: str, output: Path | None, contact: str, run: bool
     """Compare two files, or charts of the package."""
     from gms_fsm import diff
     from gms_fsm.app._own_files import own_file
+    from gms_fsm.difference.scenarios import with_settings
 
     names = (first, second)
     own = [own_file(each) for each in names]
@@ -97,6 +98,7 @@ def _files(first: str, second: str, output: Path | None, contact: str, run: bool
     assert one is not None
     assert other is not None
     found = diff(systems[0], systems[1], names=names)
+    found = with_settings(found, one.run, other.run, systems[1])
     if found.equivalent or not run or not one.run or not other.run:
         return found
     return _run(found, one, other)
