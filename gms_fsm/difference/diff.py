@@ -62,8 +62,8 @@ def diff(
     Notes
     -----
     *Equivalent* is proved with z3 (extra ``check``), over the reals; without it texts are compared
-    only. It is about charts: bodies, springs and signals of systems are compared by their texts, and
-    another order of parts is *undecided*, unless a run shows a difference.
+    only. It is about charts: bodies, springs and signals of systems are compared by their texts.
+    Another order of parts is *undecided*, unless runs show a difference.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def _of_runs(a: Trace, b: Trace, names: tuple[str, str]) -> Diff:
     reason = f"the runs agree{until} as well as their tolerances tell"
     if not runs.compared:
         verdict, reason = "undecided", "the runs have no quantity, or no time, in common"
-    elif not changes and not any(runs.largest.values()):
+    elif not (changes or until or any(runs.largest.values())):
         verdict, reason = "equal", ""
     return replace(made.diff, changes=changes, verdict=verdict, reason=reason, point={}, runs=runs)
 

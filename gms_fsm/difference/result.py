@@ -106,7 +106,7 @@ class RunsDiff:
             return f"{self.about}: first difference at transition {self.number}"
         count = self.transitions[0]
         values = f", but {self._beyond} differ" if self.apart else ""
-        same = f"the same {count} transitions" if count else "no transition"
+        same = f"the same {count} transition{'s' * (count > 1)}" if count else "no transition"
         return f"{self.about}: {same}{values}"
 
     @property

@@ -84,7 +84,7 @@ def runs_diff(
     `same` says whether charts and numbers are the same, so that equal settings give the same bits.
     """
     called, slack = names or Translation(), within(a, b, same)
-    end = min(float(a.t[-1]), float(b.t[-1]))
+    end, open_end = min(float(a.t[-1]), float(b.t[-1])), bool(a.t[-1] != b.t[-1])
     logs = [[*run.transitions[run.transitions.t <= end]] for run in (a, b)]
     fired = [
         [_who(record, called if run is a else Translation(), run) for record in log]
@@ -94,7 +94,8 @@ def runs_diff(
     number = first_unlike(fired, times, slack)
     if number is not None and number >= min(map(len, logs)):  # at the very end it may be missing
         longer = times[0] if len(times[0]) > number else times[1]
-        number = None if longer[number] > end - slack else number
+        late = longer[number] > end - slack or (longer[number] == end and open_end)
+        number = None if late else number
     t = None
     if number is not None:
         t = min(each[number] for each in times if number < len(each))
@@ -104,7 +105,12 @@ def runs_diff(
     if start <= until:
         grid = np.linspace(start, until, SAMPLES)
         near = sorted(t for each in times for t in each) if slack and number is None else []
-        found = _compared(a, b, grid[_clear(grid, near, slack)], called, slack == 0.0)
+        near += [end] * (number is None and (open_end or slack > 0.0))
+        rows = _rows_of_both(a, b, start, until)
+        if slack == 0.0 and rows.size:  # what lies between other rows is interpolated otherwise
+            found = _compared(a, b, rows[_clear(rows, near, slack)], called, True)
+        if not found.count or found.beyond:
+            found = _compared(a, b, grid[_clear(grid, near, slack)], called, slack == 0.0)
     return RunsDiff(
         about,
         None if number is None else number + 1,
@@ -151,6 +157,13 @@ class _Compared:
     count: int = 0
     largest: dict[str, float] = field(default_factory=dict)
     beyond: list[str] = field(default_factory=list)
+
+
+def _rows_of_both(a: Trace, b: Trace, start: float, until: float) -> Any:
+    """Return the times in a span that are rows of both runs; none if all rows are."""
+    one, other = a.whole().t, b.whole().t
+    common = np.array([]) if np.array_equal(one, other) else np.intersect1d(one, other)
+    return common[(common >= start) & (common <= until)]
 
 
 def _clear(grid: Any, near: Sequence[float], slack: float) -> Any:

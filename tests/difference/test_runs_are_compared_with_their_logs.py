@@ -199,6 +199,16 @@ def test_runs_of_other_lengths_agree_within_their_tolerances() -> None:
     ]
 
 
+def test_a_run_that_a_condition_ended_is_not_called_equal() -> None:
+    found = diff(ran(t_end=20.0), ran(t_end=20.0, until="t > 15"))
+    assert found.summary.startswith("equivalent: the runs agree until t = 15")
+
+
+def test_other_rows_of_the_same_run_are_no_difference() -> None:
+    found = diff(ran(), ran(t_eval=[0.0, 7.0, 40.0]))
+    assert (found.verdict, found.runs is not None and found.runs.beyond) == ("equal", ())
+
+
 IDLE = Supervisor("idle", Chart("idle", inputs=(), velocities=(), states=(State("one"),)))
 
 
@@ -221,6 +231,12 @@ def test_further_states_are_compared() -> None:
 def test_sampled_values_are_compared() -> None:
     runs = [alone(sampled=(Sampled("A", period=0.1, updates={"u": u}),)) for u in ("u + 1", "2")]
     assert differing(*runs) == ("u",)
+
+
+def test_a_tick_at_the_end_of_the_shorter_run_is_no_difference() -> None:
+    sampler = Sampled("A", period=0.1, updates={"u": "u + 1"})
+    system = System("s", supervisors=(IDLE,), sampled=(sampler,))
+    assert diff(simulate(system, 1.0), simulate(system, 1.5)).verdict == "equivalent"
 
 
 def test_free_bodies_are_compared() -> None:
