@@ -171,7 +171,7 @@ def _variable(session: Session, name: str, usage: str) -> tuple[str, int]:
         raise SessionError(
             f"{name!r} cannot be poked", advice=f"{there_are(name, values)}; {usage}"
         )
-    if not form[2] and session.model.n > 1:
+    if not form[2] and session.model.n > 1 and form[1] not in session.model.chart.hidden:
         raise SessionError(f"{name!r} cannot be poked", advice=f"for element 1 write {name}1")
     return form[1], Elements(session, 0).taken("poke", [form[2] or "1"])
 

@@ -408,6 +408,8 @@ class _Reader:
             if here := [name for name in self.names if name.startswith(f"{function}(")]:
                 raise self.refuse(f"{function} takes a state of a machine", node, some_of(here))
             if function == "duration" and self.lasting:
+                if isinstance(node, ast.Call) and len(node.args) == 1:
+                    raise self.refuse("a comparison is missing", node, f"{ast.unparse(node)} >= 1")
                 raise self.refuse("duration takes one condition", node, "duration(v > 0) >= 1")
             raise self.refuse(f"{function} does not stand here", node, ELSEWHERE[function])
         if function not in NAMESPACE and function not in SHORT:
@@ -531,8 +533,6 @@ class _Reader:
                 return Relation(">=", Name("age"), self.value(time, depth))
             case ast.Call(func=ast.Name(id="is_in"), args=[ast.Attribute() as of]):
                 return Relation(">", self.name(node, f"is_in({ast.unparse(of)})"), Number(0.5))
-            case ast.Call(ast.Name("duration"), [_], []) if self.lasting:
-                raise self.refuse("a comparison is missing", node, f"{ast.unparse(node)} >= 1")
             case ast.Call(func=ast.Name(id="after"), args=given) if "age" in self.names:
                 wanted = "one time in seconds, for example after(0.2)"
                 raise self.refuse(f"after got {len(given)} arguments", node, wanted)

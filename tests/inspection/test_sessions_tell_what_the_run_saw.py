@@ -263,3 +263,8 @@ def test_a_clause_about_forces_has_their_unit() -> None:
 def test_how_long_a_condition_has_held_is_asked_as_the_chart_shows_it() -> None:
     (clause,) = Session(HEALS, pulled_mass()[1], 0.4).why(0, "heal").edges[0].clauses
     assert (clause.text, clause.margin, clause.unit) == ("duration(|v| < 0.3) >= T", -0.1, "s")
+
+
+def test_what_the_chart_makes_cannot_be_poked_without_a_number_either() -> None:
+    made = debugger(Session(HEALS, pulled_mass()[1], 0.4))
+    assert "duration is made by the chart" in made.reply("poke duration=0.2")
