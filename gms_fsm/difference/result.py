@@ -13,7 +13,7 @@ from gms_fsm.verification.sameness.same import Verdict
 
 WIDTH = 80  # characters of a line
 MOST_NAMED = 4  # quantities in a sentence
-UNITS = {"x": "m", "v": "m/s", "F": "N"}  # of what is compared of two runs
+UNITS = {"x": "m", "v": "m/s", "F": "N", "z": "m"}  # of what is compared of two runs
 ChangeKind: TypeAlias = Literal["added", "removed", "renamed", "changed"]
 SIGNS: Mapping[ChangeKind, str] = {"added": "+", "removed": "-", "renamed": "=", "changed": "~"}
 
@@ -124,7 +124,7 @@ class RunsDiff:
         values = ", ".join(
             f"{name} {in_words(each, UNITS.get(name.rsplit('.', 1)[-1], ''), 3)}"
             for name, each in self.largest.items()
-            if name in self.beyond or name.rsplit(".", 1)[-1] in UNITS
+            if name in self.beyond or (each > 0.0 and name.rsplit(".", 1)[-1] in UNITS)
         )
         none = f"none in {self.compared} quantities" if self.compared else "nothing compared"
         lines.append(f"  largest difference until t = {until:.9g} s: {values or none}")
