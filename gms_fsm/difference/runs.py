@@ -101,7 +101,7 @@ def runs_diff(
         t = min(each[number] for each in times if number < len(each))
     until = end if t is None else t
     start = max(float(a.t[0]), float(b.t[0]))
-    found = _Compared()
+    found = Quantities()
     if start <= until:
         grid = np.linspace(start, until, SAMPLES)
         near = sorted(t for each in times for t in each) if slack and number is None else []
@@ -151,7 +151,7 @@ def _told(a: Trace, b: Trace, logs: Sequence[Sequence[Any]], number: int | None)
 
 # --------------------------------------------------------------------------- quantities
 @dataclass
-class _Compared:
+class Quantities:
     """What was compared, its largest differences, and what differs by too much."""
 
     count: int = 0
@@ -175,12 +175,12 @@ def _clear(grid: Any, near: Sequence[float], slack: float) -> Any:
     return clear if clear.any() else ~clear
 
 
-def _compared(a: Trace, b: Trace, times: Any, called: Translation, exact: bool) -> _Compared:
+def _compared(a: Trace, b: Trace, times: Any, called: Translation, exact: bool) -> Quantities:
     """Compare all quantities that both runs have, at some times."""
     runs = [run.sample(times) for run in (a, b)]
     columns = [_columns(runs[0], called), _columns(runs[1], Translation())]
     rtol = max(float(run.settings["rtol"]) for run in (a, b))  # type: ignore[arg-type]
-    found = _Compared()
+    found = Quantities()
     for name, (one, least) in columns[0].items():
         other, also = columns[1].get(name, (None, 0.0))
         if other is None or one.shape != other.shape:
