@@ -28,7 +28,7 @@ from gms_fsm.language.functions import ROUGH
 from gms_fsm.language.tree import walk
 from gms_fsm.lowering.places import Places, total
 from gms_fsm.lowering.printing.names import computed_names
-from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall, moving
+from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall
 from gms_fsm.systems.reading.assembly import of
 from integrators import FOR_A_SIGN, LIVE, WAITING
 
@@ -181,18 +181,14 @@ class ProgramWriter(ABC):
         return CodeLine(f"{rough.name} = {value}", sizes | computed_names(call))
 
     def why(self, u: Value) -> int:
-        """Say why a sign is watched; one of the time alone changes while nothing moves.
+        """Say why a sign is watched; one that follows time changes while nothing moves."""
+        return FOR_A_SIGN | (WAITING if self.follows_time(u) else 0)
 
-        Not the sign of a given motion: there something moves, and errors limit the steps.
-        """
-        motions = {name for body in self.read.system.bodies for name in (body.x, body.v)}
-        alone = {*moving(self.read.expanded(u), self.read)} == {"t"}
-        alone = alone and not self.read.closure(names_in(u)) & motions
-        return FOR_A_SIGN | (WAITING if alone else 0)
-
-    # ------------------------------------------------------------------ what elements read first
     def follows_time(self, tree: Node) -> bool:
-        """Return whether a tree depends on time though nothing moves: not by way of a motion."""
+        """Return whether a tree depends on time though nothing moves.
+
+        Not by way of a given motion: there something moves, and errors limit the steps.
+        """
         found = {name for body in self.read.system.bodies for name in (body.x, body.v)}
         found |= {name for bank in self.read.banks for name in bank.velocities}
         waiting = [*names_in(tree)]
@@ -208,6 +204,7 @@ class ProgramWriter(ABC):
                 waiting += names_in(definition.tree)
         return False
 
+    # ------------------------------------------------------------------ what elements read first
     def element(self, bank: int, reads: frozenset[str], signs: Signs) -> list[CodeLine]:
         """Assign what lines read of an element: its variables, and what is computed from them."""
         needed = self.closure(reads)
