@@ -272,6 +272,7 @@ def test_two_runs_are_drawn_in_the_same_plots(open_page: Open) -> None:
     open_tab(page, "Time")
     assert names.first.is_hidden()
     page.set_viewport_size({"width": 1100, "height": 700})  # no room for three columns
+    page.wait_for_function("innerWidth === 1100")  # on a busy machine it comes later
     first, second = (box_of(page, f".run:nth-child({k}) .left") for k in (1, 2))
     assert first["y"] + first["height"] <= second["y"]
     assert page.evaluate(CUT_OFF, [".chart.pane", "svg"]) == []
