@@ -11,9 +11,9 @@ from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._quantities import Quantity
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import names_in, spell
-from gms_fsm.lowering.adapting import FUNCTIONS, Adapting, adapt, bind, text_of
-from gms_fsm.lowering.compiling import functions
+from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run.problem import Problem
+from gms_fsm.run.recording.following import adapting_of
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout
 from integrators.runners.compiled import is_known
@@ -65,23 +65,6 @@ def translate(
 def word_of(layout: BlockLayout, each: Quantity) -> int:
     """Return the first word of a quantity in the block."""
     return layout.offset(PLACES[each.place]) + each.index
-
-
-def adapting_of(start: Problem) -> Adapting:
-    """Return the functions that follow a start's numbers, and what they need."""
-    program = start.program
-    made = bind(text_of(program.plan), functions(program))
-    y, given = start.before_entry()
-    own: Any = {name: made[name] for name in FUNCTIONS}
-    return Adapting(
-        **own,
-        chosen=start.chosen_tolerances(),
-        y=y,
-        given=given,
-        span=[start.t_start, start.last],
-        sizes=[0.0] * len(y),
-        times=[0.0],
-    )
 
 
 def check_first_call(subject: Subject, words: Collection[str]) -> None:

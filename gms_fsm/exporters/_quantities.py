@@ -13,10 +13,9 @@ from gms_fsm.exporters._names import identifier
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import EVENT
 from gms_fsm.run.problem import Problem
-from gms_fsm.systems.reading.values import numbers_of
+from gms_fsm.systems.reading.values import CURVE, MODEL, WEIGHT, numbers_of
 from gms_fsm.systems.system import Contact, System
 
-CURVE, MODEL, WEIGHT = "curve ", "model ", "threshold weight"
 DERIVED = ("v dip", "v flat")  # computed from the other numbers of a curve
 
 

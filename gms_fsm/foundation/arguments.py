@@ -231,6 +231,10 @@ def pointing(ours: Mapping[str, str]) -> Callable[[Kind], Kind]:
 
     def add(kind: Kind) -> Kind:
         def missing(self: object, name: str) -> Any:
+            if make := vars(self).get(LATER):
+                vars(self).update(vars(make()))
+                vars(self).pop(LATER, None)
+                return getattr(self, name)
             if hasattr(kind, name):
                 return object.__getattribute__(self, name)  # raises what the property has raised
             cure = f"; write {ours[name]}" if name in ours else ""
@@ -240,6 +244,28 @@ def pointing(ours: Mapping[str, str]) -> Callable[[Kind], Kind]:
         return kind
 
     return add
+
+
+LATER = "_made_later"
+
+
+def later(kind: type[Any], make: Callable[[], Any], **known: Any) -> Any:
+    """Return an object of a class that `pointing` decorates; `make` is called when it is read.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @pointing({})
+    ... @dataclass(frozen=True)
+    ... class Run:
+    ...     v: float
+    >>> later(Run, lambda: Run(0.2)).v
+    0.2
+    """
+    new = object.__new__(kind)
+    vars(new).update(known)
+    vars(new)[LATER] = make
+    return new
 
 
 # --------------------------------------------------------------------------- names

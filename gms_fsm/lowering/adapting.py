@@ -10,6 +10,7 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from types import FunctionType
 from typing import Any, NamedTuple
 
 from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
@@ -246,6 +247,19 @@ def adaptive(plan: ProgramPlan, functions: Mapping[str, Callable[..., Any]]) -> 
 
 
 # --------------------------------------------------------------------------- in machine code
+OF_A_RUN = "functions buffers log.seen buffers.sliding.live more"  # the arguments of `adapt`
+
+
+@functools.lru_cache(maxsize=64)
+def stamp_of(plan: ProgramPlan) -> str:
+    """Return a hash of what `adapt` does for a plan."""
+    from integrators.runners.compiled import digest
+
+    helpers = [each for each in HELPERS.values() if isinstance(each, FunctionType)]
+    constants = SHARE, LOOKS, ROUNDED, LIMIT
+    return digest(adapt, dip_of, flat_of, larger, *helpers, text=f"{constants} {text_of(plan)}")
+
+
 class Adapting(NamedTuple):
     """These functions, and what they need: part of the block of an export."""
 

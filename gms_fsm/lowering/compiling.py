@@ -20,6 +20,7 @@ from gms_fsm.foundation.extras import missing
 from gms_fsm.foundation.store import CodeFolder
 from gms_fsm.foundation.text import visible
 from gms_fsm.language.functions import sgn
+from gms_fsm.lowering.adapting import OF_A_RUN, adapt, stamp_of
 from gms_fsm.lowering.generated import SIGNALS, load
 from gms_fsm.lowering.observing import on_surfaces
 from gms_fsm.lowering.program import Arguments, Program, guarded
@@ -61,12 +62,14 @@ def _table(rows: list[list[float]]) -> FloatArray:
 
 
 def engine(program: Program, run: RecordArguments) -> CompiledFunction:
-    """Return the loop of a program as machine code."""
+    """Return the loop of a program as machine code, and `adapt` as its entry of that name."""
     from integrators.runners import compiled
 
     check_llvmlite()
+    text = f"{text_of(program)} {stamp_of(program.plan)}"
+    follow = compiled.Entry("adapt", adapt, OF_A_RUN)
     with _lock:
-        return compiled.engine(text_of(program), run, _calls(program), store(), notify)
+        return compiled.engine(text, run, _calls(program), store(), notify, [follow])
 
 
 def text_of(program: Program) -> str:
@@ -137,7 +140,7 @@ def observe_rows(
 
 
 @dataclass(frozen=True)
-class Prepared:
+class ReadyCode:
     """What calls of one kind have in common: machine code, and a block as it is at the beginning.
 
     Parameters
@@ -179,10 +182,10 @@ class Prepared:
             self._spare.append(block)
 
 
-_observers: dict[int, Prepared] = {}
+_observers: dict[int, ReadyCode] = {}
 
 
-def _observer(program: Program) -> Prepared:
+def _observer(program: Program) -> ReadyCode:
     from integrators.runners import compiled
 
     check_llvmlite()
@@ -201,5 +204,5 @@ def _observer(program: Program) -> Prepared:
             store(),
             notify,
         )
-        _observers[key] = Prepared(*made, program.functions)
+        _observers[key] = ReadyCode(*made, program.functions)
         return _observers[key]

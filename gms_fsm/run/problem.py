@@ -117,6 +117,11 @@ class Problem:
         """Return the firings of a run from its records."""
         return Firings.of(records, self.program.layout, of_system=self.what.named)
 
+    def fired(self, t: Any, machine: Any, edge: Any, numbers: Any) -> Firings:
+        """Return the firings of a run from the columns of its log."""
+        layout, of_system = self.program.layout, self.what.named
+        return Firings.counted(t, machine, edge, numbers, layout, of_system=of_system)
+
     def edge(self, machine: int, edge: int) -> tuple[BankPlaces, Transition]:
         """Return the contact of a machine and one of its edges, by their numbers in the run."""
         bank = self.program.layout.bank(machine)

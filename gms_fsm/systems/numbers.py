@@ -20,6 +20,7 @@ from gms_fsm.foundation.arguments import one_of, unknown
 from gms_fsm.systems.models import GMS, ChartModel, Model, parameters_of
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.parts import Contact
+from gms_fsm.systems.reading.values import CURVE, MODEL, WEIGHT, of
 from gms_fsm.systems.rigs import with_numbers as with_numbers_of_rig
 
 NUMBERS = "numbers"  # the owner of those that belong to no contact
@@ -94,6 +95,17 @@ def value_in(what: Mounted, name: str) -> float | FloatArray:
         return each.sigma_2
     assert each.stribeck is not None  # else the name would not be known
     return float(getattr(each.stribeck, own))
+
+
+def label_in(what: Mounted, name: str) -> str:
+    """Return what the trees call a number by its name in `known_in`, as `value_in` finds it."""
+    owner, own = _owner(what, name)
+    if owner == NUMBERS:
+        return own
+    if own in what.system.contact(owner).values:
+        return of(owner, own)
+    special = {WEIGHTS.name: WEIGHT, SIGMA_2.name: f"{MODEL}{own}"}
+    return of(owner, special.get(own, f"{CURVE}{own}"))
 
 
 def varied(what: Mounted, values: Mapping[str, ArrayLike]) -> Mounted:

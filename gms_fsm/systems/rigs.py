@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Protocol
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import Parameter, checked_scalar
+from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.display import short_repr
 from gms_fsm.foundation.equality import by_value
@@ -230,4 +231,10 @@ def with_numbers(rig: Rig, values: Mapping[str, ArrayLike]) -> Rig:
     0.2
     """
     new: Any = {name: values[name] for name in rig.numbers if name in values}
+    if new and not dataclasses.is_dataclass(rig):
+        raise ParameterError(
+            "its numbers cannot be changed, because it is no dataclass",
+            place=f"rig {rig.title!r}",
+            advice="make it a frozen dataclass with its numbers as fields",
+        )
     return dataclasses.replace(rig, **new) if new else rig  # type: ignore[type-var]

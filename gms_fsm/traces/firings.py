@@ -56,18 +56,12 @@ class Firings:
         return int(self.t.size)
 
     @classmethod
-    def copied(
-        cls, columns: Mapping[str, NDArray[Any]], layout: SystemLayout, *, of_system: bool
+    def counted(
+        cls, t: Any, machine: Any, edge: Any, numbers: Any, layout: SystemLayout, *, of_system: bool
     ) -> Firings:
-        """Return firings with their own copy of the four columns."""
-        return cls(
-            columns["t"].copy(),
-            columns["machine"].astype(np.int32),
-            columns["edge"].astype(np.int32),
-            columns["numbers"].copy(),
-            layout,
-            of_system and columns["t"].size > 0,
-        )
+        """Return firings from columns of their own, with codes of any length."""
+        codes = machine.astype(np.int32), edge.astype(np.int32)
+        return cls(t, *codes, numbers, layout, of_system and t.size > 0)
 
     @classmethod
     def of(cls, records: Iterable[LogRecord], layout: SystemLayout, *, of_system: bool) -> Firings:

@@ -75,10 +75,7 @@ def record(
         event = run_to_event(functions, machines, motion, b, most_steps)
         t = min(now.t, now.seen)
         if event == ROWS:
-            for row in range(memory.taken, out.row):
-                log.rows_microstep[row] = 0
-                _put_modes(now.mode, b.sliding.flags, log.rows_mode[row])
-            memory.taken = out.row
+            _put_rows(now.mode, b, log)
             if memory.phase == ARC:
                 return ROWS
         elif event == FIRING:
@@ -100,7 +97,16 @@ def record(
             switched = event in (FIRED, SLID)
             _put_stop(now, memory, out, b.sliding.flags, log, switched)
         if event == DONE:
+            _put_rows(now.mode, b, log)
             return DONE
+
+
+def _put_rows(mode: list[int], b: Buffers, log: LogColumns) -> None:
+    """Write the modes of the rows since the last event."""
+    for row in range(b.memory.taken, b.out.row):
+        log.rows_microstep[row] = 0
+        _put_modes(mode, b.sliding.flags, log.rows_mode[row])
+    b.memory.taken = b.out.row
 
 
 def _is_full(out: Output, log: LogColumns) -> bool:

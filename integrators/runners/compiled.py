@@ -52,6 +52,7 @@ __all__ = [
     "CodeStore",
     "CompiledFunction",
     "CompiledStepper",
+    "Entry",
     "RecordArguments",
     "StepArguments",
     "digest",
@@ -90,13 +91,38 @@ INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", 
 
 
 class RecordArguments(NamedTuple):
-    """The arguments of `integrators.runners.columns.record`, without the last two."""
+    """The arguments of `integrators.runners.columns.record`, without the last two, and more."""
 
     functions: Functions
     machines: Machines
     buffers: Buffers
     log: LogColumns
     recorded: Recorded
+    more: Any = ()  # what further entries need
+
+
+class Entry(NamedTuple):
+    """A function that can be called from outside, by the name of its entry.
+
+    Parameters
+    ----------
+    name : str
+        Of the entry.
+    function : callable
+        A function of the subset.
+    parts : str
+        The parts of the block that are its first arguments, as in `BlockLayout.part`; all if empty.
+    extra : tuple of str
+        Integers that are passed besides the block.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    parts: str = ""
+    extra: tuple[str, ...] = ()
+
+
+RECORD = "functions machines buffers log recorded"
 
 
 class StepArguments(NamedTuple):
@@ -296,25 +322,23 @@ def is_known(part: Any) -> bool:
 
 def _made(
     text: str,
-    function: Callable[..., Any],
     arguments: Any,
-    extra: Sequence[str],
+    entries: Sequence[Entry],
     calls: Sequence[Callable[[float], float]],
     store: CodeStore | None,
     notify: Callable[[str], None],
 ) -> CompiledFunction:
-    """Return an engine from the store, or compile it."""
+    """Return an engine from the store, or compile it; it calls the first entry."""
     layout = BlockLayout(arguments, is_known, inside=_longest(arguments) <= LONGEST_INSIDE)
-    library = _library(text, function, arguments, layout, extra, store, notify)
-    return CompiledFunction(layout, library, calls, len(extra))
+    library = _library(text, arguments, layout, entries, store, notify)
+    return CompiledFunction(layout, library, calls, len(entries[0].extra))
 
 
 def _library(
     text: str,
-    function: Callable[..., Any],
     arguments: Any,
     layout: BlockLayout,
-    extra: Sequence[str],
+    entries: Sequence[Entry],
     store: CodeStore | None,
     notify: Callable[[str], None],
     *,
@@ -325,18 +349,28 @@ def _library(
     fixed = [
         getattr(part, "__name__", part) for part in parts_of(arguments, is_known) if is_known(part)
     ]
-    what = edition(), function.__name__, text, layout.key(), fixed, target_name()
-    name = f"{function.__name__}-{hashlib.sha256(repr(what).encode()).hexdigest()[:24]}"
+    named = [(name, function.__name__, *rest) for name, function, *rest in entries]
+    what = edition(), named, text, layout.key(), fixed, target_name()
+    called = entries[0].function.__name__
+    name = f"{called}-{hashlib.sha256(repr(what).encode()).hexdigest()[:24]}"
     content = None if store is None else store.get(name)
     if content is None:
         started = time.perf_counter()
         notify("compiling, once for each chart and method ...")
-        fields = layout.value.fields.values()
         translator = Translator(INLINE)
-        numbers = [NumberValue(Local("i", each)) for each in extra]
-        made = translator.entry("entry", function, [*fields, *numbers])
+        made = [
+            translator.entry(
+                entry.name,
+                entry.function,
+                [
+                    *map(layout.part, entry.parts.split() or layout.value.fields),
+                    *(NumberValue(Local("i", extra)) for extra in entry.extra),
+                ],
+            )
+            for entry in entries
+        ]
         if each:
-            translator.for_each("each", made, layout.words)
+            translator.for_each("each", made[0], layout.words)
         content = objects.compiled(llvm_text(translator.module))
         if store is not None:
             store.put(name, content)
@@ -363,6 +397,7 @@ def engine(
     calls: Sequence[Callable[[float], float]],
     store: CodeStore | None,
     notify: Callable[[str], None],
+    more: Sequence[Entry] = (),
 ) -> CompiledFunction:
     """Return `integrators.runners.columns.record` as machine code for one system.
 
@@ -378,13 +413,16 @@ def engine(
         The cache for machine code.
     notify : callable
         Called with a text before the system is compiled, which takes a while, and afterwards.
+    more : sequence of Entry
+        Further functions on the same block; `text` changes with them, too.
 
     Returns
     -------
     CompiledFunction
         To be called with a block, the largest number of steps, and whether to pause.
     """
-    return _made(text, columns.record, arguments, ("steps", "pause"), calls, store, notify)
+    record = Entry("entry", columns.record, RECORD, ("steps", "pause"))
+    return _made(text, arguments, (record, *more), calls, store, notify)
 
 
 @dataclass(eq=False)
@@ -429,9 +467,9 @@ def stepper(
         blocks, one after the other in memory, and returns the sum of what it returns.
     """
     layout = BlockLayout(arguments, is_known)
-    step_to = stepping.step_to
+    entry = Entry("entry", stepping.step_to)
     return CompiledStepper(
-        layout, _library(text, step_to, arguments, layout, (), store, notify, each=True)
+        layout, _library(text, arguments, layout, [entry], store, notify, each=True)
     )
 
 
@@ -527,5 +565,5 @@ def observer(
         seen=[0.0] * seen,
         table=table,
     )
-    extra = "start", "count"
-    return _made(text, observing.observe_rows, rows, extra, calls, store, notify), rows
+    entry = Entry("entry", observing.observe_rows, extra=("start", "count"))
+    return _made(text, rows, [entry], calls, store, notify), rows

@@ -15,6 +15,7 @@ from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.problem import Problem
+from gms_fsm.run.recording.following import adapting_of
 from gms_fsm.run.recording.moment import Place, Recording
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.run.recording.recording import check_end, explained, interference_error
@@ -189,6 +190,11 @@ class Columns:
 
     def run(self, most_steps: int, *, pause: bool) -> int:
         """Run the machine code; see `integrators.runners.columns.record`."""
+        self.write()
+        return self.engine(self.block, most_steps, pause)
+
+    def write(self) -> None:
+        """Write everything that machine code reads into the block."""
         functions = self.run_of.functions
         places: Any = functions.p
         shared, own, tables = self.p
@@ -199,7 +205,6 @@ class Columns:
                 buffers=self.buffers,
             )
         )
-        return self.engine(self.block, most_steps, pause)
 
     def reset(self, what: Mounted) -> None:
         """Empty the columns and return to the start, with other numbers."""
@@ -342,6 +347,8 @@ class Columns:
         """Write the modes of the last rows, which the loop would write with the next event."""
         b: Any = self.buffers
         log: Any = self.log
+        if b.memory.taken == b.out.row:
+            return
         fresh = slice(int(b.memory.taken), int(b.out.row))
         modes = [*b.now.mode.tolist(), *b.sliding.flags.tolist()]
         log.rows_microstep[fresh], log.rows_mode[fresh] = 0, modes
@@ -381,13 +388,16 @@ class Columns:
 
     def fired(self) -> Firings:
         """Return the firings so far."""
-        start, count = self.start, self.log.firings
-        names = ("t", "machine", "edge", "numbers")
-        columns = {name: getattr(self.log, name)[:count] for name in names}
-        return Firings.copied(columns, start.program.layout, of_system=start.what.named)
+        count, log = self.log.firings, self.log
+        columns: Any = (log.t, log.machine, log.edge, log.numbers)
+        return self.start.fired(*(each[:count].copy() for each in columns))
 
     def trace(self) -> Trace:
         """Return the trace of all recorded data."""
+        return self.start.trace(*self.contents())
+
+    def contents(self) -> tuple[Rows, Rows, Firings]:
+        """Return the rows, both sides of every stop, and the log."""
         start, log = self.start, self.log
         if start.output == "end":
             t, y, mode = self.latest
@@ -410,13 +420,13 @@ class Columns:
                 log.stops_y,
                 log.stops_mode,
             )
-        return start.trace(rows, stops, self.fired())
+        return rows, stops, self.fired()
 
 
-_known: dict[Any, compiled.Prepared] = {}
+_known: dict[Any, compiled.ReadyCode] = {}
 
 
-def _prepared(start: Problem) -> compiled.Prepared:
+def _prepared(start: Problem) -> compiled.ReadyCode:
     """Return what a run has in common with others: what moves, the method, and the sizes."""
     program = start.program
     flow = "flow" if start.options.located else "flow_live"
@@ -424,9 +434,9 @@ def _prepared(start: Problem) -> compiled.Prepared:
     if key not in _known:
         if len(_known) >= compiled.MOST_ENGINES:
             _known.clear()
-        run = example_of(start)
+        run = example_of(start)._replace(more=adapting_of(start))
         engine = compiled.engine(program, run)
-        _known[key] = compiled.Prepared(engine, run, program.functions)
+        _known[key] = compiled.ReadyCode(engine, run, program.functions)
     return _known[key]
 
 

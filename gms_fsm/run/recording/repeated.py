@@ -1,0 +1,128 @@
+"""A compiled run that begins anew in its own block: other numbers are other words there."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gms_fsm.run.problem import Problem
+from gms_fsm.run.recording.compiled_run import STEPS_AT_ONCE, WORTH_A_LOOK, Columns
+from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
+from gms_fsm.traces.firings import Firings
+from gms_fsm.traces.rows import Rows
+from integrators import loop
+
+
+class Place(NamedTuple):
+    """Where a number is: alone, or a row of one for each element, or one of these."""
+
+    row: int
+    own: bool  # of the elements
+    element: Any = None  # an index; None for all elements
+
+
+class RepeatedRun:
+    """A run whose columns, machine code and plan serve again and again, in one thread at a time.
+
+    Parameters
+    ----------
+    start : Problem
+        For the engine ``"compiled"``; no signal of it is a Python function.
+    """
+
+    def __init__(self, start: Problem) -> None:
+        self.columns = columns = Columns(start)
+        run, layout = columns.run_of, columns.block.layout
+        more: Any = run.more
+        more.chosen[:] = start.chosen_tolerances()
+        more.y[:], more.given[:] = start.before_entry()
+        more.span[:] = start.t_start, start.last
+        columns.write()
+        self.shared: Any = run.functions.p[0]
+        self.own: Any = run.functions.p[1]
+        self.scale = layout.offset("buffers.plan.control.time_scale")
+        self.floats = columns.block.words.view(float)
+        self.first = columns.block.copy()
+        call = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)
+        library = columns.engine.library
+        self._adapt: Any = call(library.address("adapt"))
+
+    def put(self, numbers: Iterable[tuple[Place, Any]]) -> None:
+        """Return to the start, with some other numbers."""
+        self.columns.block.restore(self.first)
+        for (row, own, element), value in numbers:
+            if not own:
+                self.shared[row] = value
+            elif element is None:
+                self.own[row, : len(value) if np.ndim(value) else None] = value
+            else:
+                self.own[row, element] = value
+
+    def value(self, place: Place) -> Any:
+        """Return a number that was put, or those of all elements."""
+        row, own, element = place
+        return (
+            self.shared[row] if not own else self.own[row, element if element is not None else ...]
+        )
+
+    def follow(self) -> None:
+        """Let everything follow from the numbers."""
+        columns = self.columns
+        self.floats[self.scale] = self._adapt(columns.block.address)
+        if len(columns.log.stops_t):
+            columns.log.stops_y[0] = columns.buffers.now.y
+
+    def run(self, start: Callable[[], Problem]) -> bool:
+        """Run to the end; False if it stops before, for a reason that a run of its own gives.
+
+        `start` returns the problem with the present numbers.
+        """
+        columns = self.columns
+        out, most, next_look = columns.buffers.out, columns.start.options.max_steps, PATIENCE
+        while (event := columns.engine(columns.block, STEPS_AT_ONCE, False)) == loop.ROWS:
+            if out.steps >= next_look and most - out.steps >= WORTH_A_LOOK:
+                next_look = LATER * out.steps
+                columns.start = start()
+                check_pace(columns, columns.as_lists())
+            self._make_room()
+        return event == loop.DONE
+
+    def _make_room(self) -> None:
+        """Double the columns that are full; from now on they are as long from the start."""
+        scale = self.floats[self.scale]
+        self.columns.make_room()
+        self.columns.write()
+        self.floats[self.scale] = scale
+        words = self.columns.block.words
+        for offset, lengths, _ in self.columns.block.layout.column_offsets.values():
+            column = slice(offset, offset + 1 + lengths)
+            self.first[0][column] = words[column]
+
+    def taken(self) -> Callable[[], tuple[Rows, Rows, Firings]]:
+        """Copy rows, stops and log; what is returned makes the objects of them."""
+        columns: Any = self.columns
+        if columns.start.output != "all" or columns.packed:
+            found = columns.contents()
+            if columns.handed_out:
+                self._make_room()
+            columns.packed = ()
+            return lambda: found
+        out, log = columns.buffers.out, columns.log
+        count, fired = out.row, log.firings
+        t, microstep, y, mode = (
+            out.rows_t[:count].copy(),
+            log.rows_microstep[:count].copy(),
+            out.rows_y[:count].copy(),
+            log.rows_mode[:count].copy(),
+        )
+        switches = log.t[:fired], log.machine[:fired], log.edge[:fired], log.numbers[:fired]
+        copies = [each.copy() for each in switches]
+
+        def made() -> tuple[Rows, Rows, Firings]:
+            rows = Rows(t, microstep, y, mode)
+            return rows, rows, columns.start.fired(*copies)
+
+        return made

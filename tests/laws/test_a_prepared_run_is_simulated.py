@@ -1,0 +1,66 @@
+"""A run that is prepared and repeated with other numbers has the bits of `simulate` with these.
+
+Whatever was run before in the same memory, whatever is recorded; errors too.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gms_fsm import (
+    Prepared,
+    Trace,
+    prepare,
+    simulate,
+)
+from gms_fsm.errors import GMSError
+from gms_fsm.systems.mounted import mounted
+from gms_fsm.systems.numbers import known_in, value_in, varied
+from tests.corpus import CORPUS, FAILING, each, run
+from tests.helpers import FASTEST, other_parts
+from tests.laws.test_a_sweep_is_many_runs import LEFT_OUT
+
+FACTORS = (1.01, 1.0, 0.99)
+
+
+def alone(name: str, numbers: dict[str, Any], **more: Any) -> tuple[Trace | None, str]:
+    """Simulate a run with other numbers; return what was computed, and how it failed."""
+    one = run(name)
+    try:
+        what = varied(mounted(*one.subject), numbers)
+        subject: Any = (what.system,) if what.named else (what.model, what.rig)
+        return simulate(*subject, one.t_end, **{**one.how, **more}), ""
+    except GMSError as error:
+        return getattr(error, "trace", None), f"{type(error).__name__}: {error}"
+
+
+def repeated(ready: Prepared, numbers: dict[str, Any]) -> tuple[Trace | None, str]:
+    """Do the same with a run that is prepared."""
+    try:
+        return ready(numbers), ""
+    except GMSError as error:
+        return getattr(error, "trace", None), f"{type(error).__name__}: {error}"
+
+
+@each([*CORPUS, *FAILING])
+def test_every_number_can_be_changed(name: str) -> None:
+    one = run(name)
+    what = mounted(*one.subject)
+    values = {
+        each: np.asarray(value_in(what, each)) for each in known_in(what) if each not in LEFT_OUT
+    }
+    how = {"engine": FASTEST}
+    ready = prepare(*one.subject, one.t_end, **{**one.how, **how})
+    for by in FACTORS:
+        numbers = {each: by * u for each, u in values.items()}
+        theirs, why = alone(name, numbers, **how)
+        ours, too = repeated(ready, numbers)
+        assert too == why
+        assert other_parts(theirs, ours) == []
+        if not why and theirs is not None:
+            end, last = ready.end(numbers), theirs.rows
+            assert (end.t, end.y) == (last.t[-1], tuple(last.y[-1].tolist()))
+            assert end.transitions == len(theirs.firings)
+            assert len(ready.names) == len(end.y)
