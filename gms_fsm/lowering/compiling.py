@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from integrators.machine_code.layout import MemoryBlock
     from integrators.runners.compiled import CompiledFunction, RecordArguments
 
+OF_MANY = "functions machines buffers log recorded more.adapting more.repeats"
 Packed = tuple[FloatArray, FloatArray, FloatArray]
 MOST_ENGINES = 256  # in memory
 MOST_SPARE = 4  # blocks that are kept for further calls
@@ -64,12 +65,16 @@ def _table(rows: list[list[float]]) -> FloatArray:
 def engine(program: Program, run: RecordArguments) -> CompiledFunction:
     """Return the loop of a program as machine code, and `adapt` as its entry of that name."""
     from integrators.runners import compiled
+    from integrators.runners.repeating import repeat
 
     check_llvmlite()
     text = f"{text_of(program)} {stamp_of(program.plan)}"
-    follow = compiled.Entry("adapt", adapt, OF_A_RUN)
+    more = [
+        compiled.Entry("adapt", adapt, OF_A_RUN),
+        compiled.Entry("repeat", repeat, OF_MANY, ("start", "count", "steps")),
+    ]
     with _lock:
-        return compiled.engine(text, run, _calls(program), store(), notify, [follow])
+        return compiled.engine(text, run, _calls(program), store(), notify, more)
 
 
 def text_of(program: Program) -> str:

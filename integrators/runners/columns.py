@@ -105,7 +105,7 @@ def _put_rows(mode: list[int], b: Buffers, log: LogColumns) -> None:
     """Write the modes of the rows since the last event."""
     for row in range(b.memory.taken, b.out.row):
         log.rows_microstep[row] = 0
-        _put_modes(mode, b.sliding.flags, log.rows_mode[row])
+        put_modes(mode, b.sliding.flags, log.rows_mode[row])
     b.memory.taken = b.out.row
 
 
@@ -141,7 +141,7 @@ def _put_stop(
         row = out.row
         put_row(out, t, now.y)
         log.rows_microstep[row] = memory.microstep
-        _put_modes(now.mode, flags, log.rows_mode[row])
+        put_modes(now.mode, flags, log.rows_mode[row])
         memory.taken = out.row
     if len(log.stops_t) > 0:
         row = log.stops
@@ -149,11 +149,11 @@ def _put_stop(
         log.stops_microstep[row] = memory.microstep if switched else 0
         for j in range(len(now.y)):
             log.stops_y[row][j] = now.y[j]
-        _put_modes(now.mode, flags, log.stops_mode[row])
+        put_modes(now.mode, flags, log.stops_mode[row])
         log.stops += 1
 
 
-def _put_modes(mode: list[int], flags: list[int], place: list[int]) -> None:
+def put_modes(mode: list[int], flags: list[int], place: list[int]) -> None:
     n = len(mode)
     for i in range(n):
         place[i] = mode[i]

@@ -40,7 +40,7 @@ from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.tree import Local
-from integrators.runners import columns, observing, stepping
+from integrators.runners import columns, observing, repeating, stepping
 from integrators.runners.columns import LogColumns, Recorded
 from integrators.runners.stepping import Sample
 from integrators.sliding import Functions, Held, Sliding
@@ -67,7 +67,7 @@ __all__ = [
 # What is translated: the loop, and what it calls.
 LOOPS = (
     elementary, whole_numbers, steps, step_size, crossings, advance, sliding, sliding_bounds, jolts,
-    loop, columns, stepping, observing,
+    loop, columns, stepping, observing, repeating,
 )  # fmt: skip
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8

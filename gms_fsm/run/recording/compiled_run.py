@@ -15,7 +15,7 @@ from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.recording.following import adapting_of
+from gms_fsm.run.recording.following import following_of
 from gms_fsm.run.recording.moment import Place, Recording
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.run.recording.recording import check_end, explained, interference_error
@@ -296,9 +296,13 @@ class Columns:
                 _double(out, "rows_t", "rows_y")
                 _double(log, "rows_microstep", "rows_mode")
         if log.firings >= len(log.t):
-            _double(log, "t", "machine", "edge", "numbers")
+            self.make_room_for_firings()
         if 0 < len(log.stops_t) <= log.stops:
             _double(log, "stops_t", "stops_microstep", "stops_y", "stops_mode")
+
+    def make_room_for_firings(self) -> None:
+        """Double the columns of the log."""
+        _double(self.log, "t", "machine", "edge", "numbers")
 
     def _columns(self) -> tuple[Any, ...]:
         """Return the columns of rows."""
@@ -434,7 +438,7 @@ def _prepared(start: Problem) -> compiled.ReadyCode:
     if key not in _known:
         if len(_known) >= compiled.MOST_ENGINES:
             _known.clear()
-        run = example_of(start)._replace(more=adapting_of(start))
+        run = example_of(start)._replace(more=following_of(start))
         engine = compiled.engine(program, run)
         _known[key] = compiled.ReadyCode(engine, run, program.functions)
     return _known[key]

@@ -1,12 +1,43 @@
-"""What machine code needs to let everything follow from the numbers of a run."""
+"""What machine code needs to let everything follow from the numbers of a run, and to repeat it."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from gms_fsm.lowering.adapting import FUNCTIONS, Adapting, bind, text_of
+from gms_fsm.lowering.adapting import FUNCTIONS, Adapting, adapt, bind, text_of
 from gms_fsm.lowering.compiling import functions
 from gms_fsm.run.problem import Problem
+from integrators.runners.repeating import Repeats
+
+
+class Following(NamedTuple):
+    """What is in the block of a run besides the arguments of `record`."""
+
+    adapting: Adapting
+    repeats: Repeats
+
+
+def following_of(start: Problem) -> Following:
+    """Return it for a start, with columns that any number of runs may have."""
+    from integrators.machine_code.layout import OuterArray
+
+    column: Any = OuterArray
+    layout = start.program.layout
+    width = 1 + layout.y.size + layout.observed.size
+    repeats = Repeats(
+        adapt,
+        words=column("i"),
+        floats=column(),
+        first=column("i"),
+        scale=[0],
+        rows=column("i"),
+        columns=column("i"),
+        values=column(table=True),
+        end=column("f", width),
+        mode=column("i", layout.modes),
+        counts=column("i", 2),
+    )
+    return Following(adapting_of(start), repeats)
 
 
 def adapting_of(start: Problem) -> Adapting:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import STEPS_AT_ONCE, WORTH_A_LOOK, Columns
@@ -24,6 +25,18 @@ class Place(NamedTuple):
     element: Any = None  # an index; None for all elements
 
 
+class Ends(NamedTuple):
+    """How many runs have ended."""
+
+    end: NDArray[np.float64]  # (runs, values): the time, the state, what is observed
+    mode: NDArray[np.int64]  # (runs, modes)
+    counts: NDArray[np.int64]  # (runs, 2): the last event, and how often an edge fired
+    log: tuple[Any, ...]  # times, machines, edges and numbers of all firings, run by run
+
+
+STEPS = 100_000  # of one run between two others
+
+
 class RepeatedRun:
     """A run whose columns, machine code and plan serve again and again, in one thread at a time.
 
@@ -36,10 +49,11 @@ class RepeatedRun:
     def __init__(self, start: Problem) -> None:
         self.columns = columns = Columns(start)
         run, layout = columns.run_of, columns.block.layout
-        more: Any = run.more
+        more: Any = run.more.adapting
         more.chosen[:] = start.chosen_tolerances()
         more.y[:], more.given[:] = start.before_entry()
         more.span[:] = start.t_start, start.last
+        run.more.repeats.scale[0] = layout.offset("buffers.plan.control.time_scale")
         columns.write()
         self.shared: Any = run.functions.p[0]
         self.own: Any = run.functions.p[1]
@@ -49,6 +63,8 @@ class RepeatedRun:
         call = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)
         library = columns.engine.library
         self._adapt: Any = call(library.address("adapt"))
+        several = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, *[ctypes.c_int64] * 3)
+        self._repeat: Any = several(library.address("repeat"))
 
     def put(self, numbers: Iterable[tuple[Place, Any]]) -> None:
         """Return to the start, with some other numbers."""
@@ -90,10 +106,51 @@ class RepeatedRun:
             self._make_room()
         return event == loop.DONE
 
+    def many(self, places: Sequence[Place], values: NDArray[np.float64]) -> Ends:
+        """Make one run after the other, each with a row of values; output must be ``"end"``."""
+        columns: Any = self.columns
+        program, runs = columns.start.program, len(values)
+        width = 1 + program.layout.y.size + program.layout.observed.size
+        rows, elements = ([getattr(u, name) for u in places] for name in ("row", "element"))
+        found = Ends(
+            np.empty((runs, width)),
+            np.empty((runs, program.layout.modes), dtype=np.int64),
+            np.empty((runs, 2), dtype=np.int64),
+            (),
+        )
+        more = columns.run_of.more
+        repeats = more.repeats._replace(
+            words=columns.block.words,
+            floats=self.floats,
+            first=self.first[0],
+            rows=np.array(rows, dtype=np.int64),
+            columns=np.array([-1 if u is None else u for u in elements], dtype=np.int64),
+            values=values,
+            end=found.end,
+            mode=found.mode,
+            counts=found.counts,
+        )
+        columns.run_of = columns.run_of._replace(more=more._replace(repeats=repeats))
+        self._write()
+        columns.block.restore(self.first)
+        made = 0
+        while (made := self._repeat(columns.block.address, made, runs, STEPS)) < runs:
+            fired = columns.log.firings
+            columns.make_room_for_firings()
+            self._write()
+            columns.log.firings = fired
+        log, count = columns.log, columns.log.firings
+        switches = log.t[:count], log.machine[:count], log.edge[:count], log.numbers[:count]
+        return found._replace(log=tuple(each.copy() for each in switches))
+
     def _make_room(self) -> None:
         """Double the columns that are full; from now on they are as long from the start."""
-        scale = self.floats[self.scale]
         self.columns.make_room()
+        self._write()
+
+    def _write(self) -> None:
+        """Say where the columns are, now and whenever a run begins."""
+        scale = self.floats[self.scale]
         self.columns.write()
         self.floats[self.scale] = scale
         words = self.columns.block.words
