@@ -49,6 +49,29 @@ def clauses(condition: Condition) -> tuple[Condition, ...]:
     return condition.operands if isinstance(condition, Both) else (condition,)
 
 
+def relations(condition: Condition) -> tuple[Relation, ...]:
+    """Return the comparisons of a condition, in the order of the text; one may stand twice.
+
+    Parameters
+    ----------
+    condition : Condition
+        For example a guard.
+
+    Returns
+    -------
+    tuple of Relation
+        Also those inside ``not``, as they are written.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import parse_condition, relations, spell
+    >>> guard = parse_condition("z >= s and (v > 0 or not z >= s)", "zsv")
+    >>> [spell(part) for part in relations(guard)]
+    ['z >= s', 'v > 0.0', 'z >= s']
+    """
+    return tuple(node for node in walk(condition) if isinstance(node, Relation))
+
+
 # --------------------------------------------------------------------------- atomic comparisons
 @dataclass(frozen=True)
 class Comparison:

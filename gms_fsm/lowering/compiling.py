@@ -23,6 +23,7 @@ from gms_fsm.language.functions import sgn
 from gms_fsm.lowering.adapting import OF_A_RUN, adapt, stamp_of
 from gms_fsm.lowering.generated import SIGNALS, load
 from gms_fsm.lowering.observing import on_surfaces
+from gms_fsm.lowering.printing.counting import Counting
 from gms_fsm.lowering.program import Arguments, Program, guarded
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from integrators.machine_code.layout import MemoryBlock
     from integrators.runners.compiled import CompiledFunction, RecordArguments
 
-OF_MANY = "functions machines buffers log recorded more.adapting more.repeats"
+OF_MANY = "functions machines buffers log recorded tally more.adapting more.repeats"
 Packed = tuple[FloatArray, FloatArray, FloatArray]
 MOST_ENGINES = 256  # in memory
 MOST_SPARE = 4  # blocks that are kept for further calls
@@ -62,13 +63,19 @@ def _table(rows: list[list[float]]) -> FloatArray:
     return np.array(padded, dtype=np.float64).reshape(len(rows), length)
 
 
-def engine(program: Program, run: RecordArguments) -> CompiledFunction:
-    """Return the loop of a program as machine code, and `adapt` as its entry of that name."""
+def engine(
+    program: Program, run: RecordArguments, counting: Counting | None = None
+) -> CompiledFunction:
+    """Return the loop of a program as machine code, which may count its rows.
+
+    Its further entries `adapt` and `repeat` let everything follow from other numbers.
+    """
     from integrators.runners import compiled
     from integrators.runners.repeating import repeat
 
     check_llvmlite()
-    text = f"{text_of(program)} {stamp_of(program.plan)}"
+    own = text_of(program, "" if counting is None else counting.source)
+    text = f"{own} {stamp_of(program.plan)}"
     more = [
         compiled.Entry("adapt", adapt, OF_A_RUN),
         compiled.Entry("repeat", repeat, OF_MANY, ("start", "count", "steps")),
@@ -77,11 +84,11 @@ def engine(program: Program, run: RecordArguments) -> CompiledFunction:
         return compiled.engine(text, run, _calls(program), store(), notify, more)
 
 
-def text_of(program: Program) -> str:
-    """Return what the machine code of a program depends on: its text, and what the text calls."""
+def text_of(program: Program, more: str = "") -> str:
+    """Return what machine code depends on: a program's text, more text, and what these call."""
     from integrators.runners.compiled import digest
 
-    return digest(sgn, piecewise_linear, piecewise_slope, text=program.source)
+    return digest(sgn, piecewise_linear, piecewise_slope, text=program.source + more)
 
 
 def _calls(program: Program) -> list[Callable[[float], float]]:
@@ -92,6 +99,12 @@ def _calls(program: Program) -> list[Callable[[float], float]]:
 def functions(program: Program) -> Mapping[str, Any]:
     """Return a program's functions in the form that is translated to machine code."""
     return _loaded(program.source, tuple(program.callables))
+
+
+def count_of(program: Program, counting: Counting) -> Callable[..., Any]:
+    """Return the function that counts rows, in the form that is translated to machine code."""
+    made: Callable[..., Any] = _loaded(counting.source, tuple(program.callables))["count"]
+    return made
 
 
 @functools.lru_cache(maxsize=64)

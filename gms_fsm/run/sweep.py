@@ -22,10 +22,11 @@ from gms_fsm.foundation.display import Log
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.lowering.observing import observe
+from gms_fsm.lowering.printing.counting import Counting, counting_of
 from gms_fsm.lowering.program import Program, same_text
 from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.recording.compiled_run import CompiledRun
+from gms_fsm.run.recording.compiled_run import CompiledRun, CountTables
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.systems.models import Model
@@ -33,7 +34,7 @@ from gms_fsm.systems.mounted import Mounted, mounted, shifted
 from gms_fsm.systems.numbers import column_name, known_in, varied
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
-from gms_fsm.traces.coverage.counting import FiredEdges, of_log, of_trace
+from gms_fsm.traces.coverage.counting import FiredEdges, LogCounts, of_log, of_tables, of_trace
 from gms_fsm.traces.coverage.total import Coverage
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
@@ -89,8 +90,7 @@ def sweep(
     progress : bool, optional
         Show a progress bar on standard error; by default if that is a terminal.
     coverage : bool
-        Whether `Sweep.coverage` counts the clauses of guards, too. Every run then keeps its rows
-        until they are counted.
+        Whether `Sweep.coverage` counts the clauses of guards, too.
     **options
         Fields of `Settings` by name, which override those of `settings`.
 
@@ -119,7 +119,7 @@ def sweep(
     what = mounted(model, on, begin.settings.held_period)
     if begin.settings.engine == "compiled":
         check_llvmlite()
-    begin.start(what)  # errors common to all runs are raised once, here
+    begin = begin.counting(begin.start(what))  # errors common to all runs are raised once, here
     values = _values(what, given)
     runs = len(next(iter(values.values())))
     if executor is not None and not hasattr(executor, "submit"):
@@ -128,7 +128,7 @@ def sweep(
             place="executor",
             value=executor,
         )
-    collected = _Collected(what, runs, begin.settings.t_eval)
+    collected = _Collected(what, runs, begin)
     size = max(1, min(AT_ONCE, runs // AT_ONCE))
     chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
     # Dask treats tasks with equal arguments as one, and returns an earlier failure as their result.
@@ -137,7 +137,7 @@ def sweep(
         if executor is None:
             executor = stack.enter_context(_threads())
         shown = stack.enter_context(_bar(runs, progress))
-        waiting: dict[Future[list[_Result]], range] = {}
+        waiting: dict[Future[_Results], range] = {}
         try:
             with _interrupts_deferred():
                 for chunk in chunks:
@@ -240,7 +240,15 @@ class _Result:
     log: NDArray[Any]
     rows: Mapping[str, FloatArray] | None
     ends: Mapping[str, float] = field(default_factory=dict)  # of bodies, states, sampled values
-    coverage: Coverage | None = None  # if it was asked for
+    coverage: Coverage | None = None  # if it was asked for, and counted from rows
+
+
+@dataclass(frozen=True, eq=False)
+class _Results:
+    """Some runs, and the tables in which all of them counted their rows."""
+
+    runs: list[_Result]
+    tables: CountTables | None = None
 
 
 @dataclass(frozen=True)
@@ -252,10 +260,21 @@ class _Common:
     initial: Mapping[str, Any] | None
     settings: Settings
     coverage: bool = False
+    counted: Counting | None = None  # how machine code counts rows, so that none is kept
+
+    def counting(self, start: Problem) -> _Common:
+        """Return the same with rows counted as they come, where that is possible.
+
+        Functions of the user's are not called for it: they might fail.
+        """
+        program, own = start.program, self.settings.output == "end"
+        if self.coverage and own and start.chosen.engine == "compiled" and not program.callables:
+            return replace(self, counted=counting_of(program.plan))
+        return self
 
     def start(self, what: Mounted) -> Problem:
         settings = self.settings
-        if self.coverage and settings.output == "end":
+        if self.coverage and self.counted is None and settings.output == "end":
             settings = replace(settings, output="all")
         return Problem.on(what, self.t_end, settings, t_start=self.t_start, initial=self.initial)
 
@@ -290,10 +309,11 @@ def _run_chunk(
     begin: _Common,
     part: Mapping[str, FloatArray],
     _sweep: str,
-) -> list[_Result]:
+) -> _Results:
     """Run some sets of parameters, one after the other, for one sweep."""
     results = []
     compiled: CompiledRun | None = None
+    tables = None if begin.counted is None else CountTables.empty(begin.counted)
     for row in range(len(next(iter(part.values())))):
         values = {name: array[row] for name, array in part.items()}
         run: Run | CompiledRun | None = None
@@ -304,15 +324,16 @@ def _run_chunk(
                 compiled.reset(its)  # the same buffers and machine code
                 run = compiled
             elif begin.settings.engine == "compiled":
-                run = compiled = CompiledRun(begin.start(its))
+                run = compiled = CompiledRun(begin.start(its), tables=tables)
             else:
                 run = Run(begin.start(its))
             while run.advance():
                 pass
         except GMSError as error:
             outcome, message = type(error).__name__, cut(str(error), LONGEST - 10)
-        results.append(_result(run, outcome, message, begin.coverage))
-    return results
+        watched = begin.coverage and tables is None
+        results.append(_result(run, outcome, message, watched))
+    return _Results(results, tables)
 
 
 def _result(
@@ -392,7 +413,7 @@ class _NotDelivered(Exception):
     """A task did not reach a worker: something in it cannot be pickled."""
 
 
-def _results(future: Future[list[_Result]], count: int) -> list[_Result]:
+def _results(future: Future[_Results], count: int) -> _Results:
     """Return the results of a task; a lost task gives rows that say so."""
     try:
         return future.result()
@@ -402,21 +423,21 @@ def _results(future: Future[list[_Result]], count: int) -> list[_Result]:
             "expressions in t or as arrays, or use threads (executor=None)"
         )
         lost = _Result("NotSent", message, None, np.empty(0, dtype=LOG), None)
-        return [lost] * count
+        return _Results([lost] * count)
     except Exception as error:  # a broken pool, a worker out of memory, or an unpicklable result
         message = (
             f"the worker failed: {type(error).__name__}: {cut(str(error), LONGEST // 2)}; run "
             "these again, or use threads (executor=None)"
         )
         lost = _Result(type(error).__name__, message, None, np.empty(0, dtype=LOG), None)
-        return [lost] * count
+        return _Results([lost] * count)
 
 
 class _Collected:
     """Preallocated columns, filled in any order."""
 
-    def __init__(self, what: Mounted, runs: int, t_eval: ArrayLike | None) -> None:
-        self.what = what
+    def __init__(self, what: Mounted, runs: int, begin: _Common) -> None:
+        self.what, self.counted, t_eval = what, begin.counted, begin.settings.t_eval
         n, several = sum(each.n for each in what.system.machines), len(what.system.machines)
         columns = (several,) if several > 1 else ()
         self.times = np.array([] if t_eval is None else t_eval, dtype=np.float64)
@@ -428,16 +449,18 @@ class _Collected:
         self.mode = np.full((runs, n), -1, dtype=np.int64)
         self.logs: list[NDArray[Any]] = [np.empty(0, dtype=LOG)] * runs
         rows = runs, self.times.size
-        self.coverage: Coverage | None = None  # so far: logs of all runs at once would take memory
+        self.covered: Coverage | None = None  # so far, from rows
+        self.fired: list[LogCounts] = []  # so far: logs of all runs at once would take memory
+        self.tables = None if self.counted is None else CountTables.empty(self.counted)
         self.rows: dict[str, FloatArray] = {}
         if t_eval is not None:
             self.rows = {name: np.full((*rows, *columns), np.nan) for name in ("x", "v", "F")}
             self.rows["z"] = np.full((*rows, n), np.nan)
             self.rows |= {row_name(name): np.full(rows, np.nan) for name in what.values}
 
-    def take(self, chunk: range, results: Sequence[_Result]) -> None:
+    def take(self, chunk: range, results: _Results) -> None:
         """Store results in their rows."""
-        for run, result in zip(chunk, results, strict=True):
+        for run, result in zip(chunk, results.runs, strict=True):
             self.outcome[run], self.message[run] = result.outcome, result.message
             result.log["run"] = run
             self.logs[run] = result.log
@@ -449,28 +472,48 @@ class _Collected:
                 self.ends[name][run] = value
             for name, values in (result.rows or {}).items():
                 self.rows[name][run, : len(values)] = values
-        found = [each.coverage for each in results if each.coverage is not None]
-        found = found or [self._covered(chunk)]
-        self.coverage = Coverage.merged([*filter(None, [self.coverage]), *found])
+        found = [each.coverage for each in results.runs if each.coverage is not None]
+        if found:
+            self.covered = Coverage.merged([*filter(None, [self.covered]), *found])
+            return
+        if self.tables is not None and results.tables is not None:
+            self.tables.add(results.tables)
+        fired = self._fired(chunk)
+        pairs = zip(self.fired, fired, strict=True)
+        self.fired = [a + b for a, b in pairs] if self.fired else fired
 
-    def _covered(self, chunk: range) -> Coverage:
+    def _fired(self, chunk: range) -> list[LogCounts]:
         """Return what the logs of some runs show of each chart."""
         logs = self.logs[chunk.start : chunk.stop]
         # Column by column: numpy compares the names of all columns at each step.
         run, owner, which = (
             np.concatenate([log[name] for log in logs]) for name in ("run", "element", "edge")
         )
-        parts, element, edge = {}, 0, 0
+        found, element, edge = list[LogCounts](), 0, 0
         for each in self.what.system.machines:
-            chart, end = each.chart, element + each.n
+            end = element + each.n
             mine = (owner >= element) & (owner < end)
             last = self.mode[chunk.start : chunk.stop, element:end]
             fired = FiredEdges(
                 run[mine] - chunk.start, owner[mine] - element, which[mine] - edge, last
             )
-            parts[each.name if self.what.named else ""] = of_log(chart, fired)
-            element, edge = end, edge + len(chart.transitions)
-        return Coverage(parts)
+            found.append(LogCounts.of(each.chart, fired))
+            element, edge = end, edge + len(each.chart.transitions)
+        return found
+
+    def coverage(self) -> Coverage:
+        """Return what all runs have tried."""
+        contacts = self.what.system.machines
+        names = [each.name if self.what.named else "" for each in contacts]
+        if not self.fired:
+            assert self.covered is not None
+            return self.covered
+        parts = [of_log(each.chart, log) for each, log in zip(contacts, self.fired, strict=True)]
+        if self.tables is not None:
+            tables = zip(contacts, self.fired, self.tables.parts(), strict=True)
+            parts = [of_tables(each.chart, log, *part) for each, log, part in tables]
+        own = Coverage(dict(zip(names, parts, strict=True)))
+        return own if self.covered is None else self.covered + own
 
     def sweep(self, parameters: Mapping[str, FloatArray]) -> Sweep:
         """Return the sweep with all results."""
@@ -495,7 +538,7 @@ class _Collected:
             rows=self.rows,
             ends=self.ends,
             owners=np.array(owners if self.what.named else [], dtype=np.str_),
-            coverage=self.coverage,
+            coverage=self.coverage(),
         )
 
 

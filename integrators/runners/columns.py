@@ -5,8 +5,9 @@ Everything is in arrays, so that the whole function can be machine code.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from integrators.advance import Output, put_row
 from integrators.loop import (
@@ -31,6 +32,20 @@ class Recorded(NamedTuple):
 
     own: list[int]  # place in y of its own variable, -1 if it has none
     seen: list[list[int]]  # three places among what is observed; the third is read after, too
+
+
+class Tally(NamedTuple):
+    """Counts of rows, in place of the rows themselves; without places nothing is counted."""
+
+    count: Callable[..., Any]  # count(t, y, mode, p, counts, near)
+    counts: list[int]
+    near: Vector
+
+
+def counts_nothing(
+    t: float, y: Vector, mode: list[int], p: Any, counts: list[int], near: Vector
+) -> None:
+    """Count no row."""
 
 
 @dataclass(slots=True, eq=False)
@@ -58,12 +73,14 @@ def record(
     b: Buffers,
     log: LogColumns,
     recorded: Recorded,
+    tally: Tally,
     most_steps: int,
     pause: bool,
 ) -> int:
     """Run and write all events into columns, until they are full or the run has ended."""
     observe, now = machines.observe, b.now
-    memory, out = b.memory, b.out
+    memory, out, p = b.memory, b.out, functions.p
+    counting, last = len(tally.counts) > 0, b.out.steps + most_steps
     seen_at = float("nan")  # the time at which log.seen was computed
     on = Held(functions, now.held, b.sliding)
     motion = ArcMotion(flow_on, margins_on, on, follow_on)
@@ -75,8 +92,13 @@ def record(
         event = run_to_event(functions, machines, motion, b, most_steps)
         t = min(now.t, now.seen)
         if event == ROWS:
-            _put_rows(now.mode, b, log)
-            if memory.phase == ARC:
+            for row in range(memory.taken, out.row):
+                log.rows_microstep[row] = 0
+                put_modes(now.mode, b.sliding.flags, log.rows_mode[row])
+            memory.taken = out.row
+            if counting:
+                _count(out, memory, log, tally, p)
+            if memory.phase == ARC and (not counting or out.steps >= last):
                 return ROWS
         elif event == FIRING:
             if seen_at != t:
@@ -96,17 +118,21 @@ def record(
         if event not in (ROWS, FIRING):
             switched = event in (FIRED, SLID)
             _put_stop(now, memory, out, b.sliding.flags, log, switched)
+            if counting:
+                _count(out, memory, log, tally, p)
         if event == DONE:
-            _put_rows(now.mode, b, log)
             return DONE
 
 
-def _put_rows(mode: list[int], b: Buffers, log: LogColumns) -> None:
-    """Write the modes of the rows since the last event."""
-    for row in range(b.memory.taken, b.out.row):
-        log.rows_microstep[row] = 0
-        put_modes(mode, b.sliding.flags, log.rows_mode[row])
-    b.memory.taken = b.out.row
+def _count(out: Output, memory: Memory, log: LogColumns, tally: Tally, p: Any) -> None:
+    """Count the rows whose modes are known, and forget them; all that there are."""
+    if memory.taken == out.row:
+        for row in range(out.row):
+            tally.count(
+                out.rows_t[row], out.rows_y[row], log.rows_mode[row], p, tally.counts, tally.near
+            )
+        out.row = 0
+        memory.taken = 0
 
 
 def _is_full(out: Output, log: LogColumns) -> bool:

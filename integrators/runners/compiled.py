@@ -41,7 +41,7 @@ from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.tree import Local
 from integrators.runners import columns, observing, repeating, stepping
-from integrators.runners.columns import LogColumns, Recorded
+from integrators.runners.columns import LogColumns, Recorded, Tally, counts_nothing
 from integrators.runners.stepping import Sample
 from integrators.sliding import Functions, Held, Sliding
 from integrators.steps import Coefficients
@@ -80,7 +80,7 @@ NOT_INLINE = [
     "scaled_size", "starting_step", "retry_factor", "next_on_grid", "raise_floor", "longest_next",
     "_search", "_put_wanted", "_put_firing", "_put_stop", "_begin_arc", "_choose_stop", "_fired",
     "_finish", "_held", "_jump", "_list", "_make_due", "_no_progress", "_often_changed",
-    "_only_due", "only_let_go", "_pick", "jolted", "arrived", "jolts", "_act", "_refuse",
+    "_only_due", "only_let_go", "_pick", "jolted", "arrived", "jolts", "_act", "_refuse", "_count",
     "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
     "advance", "_begin", "_impulse", "step_to",
     "arm_on", "drop", "entangled", "let_go", "look_back", "look_held", "release", "_ask", "_bears",
@@ -98,6 +98,7 @@ class RecordArguments(NamedTuple):
     buffers: Buffers
     log: LogColumns
     recorded: Recorded
+    tally: Tally
     more: Any = ()  # what further entries need
 
 
@@ -122,7 +123,7 @@ class Entry(NamedTuple):
     extra: tuple[str, ...] = ()
 
 
-RECORD = "functions machines buffers log recorded"
+RECORD = "functions machines buffers log recorded tally"
 
 
 class StepArguments(NamedTuple):
@@ -474,7 +475,7 @@ def stepper(
 
 
 def example(functions: Functions, machines: Machines, b: Buffers, observed: int, recorded: Recorded,
-            modes: int) -> RecordArguments:  # fmt: skip
+            modes: int, count: Callable[..., Any] | None = None) -> RecordArguments:  # fmt: skip
     """Return the arguments of `integrators.runners.columns.record`, with columns that may grow.
 
     Parameters
@@ -489,6 +490,8 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
         Where the numbers are that the log stores.
     modes : int
         Number of modes that are stored with a row.
+    count : callable, optional
+        ``count(t, y, mode, p, counts, near)``, to count rows instead of keeping them.
 
     Returns
     -------
@@ -517,7 +520,10 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
     p: Any = functions.p
     shared, own, _ = p
     functions = functions._replace(p=(shared, own, OuterArray(table=True)))
-    return RecordArguments(functions, machines, b._replace(plan=plan, out=out), log, recorded)
+    tally = Tally(counts_nothing, [], [])
+    if count is not None:
+        tally = Tally(count, column("i"), column())
+    return RecordArguments(functions, machines, b._replace(plan=plan, out=out), log, recorded, tally)
 
 
 def observer(

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from integrators.loop import ROWS, Buffers, Machines
-from integrators.runners.columns import LogColumns, Recorded, put_modes, record
+from integrators.runners.columns import LogColumns, Recorded, Tally, put_modes, record
 from integrators.runners.observing import observe_row
 from integrators.sliding import Functions, Held
 from integrators.steps import Vector
@@ -37,6 +37,7 @@ def repeat(
     b: Buffers,
     log: LogColumns,
     recorded: Recorded,
+    tally: Tally,
     more: Any,
     repeats: Repeats,
     start: int,
@@ -64,7 +65,7 @@ def repeat(
                 own[row][column] = values[j]
         time = repeats.follow(functions, b, log.seen, b.sliding.live, more)
         repeats.floats[repeats.scale[0]] = time
-        event = record(functions, machines, b, log, recorded, most_steps, False)
+        event = record(functions, machines, b, log, recorded, tally, most_steps, False)
         if event == ROWS and log.firings >= len(log.t):
             log.firings = fired
             return run

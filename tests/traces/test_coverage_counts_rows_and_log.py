@@ -32,7 +32,7 @@ from gms_fsm.language import Relation, evaluate
 from gms_fsm.language.tree import walk
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import varied
-from gms_fsm.traces.coverage.counting import FiredEdges, of_log
+from gms_fsm.traces.coverage.counting import FiredEdges, LogCounts, of_log
 from gms_fsm.traces.coverage.counts import ChartCoverage
 from gms_fsm.traces.scope import Scope
 from tests import supervisor_cases, systems_cases
@@ -291,7 +291,12 @@ def test_the_log_of_a_thousand_runs_is_counted_in_a_tenth_of_their_time() -> Non
     states = [state.name for state in model.chart.states]
     last = np.vectorize(states.index)(result.states)
     begin = time.perf_counter()
-    found = of_log(model.chart, FiredEdges(log["run"], log["element"], log["edge"], last))
+    found = of_log(
+        model.chart,
+        LogCounts.of(
+            model.chart, FiredEdges(log["run"], log["element"], log["edge"], last)
+        ),
+    )
     assert time.perf_counter() - begin < 0.1 * took
     assert found == coverage(result).contact()
     assert found.runs == 1000

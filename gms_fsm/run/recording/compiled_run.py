@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import functools
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.errors import SignalError
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
 from gms_fsm.lowering.program import equations
+from gms_fsm.lowering.printing.counting import Counting, CountPlaces
 from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.following import following_of
@@ -28,7 +31,7 @@ from integrators import hybrid, loop
 from integrators.loop import Memory
 from integrators.machine_code.records import arrays_of, put_numbers
 from integrators.runners import states
-from integrators.runners.columns import LogColumns, Recorded
+from integrators.runners.columns import LogColumns, Recorded, Tally
 from integrators.sliding import Functions, Sliding
 from integrators.steps import Now
 
@@ -38,7 +41,46 @@ if TYPE_CHECKING:
 WORTH_A_LOOK = 500_000  # steps: machine code takes fewer in less time than it takes to look ahead
 LARGE = 4_000_000  # bytes of the columns of rows at the beginning, at most
 WIDE = 256  # states and modes from which on rows are packed when their columns are full
+COUNTED_AT_ONCE = 64  # rows: few, so that they stay near the processor
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
+
+
+@dataclass(frozen=True, eq=False)
+class CountTables:
+    """The counts of rows of many runs; runs add to them.
+
+    Parameters
+    ----------
+    counting : Counting
+        What is counted, and where.
+    counts : ndarray of int
+        By the truths of guards, of each element.
+    near : ndarray of float
+        How near both sides of each comparison came, infinity if not yet.
+    """
+
+    counting: Counting
+    counts: NDArray[np.int64]
+    near: NDArray[np.float64]
+
+    @classmethod
+    def empty(cls, counting: Counting) -> CountTables:
+        """Return tables without counts."""
+        counts = np.zeros(counting.counts, dtype=np.int64)
+        return cls(counting, counts, np.full(counting.distances, np.inf))
+
+    def add(self, other: CountTables) -> None:
+        """Add the counts of other runs."""
+        np.add(self.counts, other.counts, out=self.counts)
+        np.minimum(self.near, other.near, out=self.near)
+
+    def parts(self) -> Iterator[tuple[CountPlaces, NDArray[np.int64], NDArray[np.float64]]]:
+        """Yield for each contact its places, counts, one row for each element, and distances."""
+        first = nearest = 0
+        for own, n in zip(self.counting.places, self.counting.sizes, strict=True):
+            counts = self.counts[first : first + n * own.counts].reshape(n, own.counts)
+            yield own, counts, self.near[nearest : nearest + own.distances]
+            first, nearest = first + n * own.counts, nearest + own.distances
 
 
 class CompiledRun:
@@ -50,11 +92,18 @@ class CompiledRun:
         The run to perform.
     machines : MachineEngine, optional
         With the user's own machines: each firing is replayed through them.
+    tables : CountTables, optional
+        Where every step's row is counted; such a run keeps only its end.
     """
 
-    def __init__(self, start: Problem, machines: MachineEngine | None = None) -> None:
+    def __init__(
+        self,
+        start: Problem,
+        machines: MachineEngine | None = None,
+        tables: CountTables | None = None,
+    ) -> None:
         self.start = start
-        self.columns = Columns(start)
+        self.columns = Columns(start, tables=tables)
         self.recorder: Recording = self.columns
         self.engine = machines
         self.next_look = PATIENCE
@@ -142,13 +191,22 @@ class Columns:
         The run.
     p : tuple of ndarray, optional
         Parameters that replace the program's own.
+    tables : CountTables, optional
+        Where rows are counted.
     """
 
-    def __init__(self, start: Problem, p: compiled.Packed | None = None) -> None:
-        self.start = start
+    def __init__(
+        self,
+        start: Problem,
+        p: compiled.Packed | None = None,
+        tables: CountTables | None = None,
+    ) -> None:
+        if tables is not None:  # every step
+            start = replace(start, options=replace(start.options, times=None))
+        self.start, self.tables = start, tables
         layout = start.program.layout
         size, modes = layout.y.size, layout.modes
-        self.prepared = _prepared(start)
+        self.prepared = _prepared(start, None if tables is None else tables.counting)
         self.engine, self.block = self.prepared.engine, self.prepared.block()
         # A method __del__ would run while the interpreter ends, too, where modules are emptied.
         weakref.finalize(self, self.prepared.take_back, self.block).atexit = False
@@ -158,6 +216,8 @@ class Columns:
         rows = {"all": few, "t_eval": 0, "end": 0}[start.output]
         if start.options.times is not None:
             rows = len(start.options.times)
+        elif tables is not None:
+            rows = COUNTED_AT_ONCE
         stops = few if start.output == "t_eval" else 0
         floats: Any = np.zeros  # the columns' fields are typed as lists; compiled code uses arrays
         ints: Any = functools.partial(np.zeros, dtype=np.int64)
@@ -203,8 +263,18 @@ class Columns:
             self.run_of._replace(
                 functions=functions._replace(p=(*places[:2], tables)),
                 buffers=self.buffers,
+                tally=self._tally(),
             )
         )
+
+    def _tally(self) -> Tally:
+        """Return the tables of counts, if there are any."""
+        tally = self.run_of.tally
+        if self.tables is None:
+            return tally
+        counts: Any = self.tables.counts  # arrays
+        near: Any = self.tables.near
+        return tally._replace(counts=counts, near=near)
 
     def reset(self, what: Mounted) -> None:
         """Empty the columns and return to the start, with other numbers."""
@@ -430,21 +500,21 @@ class Columns:
 _known: dict[Any, compiled.ReadyCode] = {}
 
 
-def _prepared(start: Problem) -> compiled.ReadyCode:
+def _prepared(start: Problem, counting: Counting | None) -> compiled.ReadyCode:
     """Return what a run has in common with others: what moves, the method, and the sizes."""
     program = start.program
     flow = "flow" if start.options.located else "flow_live"
-    key = id(program.functions), flow, start.options.method
+    key = id(program.functions), flow, start.options.method, counting is not None
     if key not in _known:
         if len(_known) >= compiled.MOST_ENGINES:
             _known.clear()
-        run = example_of(start)._replace(more=following_of(start))
-        engine = compiled.engine(program, run)
+        run = example_of(start, counting)._replace(more=following_of(start))
+        engine = compiled.engine(program, run, counting)
         _known[key] = compiled.ReadyCode(engine, run, program.functions)
     return _known[key]
 
 
-def example_of(start: Problem) -> RecordArguments:
+def example_of(start: Problem, counting: Counting | None = None) -> RecordArguments:
     """Return the arguments of `integrators.runners.columns.record`, with columns that may grow."""
     from integrators.runners.compiled import example
 
@@ -461,6 +531,7 @@ def example_of(start: Problem) -> RecordArguments:
         layout.observed.size,
         Recorded(*map(_integers, layout.recorded)),
         layout.modes,
+        None if counting is None else compiled.count_of(program, counting),
     )
 
 

@@ -1,4 +1,4 @@
-"""Counting the coverage of runs: of one from its rows and its log, of many from their log alone."""
+"""Counting the coverage of runs: of one from its rows and its log, of many from tables and logs."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.language import Relation, Value, names_in, truths, values_of
+from gms_fsm.lowering.printing.counting import CountPlaces
 from gms_fsm.traces.coverage.counts import ChartCoverage, EdgeCoverage, StateCoverage
 from gms_fsm.traces.coverage.decisions import Decision, decisions
 from gms_fsm.traces.coverage.total import Coverage
@@ -40,12 +41,11 @@ def of_view(trace: Trace) -> ChartCoverage:
     element, edge = trace.firings.machine - places.first, trace.firings.edge - places.first_edge
     log = FiredEdges(np.zeros_like(element), element, edge, mode[:, -1:].T)
     if len(trace) == 1 and trace.t[0] != trace.settings.get("t_start"):  # the end alone
-        return of_log(chart, log)
-    log = replace(log, first=mode[:, :1].T)
-    taken = log.taken(chart)
+        return of_log(chart, LogCounts.of(chart, log))
+    found = LogCounts.of(chart, replace(log, first=mode[:, :1].T))
     values = _Values(trace, chart, mode)
-    asked = [values.asked(row, not taken[row].any()) for row in range(len(taken))]
-    return _made(chart, log, _per_element(mode, len(chart.states)), asked, watched=1)
+    asked = [values.asked(row, not each.any()) for row, each in enumerate(found.taken)]
+    return found.coverage(chart, _per_element(mode, len(chart.states)), asked, watched=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,24 +89,94 @@ class FiredEdges:
         return found
 
 
-def of_log(chart: Chart, log: FiredEdges) -> ChartCoverage:
+@dataclass(frozen=True, eq=False)
+class LogCounts:
+    """What the logs of some runs show of one chart, to be added up.
+
+    Parameters
+    ----------
+    taken, entered : ndarray of int, shape (edges, n) and (states, n)
+        How often each element took each edge and entered each state.
+    runs : int
+        Number of runs that have started.
+    """
+
+    taken: NDArray[np.int64]
+    entered: NDArray[np.int64]
+    runs: int
+
+    @classmethod
+    def of(cls, chart: Chart, log: FiredEdges) -> LogCounts:
+        """Return the counts of some logs."""
+        runs = int((log.last >= 0).all(axis=1).sum())
+        return cls(log.taken(chart), log.entered(chart), runs)
+
+    def __add__(self, other: LogCounts) -> LogCounts:
+        return LogCounts(
+            self.taken + other.taken, self.entered + other.entered, self.runs + other.runs
+        )
+
+    def coverage(
+        self, chart: Chart, rows: NDArray[np.int64], asked: Sequence[Asked], watched: int
+    ) -> ChartCoverage:
+        """Return the coverage of a chart, with the rows in each state and what guards saw there."""
+        states = zip(chart.states, rows.tolist(), self.entered.tolist(), strict=True)
+        edges = zip(chart.transitions, self.taken.tolist(), asked, strict=True)
+        return ChartCoverage(
+            chart,
+            tuple(StateCoverage(state.name, tuple(a), tuple(b)) for state, a, b in states),
+            tuple(EdgeCoverage(edge.name, edge.source, tuple(a), *b) for edge, a, b in edges),
+            self.runs,
+            watched,
+        )
+
+
+def of_log(chart: Chart, log: LogCounts) -> ChartCoverage:
     """Return what is known of runs that kept no rows: states and edges."""
-    rows = np.zeros((len(chart.states), log.last.shape[1]), dtype=np.int64)
-    return _made(chart, log, rows, [({}, {})] * len(chart.transitions), watched=0)
+    rows = np.zeros_like(log.entered)
+    return log.coverage(chart, rows, [({}, {})] * len(chart.transitions), watched=0)
 
 
-def _made(
-    chart: Chart, log: FiredEdges, rows: NDArray[np.int64], asked: Sequence[Asked], watched: int
+def of_tables(
+    chart: Chart,
+    log: LogCounts,
+    places: CountPlaces,
+    counts: NDArray[np.int64],
+    near: NDArray[np.float64],
 ) -> ChartCoverage:
-    states = zip(chart.states, rows.tolist(), log.entered(chart).tolist(), strict=True)
-    edges = zip(chart.transitions, log.taken(chart).tolist(), asked, strict=True)
-    return ChartCoverage(
-        chart,
-        tuple(StateCoverage(state.name, tuple(a), tuple(b)) for state, a, b in states),
-        tuple(EdgeCoverage(edge.name, edge.source, tuple(a), *b) for edge, a, b in edges),
-        runs=int((log.last >= 0).all(axis=1).sum()),
-        watched=watched,
-    )
+    """Return what is known of runs whose rows were counted as they came.
+
+    The counts have shape (n, `CountPlaces.counts`), near shape (`CountPlaces.distances`,).
+    """
+    rows = np.zeros_like(log.entered)
+    asked: list[Asked] = [({}, {})] * len(chart.transitions)
+    guards = decisions(chart)
+    for group in places.groups:
+        table = counts[:, group.first : group.first + group.size]
+        rows[group.state] = table.sum(axis=1)
+        seen, many = np.flatnonzero(table.any(axis=0)), len(group.comparisons)
+        distances = near[group.nearest :][: group.size * many].reshape(group.size, many)[seen]
+        for edge in group.edges:
+            parts = guards[chart.transitions[edge].name].comparisons
+            bits = [group.comparisons.index(part) for part in parts]
+            true = (seen[:, np.newaxis] >> (many - 1 - np.array(bits, dtype=np.int64))) & 1
+            apart = np.where(true, 0.0, distances[:, bits])
+            asked[edge] = _by_vector(true, table[:, seen].T, apart, not log.taken[edge].any())
+    return log.coverage(chart, rows, asked, watched=log.runs)
+
+
+def _by_vector(
+    true: NDArray[np.int64], rows: NDArray[np.int64], apart: NDArray[Any], margins: bool
+) -> Asked:
+    """Return counts and least distances by truth vector; each occurs in one row or more."""
+    asked, closest = dict[str, Any](), dict[str, Any]()
+    found = ["".join(map(str, each)) for each in true.tolist()]
+    for vector in sorted({*found}):
+        mine = np.array([each == vector for each in found])
+        asked[vector] = tuple(rows[mine].sum(axis=0).tolist())
+        if margins:
+            closest[vector] = tuple(apart[mine].min(axis=0).tolist())
+    return asked, closest
 
 
 class _Values:

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.equality import ByIdentity
-from gms_fsm.language import Both, Condition, Either, Not, Relation, clauses
-from gms_fsm.language.tree import walk
+from gms_fsm.language import Both, Condition, Either, Not, Relation, clauses, relations
 
 
 @dataclass(frozen=True)
@@ -43,8 +42,7 @@ class Decision:
     @classmethod
     def of(cls, guard: Condition) -> Decision:
         """Return the decision of a guard."""
-        found = (node for node in walk(guard) if isinstance(node, Relation))
-        return cls(guard, tuple(dict.fromkeys(found)))
+        return cls(guard, tuple(dict.fromkeys(relations(guard))))
 
     @property
     def clauses(self) -> tuple[Condition, ...]:
