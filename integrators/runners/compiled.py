@@ -523,7 +523,9 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
     tally = Tally(counts_nothing, [], [])
     if count is not None:
         tally = Tally(count, column("i"), column())
-    return RecordArguments(functions, machines, b._replace(plan=plan, out=out), log, recorded, tally)
+    return RecordArguments(
+        functions, machines, b._replace(plan=plan, out=out), log, recorded, tally
+    )
 
 
 def observer(

@@ -293,9 +293,7 @@ def test_the_log_of_a_thousand_runs_is_counted_in_a_tenth_of_their_time() -> Non
     begin = time.perf_counter()
     found = of_log(
         model.chart,
-        LogCounts.of(
-            model.chart, FiredEdges(log["run"], log["element"], log["edge"], last)
-        ),
+        LogCounts.of(model.chart, FiredEdges(log["run"], log["element"], log["edge"], last)),
     )
     assert time.perf_counter() - begin < 0.1 * took
     assert found == coverage(result).contact()

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gms_fsm.errors import SignalError
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
-from gms_fsm.lowering.program import equations
 from gms_fsm.lowering.printing.counting import Counting, CountPlaces
+from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.following import following_of

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.language import Relation, Value, names_in, truths, values_of
-from gms_fsm.lowering.printing.counting import CountPlaces
+from gms_fsm.language import COMPARISONS, Relation, names_in, values_of
+from gms_fsm.lowering.printing.counting import FEW, CountPlaces
 from gms_fsm.traces.coverage.counts import ChartCoverage, EdgeCoverage, StateCoverage
 from gms_fsm.traces.coverage.decisions import Decision, decisions
 from gms_fsm.traces.coverage.total import Coverage
@@ -19,7 +19,6 @@ from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
 
 BITS = 63  # comparisons that fit a whole number of numpy
-FEW = 10  # comparisons of a guard up to which a table of all truth vectors is small
 
 Asked = tuple[Mapping[str, tuple[int, ...]], Mapping[str, tuple[float, ...]]]
 
@@ -188,11 +187,17 @@ class _Values:
         self.states = [state.name for state in chart.states]
         parts = {part for each in self.decisions.values() for part in each.comparisons}
         self.columns = guard_columns(trace, frozenset[str]().union(*map(names_in, parts)))
-        self.truth = {part: truths(part, self._of(part), mode.shape).ravel() for part in parts}
+        # As the engine compares: 1/0 is infinite there, and not an error as in Python.
+        self.truth = {part: COMPARISONS[part.op](*self._sides(part)) for part in parts}
         self._inside: dict[str, tuple[NDArray[Any], NDArray[Any]]] = {}
 
-    def _of(self, part: Relation) -> dict[str, Any]:
-        return {name: self.columns[name] for name in names_in(part)}
+    def _sides(self, part: Relation) -> list[NDArray[np.float64]]:
+        """Return what is left and right of a comparison, at all places."""
+        found = []
+        for side in (part.left, part.right):
+            values = values_of(side, {name: self.columns[name] for name in names_in(side)})
+            found.append(np.broadcast_to(values, self.mode.shape).ravel())
+        return found
 
     def inside(self, state: str) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the places in a state, among those of all elements, and the elements."""
@@ -230,7 +235,7 @@ class _Values:
         """Return for each truth vector how close its false comparisons came to being true."""
         least = np.zeros((len(vectors), len(decision.comparisons)))
         for number, part in enumerate(decision.comparisons):
-            left, right = (self._side(part, side)[at] for side in (part.left, part.right))
+            left, right = (side[at] for side in self._sides(part))
             with np.errstate(invalid="ignore"):
                 distance = np.abs(left - right)
             distance[np.isnan(distance)] = np.inf
@@ -238,10 +243,6 @@ class _Values:
                 if vector[number] == "0":
                     least[place, number] = distance[own[place]].min()
         return dict(zip(vectors, map(tuple, least.tolist()), strict=True))
-
-    def _side(self, part: Relation, side: Value) -> NDArray[np.float64]:
-        columns = {name: np.broadcast_to(u, self.mode.shape) for name, u in self._of(part).items()}
-        return values_of(side, columns).ravel() if columns else np.zeros(self.mode.size)
 
 
 def _rows(
