@@ -55,8 +55,8 @@ if TYPE_CHECKING:
     from gms_fsm.records.record import Record as Record
     from gms_fsm.run.machines import Element as Element
     from gms_fsm.run.machines import ElementMachines as ElementMachines
-    from gms_fsm.run.prepare import Prepared as Prepared
-    from gms_fsm.run.prepare import prepare as prepare
+    from gms_fsm.run.repeated.prepare import Prepared as Prepared
+    from gms_fsm.run.repeated.prepare import prepare as prepare
     from gms_fsm.run.settings import Settings as Settings
     from gms_fsm.run.simulate import simulate as simulate
     from gms_fsm.run.sweep import Sweep as Sweep
@@ -116,7 +116,7 @@ _HOMES = {
     "coupling.bank": "FrictionBank",
     "coupling.equations": "FrictionEquations",
     "run.machines": "Element ElementMachines",
-    "run.prepare": "Prepared prepare",
+    "run.repeated.prepare": "Prepared prepare",
     "run.settings": "Settings",
     "run.simulate": "simulate",
     "coupling.stepping": "FrictionState",

@@ -247,7 +247,9 @@ def adaptive(plan: ProgramPlan, functions: Mapping[str, Callable[..., Any]]) -> 
 
 
 # --------------------------------------------------------------------------- in machine code
-OF_A_RUN = "functions buffers log.seen buffers.sliding.live more.adapting"  # the arguments of `adapt`
+OF_A_RUN = (
+    "functions buffers log.seen buffers.sliding.live more.adapting"  # the arguments of `adapt`
+)
 
 
 @functools.lru_cache(maxsize=64)

@@ -180,6 +180,7 @@ def _put_stop(
 
 
 def put_modes(mode: list[int], flags: list[int], place: list[int]) -> None:
+    """Write the modes of a row: of the machines, then of the surfaces."""
     n = len(mode)
     for i in range(n):
         place[i] = mode[i]

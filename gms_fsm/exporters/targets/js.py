@@ -42,7 +42,7 @@ from integrators.machine_code.javascript import javascript_text, script_number, 
 from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.tree import Local
 from integrators.runners import columns
-from integrators.runners.compiled import INLINE, is_known
+from integrators.runners.compiled import INLINE, RECORD, is_known
 from integrators.runners.observing import observe_rows
 from integrators.runners.stepping import FULL_LOG
 
@@ -72,6 +72,7 @@ class Whole(NamedTuple):
     buffers: Any
     log: Any
     recorded: Any
+    tally: Any
     adapting: Adapting
     table: Any  # observed values of the rows
 
@@ -279,7 +280,7 @@ class _Run(_Module):
         run = example_of(start)
         table: Any = OuterArray("f", start.program.layout.observed.size)
         whole = Whole(
-            run.functions, run.machines, run.buffers, run.log, run.recorded,
+            run.functions, run.machines, run.buffers, run.log, run.recorded, run.tally,
             adapting_of(start), table,
         )  # fmt: skip
         super().__init__(subject, start, whole, alone=False)
@@ -287,7 +288,7 @@ class _Run(_Module):
     def entries(self, translator: Translator) -> list[str]:
         """Translate the run, what follows from its numbers, and what is observed of its rows."""
         part = self.layout.part
-        run = [part(each) for each in ("functions", "machines", "buffers", "log", "recorded")]
+        run = [part(each) for each in RECORD.split()]
         steps, start = ([NumberValue(Local("i", each)) for each in pair] for pair in (
             ("steps", "pause"), ("start", "count")))  # fmt: skip
         translator.entry("record", columns.record, [*run, *steps])

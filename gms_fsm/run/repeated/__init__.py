@@ -1,0 +1,1 @@
+"""Runs that are repeated with other numbers, in one block of memory."""

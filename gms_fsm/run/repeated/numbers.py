@@ -1,0 +1,215 @@
+"""Which numbers a run can be repeated with, without making its system anew, and where they are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.charts.parameters import Bound, bounds_of
+from gms_fsm.foundation.arguments import unknown
+from gms_fsm.language import Value, names_in
+from gms_fsm.run.problem import Problem
+from gms_fsm.run.repeated.block import Place, RepeatedRun
+from gms_fsm.systems import rigs
+from gms_fsm.systems.given import is_positive
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import joined, known_in, label_in, numbers_of, varied
+from gms_fsm.systems.reading.values import numbers_of as values_of_system
+from gms_fsm.systems.signals import Function
+from gms_fsm.systems.springs import field_of
+
+MOST_SPARE = 4  # runs that wait to be repeated
+
+
+def with_given(what: Mounted, given: Mapping[str, Any]) -> Mounted:
+    """Return the same with other numbers, whole parameters or those of single elements."""
+    whole, single = known_in(what), numbers_of(what)
+    parts: dict[str, Any] = {}
+    for name, value in given.items():
+        if name in whole:
+            parts[name] = value
+        elif name in single:
+            one = single[name]
+            parts |= joined(varied(what, parts), [(one.whole, one.element, value)])
+        else:
+            raise unknown("number", name, {**whole, **single})
+    return varied(what, parts)
+
+
+# --------------------------------------------------------------------------- numbers in a block
+@dataclass(frozen=True, eq=False)
+class KnownNumber:
+    """A number whose rules can be checked in the block, without making the system anew.
+
+    Parameters
+    ----------
+    place : Place
+        Where it is.
+    n : int
+        Number of elements that may differ; 0 if there is one for all.
+    bounds : tuple of Bound
+        Those of its rule that are numbers.
+    pairs : list of (Place, int, Place)
+        Which numbers must be above others, this one among them: 1, or below: -1.
+    inertias : tuple of Value
+        Those of bodies that read it.
+    nonzero : bool
+        Whether 0 is another program.
+    """
+
+    place: Place
+    n: int
+    bounds: tuple[Bound, ...]
+    pairs: list[tuple[Place, int, Place]]
+    inertias: tuple[Value, ...] = ()
+    nonzero: bool = False
+
+    def takes(self, value: Any) -> bool:
+        """Return whether a value fulfils the rule, as far as numbers alone decide."""
+        if not isinstance(value, float | int):
+            if not (isinstance(value, np.ndarray) and value.dtype == float):
+                return False
+            if value.shape not in ((), (self.n,)) or not np.isfinite(value).all():
+                return False
+            return all(bound.holds(value, bound.limit).all() for bound in self.bounds)
+        if self.nonzero and value == 0.0:
+            return False
+        return math.isfinite(value) and all(u.holds(value, u.limit) for u in self.bounds)
+
+    def fits(self, run: RepeatedRun) -> bool:
+        """Return whether it is certain that it fits the other numbers."""
+        for one, side, other in self.pairs:
+            apart = side * (run.value(one) - run.value(other))
+            if not (apart > 0.0 if isinstance(apart, float) else (apart > 0.0).all()):
+                return False
+        return True
+
+
+class RepeatedRuns:
+    """Runs that wait to be repeated, and where the numbers are in them."""
+
+    def __init__(self, start: Problem) -> None:
+        self.start = start
+        self.known = known_numbers(start) if is_repeatable(start) else None
+        self.spare = list[RepeatedRun]()
+
+    def run(self, given: Mapping[str, Any]) -> RepeatedRun | None:
+        """Return a run with these numbers at its end; None if it cannot be a repeated one."""
+        known = self.known
+        if known is None:
+            return None
+        puts, found = list[tuple[Place, Any]](), list[KnownNumber]()
+        for name, value in given.items():
+            one = known.get(name)
+            if one is None or not one.takes(value):
+                return None
+            puts.append((one.place, value))
+            found.append(one)
+        try:
+            run = self.spare.pop()
+        except IndexError:
+            run = RepeatedRun(self.start)
+        run.put(puts)
+        if all(one.fits(run) for one in found) and self._move(given, found):
+            run.follow()
+            if run.run(lambda: self._with(given)):
+                return run
+        self.take_back(run)
+        return None
+
+    def take_back(self, run: RepeatedRun) -> None:
+        """Keep a run that has been read."""
+        if len(self.spare) < MOST_SPARE:
+            self.spare.append(run)
+
+    def _move(self, given: Mapping[str, Any], found: list[KnownNumber]) -> bool:
+        """Return whether all bodies still have inertias that are positive."""
+        inertias = [tree for one in found for tree in one.inertias]
+        if not inertias:
+            return True
+        system = self.start.system
+        numbers = dict(system.numbers)
+        numbers |= {label_in(self.start.what, name): value for name, value in given.items()}
+        return all(is_positive(tree, numbers) for tree in inertias)
+
+    def _with(self, given: Mapping[str, Any]) -> Problem:
+        return self.start.with_numbers(with_given(self.start.what, given))
+
+
+def is_repeatable(start: Problem) -> bool:
+    """Return whether another run differs in nothing but what is in its block."""
+    system, program = start.system, start.program
+    if start.chosen.engine != "compiled" or program.plan.steps or start.last < start.t_end:
+        return False
+    if any(isinstance(each, Function) for each in system.signals.values()):
+        return False
+    states = zip(system.machines, program.layout.banks, strict=True)
+    locked = any(
+        contact.chart.states[k].locked
+        for contact, bank in states
+        for k in start.mode[bank.elements]
+    )
+    # Whatever the ratios, a lock of bodies at rest has no velocity.
+    place = program.layout.y.index
+    rest = all(not body.driven and start.y[place(body.v)] == 0.0 for body in system.bodies)
+    return rest or not locked
+
+
+def known_numbers(start: Problem) -> dict[str, KnownNumber]:
+    """Return the numbers that a repeated run can have, by name."""
+    what, system, names = start.what, start.system, known_in(start.what)
+    shared, own = values_of_system(system)
+    places = {label: Place(k, own=False) for k, label in enumerate(shared)}
+    places |= {label: Place(k, own=True) for k, label in enumerate(own)}
+    careful, inertias = _careful(what), system.assembly.inertias.values() if what.named else ()
+    found: dict[str, KnownNumber] = {}
+    for name, (parameter, n) in names.items():
+        label = label_in(what, name)
+        if label in places and label not in careful:
+            found[name] = KnownNumber(
+                places[label],
+                n,
+                tuple(u for u in bounds_of(parameter.rule) if not isinstance(u.limit, str)),
+                [],
+                tuple(tree for tree in inertias if label in names_in(tree)),
+                nonzero=label in system.numbers,
+            )
+    for name, (parameter, _) in names.items():
+        for bound in bounds_of(parameter.rule):
+            if isinstance(bound.limit, str):
+                other = f"{name.removesuffix(parameter.name)}{bound.limit}"
+                if {name, other} <= {*found}:
+                    side = 1 if bound.op[0] == ">" else -1
+                    pair = found[name].place, side, found[other].place
+                    found[name].pairs.append(pair)
+                    found[other].pairs.append(pair)
+                else:
+                    found.pop(name, None)
+                    found.pop(other, None)
+    for name, one in numbers_of(what).items():
+        if one.element is not None and one.whole in found:
+            whole = found[one.whole]
+            found[name] = replace(whole, place=whole.place._replace(element=one.element), n=0)
+    return found
+
+
+def _careful(what: Mounted) -> set[str]:
+    """Return the numbers with which a system must be checked as a whole, by their labels."""
+    system = what.system
+    found = {name for name, value in system.numbers.items() if value == 0.0}  # another program
+    if not what.named:
+        own = type(what.rig).__module__ != rigs.__name__  # it may have checks of its own
+        return found | {*system.numbers} if own else found
+    fields = [field_of(system, i, name) for i in range(len(system.springs)) for name in ("k", "d")]
+    locks = [
+        ratio
+        for bank in system.assembly.banks
+        if all(state.locked for state in bank.chart.states)
+        for row in bank.jacobian
+        for ratio in row.values()
+    ]
+    return found.union(*map(names_in, (*fields, *locks)))
