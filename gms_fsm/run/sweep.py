@@ -9,24 +9,30 @@ import threading
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, meant, refusing, unknown
-from gms_fsm.foundation.display import Log
 from gms_fsm.lowering.compiling import check_llvmlite
-from gms_fsm.lowering.log_columns import LOG_NUMBERS
-from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.printing.counting import Counting, counting_of
-from gms_fsm.lowering.program import Program, same_text
-from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
+from gms_fsm.lowering.program import same_text
+from gms_fsm.run._swept import LOG, LONGEST, Sweep
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun, CountTables
+from gms_fsm.run.repeated.block import RepeatedRun
+from gms_fsm.run.repeated.collected import (
+    Collected,
+    ManyRuns,
+    RunResult,
+    RunResults,
+    result_of,
+)
+from gms_fsm.run.repeated.numbers import RepeatedRuns
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.systems.models import Model
@@ -34,11 +40,6 @@ from gms_fsm.systems.mounted import Mounted, mounted, shifted
 from gms_fsm.systems.numbers import column_name, known_in, varied
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
-from gms_fsm.traces.coverage.counting import FiredEdges, LogCounts, of_log, of_tables, of_trace
-from gms_fsm.traces.coverage.total import Coverage
-from gms_fsm.traces.firings import Firings
-from gms_fsm.traces.rows import Rows
-from gms_fsm.traces.trace import Trace
 
 if TYPE_CHECKING:
     import pandas
@@ -128,7 +129,7 @@ def sweep(
             place="executor",
             value=executor,
         )
-    collected = _Collected(what, runs, begin)
+    collected = Collected(what, runs, begin.counted, begin.settings.t_eval)
     size = max(1, min(AT_ONCE, runs // AT_ONCE))
     chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
     # Dask treats tasks with equal arguments as one, and returns an earlier failure as their result.
@@ -137,7 +138,7 @@ def sweep(
         if executor is None:
             executor = stack.enter_context(_threads())
         shown = stack.enter_context(_bar(runs, progress))
-        waiting: dict[Future[_Results], range] = {}
+        waiting: dict[Future[RunResults], range] = {}
         try:
             with _interrupts_deferred():
                 for chunk in chunks:
@@ -230,27 +231,6 @@ def _elements_joined(
 
 
 # --------------------------------------------------------------------------- running
-@dataclass(frozen=True, eq=False)
-class _Result:
-    """One run, as returned by a worker."""
-
-    outcome: str
-    message: str
-    end: Mapping[str, Any] | None  # t, x, v, F, z, mode
-    log: NDArray[Any]
-    rows: Mapping[str, FloatArray] | None
-    ends: Mapping[str, float] = field(default_factory=dict)  # of bodies, states, sampled values
-    coverage: Coverage | None = None  # if it was asked for, and counted from rows
-
-
-@dataclass(frozen=True, eq=False)
-class _Results:
-    """Some runs, and the tables in which all of them counted their rows."""
-
-    runs: list[_Result]
-    tables: CountTables | None = None
-
-
 @dataclass(frozen=True)
 class _Common:
     """What all runs of a sweep have in common."""
@@ -308,13 +288,29 @@ def _run_chunk(
     what: Mounted,
     begin: _Common,
     part: Mapping[str, FloatArray],
-    _sweep: str,
-) -> _Results:
+    sweep_name: str,
+) -> RunResults:
     """Run some sets of parameters, one after the other, for one sweep."""
-    results = []
-    compiled: CompiledRun | None = None
     tables = None if begin.counted is None else CountTables.empty(begin.counted)
-    for row in range(len(next(iter(part.values())))):
+    many = _many(what, begin, part, sweep_name, tables)
+    runs = len(next(iter(part.values())))
+    left = range(runs) if many is None else np.setdiff1d(range(runs), many.which).tolist()
+    if many is not None and tables is not None and left:  # those that failed have been counted
+        tables, many, left = CountTables.empty(tables.counting), None, range(runs)
+    return RunResults(_each(what, begin, part, left, tables), tables, many)
+
+
+def _each(
+    what: Mounted,
+    begin: _Common,
+    part: Mapping[str, FloatArray],
+    rows: Iterable[int],
+    tables: CountTables | None,
+) -> dict[int, RunResult]:
+    """Make runs one by one: with numbers that are another program, or that may be refused."""
+    results: dict[int, RunResult] = {}
+    compiled: CompiledRun | None = None
+    for row in rows:
         values = {name: array[row] for name, array in part.items()}
         run: Run | CompiledRun | None = None
         outcome, message = "ok", ""
@@ -325,6 +321,8 @@ def _run_chunk(
                 run = compiled
             elif begin.settings.engine == "compiled":
                 run = compiled = CompiledRun(begin.start(its), tables=tables)
+                if compiled.start.program.plan.steps:  # the numbers say at which times it stops
+                    compiled = None
             else:
                 run = Run(begin.start(its))
             while run.advance():
@@ -332,88 +330,42 @@ def _run_chunk(
         except GMSError as error:
             outcome, message = type(error).__name__, cut(str(error), LONGEST - 10)
         watched = begin.coverage and tables is None
-        results.append(_result(run, outcome, message, watched))
-    return _Results(results, tables)
+        results[row] = result_of(run, outcome, message, watched)
+    return results
 
 
-def _result(
-    run: Run | CompiledRun | None, outcome: str, message: str, watched: bool = False
-) -> _Result:
-    """Return values of each contact, and of everything else that the user has named."""
-    if run is None:
-        return _Result(outcome, message, None, np.empty(0, dtype=LOG), None)
-    start, trace = run.start, run.recorder.trace()
-    t, y, mode = run.recorder.latest
-    ends: dict[str, float] = {}
-    if start.what.values:
-        now = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
-        last = start.trace(now, now, trace.firings)
-        ends = {name: float(values[0]) for name, values in _of_parts(last).items()}
-    rows = None
-    if start.output == "t_eval":
-        rows = {row_name(name): values for name, values in _of_parts(trace).items()}
-        rows |= _of_contacts(trace)
-    end = _end_of_contacts(start.program, t, y, mode)
-    counts = of_trace(trace) if watched else None
-    return _Result(outcome, message, end, _log_of(trace.firings), rows, ends, counts)
+_of_thread = threading.local()  # what a thread has made ready for the sweep that it works at
 
 
-def _end_of_contacts(
-    program: Program, t: float, y: list[float], mode: tuple[int, ...]
-) -> dict[str, Any]:
-    """Return the state reached, as `_of_contacts`, with its time and modes."""
-    layout = program.layout
-    seen = layout.y.named(y) | layout.observed.named(observe(program, t, y, mode))
-    found: dict[str, Any] = {"t": t, "mode": mode[layout.elements], "z": []}
-    for bank in layout.banks:
-        own = seen[bank.of(bank.variables[0])] if bank.variables else [np.nan] * bank.n
-        found["z"] += own
-    places = [
-        {"x": bank.position, "v": bank.of(bank.velocity), "F": bank.of("F")}
-        if bank.velocity
-        else {}
-        for bank in layout.banks
-    ]
-    for name in ("x", "v", "F"):
-        # A supervisor has none of them.
-        values = [seen[place[name]] if place else np.nan for place in places]
-        found[name] = values if len(values) > 1 else values[0]
-    return found
-
-
-def _log_of(firings: Firings) -> NDArray[Any]:
-    log = np.empty(len(firings), dtype=LOG)
-    log["t"], log["element"], log["edge"] = firings.t, firings.machine, firings.edge
-    for name, column in zip(LOG_NUMBERS, firings.numbers.T, strict=True):
-        log[name] = column
-    return log
-
-
-def _of_contacts(trace: Trace) -> dict[str, FloatArray]:
-    """Return the columns of the contacts side by side; x, v and F of a single one as they are."""
-    parts = [trace.contact(each.name) for each in trace.what.system.machines]
-    none, found = np.full(len(trace.t), np.nan), {}
-    for name in ("x", "v", "F"):
-        own = [getattr(part, name) if part.model.chart.velocities else none for part in parts]
-        columns = np.stack(own, axis=1)
-        found[name] = columns[:, 0] if len(parts) == 1 else columns
-    return found | {"z": np.concatenate([part.z for part in parts], axis=1)}
-
-
-def _of_parts(trace: Trace) -> dict[str, FloatArray]:
-    """Return the columns of the bodies, and the further states and sampled values."""
-    found: dict[str, FloatArray] = {}
-    for name in trace.what.values:
-        body, _, which = name.rpartition(".")
-        found[name] = getattr(trace.body(body), which) if body else trace.value(name)
-    return found
+def _many(
+    what: Mounted,
+    begin: _Common,
+    part: Mapping[str, FloatArray],
+    sweep_name: str,
+    tables: CountTables | None,
+) -> ManyRuns | None:
+    """Make the runs whose numbers need no look, all in machine code; None if there are none."""
+    if getattr(_of_thread, "sweep_name", "") != sweep_name:
+        start = begin.start(what)
+        driven = any(body.driven and what.named for body in what.system.bodies)
+        repeatable = start.output == "end" and start.chosen.engine == "compiled" and not driven
+        _of_thread.sweep_name, _of_thread.runs, _of_thread.run = sweep_name, None, None
+        if repeatable and (runs := RepeatedRuns(start)).known is not None:
+            _of_thread.runs, _of_thread.run = runs, RepeatedRun(start, tables)
+    run: RepeatedRun | None = _of_thread.run
+    cells = None if run is None else _of_thread.runs.cells(part)
+    if run is None or cells is None or not cells.certain.any():
+        return None
+    which = np.flatnonzero(cells.certain)
+    found = run.many(cells.places, np.ascontiguousarray(cells.values[which]), tables)
+    return ManyRuns.of(run.columns.start, which, found)
 
 
 class _NotDelivered(Exception):
     """A task did not reach a worker: something in it cannot be pickled."""
 
 
-def _results(future: Future[_Results], count: int) -> _Results:
+def _results(future: Future[RunResults], count: int) -> RunResults:
     """Return the results of a task; a lost task gives rows that say so."""
     try:
         return future.result()
@@ -422,124 +374,15 @@ def _results(future: Future[_Results], count: int) -> _Results:
             f"the run could not be sent to a worker ({cut(str(error))}); give signals as "
             "expressions in t or as arrays, or use threads (executor=None)"
         )
-        lost = _Result("NotSent", message, None, np.empty(0, dtype=LOG), None)
-        return _Results([lost] * count)
+        lost = RunResult("NotSent", message, None, np.empty(0, dtype=LOG), None)
+        return RunResults(dict.fromkeys(range(count), lost))
     except Exception as error:  # a broken pool, a worker out of memory, or an unpicklable result
         message = (
             f"the worker failed: {type(error).__name__}: {cut(str(error), LONGEST // 2)}; run "
             "these again, or use threads (executor=None)"
         )
-        lost = _Result(type(error).__name__, message, None, np.empty(0, dtype=LOG), None)
-        return _Results([lost] * count)
-
-
-class _Collected:
-    """Preallocated columns, filled in any order."""
-
-    def __init__(self, what: Mounted, runs: int, begin: _Common) -> None:
-        self.what, self.counted, t_eval = what, begin.counted, begin.settings.t_eval
-        n, several = sum(each.n for each in what.system.machines), len(what.system.machines)
-        columns = (several,) if several > 1 else ()
-        self.times = np.array([] if t_eval is None else t_eval, dtype=np.float64)
-        self.outcome, self.message = ["lost"] * runs, [""] * runs
-        self.t = np.full(runs, np.nan)
-        self.end = {name: np.full((runs, *columns), np.nan) for name in ("x", "v", "F")}
-        self.end["z"] = np.full((runs, n), np.nan)
-        self.ends = {name: np.full(runs, np.nan) for name in what.values}
-        self.mode = np.full((runs, n), -1, dtype=np.int64)
-        self.logs: list[NDArray[Any]] = [np.empty(0, dtype=LOG)] * runs
-        rows = runs, self.times.size
-        self.covered: Coverage | None = None  # so far, from rows
-        self.fired: list[LogCounts] = []  # so far: logs of all runs at once would take memory
-        self.tables = None if self.counted is None else CountTables.empty(self.counted)
-        self.rows: dict[str, FloatArray] = {}
-        if t_eval is not None:
-            self.rows = {name: np.full((*rows, *columns), np.nan) for name in ("x", "v", "F")}
-            self.rows["z"] = np.full((*rows, n), np.nan)
-            self.rows |= {row_name(name): np.full(rows, np.nan) for name in what.values}
-
-    def take(self, chunk: range, results: _Results) -> None:
-        """Store results in their rows."""
-        for run, result in zip(chunk, results.runs, strict=True):
-            self.outcome[run], self.message[run] = result.outcome, result.message
-            result.log["run"] = run
-            self.logs[run] = result.log
-            if result.end is not None:
-                self.t[run], self.mode[run] = result.end["t"], result.end["mode"]
-                for name, values in self.end.items():
-                    values[run] = result.end[name]
-            for name, value in result.ends.items():
-                self.ends[name][run] = value
-            for name, values in (result.rows or {}).items():
-                self.rows[name][run, : len(values)] = values
-        found = [each.coverage for each in results.runs if each.coverage is not None]
-        if found:
-            self.covered = Coverage.merged([*filter(None, [self.covered]), *found])
-            return
-        if self.tables is not None and results.tables is not None:
-            self.tables.add(results.tables)
-        fired = self._fired(chunk)
-        pairs = zip(self.fired, fired, strict=True)
-        self.fired = [a + b for a, b in pairs] if self.fired else fired
-
-    def _fired(self, chunk: range) -> list[LogCounts]:
-        """Return what the logs of some runs show of each chart."""
-        logs = self.logs[chunk.start : chunk.stop]
-        # Column by column: numpy compares the names of all columns at each step.
-        run, owner, which = (
-            np.concatenate([log[name] for log in logs]) for name in ("run", "element", "edge")
-        )
-        found, element, edge = list[LogCounts](), 0, 0
-        for each in self.what.system.machines:
-            end = element + each.n
-            mine = (owner >= element) & (owner < end)
-            last = self.mode[chunk.start : chunk.stop, element:end]
-            fired = FiredEdges(
-                run[mine] - chunk.start, owner[mine] - element, which[mine] - edge, last
-            )
-            found.append(LogCounts.of(each.chart, fired))
-            element, edge = end, edge + len(each.chart.transitions)
-        return found
-
-    def coverage(self) -> Coverage:
-        """Return what all runs have tried."""
-        contacts = self.what.system.machines
-        names = [each.name if self.what.named else "" for each in contacts]
-        if not self.fired:
-            assert self.covered is not None
-            return self.covered
-        parts = [of_log(each.chart, log) for each, log in zip(contacts, self.fired, strict=True)]
-        if self.tables is not None:
-            tables = zip(contacts, self.fired, self.tables.parts(), strict=True)
-            parts = [of_tables(each.chart, log, *part) for each, log, part in tables]
-        own = Coverage(dict(zip(names, parts, strict=True)))
-        return own if self.covered is None else self.covered + own
-
-    def sweep(self, parameters: Mapping[str, FloatArray]) -> Sweep:
-        """Return the sweep with all results."""
-        contacts, states, edges, owners = self.what.system.machines, [], list[str](), list[str]()
-        borders = np.cumsum([each.n for each in contacts])[:-1]
-        for each, modes in zip(contacts, np.split(self.mode, borders, axis=1), strict=True):
-            names = np.array([*(state.name for state in each.chart.states), ""])
-            states.append(names[modes])
-            owners += [each.name] * each.n
-            lead = f"{each.name}." if len(contacts) > 1 else ""
-            edges += [f"{lead}{edge.name}" for edge in each.chart.transitions]
-        return Sweep(
-            parameters,
-            np.array(self.outcome),
-            np.array(self.message),
-            self.t,
-            **self.end,
-            states=np.concatenate(states, axis=1),
-            transitions=np.concatenate(self.logs).view(Log),
-            edges=tuple(edges),
-            times=self.times,
-            rows=self.rows,
-            ends=self.ends,
-            owners=np.array(owners if self.what.named else [], dtype=np.str_),
-            coverage=self.coverage(),
-        )
+        lost = RunResult(type(error).__name__, message, None, np.empty(0, dtype=LOG), None)
+        return RunResults(dict.fromkeys(range(count), lost))
 
 
 # --------------------------------------------------------------------------- helpers

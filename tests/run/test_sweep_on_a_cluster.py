@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, sweep
-from gms_fsm.run.sweep import _Collected
+from gms_fsm.run.repeated.collected import Collected
 from tests.helpers import pulled_mass, stick_slip
 
 pytestmark = pytest.mark.slow
@@ -62,16 +62,16 @@ def test_a_killed_worker_costs_no_result(cluster: Any, monkeypatch: pytest.Monke
     model, rig = pulled_mass()
     arrived: list[int] = []
     killed: list[int] = []
-    take = _Collected.take
+    take = Collected.take
 
-    def taken(self: _Collected, chunk: range, results: Any) -> None:
+    def taken(self: Collected, chunk: range, results: Any) -> None:
         arrived.extend(chunk)
         take(self, chunk, results)
         if not killed and len(arrived) >= RUNS // 4:  # part of the way through
             killed.append(cluster.workers[0].process.pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    monkeypatch.setattr(_Collected, "take", taken)
+    monkeypatch.setattr(Collected, "take", taken)
     with distributed.Client(cluster) as client:
         workers = set(client.run(os.getpid).values())
         assert len(workers) == 2

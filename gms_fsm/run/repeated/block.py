@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.recording.compiled_run import STEPS_AT_ONCE, WORTH_A_LOOK, Columns
+from gms_fsm.run.recording.compiled_run import STEPS_AT_ONCE, WORTH_A_LOOK, Columns, CountTables
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
@@ -44,10 +44,12 @@ class RepeatedRun:
     ----------
     start : Problem
         For the engine ``"compiled"``; no signal of it is a Python function.
+    tables : CountTables, optional
+        Where rows are counted, to begin with.
     """
 
-    def __init__(self, start: Problem) -> None:
-        self.columns = columns = Columns(start)
+    def __init__(self, start: Problem, tables: CountTables | None = None) -> None:
+        self.columns = columns = Columns(start, tables=tables)
         run, layout = columns.run_of, columns.block.layout
         more: Any = run.more.adapting
         more.chosen[:] = start.chosen_tolerances()
@@ -106,9 +108,15 @@ class RepeatedRun:
             self._make_room()
         return event == loop.DONE
 
-    def many(self, places: Sequence[Place], values: NDArray[np.float64]) -> Ends:
+    def many(
+        self,
+        places: Sequence[Place],
+        values: NDArray[np.float64],
+        tables: CountTables | None = None,
+    ) -> Ends:
         """Make one run after the other, each with a row of values; output must be ``"end"``."""
         columns: Any = self.columns
+        columns.tables = tables
         program, runs = columns.start.program, len(values)
         width = 1 + program.layout.y.size + program.layout.observed.size
         rows, elements = ([getattr(u, name) for u in places] for name in ("row", "element"))

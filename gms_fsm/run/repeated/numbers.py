@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import Bound, bounds_of
 from gms_fsm.foundation.arguments import unknown
@@ -80,6 +81,16 @@ class KnownNumber:
             return False
         return math.isfinite(value) and all(u.holds(value, u.limit) for u in self.bounds)
 
+    def takes_each(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return for each run whether its values fulfil the rule, as far as numbers decide."""
+        good: NDArray[np.bool_] = np.isfinite(values)
+        for bound in self.bounds:
+            good &= bound.holds(values, bound.limit)
+        if self.nonzero:
+            good &= values != 0.0
+        each: NDArray[np.bool_] = np.all(good.reshape(len(values), -1), axis=1)
+        return each
+
     def fits(self, run: RepeatedRun) -> bool:
         """Return whether it is certain that it fits the other numbers."""
         for one, side, other in self.pairs:
@@ -87,6 +98,14 @@ class KnownNumber:
             if not (apart > 0.0 if isinstance(apart, float) else (apart > 0.0).all()):
                 return False
         return True
+
+
+class Cells(NamedTuple):
+    """The numbers of many runs, one by one."""
+
+    certain: NDArray[np.bool_]  # which runs need no further check
+    places: list[Place]
+    values: NDArray[np.float64]  # (runs, places)
 
 
 class RepeatedRuns:
@@ -120,6 +139,36 @@ class RepeatedRuns:
                 return run
         self.take_back(run)
         return None
+
+    def cells(self, given: Mapping[str, NDArray[np.float64]]) -> Cells | None:
+        """Return the numbers of many runs, shapes as for a sweep; None if some cannot be put."""
+        known = self.known
+        if known is None or not {*given} <= {*known}:
+            return None
+        found = {name: known[name] for name in given}
+        runs = len(next(iter(given.values())))
+        certain = np.ones(runs, dtype=bool)
+        places, columns = list[Place](), list[NDArray[np.float64]]()
+        for name, one in found.items():
+            certain &= one.takes_each(given[name])
+            parts = [one.place._replace(element=i) for i in range(one.n)] or [one.place]
+            places += parts
+            columns += np.broadcast_to(given[name].T, (len(parts), runs))
+        at = {one.place: given[name].reshape(runs, -1) for name, one in found.items()}
+        for one in found.values():
+            for above, side, below in one.pairs:
+                apart = at.get(above, self._now(above)) - at.get(below, self._now(below))
+                certain &= (side * apart > 0.0).all(axis=1)
+        if any(one.inertias for one in found.values()):
+            for run in np.flatnonzero(certain).tolist():
+                row = {name: values[run] for name, values in given.items()}
+                certain[run] = self._move(row, [*found.values()])
+        return Cells(certain, places, np.ascontiguousarray(np.stack(columns, axis=1)))
+
+    def _now(self, place: Place) -> NDArray[np.float64]:
+        """Return the number of the start, or those of its elements, as of one run."""
+        shared, own, _ = self.start.program.p
+        return np.atleast_2d(own[place.row] if place.own else [shared[place.row]])
 
     def take_back(self, run: RepeatedRun) -> None:
         """Keep a run that has been read."""
