@@ -92,12 +92,12 @@ def record(
         event = run_to_event(functions, machines, motion, b, most_steps)
         t = min(now.t, now.seen)
         if event == ROWS:
+            if counting:
+                _count(out, memory, now.mode, tally, p)
             for row in range(memory.taken, out.row):
                 log.rows_microstep[row] = 0
                 put_modes(now.mode, b.sliding.flags, log.rows_mode[row])
             memory.taken = out.row
-            if counting:
-                _count(out, memory, log, tally, p)
             if memory.phase == ARC and (not counting or out.steps >= last):
                 return ROWS
         elif event == FIRING:
@@ -118,21 +118,18 @@ def record(
         if event not in (ROWS, FIRING):
             switched = event in (FIRED, SLID)
             _put_stop(now, memory, out, b.sliding.flags, log, switched)
-            if counting:
-                _count(out, memory, log, tally, p)
+            if counting and switched:
+                _count(out, memory, now.mode, tally, p)
         if event == DONE:
             return DONE
 
 
-def _count(out: Output, memory: Memory, log: LogColumns, tally: Tally, p: Any) -> None:
-    """Count the rows whose modes are known, and forget them; all that there are."""
-    if memory.taken == out.row:
-        for row in range(out.row):
-            tally.count(
-                out.rows_t[row], out.rows_y[row], log.rows_mode[row], p, tally.counts, tally.near
-            )
-        out.row = 0
-        memory.taken = 0
+def _count(out: Output, memory: Memory, mode: list[int], tally: Tally, p: Any) -> None:
+    """Count the rows since the last event, all in the same modes, and forget them."""
+    for row in range(out.row):
+        tally.count(out.rows_t[row], out.rows_y[row], mode, p, tally.counts, tally.near)
+    out.row = 0
+    memory.taken = 0
 
 
 def _is_full(out: Output, log: LogColumns) -> bool:

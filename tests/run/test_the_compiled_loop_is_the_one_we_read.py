@@ -18,7 +18,17 @@ from hypothesis import strategies as st
 pytest.importorskip("llvmlite", reason="needs the extra fast")
 
 import integrators.runners.compiled
-from gms_fsm import Chart, ChartModel, ElementMachines, Prescribed, State, Trace, simulate
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    ElementMachines,
+    Prescribed,
+    State,
+    Trace,
+    coverage,
+    simulate,
+    sweep,
+)
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.observing import on_surfaces
 from gms_fsm.lowering.program import lower
@@ -40,7 +50,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     returned = []
     machine = integrators.runners.compiled
 
-    def engine(program: Any, run: Any) -> Any:
+    def engine(program: Any, run: Any, counting: Any) -> Any:
         inside = machine._longest(run) <= machine.LONGEST_INSIDE
         return SimpleNamespace(layout=BlockLayout(run, machine.is_known, inside=inside))
 
@@ -50,9 +60,10 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         names = ("arm", "margins", "normal", "follow")
         functions = Functions(flow, *(code[name] for name in names), self.p)
         machines = Machines(*(code[name] for name in ("switch", "act", "tick", "jolts", "observe")))
+        recorded, tally = self.run_of.recorded, self._tally()
         with np.errstate(all="ignore"):
             event = columns.record(
-                functions, machines, self.buffers, self.log, self.run_of.recorded, most_steps, pause
+                functions, machines, self.buffers, self.log, recorded, tally, most_steps, pause
             )
         returned.append(event)
         return event
@@ -86,6 +97,13 @@ def test_the_source_of_the_loop_gives_the_same_run(name: str, read: list[int]) -
 def test_the_source_of_the_loop_records_the_end(read: list[int]) -> None:
     end = run("open loop")(engine="compiled", output="end")
     assert other_parts(end, run("open loop")(engine="ifelse", output="end")) == []
+    assert read
+
+
+def test_the_source_of_the_loop_counts_rows(read: list[int]) -> None:
+    model, rig = stick_slip("signed"), Prescribed("0.2*sin(t)")
+    found = sweep(model, rig, 6.0, {"F_s": [1.5]}, coverage=True)
+    assert coverage(found) == coverage(simulate(model, rig, 6.0, engine="ifelse"))
     assert read
 
 

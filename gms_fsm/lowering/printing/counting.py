@@ -13,6 +13,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import Binary, Relation, relations
+from gms_fsm.lowering.places import total
 from gms_fsm.lowering.printing.lines import CodeLine, numbered
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
 from gms_fsm.lowering.printing.names import computed_names
@@ -158,14 +159,13 @@ class _CountPrinter(LockFunctions):
         for bank, own in zip(banks, places, strict=True):
             branches: dict[str, list[CodeLine]] = {state: [] for state in bank.states}
             for group in own.groups:
-                branches[bank.states[group.state]] += self.counted(
-                    bank, group, f"{first} + i * {own.counts}", nearest
-                )
+                place = str(first + group.first), f"{own.counts} * i"
+                branches[bank.states[group.state]] += self.counted(bank, group, place, nearest)
             lines += self.loop(bank.index, "live", (), branches)
             first += own.counts * bank.n
             nearest += own.distances
         head = [f"# {visible(self.plan.title)}: counts what guards see"]
-        head += [f"{numbered(states.values())}" for states in self.names.states]
+        head += [numbered(states.values()) for states in self.names.states]
         code = self.function(
             f"count(t, y, mode, p, {self.own_name('counts')}, {self.own_name('near')})",
             "Count the truths of the guards of each element, and how near their sides came.",
@@ -180,11 +180,13 @@ class _CountPrinter(LockFunctions):
             name += "_"
         return name
 
-    def counted(self, bank: Bank, group: AskedTogether, first: str, nearest: int) -> list[CodeLine]:
+    def counted(
+        self, bank: Bank, group: AskedTogether, first: tuple[str, str], nearest: int
+    ) -> list[CodeLine]:
         """Write the count of the guards of a group."""
         counts, near, place = map(self.own_name, ("counts", "near", "place"))
         if not group.comparisons:
-            return [CodeLine(f"{counts}[{first} + {group.first}] += 1")]
+            return [CodeLine(f"{counts}[{total(first)}] += 1")]
         meant = {
             before: after
             for number in group.edges
@@ -201,14 +203,14 @@ class _CountPrinter(LockFunctions):
                 CodeLine(f"if {self.spell(its)}:", computed_names(its)),
                 CodeLine(f"    {place} += {1 << bit}"),
             ]
-        start, many = nearest + group.nearest, len(group.comparisons)
+        start, many = str(nearest + group.nearest), len(group.comparisons)
         lines += [
-            CodeLine(f"{counts}[{first} + {group.first} + {place}] += 1"),
-            CodeLine(f"{place} = {start} + {many} * {place}"),
+            CodeLine(f"{counts}[{total([*first, place])}] += 1"),
+            CodeLine(f"{place} = {total([start, f'{many} * {place}'])}"),
         ]
         for number, part in enumerate(group.comparisons):
             its = meant[part]
-            at = f"{near}[{place} + {number}]"
+            at = f"{near}[{total([str(number), place])}]"
             apart = self.spell(Binary("-", its.left, its.right))
             text = f"{at} = min({at}, abs({apart}))"
             lines.append(CodeLine(text, computed_names(its)))
