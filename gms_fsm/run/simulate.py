@@ -14,6 +14,7 @@ from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
+from gms_fsm.run.recording.counted import CountTables, RowCounter, of_every_step
 from gms_fsm.run.recording.moment import Moment, Recording
 from gms_fsm.run.recording.own_machines import engine_of, own_machines
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
@@ -188,6 +189,8 @@ class Run:
         The run to perform; for the engine ``"compiled"``, machines run it, with the same result.
     machines : mapping of str to ElementMachines, optional
         The user's own machines, by contact.
+    tables : CountTables, optional
+        Where every step's row is counted; such a run keeps only its end.
 
     Examples
     --------
@@ -199,14 +202,20 @@ class Run:
     """
 
     def __init__(
-        self, start: Problem, machines: Mapping[str, ElementMachines] | None = None
+        self,
+        start: Problem,
+        machines: Mapping[str, ElementMachines] | None = None,
+        tables: CountTables | None = None,
     ) -> None:
+        self.counter: RowCounter | None = None
+        if tables is not None:
+            start, self.counter = of_every_step(start), RowCounter(tables, start.program.p)
         self.start = start
         switch: MachineEngine | IfElse = IfElse(start.program)
         self.engine: MachineEngine | None = None
         if start.chosen.engine != "ifelse":
             switch = self.engine = engine_of(start, machines or {})
-        self.recorder, self.next_look = Recorder(start), PATIENCE
+        self.recorder, self.next_look = Recorder(start, self.counter), PATIENCE
         self.event: integrators.Event | None = None  # the latest
         made, options = equations(start.program), start.options
         self.buffers = hybrid.buffers(made, start.t_start, start.y, start.mode, start.last, options)

@@ -23,7 +23,8 @@ from gms_fsm.lowering.printing.counting import Counting, counting_of
 from gms_fsm.lowering.program import same_text
 from gms_fsm.run._swept import LOG, LONGEST, Sweep
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.recording.compiled_run import CompiledRun, CountTables
+from gms_fsm.run.recording.compiled_run import CompiledRun
+from gms_fsm.run.recording.counted import LARGE, CountTables
 from gms_fsm.run.repeated.block import RepeatedRun
 from gms_fsm.run.repeated.collected import (
     Collected,
@@ -240,17 +241,18 @@ class _Common:
     initial: Mapping[str, Any] | None
     settings: Settings
     coverage: bool = False
-    counted: Counting | None = None  # how machine code counts rows, so that none is kept
+    counted: Counting | None = None  # how rows are counted, so that none is kept
 
     def counting(self, start: Problem) -> _Common:
         """Return the same with rows counted as they come, where that is possible.
 
         Functions of the user's are not called for it: they might fail.
         """
-        program, own = start.program, self.settings.output == "end"
-        if self.coverage and own and start.chosen.engine == "compiled" and not program.callables:
-            return replace(self, counted=counting_of(program.plan))
-        return self
+        if not self.coverage or start.output != "end" or start.program.callables:
+            return self
+        found = counting_of(start.program.plan)
+        large = found is not None and found.counts + found.distances > LARGE
+        return self if large and start.chosen.engine != "compiled" else replace(self, counted=found)
 
     def start(self, what: Mounted) -> Problem:
         settings = self.settings
@@ -324,11 +326,13 @@ def _each(
                 if compiled.start.program.plan.steps:  # the numbers say at which times it stops
                     compiled = None
             else:
-                run = Run(begin.start(its))
+                run = Run(begin.start(its), tables=tables)
             while run.advance():
                 pass
         except GMSError as error:
             outcome, message = type(error).__name__, cut(str(error), LONGEST - 10)
+        if isinstance(run, Run) and run.counter is not None:
+            run.counter.put()
         watched = begin.coverage and tables is None
         results[row] = result_of(run, outcome, message, watched)
     return results

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import functools
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gms_fsm.errors import SignalError
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
-from gms_fsm.lowering.printing.counting import Counting, CountPlaces
+from gms_fsm.lowering.printing.counting import Counting
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.problem import Problem
+from gms_fsm.run.recording.counted import CountTables, of_every_step
 from gms_fsm.run.recording.following import following_of
 from gms_fsm.run.recording.moment import Place, Recording
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
@@ -43,44 +42,6 @@ LARGE = 4_000_000  # bytes of the columns of rows at the beginning, at most
 WIDE = 256  # states and modes from which on rows are packed when their columns are full
 COUNTED_AT_ONCE = 64  # rows: few, so that they stay near the processor
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
-
-
-@dataclass(frozen=True, eq=False)
-class CountTables:
-    """The counts of rows of many runs; runs add to them.
-
-    Parameters
-    ----------
-    counting : Counting
-        What is counted, and where.
-    counts : ndarray of int
-        By the truths of guards, of each element.
-    near : ndarray of float
-        How near both sides of each comparison came, infinity if not yet.
-    """
-
-    counting: Counting
-    counts: NDArray[np.int64]
-    near: NDArray[np.float64]
-
-    @classmethod
-    def empty(cls, counting: Counting) -> CountTables:
-        """Return tables without counts."""
-        counts = np.zeros(counting.counts, dtype=np.int64)
-        return cls(counting, counts, np.full(counting.distances, np.inf))
-
-    def add(self, other: CountTables) -> None:
-        """Add the counts of other runs."""
-        np.add(self.counts, other.counts, out=self.counts)
-        np.minimum(self.near, other.near, out=self.near)
-
-    def parts(self) -> Iterator[tuple[CountPlaces, NDArray[np.int64], NDArray[np.float64]]]:
-        """Yield for each contact its places, counts, one row for each element, and distances."""
-        first = nearest = 0
-        for own, n in zip(self.counting.places, self.counting.sizes, strict=True):
-            counts = self.counts[first : first + n * own.counts].reshape(n, own.counts)
-            yield own, counts, self.near[nearest : nearest + own.distances]
-            first, nearest = first + n * own.counts, nearest + own.distances
 
 
 class CompiledRun:
@@ -201,8 +162,7 @@ class Columns:
         p: compiled.Packed | None = None,
         tables: CountTables | None = None,
     ) -> None:
-        if tables is not None:  # every step
-            start = replace(start, options=replace(start.options, times=None))
+        start = start if tables is None else of_every_step(start)
         self.start, self.tables = start, tables
         layout = start.program.layout
         size, modes = layout.y.size, layout.modes

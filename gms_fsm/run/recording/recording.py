@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,10 +86,16 @@ class Recorder:
     ----------
     start : Problem
         The run.
+    count : callable, optional
+        ``count(t, y, mode)``, called for every row instead of keeping it.
     """
 
-    def __init__(self, start: Problem) -> None:
-        self.start = start
+    def __init__(
+        self,
+        start: Problem,
+        count: Callable[[float, list[float], Sequence[int]], None] | None = None,
+    ) -> None:
+        self.start, self.count = start, count
         self.rows = _Columns([], [], [], [])
         self.stops = _Columns([], [], [], [])
         self.log: list[LogRecord] = []
@@ -103,16 +109,22 @@ class Recorder:
         output = self.start.output
         match event:
             case Arc(t=times, y=states, mode=mode):
-                self.rows.t.extend(times)
-                self.rows.microstep.extend([0] * len(times))
-                self.rows.y.extend(states)
-                self.rows.mode.extend([mode] * len(times))
+                if self.count is None:
+                    self.rows.t.extend(times)
+                    self.rows.microstep.extend([0] * len(times))
+                    self.rows.y.extend(states)
+                    self.rows.mode.extend([mode] * len(times))
+                else:
+                    for t, y in zip(times, states, strict=True):
+                        self.count(t, y, mode)
                 if times:
                     self.latest = (times[-1], states[-1], mode)
             case Firing() | Slide():
                 # The log first: no row may show a firing that is not in it.
                 if isinstance(event, Firing):
                     self.log.append(self._record(event))
+                if self.count is not None:
+                    self.count(event.t, event.y, event.mode)
                 if output != "end":
                     side = self.stops if output == "t_eval" else self.rows
                     side.add(event.t, event.microstep, event.y, event.mode)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.recording.compiled_run import STEPS_AT_ONCE, WORTH_A_LOOK, Columns, CountTables
+from gms_fsm.run.recording.compiled_run import STEPS_AT_ONCE, WORTH_A_LOOK, Columns
+from gms_fsm.run.recording.counted import CountTables
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows

@@ -17,7 +17,8 @@ from gms_fsm.lowering.printing.counting import Counting
 from gms_fsm.lowering.program import Program
 from gms_fsm.run._swept import LOG, Sweep, row_name
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.recording.compiled_run import CompiledRun, CountTables
+from gms_fsm.run.recording.compiled_run import CompiledRun
+from gms_fsm.run.recording.counted import CountTables
 from gms_fsm.run.repeated.block import Ends
 from gms_fsm.run.simulate import Run
 from gms_fsm.systems.mounted import Mounted

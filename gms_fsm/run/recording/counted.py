@@ -1,0 +1,100 @@
+"""Rows that are counted as they come instead of being kept: the truths of guards, for coverage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful
+from gms_fsm.lowering.printing.counting import Counting, CountPlaces
+from gms_fsm.run.problem import Problem
+
+LARGE = 10_000  # places of tables up to which Python may copy them at each row
+
+
+def of_every_step(start: Problem) -> Problem:
+    """Return a run that keeps its end, and hands out the row of every step."""
+    return replace(start, options=replace(start.options, times=None))
+
+
+@dataclass(frozen=True, eq=False)
+class CountTables:
+    """The counts of rows of many runs; runs add to them.
+
+    Parameters
+    ----------
+    counting : Counting
+        What is counted, and where.
+    counts : ndarray of int
+        By the truths of guards, of each element.
+    near : ndarray of float
+        How near both sides of each comparison came, infinity if not yet.
+    """
+
+    counting: Counting
+    counts: NDArray[np.int64]
+    near: NDArray[np.float64]
+
+    @classmethod
+    def empty(cls, counting: Counting) -> CountTables:
+        """Return tables without counts."""
+        counts = np.zeros(counting.counts, dtype=np.int64)
+        return cls(counting, counts, np.full(counting.distances, np.inf))
+
+    def add(self, other: CountTables) -> None:
+        """Add the counts of other runs."""
+        np.add(self.counts, other.counts, out=self.counts)
+        np.minimum(self.near, other.near, out=self.near)
+
+    def parts(self) -> Iterator[tuple[CountPlaces, NDArray[np.int64], NDArray[np.float64]]]:
+        """Yield for each contact its places, counts, one row for each element, and distances."""
+        first = nearest = 0
+        for own, n in zip(self.counting.places, self.counting.sizes, strict=True):
+            counts = self.counts[first : first + n * own.counts].reshape(n, own.counts)
+            yield own, counts, self.near[nearest : nearest + own.distances]
+            first, nearest = first + n * own.counts, nearest + own.distances
+
+
+@dataclass(eq=False)
+class RowCounter:
+    """Counts the rows of a run that Python takes.
+
+    Parameters
+    ----------
+    tables : CountTables
+        Where they are counted, by `put`.
+    p : tuple
+        The numbers of the program.
+    """
+
+    tables: CountTables
+    p: Any
+    _counts: list[int] = field(init=False)
+    _near: list[float] = field(init=False)
+
+    def __post_init__(self) -> None:
+        source = self.tables.counting.source
+        self._fast = load("counting", source, SIGNALS)["count"]
+        self._careful = ieee(_fails, load_careful("counting", source, SIGNALS)["count"])
+        self._counts, self._near = self.tables.counts.tolist(), self.tables.near.tolist()
+
+    def __call__(self, t: float, y: list[float], mode: Sequence[int]) -> None:
+        """Count a row."""
+        before = self._counts[:], self._near[:]
+        try:
+            self._fast(t, y, mode, self.p, self._counts, self._near)
+        except (ArithmeticError, ValueError):  # perhaps after some elements
+            self._counts[:], self._near[:] = before
+            self._careful(t, y, list(mode), self.p, self._counts, self._near)
+
+    def put(self) -> None:
+        """Put the counts into the tables."""
+        self.tables.counts[:], self.tables.near[:] = self._counts, self._near
+
+
+def _fails(*_: Any) -> None:
+    raise ArithmeticError
