@@ -77,8 +77,8 @@ def engine(
     own = text_of(program, "" if counting is None else counting.source)
     text = f"{own} {stamp_of(program.plan)}"
     more = [
-        compiled.Entry("adapt", adapt, OF_A_RUN),
-        compiled.Entry("repeat", repeat, OF_MANY, ("start", "count", "steps")),
+        compiled.EntryPoint("adapt", adapt, OF_A_RUN),
+        compiled.EntryPoint("repeat", repeat, OF_MANY, ("start", "count", "steps")),
     ]
     with _lock:
         return compiled.engine(text, run, _calls(program), store(), notify, more)

@@ -41,7 +41,7 @@ from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.tree import Local
 from integrators.runners import columns, observing, repeating, stepping
-from integrators.runners.columns import LogColumns, Recorded, Tally, counts_nothing
+from integrators.runners.columns import LogColumns, Recorded, RowCounts, counts_nothing
 from integrators.runners.stepping import Sample
 from integrators.sliding import Functions, Held, Sliding
 from integrators.steps import Coefficients
@@ -52,7 +52,7 @@ __all__ = [
     "CodeStore",
     "CompiledFunction",
     "CompiledStepper",
-    "Entry",
+    "EntryPoint",
     "RecordArguments",
     "StepArguments",
     "digest",
@@ -98,11 +98,11 @@ class RecordArguments(NamedTuple):
     buffers: Buffers
     log: LogColumns
     recorded: Recorded
-    tally: Tally
+    tally: RowCounts
     more: Any = ()  # what further entries need
 
 
-class Entry(NamedTuple):
+class EntryPoint(NamedTuple):
     """A function that can be called from outside, by the name of its entry.
 
     Parameters
@@ -324,7 +324,7 @@ def is_known(part: Any) -> bool:
 def _made(
     text: str,
     arguments: Any,
-    entries: Sequence[Entry],
+    entries: Sequence[EntryPoint],
     calls: Sequence[Callable[[float], float]],
     store: CodeStore | None,
     notify: Callable[[str], None],
@@ -339,7 +339,7 @@ def _library(
     text: str,
     arguments: Any,
     layout: BlockLayout,
-    entries: Sequence[Entry],
+    entries: Sequence[EntryPoint],
     store: CodeStore | None,
     notify: Callable[[str], None],
     *,
@@ -398,7 +398,7 @@ def engine(
     calls: Sequence[Callable[[float], float]],
     store: CodeStore | None,
     notify: Callable[[str], None],
-    more: Sequence[Entry] = (),
+    more: Sequence[EntryPoint] = (),
 ) -> CompiledFunction:
     """Return `integrators.runners.columns.record` as machine code for one system.
 
@@ -414,7 +414,7 @@ def engine(
         The cache for machine code.
     notify : callable
         Called with a text before the system is compiled, which takes a while, and afterwards.
-    more : sequence of Entry
+    more : sequence of EntryPoint
         Further functions on the same block; `text` changes with them, too.
 
     Returns
@@ -422,7 +422,7 @@ def engine(
     CompiledFunction
         To be called with a block, the largest number of steps, and whether to pause.
     """
-    record = Entry("entry", columns.record, RECORD, ("steps", "pause"))
+    record = EntryPoint("entry", columns.record, RECORD, ("steps", "pause"))
     return _made(text, arguments, (record, *more), calls, store, notify)
 
 
@@ -468,7 +468,7 @@ def stepper(
         blocks, one after the other in memory, and returns the sum of what it returns.
     """
     layout = BlockLayout(arguments, is_known)
-    entry = Entry("entry", stepping.step_to)
+    entry = EntryPoint("entry", stepping.step_to)
     return CompiledStepper(
         layout, _library(text, arguments, layout, [entry], store, notify, each=True)
     )
@@ -520,9 +520,9 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
     p: Any = functions.p
     shared, own, _ = p
     functions = functions._replace(p=(shared, own, OuterArray(table=True)))
-    tally = Tally(counts_nothing, [], [])
+    tally = RowCounts(counts_nothing, [], [])
     if count is not None:
-        tally = Tally(count, column("i"), column())
+        tally = RowCounts(count, column("i"), column())
     return RecordArguments(
         functions, machines, b._replace(plan=plan, out=out), log, recorded, tally
     )
@@ -573,5 +573,5 @@ def observer(
         seen=[0.0] * seen,
         table=table,
     )
-    entry = Entry("entry", observing.observe_rows, extra=("start", "count"))
+    entry = EntryPoint("entry", observing.observe_rows, extra=("start", "count"))
     return _made(text, rows, [entry], calls, store, notify), rows

@@ -100,7 +100,7 @@ class KnownNumber:
         return True
 
 
-class Cells(NamedTuple):
+class NumberCells(NamedTuple):
     """The numbers of many runs, one by one."""
 
     certain: NDArray[np.bool_]  # which runs need no further check
@@ -140,7 +140,7 @@ class RepeatedRuns:
         self.take_back(run)
         return None
 
-    def cells(self, given: Mapping[str, NDArray[np.float64]]) -> Cells | None:
+    def cells(self, given: Mapping[str, NDArray[np.float64]]) -> NumberCells | None:
         """Return the numbers of many runs, shapes as for a sweep; None if some cannot be put."""
         known = self.known
         if known is None or not {*given} <= {*known}:
@@ -153,7 +153,7 @@ class RepeatedRuns:
             certain &= one.takes_each(given[name])
             parts = [one.place._replace(element=i) for i in range(one.n)] or [one.place]
             places += parts
-            columns += np.broadcast_to(given[name].T, (len(parts), runs))
+            columns.extend(np.broadcast_to(given[name].T, (len(parts), runs)))
         at = {one.place: given[name].reshape(runs, -1) for name, one in found.items()}
         for one in found.values():
             for above, side, below in one.pairs:
@@ -163,7 +163,7 @@ class RepeatedRuns:
             for run in np.flatnonzero(certain).tolist():
                 row = {name: values[run] for name, values in given.items()}
                 certain[run] = self._move(row, [*found.values()])
-        return Cells(certain, places, np.ascontiguousarray(np.stack(columns, axis=1)))
+        return NumberCells(certain, places, np.ascontiguousarray(np.stack(columns, axis=1)))
 
     def _now(self, place: Place) -> NDArray[np.float64]:
         """Return the number of the start, or those of its elements, as of one run."""
