@@ -6,9 +6,11 @@ do. The command line prints that text and exits with code 2; Python callers can 
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import copyreg
 import enum
+from collections.abc import Iterator
 from typing import Any, NamedTuple, Self
 
 LONGEST_SHOWN = 120  # characters of a value in a message
@@ -84,8 +86,9 @@ class GMSError(Exception):
     advice : str, optional
         What to do about it.
     key : tuple of str or int, optional
-        The part of a chart or a system that is at fault, as the names of attributes and places in
-        sequences that lead to it: ``("transitions", 2, "guard")``. Not shown.
+        The part of a chart, a system or the arguments of a call that is at fault, as the names of
+        attributes and places in sequences that lead to it: ``("transitions", 2, "guard")``,
+        ``("initial", "z")``. Not shown; a file finds its line by it.
 
     Examples
     --------
@@ -197,6 +200,21 @@ def scene(text: str, column: int) -> str:
     start = max(0, column - 1 - SCENE // 2)
     shown = text[start : start + SCENE].replace("\n", " ").replace("\t", " ").rstrip()
     return f"    {shown}\n    {' ' * (column - 1 - start)}^"
+
+
+@contextlib.contextmanager
+def keyed(*key: str | int) -> Iterator[None]:
+    """Errors within are of a part of something larger, or of an argument of a call.
+
+    >>> with keyed("initial"), keyed("z"):
+    ...     raise GMSError("it must be > 0", place="z", value=0)
+    Traceback (most recent call last):
+    gms_fsm.errors.GMSError: z is 0; it must be > 0
+    """
+    try:
+        yield
+    except GMSError as error:
+        raise error.replaced(key=(*key, *error.key)) from None
 
 
 class Part(NamedTuple):

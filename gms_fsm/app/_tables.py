@@ -18,6 +18,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticKnownError
 
+from gms_fsm.errors import ScenarioError
 from gms_fsm.foundation.tables import LIST, ONE, TABLE, TEXT, Numbers, Table
 from gms_fsm.identification.problem.task import FitOptions
 from gms_fsm.records.record import Column, Record
@@ -157,6 +158,14 @@ else:
     EventsName, EngineName = Literal[tuple(EVENTS)], Literal[tuple(ENGINES)]
 
 _DEFAULT = Settings()
+_Tolerance = Annotated[
+    Annotated[PositiveFloat, Tag(ONE)] | Annotated[list[PositiveFloat], Tag(LIST)],
+    Discriminator(lambda given: LIST if isinstance(given, list) else ONE),
+]
+Tolerances = Annotated[
+    Annotated[PositiveFloat, Tag(ONE)] | Annotated[dict[str, _Tolerance], Tag(TABLE)],
+    Discriminator(lambda given: TABLE if isinstance(given, dict) else ONE),
+]
 
 
 class RunTable(Table):
@@ -169,7 +178,7 @@ class RunTable(Table):
     method: MethodName = Field(_DEFAULT.method_name, description="the solver")
     step: float | None = Field(_DEFAULT.step, gt=0, description="fixed time step dt, s")
     rtol: float = Field(_DEFAULT.rtol, gt=0)
-    atol: PositiveFloat | dict[str, PositiveFloat | list[PositiveFloat]] | None = Field(
+    atol: Tolerances | None = Field(
         None,
         description="absolute tolerance of all components, or by name { x, v, z }; by "
         "default from the scales of the model",
@@ -267,7 +276,11 @@ class FitTable(Table):
         for name in ("train", "test"):
             pair = getattr(self, name)
             if pair is not None and not pair[0] < pair[1]:
-                raise ValueError(f"{name} ends at {pair[1]:g} s, not after its start")
+                raise ScenarioError(
+                    f"{name} ends at {pair[1]:g} s, not after its start",
+                    advice="give from and to, s",
+                    key=(name,),
+                )
         return self
 
     def options(self, smoothing: float | None) -> FitOptions:
@@ -299,12 +312,24 @@ class Scenario(Table):
     @model_validator(mode="after")
     def _fits(self) -> Scenario:
         if isinstance(self.rig, RecordedTable) and self.record is None:
-            raise ValueError("rig.kind = 'record' needs a table [record]")
+            raise ScenarioError(
+                "rig.kind = 'record' needs a table [record]",
+                advice="add one with file, time and position or velocity",
+                key=("rig", "kind"),
+            )
         if not isinstance(self.rig, RecordedTable):
             if self.record is not None:
-                raise ValueError("the table [record] requires rig.kind = 'record'")
+                raise ScenarioError(
+                    "the table [record] requires rig.kind = 'record'",
+                    advice="change the rig, or leave the table out",
+                    key=("rig", "kind"),
+                )
             if self.run.t_end is None:
-                raise ValueError("run.t_end is missing; it can be omitted only with a record")
+                raise ScenarioError(
+                    "run.t_end is missing",
+                    advice="add t_end in s to [run]; it can be omitted only with a record",
+                    key=("run",),
+                )
         return self
 
 
@@ -353,9 +378,17 @@ class SystemScenario(SystemFile):
     @model_validator(mode="after")
     def _fits(self) -> SystemScenario:
         if self.record is not None and self.fit is None:
-            raise ValueError("the table [record] of a system is for gms-fsm fit; add a table [fit]")
+            raise ScenarioError(
+                "the table [record] of a system is for gms-fsm fit",
+                advice="add a table [fit]",
+                key=("record",),
+            )
         if self.run.events == "held":
-            raise ValueError("run.events = 'held' is for a model on a rig; give a contact a period")
+            raise ScenarioError(
+                "run.events = 'held' is for a model on a rig",
+                advice="give a contact a period",
+                key=("run", "events"),
+            )
         return self
 
     def initial_values(self) -> dict[str, Any]:

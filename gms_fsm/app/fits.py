@@ -7,12 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gms_fsm.app._tables import FitTable, RecordTable, Scenario, SystemScenario
-from gms_fsm.app.scenario import find_file, kind_of, load_scenario, read_system, scenario_file
-from gms_fsm.errors import GMSError, RecordError, ScenarioError
+from gms_fsm.app.scenario import (
+    blaming,
+    kind_of,
+    load_scenario,
+    read_record,
+    read_system,
+    scenario_file,
+)
+from gms_fsm.errors import ScenarioError
 from gms_fsm.foundation.toml import parsed
 from gms_fsm.identification.fit import task_of
 from gms_fsm.identification.problem.task import Task
-from gms_fsm.records.record import Record
 from gms_fsm.scenarios import shipped
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
@@ -74,18 +80,20 @@ def load_fit(path: str | Path, overrides: Sequence[str] = ()) -> LoadedFit:
     scenario: Scenario | SystemScenario
     model: Model | System
     if kind_of(parsed(path)) == "system":
-        scenario, model = read_system(path, overrides)
+        file, scenario, model = read_system(path, overrides)
         table, columns = _given(path, scenario)
-        record = columns.read(find_file(path, columns.file), columns.columns())
+        record = read_record(file, columns)
     else:
         loaded = load_scenario(path, overrides)
-        scenario, model = loaded.scenario, loaded.model
+        file, scenario, model = loaded.file, loaded.scenario, loaded.model
         table, columns = _given(path, scenario)
         assert loaded.record is not None
         record = loaded.record
     unused = [f"[{name}]" for name in ("run", "initial") if name in scenario.model_fields_set]
     notes = (f"a fit ignores {' and '.join(unused)}",) if unused else ()
-    return LoadedFit(path, _task(path, record, model, table, columns.smoothing), notes)
+    with blaming(file, "fit"):
+        task = task_of(record, model, table.fixed, table.options(columns.smoothing))
+    return LoadedFit(path, task, notes)
 
 
 def _given(path: Path, scenario: Scenario | SystemScenario) -> tuple[FitTable, RecordTable]:
@@ -107,18 +115,3 @@ def _given(path: Path, scenario: Scenario | SystemScenario) -> tuple[FitTable, R
             advice='add [record] with file, time, position and force; and kind = "record" in [rig]',
         )
     return scenario.fit, scenario.record
-
-
-def _task(
-    path: Path,
-    record: Record,
-    model: Model | System,
-    table: FitTable,
-    smoothing: float | None,
-) -> Task:
-    try:
-        return task_of(record, model, table.fixed, table.options(smoothing))
-    except RecordError:
-        raise
-    except GMSError as error:
-        raise ScenarioError.of(error).inside("[fit]").inside(path) from None

@@ -13,7 +13,7 @@ import numpy as np
 
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
-from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
+from gms_fsm.errors import MissingExtraError
 from gms_fsm.foundation.files import output_folder, refuse_input, write_text
 from gms_fsm.foundation.quantities import named_numbers
 from gms_fsm.foundation.text import plain, table_lines
@@ -156,8 +156,6 @@ def run_scenario(
             if not getattr(verdict, "livelock", False):  # that is the error just reported
                 failed.add_note(line)
         raise failed from error.__cause__
-    except GMSError as error:
-        raise ScenarioError.of(error).inside(loaded.path) from None
     except KeyboardInterrupt as error:
         part: Any = getattr(error, "trace", ())  # empty if the run has not started
         error.args = ("interrupted before the first row; nothing was written",)

@@ -7,7 +7,8 @@ record file must be in the folder of the scenario (or in the data folder named b
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -18,6 +19,8 @@ from pydantic import TypeAdapter
 from gms_fsm.app._tables import (
     PrescribedTable,
     PulledTable,
+    RecordTable,
+    RunTable,
     Scenario,
     SignalField,
     SignalRecordTable,
@@ -25,11 +28,11 @@ from gms_fsm.app._tables import (
     SystemScenario,
 )
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
+from gms_fsm.errors import GMSError, RecordError, ScenarioError, cut
 from gms_fsm.foundation.arguments import no_file, unknown
 from gms_fsm.foundation.files import inside
-from gms_fsm.foundation.tables import place_in, read_file
-from gms_fsm.foundation.toml import parsed
+from gms_fsm.foundation.tables import read
+from gms_fsm.foundation.toml import Key, TomlFile, parsed
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
 from gms_fsm.run.simulate import simulate
@@ -40,7 +43,8 @@ from gms_fsm.systems.mounted import mounted, mounted_alone
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.systems.signals import Corners, SignalLike, as_signal
 from gms_fsm.systems.system import System
-from gms_fsm.traces.monitors import Monitor, checked
+from gms_fsm.traces.failures import SimulationError
+from gms_fsm.traces.monitors import checked
 from gms_fsm.traces.trace import Trace
 
 if TYPE_CHECKING:
@@ -56,6 +60,7 @@ __all__ = [
 __all__ += ["schema", "session_of"]
 
 DATA_VARIABLE = "GMS_FSM_DATA"
+MOST_ROWS = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +69,10 @@ class Loaded:
 
     Parameters
     ----------
-    path : Path
+    file : TomlFile
         The scenario file.
     scenario : Scenario or SystemScenario
-        The contents of the file.
+        Its contents.
     model, rig
         What to simulate; of a system its only contact, and the rest.
     arguments : mapping
@@ -78,7 +83,7 @@ class Loaded:
         The system, if the file describes one.
     """
 
-    path: Path
+    file: TomlFile
     scenario: Scenario | SystemScenario
     model: Model
     rig: Rig
@@ -86,6 +91,11 @@ class Loaded:
     record: Record | None
     motion: Motion | None
     system: System | None = None
+
+    @property
+    def path(self) -> Path:
+        """The scenario file."""
+        return self.file.path
 
     @property
     def title(self) -> str:
@@ -124,10 +134,34 @@ class Loaded:
         -------
         Trace
             The run.
+
+        Raises
+        ------
+        ScenarioError
+            If `simulate` rejects an argument; the message names the line that gives it.
+        SimulationError
+            If the run cannot continue.
         """
         given: Any = {**self.arguments, **options}
         what: Any = (*self.subject[:-1], given.pop("t_end"))
-        return replace(simulate(*what, **given), heading=self.scenario.title)
+        with self.blaming():
+            return replace(simulate(*what, **given), heading=self.scenario.title)
+
+    @contextmanager
+    def blaming(self) -> Iterator[None]:
+        """Errors in the arguments of a run name the line of the file that gives the argument."""
+        try:
+            yield
+        except SimulationError:
+            raise
+        except GMSError as error:
+            first, *rest = error.key or (error.place,)
+            key: Key = ("initial", *rest) if first == "initial" else ()
+            if first == "t_eval":
+                key = ("output", "every")
+            elif first in RunTable.model_fields:
+                key = ("run", first, *rest)
+            raise self.file.blamed(ScenarioError.of(error), key) from None
 
 
 def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
@@ -172,17 +206,24 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         )
     if kind_of(data) == "system":
         return _loaded_system(path, overrides)
-    scenario = read_file(path, Scenario, ScenarioError, lambda table: table, overrides)
+    file = TomlFile.of(path, overrides=overrides)
+    return _loaded(file, read(file, Scenario, ScenarioError, lambda table: table))
+
+
+@contextmanager
+def blaming(file: TomlFile, *key: str) -> Iterator[None]:
+    """Errors within name the line of a key of a file, or of one in it.
+
+    One in the rows of a table names the file and the row of the table.
+    """
     try:
-        return _loaded(path, scenario, overrides)
-    except (RecordError, ScenarioError):
-        raise
-    except UnitError as error:
-        place = f"[record] {error.place}".rstrip()
-        raise ScenarioError.of(error).replaced(place=place).inside(path) from None
+        yield
     except GMSError as error:
-        place = place_in(path, ("rig", error.place), overrides) + f"[rig] {error.place}".rstrip()
-        raise ScenarioError.of(error).replaced(place=place).inside(path) from None
+        wrong = error if isinstance(error, RecordError) else ScenarioError.of(error)
+        inner = error.key or ((error.place,) if error.place and not error.outer else ())
+        if wrong is error and not error.key:
+            raise
+        raise file.blamed(wrong, (*key, *inner)) from None
 
 
 def scenario_file(given: str | Path) -> Path:
@@ -266,18 +307,19 @@ def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
         raise ScenarioError(
             "it is a model on a rig, not a system", place=str(path), advice="use load_scenario"
         )
-    return read_system(path, overrides)[1]
+    return read_system(path, overrides)[2]
 
 
-def read_system(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, System]:
-    """Return the contents of a scenario file of a system, and the system."""
+def read_system(path: Path, overrides: Sequence[str]) -> tuple[TomlFile, SystemScenario, System]:
+    """Return a scenario file of a system, its contents, and the system."""
 
-    def build(table: SystemScenario) -> tuple[SystemScenario, System]:
-        return table, table.chosen(path.parent, System)
+    def build(table: SystemScenario) -> tuple[TomlFile, SystemScenario, System]:
+        return file, table, table.chosen(path.parent, System)
 
     _check_numbers(path, overrides)
+    file = TomlFile.of(path, overrides=overrides)
     try:
-        return read_file(path, SystemScenario, ScenarioError, build, overrides)
+        return read(file, SystemScenario, ScenarioError, build)
     except GMSError as error:
         raise ScenarioError.of(error) from None
 
@@ -292,7 +334,7 @@ def _check_numbers(path: Path, overrides: Sequence[str]) -> None:
 
 
 def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
-    scenario, system = read_system(path, overrides)
+    file, scenario, system = read_system(path, overrides)
     run = scenario.run
     start, end = run.t_start or 0.0, run.t_end
     if end is None:
@@ -301,50 +343,46 @@ def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
             place=str(path),
             advice="add a table [run] with t_end in s, or give --set run.t_end=10.0",
         )
-    _check_end(path, start, end, overrides)
+    _check_end(file, start, end)
     arguments = run.options() | {"t_start": start, "t_end": end}
     if initial := scenario.initial_values():
         arguments["initial"] = initial
     if scenario.output.every is not None:
-        arguments["t_eval"] = _rows(path, scenario.output.every, start, end)
+        arguments["t_eval"] = _rows(file, scenario.output.every, start, end)
     what = mounted(system)
     if run.monitors:
         arguments["monitors"] = tuple(run.monitors)  # checked by the run
-    return Loaded(path, scenario, what.model, what.rig, arguments, None, None, system)
+    return Loaded(file, scenario, what.model, what.rig, arguments, None, None, system)
 
 
-def _check_end(path: Path, start: float, end: float, overrides: Sequence[str]) -> None:
+def _check_end(file: TomlFile, start: float, end: float) -> None:
     """Refuse a run that ends before it starts."""
-    if end <= start:
-        raise ScenarioError(
-            f"it must be later than t_start, {start!r}",
-            place=f"{place_in(path, ('run', 't_end'), overrides)}run.t_end",
-            value=end,
-        ).inside(path)
+    if end > start:
+        return
+    if "t_end" in file.data.get("run", {}):
+        late = f"it must be later than t_start, {start!r}"
+        raise file.blamed(ScenarioError(late, place="t_end", value=end), ("run", "t_end"))
+    late = f"it must be earlier than the end of the record, {end!r}"
+    raise file.blamed(ScenarioError(late, place="t_start", value=start), ("run", "t_start"))
 
 
-def _rows(path: Path, every: float, start: float, end: float) -> FloatArray:
+def _rows(file: TomlFile, every: float, start: float, end: float) -> FloatArray:
     """Return the times of the rows."""
     wanted = max(0.0, (end - start) / every)  # t_end is checked later
-    if wanted > 10_000_000:
-        raise ScenarioError(
-            f"output.every = {every} s gives {wanted:.4g} rows",
-            place=str(path),
-            advice="use a larger value",
+    if wanted > MOST_ROWS:
+        many = ScenarioError(
+            f"it gives {wanted:.4g} rows, and at most {MOST_ROWS:,} can be kept",
+            place="every",
+            value=every,
+            advice=f"use at least {(end - start) / MOST_ROWS:.1g} s",
         )
+        raise file.blamed(many, ("output", "every"))
     times: FloatArray = np.minimum(start + every * np.arange(int(wanted) + 1), end)
     return times
 
 
-def _monitors(path: Path, given: Sequence[str], model: Model) -> tuple[Monitor, ...]:
-    try:
-        return tuple(checked(given, mounted_alone(model)).values())
-    except GMSError as error:
-        raise ScenarioError.of(error).inside("run.monitors").inside(path) from None
-
-
 # --------------------------------------------------------------------------- a model on a rig
-def _loaded(path: Path, scenario: Scenario, overrides: Sequence[str]) -> Loaded:
+def _loaded(file: TomlFile, scenario: Scenario) -> Loaded:
     run, record, motion = scenario.run, None, None
     start, end = run.t_start, run.t_end
     initial = scenario.initial.model_dump(exclude_none=True)
@@ -352,16 +390,19 @@ def _loaded(path: Path, scenario: Scenario, overrides: Sequence[str]) -> Loaded:
     rig: Rig
     match scenario.rig:
         case PrescribedTable(velocity=velocity):
-            rig = Prescribed(_signal(path, velocity, "velocity", overrides))
+            rig = Prescribed(_signal(file, velocity, "velocity"))
         case SliderTable(mass=mass, force=force):
-            rig = Slider(mass, _signal(path, force, "force", overrides))
+            push = _signal(file, force, "force")
+            with blaming(file, "rig"):
+                rig = Slider(mass, push)
         case PulledTable(mass=mass, stiffness=stiffness, speed=speed):
-            rig = PulledSlider(mass, stiffness, speed)
+            with blaming(file, "rig"):
+                rig = PulledSlider(mass, stiffness, speed)
         case _:
             assert scenario.record is not None
-            table = scenario.record
-            record = table.read(find_file(path, table.file), table.columns())
-            motion = record.motion(table.smoothing)
+            record = read_record(file, scenario.record)
+            with blaming(file, "record"):
+                motion = record.motion(scenario.record.smoothing)
             rig = Prescribed(Corners(motion.time, motion.velocity, held=False))
             start = float(motion.time[0]) if start is None else start
             end = float(motion.time[-1]) if end is None else end
@@ -371,32 +412,37 @@ def _loaded(path: Path, scenario: Scenario, overrides: Sequence[str]) -> Loaded:
                 arguments["t_eval"] = motion.time[inside]
     assert end is not None
     start = 0.0 if start is None else start
-    _check_end(path, start, end, overrides)
+    _check_end(file, start, end)
     if scenario.output.every is not None:
-        arguments["t_eval"] = _rows(path, scenario.output.every, start, end)
+        arguments["t_eval"] = _rows(file, scenario.output.every, start, end)
     arguments |= {"t_start": start, "t_end": end, "initial": initial}
     model = scenario.model.build()
+    loaded = Loaded(file, scenario, model, rig, arguments, record, motion)
     if run.monitors:
-        arguments["monitors"] = _monitors(path, run.monitors, model)
-    return Loaded(path, scenario, model, rig, arguments, record, motion)
+        with loaded.blaming():
+            arguments["monitors"] = tuple(checked(run.monitors, mounted_alone(model)).values())
+    return loaded
 
 
-def _signal(path: Path, given: SignalField, quantity: str, overrides: Sequence[str]) -> SignalLike:
-    key = f"rig.{quantity}"
-    try:
+def _signal(file: TomlFile, given: SignalField, quantity: str) -> SignalLike:
+    with blaming(file, "rig", quantity):
         if isinstance(given, SignalRecordTable):
-            file = find_file(path, given.file)
+            path = find_file(file.path, given.file)
             # The value column is read as the quantity it represents, so that units are checked.
-            record = given.read(file, {quantity: given.value.build()})
+            try:
+                record = given.read(path, {quantity: given.value.build()})
+            except GMSError as error:
+                key = ["value" if part == quantity else part for part in error.key]
+                raise error.replaced(key=(*key,)) from None
             rows = record.chosen
             return Corners(record.columns["time"][rows], record.columns[quantity][rows], held=False)
-        key += f" = {cut(shown(given), 40)}"
         return as_signal([(t, value) for t, value in given] if isinstance(given, list) else given)
-    except (RecordError, ScenarioError):
-        raise
-    except GMSError as error:
-        line = place_in(path, ("rig", quantity), overrides)
-        raise ScenarioError.of(error).inside(f"{line}{key}").inside(path) from None
+
+
+def read_record(file: TomlFile, table: RecordTable) -> Record:
+    """Read the record of a scenario."""
+    with blaming(file, "record"):
+        return table.read(find_file(file.path, table.file), table.columns())
 
 
 def find_file(scenario: Path, name: str) -> Path:
@@ -409,12 +455,16 @@ def find_file(scenario: Path, name: str) -> Path:
             found = inside(folder, name)
         except (OSError, ValueError) as error:  # too long, or contains a null byte
             raise ScenarioError(
-                f"file = {shown(name)} is not a file name ({cut(str(error))})", place=str(scenario)
+                f"it is not a file name ({cut(str(error))})",
+                place="file",
+                value=name,
+                advice="name a table beside the scenario",
             ) from None
         if found is None:
             raise ScenarioError(
-                f"file = {shown(name)} is outside the folder of the scenario",
-                place=str(scenario),
+                "it is outside the folder of the scenario",
+                place="file",
+                value=name,
                 advice="put the file next to the scenario, or in the folder named by "
                 f"{DATA_VARIABLE}",
             )
@@ -423,8 +473,8 @@ def find_file(scenario: Path, name: str) -> Path:
     missing = no_file(folders[0] / name, ScenarioError)
     second = f"or in {folders[1]}, the" if len(folders) > 1 else f"or set {DATA_VARIABLE} to a"
     raise missing.replaced(
-        reason=f"file = {shown(name)}: {missing.reason}",
-        place=str(scenario),
+        place="file",
+        value=name,
         advice=f"{missing.advice}; put it beside the scenario, {second} data folder",
     )
 
@@ -450,10 +500,8 @@ def session_of(loaded: Loaded) -> Session:
     """
     not_here = ("t_end", "t_eval", "monitors")
     options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
-    try:
+    with loaded.blaming():
         return Session(*loaded.subject, **options)
-    except GMSError as error:
-        raise ScenarioError.of(error).inside(loaded.path) from None
 
 
 def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:

@@ -181,7 +181,8 @@ def swept(
     else:
         options["output"] = "t_eval"
     options.pop("t_end")
-    return sweep(*(*loaded.subject, parameters), engine=engine, coverage=coverage, **options)
+    with loaded.blaming():
+        return sweep(*(*loaded.subject, parameters), engine=engine, coverage=coverage, **options)
 
 
 def _known(loaded: Loaded) -> tuple[Parameter, ...]:

@@ -228,7 +228,9 @@ class Transition:
             )
         sources = (source,) if isinstance(source, str) else tuple(source)
         if not sources:
-            raise ChartError("it leaves no state", place=f"edge {shown(name)}")
+            raise ChartError(
+                "it leaves no state", place=f"edge {shown(name)}", advice="name the state it leaves"
+            )
         given = texts_of({} if actions is None else actions, f"edge {shown(name)}: actions")
         if not isinstance(impulse, bool):
             raise ChartError(

@@ -5,7 +5,6 @@ The sentence gives key, value, rule, and the nearest key; it names no file.
 
 from __future__ import annotations
 
-import functools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,12 +13,12 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
 from pydantic.fields import FieldInfo
 
-from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, shown
+from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, keyed, shown
 from gms_fsm.foundation.arguments import either, meant, nearest, some_of
 from gms_fsm.foundation.files import output_folder, write_whole
 from gms_fsm.foundation.quantities import in_si
 from gms_fsm.foundation.text import encoded
-from gms_fsm.foundation.toml import LARGEST_FILE, Key, data_of, line_of, override, text_of, written
+from gms_fsm.foundation.toml import LARGEST_FILE, Key, TomlFile, written
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
 ONE, LIST, TEXT, TABLE = "<one>", "<list>", "<text>", "<table>"
@@ -63,38 +62,23 @@ def read_file(
     overrides: Sequence[str] = (),
 ) -> Made:
     """Read what a TOML file describes."""
-    text = text_of(path, error)
-    data = data_of(text, path, error)
-    replaced = [override(data, each) for each in overrides]
-    place_of = functools.partial(_place_of, text, replaced)
+    return read(TomlFile.of(path, error, overrides), kind, error, build)
+
+
+def read(
+    file: TomlFile, kind: type[Kind], error: type[GMSError], build: Callable[[Kind], Made]
+) -> Made:
+    """Read what the tables of a TOML file describe."""
     try:
-        table = kind.model_validate(data)
+        table = kind.model_validate(file.data)
     except ValidationError as found:
-        key, sentence = explained(found, data, kind)
-        raise error(": ".join([*place_of(key), sentence]), place=str(path)) from None
+        key, sentence = explained(found, file.data, kind)
+        place = file.place_of(key)
+        raise error(": ".join([*place, sentence]), place=str(file.path)) from None
     try:
         return build(table)
     except GMSError as found:
-        key = _key_in_file(found.key, data, kind)
-        place = place_of(key)
-        place += [".".join(map(str, key))] if key else []
-        raise (found.inside(", ".join(place)) if place else found).inside(path) from None
-
-
-def place_in(path: Path, key: Key, overrides: Sequence[str] = ()) -> str:
-    """Return where a key of a file is given, to stand before what is said of it."""
-    text = text_of(path)
-    data = data_of(text, path)
-    found = _place_of(text, [override(data, each) for each in overrides], key)
-    return "".join(f"{each}: " for each in found)
-
-
-def _place_of(text: str, replaced: Sequence[Key], key: Key) -> list[str]:
-    """Return where a key is given: on a line, or by an override."""
-    if any(key[: len(each)] == each for each in replaced):
-        return ["--set"]
-    line = line_of(text, key)
-    return [f"line {line}"] if line else []
+        raise file.blamed(found, _key_in_file(found.key, file.data, kind)) from None
 
 
 def write_file(path: Path, table: Table) -> Path:
@@ -121,10 +105,8 @@ def write_file(path: Path, table: Table) -> Path:
 
 def built(make: Callable[..., Made], *key: str | int, **given: Any) -> Made:
     """Return what a function makes; its errors name a part of something larger."""
-    try:
+    with keyed(*key):
         return make(**given)
-    except GMSError as error:
-        raise error.replaced(key=(*key, *error.key)) from None
 
 
 def _key_in_file(key: Key, given: Any, root: type[BaseModel]) -> Key:
@@ -162,8 +144,11 @@ def explained(
         return places, f"{places[-1]} is {where}; write the head of its table, {head}, above it"
     rest = len(findings) - 1
     sentence = _sentence(first, places, data, root) + (f" (and {rest} more)" if rest else "")
+    cause = first.get("ctx", {}).get("error")
+    if inner := getattr(cause, "key", ()):
+        return (*places, *inner), sentence
     tag = first.get("ctx", {}).get("discriminator", "").strip("'")
-    part = tag or getattr(first.get("ctx", {}).get("error"), "place", "").partition("[")[0]
+    part = tag or getattr(cause, "place", "").partition("[")[0]
     value = first.get("input")
     return (*places, part) if isinstance(value, dict) and part in value else places, sentence
 
@@ -197,7 +182,10 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
         return f"{key} = {cut(shown(value), 40)}: unknown key; {hint}valid here: {some_of(valid)}"
     if kind == "missing":
         field = _fields_at(places[:-1], data, root).get(str(places[-1]))
-        return f"{key} is missing{'' if field is None else _what(field)}"
+        told = "" if field is None else _what(field)
+        if not told and field is not None and _tables_in(field.annotation):
+            told = f"; add a table [{key}]"
+        return f"{key} is missing{told}"
     if kind == "union_tag_not_found":
         field = _fields_at(places[:-1], data, root).get(str(places[-1]))
         return f"{key}.kind is missing{'' if field is None else _what_kind(field)}"
@@ -215,6 +203,8 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
     if isinstance(value, dict):
         if kind == "list_type":
             return f"[{key}]: there may be several of it; write [[{key}]]"
+        if kind != "value_error":
+            return f"[{key}] is a table; {_other_form(kind, None, 0) or text}"
         return f"[{key}] {text}" if key else text
     field = _fields_at(places[:-1], data, root).get(str(places[-1]))
     outer = _fields_at(places[:-2], data, root).get(str(places[-2])) if len(places) > 1 else None
@@ -231,7 +221,11 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
 def _other_form(kind: str, value: object, elements: int) -> str:
     """Return how a value of another type is written; empty if the rule says it."""
     text = value.strip() if isinstance(value, str) else ""
-    if kind == "float_type" and text:
+    if kind in ("int_type", "int_parsing", "int_from_float"):
+        return f"it must be a whole number{', without quotes' * bool(text)}"
+    if kind == "float_type" and not text:
+        return "it must be a number"
+    if kind == "float_type":
         number = in_si(text)
         form = "it must be a number in SI units, without quotes, unit or formula"
         return f"{form}: {number}" if number else form
@@ -249,7 +243,7 @@ def _other_form(kind: str, value: object, elements: int) -> str:
     if kind == "list_type" and isinstance(value, int | float) and not isinstance(value, bool):
         every = ", ".join([repr(value)] * max(1, elements))
         return f"it must be a list{', one number for each element' * bool(elements)}: [{every}]"
-    return ""
+    return "it must be a list, in brackets" if kind == "list_type" else ""
 
 
 def _as_pair(value: object, field: FieldInfo | None) -> str:

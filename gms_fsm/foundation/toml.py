@@ -6,14 +6,16 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from gms_fsm.errors import GMSError, ScenarioError, cut, scene, shown
 from gms_fsm.foundation.arguments import no_file, unknown
 from gms_fsm.foundation.quantities import in_si
 
 Key = tuple[str | int, ...]  # names of keys, and places in arrays from 0
+Error = TypeVar("Error", bound=GMSError)
 
 LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 2000  # characters that are searched for what is usual, in quadratic time
@@ -260,6 +262,72 @@ def _index(tables: Sequence[Mapping[str, Any]], part: str, here: str) -> int:
 
 
 # --------------------------------------------------------------------------- lines
+@dataclass(frozen=True, eq=False)
+class TomlFile:
+    """A TOML file as it was read, which knows where each of its keys is given.
+
+    `replaced` are the keys given by ``--set``.
+    """
+
+    path: Path
+    text: str
+    data: dict[str, Any]
+    replaced: Sequence[Key] = ()
+
+    @classmethod
+    def of(
+        cls, path: Path, kind: type[GMSError] = ScenarioError, overrides: Sequence[str] = ()
+    ) -> TomlFile:
+        """Read a file, and change keys."""
+        text = text_of(path, kind)
+        data = data_of(text, path, kind)
+        return cls(path, text, data, [override(data, each) for each in overrides])
+
+    def place_of(self, key: Key) -> list[str]:
+        """Return where a key is given: on a line, or by an override; nothing if nowhere."""
+        if any(key[: len(each)] == each for each in self.replaced):
+            return ["--set"]
+        line = line_of(self.text, key)
+        return [f"line {line}"] if line else []
+
+    def written(self, key: Key) -> Key:
+        """Return what the file has of a key; a name with dots may be tables in tables."""
+        found, data, left = list[str | int](), self.data, [*key]
+        while left and isinstance(data, dict | list):
+            part = left.pop(0)
+            if isinstance(part, str) and isinstance(data, dict) and part not in data:
+                part, dot, rest = part.partition(".")
+                left[:0] = [rest] * bool(dot)
+            if not _has(data, (part,)):
+                break
+            found.append(part)
+            data = data[part]  # type: ignore[index]
+        return tuple(found)
+
+    def _narrowed(self, key: Key, name: str) -> Key:
+        """Return the key of a name that is given in a table of the file, or in a table in it."""
+        table: Any = self.data
+        for part in key:
+            table = table[part]
+        if not isinstance(table, dict):
+            return key
+        inner = [(each, name) for each, value in table.items() if isinstance(value, dict)]
+        return next(((*key, *each) for each in [(name,), *inner] if _has(table, each)), key)
+
+    def blamed(self, error: Error, key: Key) -> Error:
+        """Return an error with the line and the key of this file that it is about, if any."""
+        found = self.written(key)
+        found = found and self._narrowed(found, error.place.partition("[")[0])
+        where, dotted = self.place_of(found) if found else [], ".".join(map(str, found))
+        if not where:
+            return error.inside(self.path)
+        if not error.outer and error.place and found[-1] == error.place:
+            error = error.replaced(place=dotted)
+        else:
+            where.append(dotted)
+        return error.inside(", ".join(where)).inside(self.path)
+
+
 def line_of(text: str, key: Key) -> int:
     r"""Return the line on which a key is written.
 

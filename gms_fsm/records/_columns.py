@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from gms_fsm.errors import ParameterError, UnitError
+from gms_fsm.errors import ParameterError, UnitError, keyed
 from gms_fsm.foundation.quantities import UNITS, factor, plain
 
 if TYPE_CHECKING:
@@ -71,9 +71,12 @@ def columns_of(given: dict[str, Any]) -> dict[str, Column]:
     >>> columns_of({"position": ("x", "mm"), "force": "F", "normal": None})["force"]
     Column(name='F', unit='N', sign=1)
     """
-    found = {name: _column(name, each) for name, each in given.items() if each is not None}
-    for quantity, column in found.items():
-        factor(quantity, column.unit)
+    found: dict[str, Column] = {}
+    for quantity, each in given.items():
+        if each is not None:
+            with keyed(quantity):
+                found[quantity] = _column(quantity, each)
+                factor(quantity, found[quantity].unit)
     return found
 
 

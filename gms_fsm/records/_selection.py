@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import ExpressionError, ParameterError, RecordError, UnitError, shown
+from gms_fsm.errors import ExpressionError, ParameterError, RecordError, UnitError, keyed, shown
 from gms_fsm.foundation.arguments import one_of
 from gms_fsm.foundation.quantities import convert_numbers
 from gms_fsm.language import evaluate, names_in, parse_condition
@@ -113,11 +113,15 @@ def selected(
     if not isinstance(where, str):
         raise ParameterError("it must be a condition, as a text", place="where", value=where)
     one_of("missing", missing, MISSING)
-    chosen = _chosen(origin, values, where, rows.size)
+    with keyed("where"):
+        chosen = _chosen(origin, values, where, rows.size)
     if not chosen.any():
         if words:
             _check_separator(origin, words)
-        raise origin.error(f"no row satisfies where = {shown(where)}", "choose another condition")
+        with keyed("where"):
+            raise origin.error(
+                f"no row satisfies where = {shown(where)}", "choose another condition"
+            )
     part = _from_first_to_last(origin, RecordRows(values, chosen, rows, []), words, where)
     part = _without_gaps(origin, part, words, missing)
     _check_finite(origin, part, tuple(values))

@@ -314,6 +314,7 @@ def _places(path: Path, head: _Head, columns: Mapping[str, Column]) -> dict[str,
                 place=str(path),
                 advice=f"columns in row {head.row}: "
                 f"{cut(', '.join(map(repr, head.names)), 1000)}; {advice}",
+                key=(quantity,),
             )
     return {quantity: head.names.index(column.name) for quantity, column in columns.items()}
 
@@ -397,6 +398,7 @@ def _units(
                 f"{quantity} is read in {shown(column.unit)}",
                 place=str(path),
                 advice="give the right unit, or correct the row",
+                key=(quantity,),
             )
     return f"row {number} is a line of units: {', '.join(cells.values())}"
 

@@ -82,7 +82,10 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     time = record.columns["time"]
     if smoothing is not None and not smoothing >= 0.0:
         raise RecordError(
-            f"smoothing is {shown(smoothing)} s", place=record.place, advice="it must be >= 0"
+            f"smoothing is {shown(smoothing)} s",
+            place=record.place,
+            advice="it must be >= 0",
+            key=("smoothing",),
         )
     interval = float(np.median(np.diff(time)))
     if smoothing is not None and smoothing > time[-1] - time[0]:
@@ -91,6 +94,7 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
             "s)",
             place=record.place,
             advice="use a smaller value",
+            key=("smoothing",),
         )
     if "velocity" in record.columns:
         raw, given = record.columns["velocity"], "velocity"

@@ -13,7 +13,7 @@ import numpy as np
 import integrators
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
-from gms_fsm.errors import ParameterError, SignalError, shown
+from gms_fsm.errors import ParameterError, SignalError, keyed, shown
 from gms_fsm.foundation.arguments import there_are, unknown
 from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.lowering.floor import floor_of
@@ -181,6 +181,7 @@ class Problem:
             raise ParameterError(
                 f"method {method.__name__} needs an absolute tolerance, and the chart "
                 f"gives no scale for {', '.join(missing)}",
+                key=("method",),
                 advice=f"give one far below the values that matter, for example atol={missing}",
             )
         options = LoopOptions(
@@ -275,7 +276,10 @@ def _times(t_start: float, t_end: float) -> tuple[float, float]:
     for name, time in (("t_start", t_start), ("t_end", t_end)):
         if abs(time) > LATEST:
             raise ParameterError(
-                f"{name} is {time!r} s", advice=f"beyond {LATEST:g} s time is resolved too coarsely"
+                f"beyond {LATEST:g} s time is resolved too coarsely",
+                place=name,
+                value=time,
+                advice="give times from the start of the run",
             )
     if t_end <= t_start:
         raise ParameterError(
@@ -290,7 +294,9 @@ def _check_resolution(chosen: Settings, t_start: float, t_end: float) -> None:
     for name, length in (("step", chosen.step), ("max_step", chosen.max_step)):
         if length is not None and length <= tick:
             raise ParameterError(
-                f"{name} is {length!r} s, below the resolution of the clock ({tick:.2g} s here)",
+                f"it is below the resolution of the clock ({tick:.2g} s here)",
+                place=name,
+                value=length,
                 advice="give a larger value",
             )
 
@@ -318,11 +324,13 @@ def _tolerances(
     rows = {name: default[name] for name in (*places.shared, *places.own)}
     by_name: Mapping[str, Any] = {} if atol is None else atol
     for key, given in by_name.items():
-        name = _component(layout, key, "atol")
-        if np.ndim(given) == 0:
-            rows[name] = [checked_scalar(f"atol[{key!r}]", given, "> 0")] * len(rows[name])
-        else:
-            rows[name] = as_floats(checked_array(f"atol[{key!r}]", given, len(rows[name]), "> 0"))
+        with keyed("atol", key):
+            name = _component(layout, key, "atol")
+            here, size = f"atol[{key!r}]", len(rows[name])
+            if np.ndim(given) == 0:
+                rows[name] = [checked_scalar(here, given, "> 0")] * size
+            else:
+                rows[name] = as_floats(checked_array(here, given, size, "> 0"))
     found: dict[str, float | list[float]] = {
         name: row if name in places.own else row[0] for name, row in rows.items()
     }
@@ -377,6 +385,7 @@ def _covered(system: System, t_start: float, t_end: float) -> float:
                     f"signal {name!r} covers {float(signal.times[0])!r} to "
                     f"{float(signal.times[-1])!r} s, but the run starts at {t_start!r} s",
                     advice="choose t_start within the record",
+                    key=("t_start",),
                 )
             last = min(last, float(signal.times[-1]))
     return last
@@ -406,6 +415,7 @@ def _given(
         )
     names: dict[str, Any] = {}
     given: dict[str, Any] = {}
+    called: dict[str, Any] = {}  # as the user calls it
     for key, value in initial.items():
         contact = key.removesuffix("states").removesuffix(".") if isinstance(key, str) else ""
         if key == "states" and len(layout.banks) == 1:
@@ -414,15 +424,17 @@ def _given(
             names[system.contact(contact).name] = value
         elif key in layout.keys:
             given[layout.keys[key]] = value
+            called[layout.keys[key]] = key
         else:
             reason, advice = _unknown_initial(what, layout, key, value)
-            raise ParameterError(reason, advice=advice)
+            raise ParameterError(reason, advice=advice, key=("initial", key))
     y: dict[str, Any] = dict.fromkeys(layout.y.shared, 0.0)
     for each in system.sampled:
         y |= each.initial
     for name in layout.y.shared:
         if name in given:
-            y[name] = checked_scalar(f"initial[{name!r}]", given[name], "finite")
+            with keyed("initial", called[name]):
+                y[name] = checked_scalar(f"initial[{name!r}]", given[name], "finite")
     for each in system.sampled:
         for name, source in each.delayed.items():
             if source in given and name not in given:
@@ -431,14 +443,14 @@ def _given(
         for variable in bank.variables:
             start = part.chart.initial.get(variable, 0.0)
             name, label = bank.of(variable), layout.label(bank.of(variable))
-            values = checked_array(
-                f"initial[{label!r}]", given.get(name, [start] * bank.n), None, "finite"
-            )
-            if values.size != bank.n:
-                raise ParameterError(
-                    f"initial[{label!r}] has {values.size} entries",
-                    advice=f"the model has {bank.n} elements",
-                )
+            here = f"initial[{label!r}]"
+            with keyed("initial", called.get(name, label)):
+                values = checked_array(here, given.get(name, [start] * bank.n), None, "finite")
+                if values.size != bank.n:
+                    raise ParameterError(
+                        f"{here} has {values.size} entries",
+                        advice=f"give one number for each of the {bank.n} elements",
+                    )
             y[name] = as_floats(values)
         y |= {
             name: [0.0] * bank.n
@@ -450,12 +462,16 @@ def _given(
         chart = part.chart
         default = [chart.default_state.name] * bank.n
         wanted = names.get(bank.name, default)
-        if isinstance(wanted, str) or np.ndim(wanted) != 1 or len(wanted) != bank.n:
-            label = "states" if len(layout.banks) == 1 else f"{bank.name}.states"
-            raise ParameterError(
-                f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
-            )
-        active = [chart.state_index(str(name)) for name in wanted]
+        label = "states" if len(layout.banks) == 1 else f"{bank.name}.states"
+        with keyed("initial", label):
+            if isinstance(wanted, str) or np.ndim(wanted) != 1 or len(wanted) != bank.n:
+                raise ParameterError(
+                    f"it must list {bank.n} state names",
+                    place=f"initial[{label!r}]",
+                    value=wanted,
+                    advice=f"the states are {', '.join(each.name for each in chart.states)}",
+                )
+            active = [chart.state_index(str(name)) for name in wanted]
         for level in chart.nesting.composite:
             if level.state.history and bank.of(level.last) not in given:
                 leaves = (chart.states[k].name for k in active)
@@ -497,6 +513,7 @@ def _check_locks(
                     f"contact {bank.name!r} starts in state {state.name!r}, which holds {name} at "
                     f"0, with {name} = {v:.6g}",
                     place="initial",
+                    key=("initial", key),
                     advice=f"give velocities for which {name} is 0, or another state, for example "
                     f"initial={{{key!r}: [{_not_locked(chart)!r}]}}",
                 )
@@ -534,6 +551,7 @@ def _entered(
             if name in chart.velocities and 0 in mode[bank.elements]:
                 raise ParameterError(
                     f"the entry of the default state {chart.states[0].name!r} sets {name!r}",
+                    key=("initial",),
                     place=f"chart {chart.name!r}",
                     advice="give the initial velocity instead",
                 )

@@ -139,11 +139,14 @@ class Settings:
         one_of("events", self.events, EVENTS)
         if self.events == "step" and self.step is None and not math.isfinite(self.max_step):
             raise ParameterError(
-                "events='step' checks the guards once per step: give step=... or a finite max_step"
+                "events='step' checks the guards once per step: give step=... or a finite max_step",
+                key=("events",),
             )
         if self.events == "held" and self.step is None:
             raise ParameterError(
-                "events='held' evaluates the chart at ticks", advice="give their distance, step=..."
+                "events='held' evaluates the chart at ticks",
+                advice="give their distance, step=...",
+                key=("events",),
             )
         if self.t_eval is not None:
             put(self, "t_eval", _increasing(self.t_eval))
@@ -170,6 +173,7 @@ class Settings:
                 raise ParameterError(
                     f"method {method!r} has no error estimate",
                     advice="give step=..., or use 'dp45' or 'bs23'",
+                    key=("method",),
                 )
         elif not (isinstance(method, type) and hasattr(method, "TOO_SMALL_STEP")):
             raise ParameterError(
@@ -183,6 +187,7 @@ class Settings:
                 f"engine 'compiled' runs the built-in methods ({', '.join(integrators.METHODS)}), "
                 f"not {method.__name__}",
                 advice="use engine='machines' for SciPy's solvers",
+                key=("engine",),
             )
 
     def _output(self) -> str:

@@ -21,6 +21,7 @@ from gms_fsm.charts.parameters import (
     WEIGHTS,
     FloatArray,
     Parameter,
+    as_numbers,
     check_names,
     checked_array,
     checked_scalar,
@@ -452,7 +453,10 @@ def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
         return checked_scalar(name, values.get(name, old), "finite")
 
     def array(name: str, old: float | FloatArray) -> FloatArray:
-        return np.full(model.n, values.get(name, old), dtype=np.float64)
+        given = as_numbers(name, values.get(name, old))
+        return (
+            checked_array(name, given, model.n, "finite") if given.ndim else given.repeat(model.n)
+        )
 
     own_names = model.values
     common = {name for name in values if name not in own_names}

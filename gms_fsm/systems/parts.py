@@ -382,7 +382,9 @@ class Sampled:
         put(self, "updates", _with_delays(given, self.name, here))
         put(self, "initial", mapping_of(self.initial, f"{here}: initial"))
         if not self.updates:
-            raise ParameterError("it updates nothing", place=here)
+            raise ParameterError(
+                "it updates nothing", place=here, advice='give updates, such as {"u": "k_p * x"}'
+            )
         for name in self.initial:
             if name not in self.updates:
                 raise ParameterError(

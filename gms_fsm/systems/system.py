@@ -157,7 +157,9 @@ class System:
         for each, kind in kinds.items():
             put(self, each, several(getattr(self, each), kind, f"{here}: {each}"))
         if self.contacts and not self.bodies:
-            raise ParameterError("it has contacts, but no bodies", place=here)
+            raise ParameterError(
+                "it has contacts, but no bodies", place=here, advice="give the bodies that move"
+            )
         if not self.machines:
             raise ParameterError(
                 "it has no contacts and no supervisors", place=here, advice="give at least one"

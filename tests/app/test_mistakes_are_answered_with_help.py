@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 import re
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +16,17 @@ import pytest
 
 import gms_fsm as package
 from gms_fsm import Prescribed, Session, simulate
+from gms_fsm.app.fits import load_fit
+from gms_fsm.app.scenario import load_scenario, session_of
 from gms_fsm.charts import gms_element
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import GMSError, ParameterError, shown
+from gms_fsm.foundation.toml import written
 from gms_fsm.run.simulate import Moment
+from gms_fsm.scenarios import shipped
 from plots import block_diagram, mermaid, render, statechart
 from plots.output.formats import of
 from tests.helpers import pulled_mass, stick_slip
-from tests.scenario_files import CommandLine
+from tests.scenario_files import MEASURED, OPEN_LOOP, CommandLine, changed, sine_table
 
 
 @pytest.mark.slow
@@ -133,3 +141,72 @@ def test_a_moment_knows_where_the_slider_is() -> None:
     for t, x in moments:
         assert x in trace.x[trace.t == t].tolist()
     assert moments[-1][1] > 0.0
+
+
+def keys_of(table: Any, before: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the keys of a table and of the tables in it."""
+    for key, value in table.items() if isinstance(table, dict) else enumerate(table):
+        yield (*before, key)
+        if isinstance(value, dict) or (
+            value and isinstance(value, list) and isinstance(value[0], dict)
+        ):
+            yield from keys_of(value, (*before, key))
+
+
+PULLED = (
+    OPEN_LOOP.replace(
+        'kind = "prescribed"\nvelocity = "0.1*sin(t)"',
+        'kind = "pulled"\nmass = 1.0\nstiffness = 100.0\nspeed = 0.01',
+    )
+    + """\
+every = 0.1
+[initial]
+z = [0.0, 0.0]
+states = ["stick", "stick"]
+v = 0.0
+"""
+)
+RUN = """\
+t_end = 1.0
+method = "dp45"
+rtol = 1e-6
+atol = { z = [1e-9, 1e-9] }
+monitors = ["passivity", "abs(z) < 1"]
+"""
+FIT = """\
+[fit]
+free = ["k"]
+fixed = { C = 21.0 }
+measured = "F"
+train = [0.0, 0.5]
+bounds = { k = [10.0, 1e5] }
+"""
+FILES = {
+    "a model on a rig": changed(PULLED, "t_end = 1.0\n", RUN),
+    "a fit of a record": MEASURED.replace('file = "own', 'where = "time >= 0 s"\nfile = "own')
+    + FIT,
+    "a system": shipped()["servo"].read_text(encoding="utf-8"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FILES)
+def test_every_key_that_is_mistyped_is_found_on_its_line(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("own.csv").write_text(sine_table())
+    said = list[str]()
+    for *tables, key in keys_of(tomllib.loads(FILES[name])):
+        for wrong in (-1, "abc", ["abc"]):
+            data = tomllib.loads(FILES[name])
+            functools.reduce(operator.getitem, tables, data)[key] = wrong
+            Path("a.toml").write_text(written(data))
+            try:
+                session_of(load_scenario("a.toml"))
+                if "fit" in data:
+                    load_fit("a.toml")
+            except GMSError as error:
+                said.append(str(error))
+    assert len(said) > 50
+    assert [each for each in said if not re.match(r"a\.toml: line \d+[:, ]", each)] == []

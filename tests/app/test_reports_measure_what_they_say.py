@@ -104,7 +104,7 @@ def test_the_element_table_equals_the_log(case: str, tmp_path: Path) -> None:
     trace = whole(case)
     (tmp_path / "any.toml").write_text(OPEN_LOOP)
     base = load_scenario(tmp_path / "any.toml")
-    loaded = Loaded(base.path, base.scenario, trace.model, trace.rig, {}, None, None)
+    loaded = Loaded(base.file, base.scenario, trace.model, trace.rig, {}, None, None)
     text = summary_text(loaded, trace, trace.trust())
     rows, dwell, log = element_rows(text), dwell_times(trace), trace.transitions
     assert [row["element"] for row in rows] == [str(i + 1) for i in range(trace.n)]

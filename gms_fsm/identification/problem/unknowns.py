@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray, Parameter, checked_scalar
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError, keyed, shown
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import NamedNumber, joined, known_in, parts_of, value_in
@@ -102,12 +102,14 @@ def unknowns_of(
             raise ParameterError(
                 f"{shown(name)} is not among the free parameters",
                 place="bounds",
+                key=("bounds", name),
                 advice=f"free are {', '.join(found) or 'none'}",
             )
         for key in hit:
             other = found[key].other
             base = float(np.min(value_in(subject, other))) if other else 0.0
-            bounded[key] = _bounded(found[key], pair, base)
+            with keyed("bounds", name):
+                bounded[key] = _bounded(found[key], pair, base)
     return tuple(bounded.values())
 
 

@@ -147,7 +147,7 @@ class GMSTable(Table):
         advice = "give one number for each element"
         for name, value in lists.items():
             whole = all(each >= 0 and each.is_integer() for each in value)
-            if whole and len(value) == 2 * min(lengths):
+            if whole and 0 < len(value) == 2 * min(lengths):
                 pairs = zip(value[::2], value[1::2], strict=True)
                 numbers = ", ".join(f"{a:.0f}.{b:.0f}" for a, b in pairs)
                 advice = f"a number has a decimal point: {name} = [{numbers}]"

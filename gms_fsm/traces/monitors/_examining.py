@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError, keyed, shown
 from gms_fsm.foundation.arguments import listed, there_are, unknown
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces.monitors._chattering import chattering
@@ -67,22 +67,27 @@ def checked(
         else listed("monitors", monitors, "names of monitors, or monitors")
     )
     found: dict[str, Monitor] = {}
-    for each in given:
-        for monitor in _monitors(each, what.machines):
-            if monitor.name in found:
-                raise ParameterError(
-                    f"monitors contains {shown(monitor.name)} twice", advice="give it once"
-                )
-            if isinstance(monitor, Invariant):
-                read_invariant(monitor, what)
-            if output == "end" and not isinstance(monitor, Chattering):
-                raise ParameterError(
-                    f"the monitor {shown(monitor.name)} needs the rows of a run, but "
-                    "output is 'end'",
-                    advice="use output='all'",
-                )
-            found[monitor.name] = monitor
+    for i, each in enumerate(given):
+        with keyed("monitors", i):
+            for monitor in _monitors(each, what.machines):
+                _check(monitor, what, found, output)
+                found[monitor.name] = monitor
     return found
+
+
+def _check(monitor: Monitor, what: Mounted, others: Mapping[str, Monitor], output: str) -> None:
+    """Refuse a monitor that is given twice, or that the run cannot have."""
+    if monitor.name in others:
+        raise ParameterError(
+            f"monitors contains {shown(monitor.name)} twice", advice="give it once"
+        )
+    if isinstance(monitor, Invariant):
+        read_invariant(monitor, what)
+    if output == "end" and not isinstance(monitor, Chattering):
+        raise ParameterError(
+            f"the monitor {shown(monitor.name)} needs the rows of a run, but output is 'end'",
+            advice="use output='all'",
+        )
 
 
 def _monitors(given: str | Monitor, known: Sequence[str]) -> list[Monitor]:
