@@ -29,13 +29,18 @@ def cut(text: str, longest: int = LONGEST_SHOWN) -> str:
 def shown(value: object) -> str:
     """Return a value as a message shows it: its Python repr, cut if it is long.
 
-    NumPy numbers appear as plain numbers: 20.0, not np.float64(20.0).
+    NumPy numbers appear as plain numbers: 20.0, not np.float64(20.0). What would take several
+    lines, such as a table, is only named, unless it is an array.
 
     >>> shown("abc")
     "'abc'"
     """
     try:
-        return cut(repr(_plain(value)))
+        text = repr(_plain(value))
+        if "\n" in text:
+            plain = hasattr(value, "dtype") or type(value) in (list, tuple, dict)
+            text = " ".join(text.split()) if plain else f"<{type(value).__name__}>"
+        return cut(text)
     except (RecursionError, ValueError):  # nested too deeply; an integer of 5,000 digits
         return "..."
 

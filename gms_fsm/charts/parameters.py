@@ -271,6 +271,11 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
     if array.ndim != 1 or array.size == 0:
         raise ParameterError(f"{name} has shape {array.shape}", advice=_flat(array))
     if n is not None and array.size != n:
+        if n == 1:
+            raise ParameterError(
+                f"{name} has {array.size} entries, but there is 1 element",
+                advice=f"give one number, or the number of elements, n={array.size}",
+            )
         raise ParameterError(
             f"{name} has {array.size} entries, but there are {n} elements",
             advice="give one number for each element",

@@ -21,7 +21,7 @@ from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
 from gms_fsm.foundation.arguments import checked_kind, listed, one_of, refusing
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, FitStart
 from gms_fsm.identification.certainty.statistics import correlation_time
-from gms_fsm.identification.fit import fitted, options_of, task_of, window_of
+from gms_fsm.identification.fit import checked_records, fitted, options_of, task_of, window_of
 from gms_fsm.identification.problem.experiment import Point
 from gms_fsm.identification.problem.runs import ThreadPool
 from gms_fsm.identification.problem.search import Best, refine
@@ -50,7 +50,11 @@ NEARLY = 0.1  # of a cycle may be missing at the end
 INTERRUPTED = "The choice was interrupted: {done} of {all} candidates were compared."
 
 
-@refusing()
+@refusing(
+    ParameterError,
+    'models are candidates=[(name, model, free)], for example ("one element", model, ["k", "C"])',
+    instead={"models": "candidates", "model": "candidates"},
+)
 def choose(
     records: Record | Sequence[Record],
     *,
@@ -168,12 +172,8 @@ def choose(
 
 # --------------------------------------------------------------------------- arguments
 def _checked_records(records: Any) -> list[Record]:
-    wanted = "a Record, for example Record.from_csv(path), or several"
-    given = [records] if isinstance(records, Record) else listed("records", records, wanted)
-    if not given:
-        raise ParameterError(f"it must be {wanted}", place="records", value=records)
+    given = checked_records(records)
     for each in given:
-        checked_kind("records", each, Record, "a Record, from Record.from_csv or from_dataframe")
         if "force" not in each.columns:
             raise RecordError(
                 "it has no force, with which to compare",

@@ -41,7 +41,7 @@ from gms_fsm.identification.problem.unknowns import values_by_key
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.mounted import Mounted, mounted_alone
+from gms_fsm.systems.mounted import Mounted, misplaced, mounted_alone
 from gms_fsm.systems.numbers import known_in, varied
 from gms_fsm.systems.system import System
 
@@ -227,6 +227,25 @@ def window_of(name: str, given: Any) -> tuple[float, float] | None:
     return first, last
 
 
+def checked_records(given: Any) -> list[Record]:
+    """Return one record or several as a list."""
+    wanted = "a Record, for example Record.from_csv(path), or several"
+    if not isinstance(given, Record) and (advice := misplaced(given)):
+        raise ParameterError(f"it must be {wanted}", place="records", value=given, advice=advice)
+    every = [given] if isinstance(given, Record) else listed("records", given, wanted)
+    if not every:
+        raise ParameterError(f"it must be {wanted}", place="records", value=given)
+    for i, each in enumerate(every):
+        if not isinstance(each, Record):
+            raise ParameterError(
+                "it must be a Record, from Record.from_csv or from_dataframe",
+                place=f"records[{i}]",
+                value=each,
+                advice=misplaced(each),
+            )
+    return every
+
+
 def task_of(
     records: Record | Sequence[Record],
     model: Model | System,
@@ -252,13 +271,7 @@ def task_of(
     ParameterError, RecordError
         As in `fit`.
     """
-    if isinstance(records, Record):
-        records = [records]
-    every = listed("records", records, "records, from Record.from_csv(path)")
-    if not every:
-        raise ParameterError("there is none", place="records", advice="give at least one Record")
-    for each in every:
-        checked_kind("records", each, Record, "a Record, from Record.from_csv or from_dataframe")
+    every = checked_records(records)
     subject = _with_fixed(mounted_alone(model), fixed, options.free)
     task = Task(subject, tuple(every), options, begin=options.begin or BEGINS[1])
     _ = task.unknowns  # raises errors of names and bounds

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
-from gms_fsm.errors import RecordError, cut, shown
+from gms_fsm.errors import ParameterError, RecordError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path, meant, refusing
 from gms_fsm.records._columns import QUANTITIES, RENAME, Column, ColumnLike, columns_of
 from gms_fsm.records._selection import FEWEST, Origin, selected
@@ -271,6 +271,9 @@ class Record:
         """
         given = {"time": time, "position": position, "velocity": velocity}
         columns = columns_of(given | {"force": force, "normal": normal})
+        if hasattr(path, "columns"):
+            advice = "Record.from_dataframe(frame, time=..., position=..., force=...) reads it"
+            raise ParameterError("it is no file", place="path", value=path, advice=advice)
         file = checked_path("path", path)
         if "time" not in columns:
             raise RecordError(

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.errors import CheckpointError, ParameterError, SignalError, cut, shown, why
+from gms_fsm.errors import CheckpointError, ParameterError, SignalError, cut, shown
 from gms_fsm.foundation.files import write_whole
 from gms_fsm.lowering.log_columns import CONTACT, LOG_TEXTS
 from gms_fsm.run._identity import identity
@@ -25,6 +25,7 @@ from gms_fsm.run.problem import Problem
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import Contact
 from gms_fsm.traces.files.archives import member
+from gms_fsm.traces.files.unreadable import unreadable
 from integrators import hybrid
 from integrators.runners import states
 
@@ -126,12 +127,9 @@ class Checkpointer:
                     kept = {name: member(file, f"kept_{name}", most) for name in columns}
                     _check(self.run, state, kept)
         except Exception as error:  # numpy and zipfile raise many kinds for damaged files
-            raise CheckpointError(
-                f"not a checkpoint, or damaged ({why(error)})",
-                place=str(self.path),
-                advice="give the path of a file"
-                if self.path.is_dir()
-                else "remove it to restart the run",
+            advice = "remove it to restart the run"
+            raise unreadable(
+                self.path, "checkpoint", error, CheckpointError, advice=advice
             ) from None
         if head[:2] != ours[:2]:
             begun = cut(head[1]) if len(head) == 3 else "an older gms-fsm"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
-from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
+from gms_fsm.errors import OutputError, TraceFileError, cut, shown
 from gms_fsm.foundation.arguments import checked_path, no_file, refusing, unknown
 from gms_fsm.foundation.display import Log
 from gms_fsm.foundation.extras import require
@@ -21,6 +21,7 @@ from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.systems.numbers import column_name
 from gms_fsm.traces.coverage.total import Coverage
 from gms_fsm.traces.files.archives import member, write_arrays
+from gms_fsm.traces.files.unreadable import unreadable
 
 if TYPE_CHECKING:
     import pandas
@@ -352,9 +353,7 @@ class Sweep:
         except FileNotFoundError:
             raise no_file(path, TraceFileError) from None
         except Exception as error:  # numpy and zipfile raise many kinds for damaged files
-            raise TraceFileError(
-                f"not a sweep, or damaged ({why(error)})", place=str(path), advice="run it again"
-            ) from None
+            raise unreadable(path, "sweep", error, advice="run it again") from None
 
 
 # --------------------------------------------------------------------------- files

@@ -115,6 +115,13 @@ def sweep(
     >>> result.outcome.tolist(), result.transition_count.tolist()
     (['ok', 'ok'], [4, 4])
     """
+    if isinstance(t_end, Mapping) and isinstance(parameters, int | float):
+        raise ParameterError(
+            "it gives values by name: t_end and parameters are swapped",
+            place="t_end",
+            value=t_end,
+            advice="write sweep(model, rig, t_end, parameters)",
+        )
     on, end, given = shifted("sweep(system, t_end, parameters)", model, rig, t_end, parameters)
     checked_kind("coverage", coverage, bool, "True or False")
     begin = _Common(end, t_start, initial, _chosen(settings, options), coverage)

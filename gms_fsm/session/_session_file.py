@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gms_fsm.errors import SessionError, TraceFileError, why
-from gms_fsm.foundation.arguments import no_file
+from gms_fsm.errors import SessionError, TraceFileError
+from gms_fsm.foundation.arguments import checked_integer, no_file
 from gms_fsm.foundation.files import write_text
 from gms_fsm.run.settings import Settings
 from gms_fsm.session._breakpoints import Breakpoint
@@ -21,6 +21,7 @@ from gms_fsm.session.tree.branch import Branch
 from gms_fsm.session.tree.branches import Fork
 from gms_fsm.systems.signals import Function
 from gms_fsm.traces.files.header import Header
+from gms_fsm.traces.files.unreadable import part_of_a_file, unreadable
 
 if TYPE_CHECKING:
     from gms_fsm.session.session import Session
@@ -102,25 +103,35 @@ def read(path: Path, made: Callable[..., Session]) -> Session:
     data = json.loads(path.read_text(encoding="utf-8"))
     if data["format"] != FORMAT:
         raise ValueError(f"format is {data['format']!r}")
-    header = Header.model_validate(data["header"])
-    what = header.to_mounted()
+    with part_of_a_file("header"):
+        what = Header.model_validate(data["header"]).to_mounted()
     given = (what.given,) if what.named else (what.model, what.rig)
-    session = made(*given, data["t_end"], **data["options"])
-    for branch in data["branches"]:
-        _make(session, branch)
-    for number, branch in enumerate(data["branches"]):
-        session.switch(number)
-        walker.walk_to(session.branch, int(branch["cursor"]), branch["between"])
-    session.switch(int(data["current"]))
-    for point in (Breakpoint(**each) for each in data["breakpoints"]):
-        where: int | str | None = point.element
-        if point.contact:
-            element = "" if point.element is None else f" {point.element + 1}"
-            where = f"{point.contact}{element}"
-        found = session.break_on(point.kind, point.name, where, point.condition, point.hits)
-        found.seen = point.seen
-    session.watches = [str(text) for text in data["watches"]]
+    with part_of_a_file("t_end and options"):
+        session = made(*given, data["t_end"], **data["options"])
+    with part_of_a_file("branches"):
+        for branch in data["branches"]:
+            _make(session, branch)
+        for number, branch in enumerate(data["branches"]):
+            session.switch(number)
+            walker.walk_to(session.branch, int(branch["cursor"]), branch["between"])
+    with part_of_a_file("current"):
+        session.switch(checked_integer("current", data["current"]))
+    with part_of_a_file("breakpoints"):
+        for each in data["breakpoints"]:
+            _break(session, Breakpoint(**each))
+    with part_of_a_file("watches"):
+        session.watches = [str(text) for text in data["watches"]]
     return session
+
+
+def _break(session: Session, point: Breakpoint) -> None:
+    """Set a breakpoint with its count."""
+    where: int | str | None = point.element
+    if point.contact:
+        element = "" if point.element is None else f" {point.element + 1}"
+        where = f"{point.contact}{element}"
+    found = session.break_on(point.kind, point.name, where, point.condition, point.hits)
+    found.seen = point.seen
 
 
 def _make(session: Session, data: Mapping[str, Any]) -> None:
@@ -167,6 +178,4 @@ def blamed(path: Path) -> Iterator[None]:
     except FileNotFoundError:
         raise no_file(path, TraceFileError) from None
     except Exception as error:  # any error is the fault of the damaged file
-        raise TraceFileError(
-            f"not a session file, or damaged ({why(error)})", place=str(path)
-        ) from None
+        raise unreadable(path, "session", error, advice="save the session again") from None

@@ -221,7 +221,13 @@ class LuGre:
         return np.ones(1)
 
 
-@refusing()
+@refusing(
+    ParameterError,
+    "numbers of the chart are given by name: ChartModel(chart, {'k': 100.0}), and those of n "
+    "elements as lists, ChartModel(chart, {'k': [100.0, 50.0]}, n=2)",
+    chart="a chart, such as gms_fsm.charts.CHARTS['lugre']",
+    values="a number for each parameter of the chart, for example {'k': 1.0}",
+)
 @displayed("svg", "html")
 @short_repr
 @by_value()

@@ -204,10 +204,43 @@ def mounted(model: Model | System, rig: Rig | None = None, period: float | None 
     ):
         if isinstance(given, type) or not hasattr(given, mark):
             raise ParameterError(
-                f"it must be a {what}, for example {example}", place=what, value=given
+                f"it must be a {what}, for example {example}",
+                place=what,
+                value=given,
+                advice=misplaced(given),
             )
     assert rig is not None
     return Mounted(system_of(model, rig, period), model, rig, named=False)
+
+
+OF_ANOTHER_PLACE = {  # what is often given where it does not belong, by the name of its class
+    "Record": "it is a record: fit(record, model, free=[...]) takes it first, and "
+    "Prescribed((motion.time, motion.velocity)) of motion = record.motion() moves a model by it",
+    "Motion": "it is a motion: Prescribed((motion.time, motion.velocity)) moves a model by it",
+    "Chart": "it is a chart: ChartModel(chart, values) is a model of it",
+    "GMSParameters": "they are parameters: GMS(parameters, law='signed') is a model with them",
+    "Trace": "it is a run: its model is trace.model, its rig trace.rig",
+    "Session": "it is a session: what runs in it is session.system",
+}
+
+
+def misplaced(given: object) -> str:
+    """Return what to do with an object that stands where it does not belong; empty if unknown.
+
+    >>> misplaced(PulledSlider(1.0, 2.0, 0.1))
+    'it is a rig, simulate(model, rig, t_end) takes it second'
+    """
+    if isinstance(given, type):
+        return f"it is a class: write {given.__name__}(...)"
+    if is_model(given):
+        return "it is a model, fit(records, model, free=[...]) takes it second"
+    if hasattr(given, "signals"):
+        return "it is a rig, simulate(model, rig, t_end) takes it second"
+    table = (
+        "it is a table: Record.from_dataframe(frame, time=..., position=..., force=...) reads it"
+    )
+    known = OF_ANOTHER_PLACE.get(type(given).__name__, "")
+    return known or (table if hasattr(given, "columns") else "")
 
 
 def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
@@ -219,6 +252,7 @@ def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
             "it must be a model or a system, for example initial_bank(record, 4)",
             place=place,
             value=model,
+            advice=misplaced(model),
         )
     return mounted(model, Prescribed("0"))
 
@@ -275,6 +309,14 @@ def arguments_of(
     caller: str, model: Model | System, rig: Rig | float, t_end: float | None
 ) -> tuple[Rig | None, float]:
     """Return the rig, if there is one, and the end of the run."""
+    if hasattr(t_end, "signals") or is_model(t_end):
+        what = "rig" if hasattr(t_end, "signals") else "model"
+        raise ParameterError(
+            f"it is a {what}",
+            place="t_end",
+            value=t_end,
+            advice=f"write {caller}(model, rig, t_end)",
+        )
     on, end = shifted(f"{caller}(system, t_end)", model, rig, t_end)
     if end is None:
         raise ParameterError(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, as_numbers
-from gms_fsm.errors import OutputError, ParameterError, TraceFileError, shown, why
+from gms_fsm.errors import OutputError, ParameterError, TraceFileError, shown
 from gms_fsm.foundation.arguments import no_file, some_of
 from gms_fsm.foundation.display import Log, short_repr
 from gms_fsm.lowering.observing import armed, rate, sigmas
@@ -18,6 +18,7 @@ from gms_fsm.lowering.program import Program
 from gms_fsm.systems.system import Body
 from gms_fsm.traces.between import between
 from gms_fsm.traces.files.parts import Parts, RunDescription, checked
+from gms_fsm.traces.files.unreadable import kind_of_file, unreadable
 from gms_fsm.traces.rows import Rows, merged
 
 if TYPE_CHECKING:
@@ -221,24 +222,27 @@ def read_parts(path: Path) -> Parts:
             advice=f"give {some_of(map(str, inside))}" if inside else "give a .npz or .csv file",
         )
     if reader is None:
+        if path.exists() and kind_of_file(path) not in ("", "trace"):
+            raise unreadable(path, "trace", ValueError())
         raise TraceFileError(
             f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",
             place=str(path),
+            advice="give a file that Trace.save or gms-fsm run has written",
         )
     try:
         return checked(reader(path))
     except TraceFileError as error:
-        raise (error if error.outer else error.inside(path)) from None
+        if error.outer and not error.advice:
+            raise error.replaced(advice="write it again") from None
+        if error.advice and kind_of_file(path) in ("", "trace", "table"):
+            raise (error if error.outer else error.inside(path)) from None
+        raise unreadable(path, "trace", error) from None
     except FileNotFoundError as error:
         raise no_file(error.filename, TraceFileError) from None
     except Exception as error:
         # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, each
         # with its own errors; in every case the file is at fault.
-        raise TraceFileError(
-            f"damaged or incomplete trace file ({why(error)})",
-            place=str(path),
-            advice="write it again",
-        ) from None
+        raise unreadable(path, "trace", error) from None
 
 
 CALLED = {  # what other programs have, and what it is here

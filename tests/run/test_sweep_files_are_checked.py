@@ -53,11 +53,11 @@ def test_every_shape_and_type_is_checked(arrays: dict[str, Any], tmp_path: Path)
         if name not in ("edges", "transitions"):
             changes.append(array[:-1])
         for changed in changes:
-            with pytest.raises(TraceFileError, match=r"runs\.npz: not a sweep, or damaged"):
+            with pytest.raises(TraceFileError, match=r"runs\.npz: .*damaged"):
                 _load(arrays | {name: changed}, tmp_path)
             tried += 1
         if not name.startswith("parameter_"):  # without it, it is valid for another sweep
-            with pytest.raises(TraceFileError, match=r"runs\.npz: not a sweep, or damaged"):
+            with pytest.raises(TraceFileError, match=r"runs\.npz: .*damaged"):
                 _load({other: u for other, u in arrays.items() if other != name}, tmp_path)
     assert tried > 45
 

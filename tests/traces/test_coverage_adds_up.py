@@ -100,7 +100,7 @@ def test_a_file_with_other_counts_than_those_of_its_chart_is_refused(
     data = json.loads(path.read_text())
     data["parts"][""][key] = value
     path.write_text(json.dumps(data))
-    with pytest.raises(TraceFileError, match="not a coverage file, or damaged"):
+    with pytest.raises(TraceFileError, match="damaged coverage file"):
         Coverage.load(path)
 
 
@@ -121,5 +121,5 @@ def test_counts_that_do_not_fit_the_guards_are_refused(
     data = json.loads(path.read_text())
     data["parts"][""]["edges"][edge][key] = value
     path.write_text(json.dumps(data))
-    with pytest.raises(TraceFileError, match="not a coverage file, or damaged"):
+    with pytest.raises(TraceFileError, match="damaged coverage file"):
         Coverage.load(path)

@@ -12,13 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.files.tables import ChartTable
-from gms_fsm.errors import GMSError, TraceFileError, cut, why
+from gms_fsm.errors import GMSError, TraceFileError
 from gms_fsm.foundation.arguments import no_file
 from gms_fsm.foundation.files import write_text
 from gms_fsm.traces.coverage.counts import ChartCoverage, EdgeCoverage, StateCoverage
 from gms_fsm.traces.coverage.decisions import decisions
+from gms_fsm.traces.files.unreadable import unreadable
 
-MOST_TOLD = 3  # findings in a message
 FORMAT = "gms-fsm coverage 1"
 Count = Annotated[int, Field(ge=0)]
 Counted = tuple[Count, ...]
@@ -69,26 +69,8 @@ def read_parts(path: Path) -> dict[str, ChartCoverage]:
     except FileNotFoundError:
         raise no_file(path, TraceFileError) from None
     except (OSError, ValueError, ValidationError, GMSError, RecursionError) as error:
-        raise TraceFileError(
-            f"not a coverage file, or damaged ({_wrong(error)})",
-            place=str(path),
-            advice="give another name, or remove it",
-        ) from None
-
-
-def _wrong(error: Exception) -> str:
-    """Say what is wrong in a file, in its own words."""
-    if not isinstance(error, ValidationError):
-        said = why(error).partition(": ")[2]
-        return said if said and isinstance(error, ValueError | GMSError) else why(error)
-    found = list[str]()
-    for each in error.errors(include_url=False):
-        place = ".".join(map(str, each["loc"]))
-        said = each["msg"].replace("Input should be", "it must be")
-        missing = each["type"] == "missing"
-        found.append(f"{place} is missing" if missing else f"{place}: {said}".removeprefix(": "))
-    more = f", and {len(found) - MOST_TOLD} more" if len(found) > MOST_TOLD else ""
-    return cut(f"{', '.join(found[:MOST_TOLD])}{more}", 200)
+        advice = "give another name, or remove it"
+        raise unreadable(path, "coverage", error, advice=advice) from None
 
 
 def _written(part: ChartCoverage) -> dict[str, Any]:

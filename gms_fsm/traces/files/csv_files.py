@@ -222,5 +222,9 @@ def _read_columns(
                 ).inside(path)
         cells = list(zip(*rows, strict=True))
         for name, (convert, dtype) in kinds.items():
-            parts[name].append(np.array([convert(cell) for cell in cells[places[name]]], dtype))
+            try:
+                parts[name].append(np.array([convert(cell) for cell in cells[places[name]]], dtype))
+            except (ValueError, OverflowError):
+                what = "whole number" if dtype.kind == "i" else "number"
+                raise TraceFileError(f"a cell is not a {what}", place=f"column {name}") from None
     return {name: np.concatenate(blocks) for name, blocks in parts.items()}

@@ -20,6 +20,7 @@ from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRec
 from gms_fsm.traces.files.archives import member, write_arrays
 from gms_fsm.traces.files.header import FORMATS, Header
 from gms_fsm.traces.files.parts import Parts, RunDescription
+from gms_fsm.traces.files.unreadable import part_of_a_file
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
 
@@ -53,8 +54,10 @@ def read(path: Path) -> Parts:
     """Read a trace; an array larger than the number of rows allows is rejected."""
     with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
         array = partial(member, file)
-        header = Header.model_validate_json(str(array("header")))
-        ran = RunDescription(header.to_mounted())
+        text = str(array("header"))
+        with part_of_a_file("header"):
+            header = Header.model_validate_json(text)
+            ran = RunDescription(header.to_mounted())
         layout = ran.layout
         rows = _table(array, "rows", layout)
         stops = _table(array, "stops", layout) if "stops_t" in file.files else rows
