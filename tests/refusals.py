@@ -3475,5 +3475,22 @@ rows = {"scenario": ("own.toml", ..., OPEN_LOOP.encode())}
 group("file that is another", ChartError, chart_bytes, rows)
 
 
+def wrong_place(*words: str) -> None:
+    """Call ``gms-fsm`` beside a scenario and a run."""
+    Path("in").mkdir()
+    Path("in/a.toml").write_text(OPEN_LOOP)
+    ran().save("run.npz")
+    verb(*words)
+
+
+rows = {"folder for a scenario": ("in", ..., "run", "in")}
+group("wrong place", ScenarioError, wrong_place, rows)
+rows = {
+    "picture for the folder of pictures": ("one.png", ..., "plot", "run.npz", "-o", "one.png"),
+    "file for the folder of a run": ("a.csv", ..., "run", "in/a.toml", "-o", "a.csv"),
+}
+group("wrong place", OutputError, wrong_place, rows)
+
+
 if __name__ == "__main__":
     APPROVED.write_text(transcript(), encoding="utf-8")

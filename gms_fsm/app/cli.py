@@ -70,6 +70,10 @@ _MEANT = {
     "coverage": "cover",
     "list": "run --list",
     "scenarios": "run --list",
+    "help": "--help",
+    "version": "--version",
+    "new": "copy",
+    "optimise": "fit",
 }
 
 

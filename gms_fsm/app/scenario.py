@@ -29,7 +29,7 @@ from gms_fsm.app._tables import (
 )
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, cut
-from gms_fsm.foundation.arguments import no_file, unknown
+from gms_fsm.foundation.arguments import no_file, some_of, unknown
 from gms_fsm.foundation.files import inside
 from gms_fsm.foundation.tables import read
 from gms_fsm.foundation.toml import Key, TomlFile, parsed
@@ -229,6 +229,14 @@ def blaming(file: TomlFile, *key: str) -> Iterator[None]:
 def scenario_file(given: str | Path) -> Path:
     """Return the path of a scenario; refuse a file that is none of ours, or a run."""
     path = scenario_path(given)
+    if path.is_dir():
+        raise ScenarioError(
+            "it is a folder",
+            place=str(path),
+            advice=f"give {some_of(sorted(map(str, path.glob('*.toml'))))}"
+            if any(path.glob("*.toml"))
+            else "give a scenario (.toml)",
+        )
     match path.suffix.lower():
         case ".py":
             raise ScenarioError(
@@ -243,6 +251,12 @@ def scenario_file(given: str | Path) -> Path:
                 place=str(path),
                 advice="a table of measurements is named in the [record] of a scenario; a trace "
                 f"is drawn by `gms-fsm plot {path}`, and `gms-fsm replay {path}` steps through it",
+            )
+        case ".md" | ".html" | ".png" | ".svg" | ".pdf" | ".json" if path.exists():
+            raise ScenarioError(
+                f"it is a {path.suffix} file, and a scenario (.toml) is wanted",
+                place=str(path),
+                advice="`gms-fsm copy servo` gives an example",
             )
         case "" if len(path.parts) == 1 and not path.exists():
             if path.with_suffix(".toml").is_file():

@@ -585,3 +585,4 @@ class Commands:
 
 
 _MEANT = {"delete": "clear", "switch": "branch", "exit": "quit", "quit": "quit", "help": "help"}
+_MEANT |= dict.fromkeys(("info", "show", "state", "states"), "where") | {"fork": "poke"}

@@ -184,7 +184,7 @@ def test_plot_animate_and_replay(gms_fsm: CommandLine) -> None:
     assert "<b>two</b>" not in page
     for arguments, words in (
         (("animate", "t.npz", "-o", "film.avi"), ".gif, .mp4 or .webm"),
-        (("replay", "t.npz", "bad.npz"), "damaged or incomplete"),
+        (("replay", "t.npz", "bad.npz"), "damaged"),
         (("replay", "t.npz", "-o", "nowhere/page.html"), "choose another folder"),
     ):
         one_message(gms_fsm(*arguments), words)

@@ -139,7 +139,8 @@ class Tree:
         if checked_integer("branch", number, None, SessionError) not in self.forks:
             numbers, last = list(self.forks), max(self.forks)
             known = f"0 to {last}" if len(numbers) == last + 1 else ", ".join(map(str, numbers))
-            raise SessionError(f"no branch {shown(number)}", advice=f"there are {known}")
+            there = f"there are {known}" if last else "there is only branch 0; poke makes another"
+            raise SessionError(f"no branch {shown(number)}", advice=there)
         return number
 
     def branch(self, branch: int | None = None) -> Branch:
