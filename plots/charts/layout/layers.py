@@ -3,7 +3,8 @@
 Every edge is one line, and its label is right of it. Lines are vertical within a row, each at a
 place of its own, and curve only in the channels between two rows, where there are no boxes. So no
 line crosses a box, no label touches another or an arrowhead, and no two edges end at the same point
-of a state. The labels of the edges that leave a state are ordered by priority, from left to right.
+of a state. The labels of the edges that leave a state are ordered by priority, from left to right,
+unless lines would cross for it that need not.
 
 A layout from left to right is the same with x and y exchanged, but labels are above their lines.
 Lengths are points; y points down.
@@ -201,7 +202,22 @@ class _Layers:
             self.chain[k] = [*chain, lower]
 
     def _ordered_rows(self) -> list[list[int]]:
-        """Order the items of every row so that few lines cross."""
+        """Order the items of every row so that few lines cross.
+
+        The labels of a state are in the order of priority, unless only another lets no lines cross.
+        """
+        self.ranked = True
+        rows = self._swept()
+        if self._crossings(rows):
+            self.ranked = False
+            others = self._swept()
+            if not self._crossings(others):
+                return others
+            self.ranked = True
+        return rows
+
+    def _swept(self) -> list[list[int]]:
+        """Order the items of every row by those above and below, again and again."""
         rows: list[list[int]] = [[] for _ in range(max(self.row) + 1)]
         for item, number in enumerate(self.row):
             rows[number].append(item)
@@ -217,7 +233,7 @@ class _Layers:
                 keys = {i: sum(x[j] for j in near[i]) / len(near[i]) for i in row if near[i]}
                 if r % 2 or sweep:  # states keep the chart's order at first
                     row.sort(key=lambda i: keys.get(i, x[i]))
-                if r % 2:
+                if r % 2 and self.ranked:
                     self._by_priority(row)
                 self._pack(row, x)
             rank = self._agreed_order(x)
@@ -241,14 +257,19 @@ class _Layers:
             for place, item in zip(places, items, strict=True):
                 row[place] = item
 
+    def _own_labels(self) -> list[list[int]]:
+        """Return the labels of each state by priority; none if they have another order."""
+        found: dict[int, list[int]] = {}
+        for k in self.crossing:
+            found.setdefault(self.links[k].source, []).append(self.label[k])
+        return [*found.values()] if self.ranked else []
+
     def _agreed_order(self, x: Sequence[float]) -> dict[int, int]:
         """Return one order of all labels and lines, with the labels of each state by priority."""
-        chains: dict[int, list[int]] = {}
-        for k in self.crossing:
-            chains.setdefault(self.links[k].source, []).append(self.label[k])
-        labels = set(self.label.values())
+        chains = self._own_labels()
+        labels = {each for chain in chains for each in chain}
         lines = [[i] for i in range(len(self.sizes), len(self.row)) if i not in labels]
-        heads = [(x[chain[0]], chain[0], chain[1:]) for chain in [*chains.values(), *lines]]
+        heads = [(x[chain[0]], chain[0], chain[1:]) for chain in [*chains, *lines]]
         heapq.heapify(heads)
         rank: dict[int, int] = {}
         while heads:
@@ -302,10 +323,7 @@ class _Layers:
                     segment = (state, other) if lower else (other, state)
                     offset[segment] = (i - (len(others) - 1) / 2) * step
         apart = [(a, b, self._apart(a, b)) for row in rows for a, b in pairwise(row)]
-        chains: dict[int, list[int]] = {}
-        for k in self.crossing:
-            chains.setdefault(self.links[k].source, []).append(self.label[k])
-        apart += [(a, b, 1.0) for own in chains.values() for a, b in pairwise(own)]
+        apart += [(a, b, 1.0) for own in self._own_labels() for a, b in pairwise(own)]
         sides = [
             (state, others)
             for state in range(len(self.sizes))
