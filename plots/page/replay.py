@@ -21,14 +21,15 @@ from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypedDict, Unpack
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import checked_kind, listed, refusing
+from gms_fsm.foundation.arguments import checked_kind, listed, refusing, unknown
 from gms_fsm.foundation.extras import missing
 from gms_fsm.foundation.quantities import PREFIXES, SMALLEST, TAKES_PREFIX, UNITS
-from gms_fsm.foundation.text import visible
+from gms_fsm.foundation.text import visible, visible_lines
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
@@ -66,6 +67,7 @@ SCRIPTS = (
     "js/panes/microscope.js",
     "js/panes/bristles.js",
     "js/host.js",
+    "js/presenting.js",
     "js/page.js",
 )
 HATCH_ANGLES = (None, 45, 135, 0, 90)  # of the states' ribbons, degrees
@@ -132,6 +134,7 @@ class PageOptions(TypedDict, total=False):
     names: Sequence[str]
     window: tuple[float, float] | None
     checks: Report | Sequence[Report]
+    notes: Mapping[float | str, str]
 
 
 @refusing()
@@ -158,6 +161,9 @@ def replay(
     checks : Report or sequence of Report, optional
         From `gms_fsm.verification.prove.prove`; the counterexamples are pinned in the landscapes of
         their charts.
+    notes : mapping of float or str to str, optional
+        What a lecturer says in a presentation of the page (key ``n``): from a time on, s, or
+        whenever the edge of that name fires.
 
     Returns
     -------
@@ -168,7 +174,8 @@ def replay(
     ------
     ParameterError
         If there are names, but not one per run, the window is not inside the run, or it contains
-        too many transitions.
+        too many transitions; if a note is for a time outside the runs or for an edge they do not
+        have.
     MissingExtraError
         If uPlot is not installed.
 
@@ -236,6 +243,7 @@ def page_data(
     names: Sequence[str] = (),
     window: tuple[float, float] | None = None,
     checks: Report | Sequence[Report] = (),
+    notes: Mapping[float | str, str] = MappingProxyType({}),
     draw: Callable[[Chart, int], str] = chart_svg,
 ) -> tuple[dict[str, Any], list[str]]:
     """Return what a page shows: the data of one or two runs, and pictures of their charts."""
@@ -269,6 +277,7 @@ def page_data(
     data = {
         "title": visible(title or " and ".join(dict.fromkeys(map(_heading, traces)))),
         "runs": runs,
+        "notes": _notes(notes, traces),
         "language": _language(),
         "quantities": {
             "prefixes": PREFIXES,
@@ -303,6 +312,34 @@ def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
     }
     # In one pass, so that placeholders inside the parts are left unchanged.
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _part("template.html"))
+
+
+def _notes(notes: Mapping[Any, str], traces: Sequence[Trace]) -> list[dict[str, Any]]:
+    """Return the notes, each with its time or its edge."""
+    checked_kind("notes", notes, Mapping, "a mapping from times, s, or names of edges to texts")
+    edges = {
+        edge.name
+        for each in traces
+        for view in views_of(each)
+        for edge in view.model.chart.transitions
+    }
+    start, end = (pick(each.t[at] for each in traces) for pick, at in ((min, 0), (max, -1)))
+    found: list[dict[str, Any]] = []
+    for when, text in notes.items():
+        checked_kind(f"notes[{when!r}]", text, str, "a text")
+        if isinstance(when, str):
+            if when not in edges:
+                raise unknown("edge", when, sorted(edges)).inside("notes")
+            found.append({"edge": when, "text": visible_lines(text)})
+        elif isinstance(when, int | float) and start <= when <= end:
+            found.append({"at": float(when), "text": visible_lines(text)})
+        else:
+            raise ParameterError(
+                f"a note begins at a time of the run, from {start:g} to {end:g} s, or at an edge",
+                place="notes",
+                value=when,
+            )
+    return found
 
 
 def _heading(trace: Trace) -> str:

@@ -18,6 +18,7 @@ from gms_fsm.errors import ScenarioError, TraceFileError
 from gms_fsm.exporters import formats
 from gms_fsm.lowering.program import lower
 from tests.helpers import ROOT, matrix, stick_slip
+from tests.plots.stored import data_of
 from tests.scenario_files import (
     MEASURED,
     OPEN_LOOP,
@@ -182,10 +183,19 @@ def test_plot_animate_and_replay(gms_fsm: CommandLine) -> None:
     page = Path("page.html").read_text(encoding="utf-8")
     assert "default-src 'none'" in page
     assert "<b>two</b>" not in page
+    Path("notes.toml").write_text('2.5 = "then"\n"1e1" = "later"\narrest = "it sticks"\n')
+    said(gms_fsm("replay", "t.npz", "-o", "told.html", "--notes", "notes.toml"))
+    assert data_of(Path("told.html").read_text(encoding="utf-8"))["notes"] == [
+        {"at": 2.5, "text": "then"},
+        {"at": 10.0, "text": "later"},
+        {"edge": "arrest", "text": "it sticks"},
+    ]
     for arguments, words in (
         (("animate", "t.npz", "-o", "film.avi"), ".gif, .mp4 or .webm"),
         (("replay", "t.npz", "bad.npz"), "damaged"),
         (("replay", "t.npz", "-o", "nowhere/page.html"), "choose another folder"),
+        (("replay", "t.npz", "--notes", "none.toml"), "none.toml: no such file"),
+        (("replay", "t.npz", "--notes", "bad.npz"), "bad.npz: "),
     ):
         one_message(gms_fsm(*arguments), words)
 

@@ -65,4 +65,4 @@ def test_a_file_may_source_another_but_not_itself(
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "mine.bin"
     path.write_bytes(b"\xff\xfe\x00step")
-    assert "no file of commands" in debugger(fig4()).reply(f"source {path}")
+    assert "no file of commands" in " ".join(debugger(fig4()).reply(f"source {path}").split())

@@ -83,6 +83,7 @@ REFUSED: list[tuple[str, Call, str, list[Any]]] = [
     ("phase", lambda w: plots.phase(run(), window=w), "window", WINDOWS),
     ("unfold", lambda w: plots.unfold(run(), *w), "window", [(2.0, 1.0), (1.0, 19.0), ("a", 2.0)]),
     ("replay", lambda w: replay_html(run(), window=w), "window", [*WINDOWS, "all"]),
+    ("notes of a replay", lambda w: replay_html(run(), notes=w), "notes", [["a"], "a", None]),
     ("ribbons_figure", lambda w: figures.ribbons_figure(run(), w), "around", TIMES),
     ("cascade_window", lambda w: panels.cascade_window(run(), within=w), "within",
      [0.0, -1.0, NAN, "x"]),
@@ -188,6 +189,12 @@ LATE = np.array([20.0, 30.0])
         (lambda: plots.unfold(run(), 0.1, 1.0), r"no transition from 0.1 to 1 s; the nearest one"),
         (lambda: figures.profiles_figure(two_records()), r"no open profile.*fit\.profile\(name\)"),
         (lambda: replay_html(run(), run(), names=["one"]), r"2 run\(s\) but names = \['one'\]"),
+        *((partial(replay_html, run(), notes={when: "a"}),
+           f"notes is {when}; a note begins at a time of the run, from 0 to 10 s, or at an edge")
+          for when in (10.5, NAN, None)),
+        (lambda: replay_html(run(), notes={"arest": "a"}), "there is no edge 'arest'"),
+        (lambda: replay_html(run(), notes={0.0: 5}),
+         r"notes\[0\.0\] is 5; it must be a text"),
         (lambda: handout_figure(1), "model is 1; give a model"),  # type: ignore[arg-type]
         pytest.param(lambda: sheet_of("0*z"), "no sine between .* gives a loop of own; give",
                      marks=pytest.mark.slow),

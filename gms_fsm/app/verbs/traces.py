@@ -50,6 +50,23 @@ def _loaded(path: Path) -> Trace:
     return Trace.load(path)
 
 
+def _notes(path: Path) -> dict[float | str, str]:
+    """Return notes from a file: its keys are times or names of edges, its values texts."""
+    from gms_fsm.foundation.toml import data_of, text_of
+
+    found: dict[float | str, str] = {}
+    for key, value in data_of(text_of(path, ParameterError), path, ParameterError).items():
+        # 2.5 without quotes is a table of TOML.
+        parts = value if isinstance(value, dict) else {"": value}
+        for part, text in parts.items():
+            when = f"{key}.{part}" if part else key
+            try:
+                found[float(when)] = text
+            except ValueError:
+                found[when] = text
+    return found
+
+
 def _window(run: Trace, start: float | None, end: float | None) -> tuple[float, float] | None:
     """Return the part of a run to show; None for the whole run."""
     if start is None and end is None:
@@ -140,6 +157,13 @@ def replay_command(
     check: Annotated[
         bool, typer.Option("--check", help="Pin the counterexamples of `gms-fsm check`.")
     ] = False,
+    notes: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="A lecturer's notes (.toml): a time in s, or an edge, and the text for it.",
+        ),
+    ] = None,
 ) -> None:
     """Write a run as a web page in which it can be stepped through and explained."""
     from gms_fsm import prove
@@ -147,7 +171,8 @@ def replay_command(
     from plots import write_replay
 
     files = [trace] if other is None else [trace, other]
-    refuse_input(output, *chain(*map(files_of, files)))
+    given = [] if notes is None else [notes]
+    refuse_input(output, *chain(*map(files_of, files)), *given)
     runs = [_of_contact(each, contact) if contact else _loaded(each) for each in files]
     names = [] if other is None else [each.stem for each in files]
     charts: list[Chart] = []
@@ -156,5 +181,8 @@ def replay_command(
             charts.append(view.model.chart)
     reports = [prove(chart) for chart in charts] if check else []
     window = _window(runs[0], start, end)
-    page = write_replay(output, *runs, title=title, names=names, window=window, checks=reports)
+    told = {} if notes is None else _notes(notes)
+    page = write_replay(
+        output, *runs, title=title, names=names, window=window, checks=reports, notes=told
+    )
     put(str(page))

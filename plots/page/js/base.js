@@ -33,6 +33,10 @@ function say(node, text) { if (node.textContent !== text) node.textContent = tex
 
 const counted = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
 
+// How many times as large a presentation shows what is in `main`, by CSS: sizes of nodes are in px before, places of the mouse
+// in px after.
+let large = 1;
+
 const clamp = (u, low, high) => Math.min(Math.max(u, low), high);
 
 // The last index whose value is not above u, in an increasing array; -1 if there is none.

@@ -6,7 +6,7 @@ const breakpoints = new Map();
 let frame = 0, following = true, zooming = false;
 const views = [];
 // A wide screen: the page fills it and does not scroll; two runs need more of it than one.
-const isWide = () => innerHeight >= 520 && innerWidth >= (runs.length > 1 ? 1240 : 1000);
+const isWide = () => presenting.on || (innerHeight >= 520 && innerWidth >= (runs.length > 1 ? 1240 : 1000));
 const keyOf = (view, contact, element, edge) => `${view.place}/${contact.name}/${element}/${edge}`;
 
 function show(k, words = "") {
@@ -23,6 +23,7 @@ function show(k, words = "") {
   $("#say").textContent = words && views.length > 1 ? words : [words, ...verdicts].filter(Boolean).join("; ");
   $("#say").classList.toggle("fired", views.some((view) => view.happened().length));
   tell();
+  tellNotes();
 }
 
 function pointAt(k) {
@@ -46,6 +47,7 @@ function openPane(side, key) {
 }
 
 function nextPane(side) {
+  if (presenting.on) { chooseSlide((slideNumber() + (side === "right" ? 1 : slides().length - 1)) % slides().length); return; }
   const tabs = $$(`.${side} [role=tab]`, views[0].root), at = tabs.findIndex((tab) => tab.getAttribute("aria-selected") === "true");
   openPane(side, tabs[(at + 1) % tabs.length].dataset.key);
 }
@@ -174,6 +176,7 @@ const actions = {
   right: () => nextPane("right"), left: () => nextPane("left"),
   help: () => $("#keys").showModal(),
   difference: firstDifference,
+  present, "notes-button": notes, "notes-window": notesWindow,
   more: () => {
     const on = document.body.classList.toggle("more");
     $("#more").setAttribute("aria-expanded", on);
@@ -183,17 +186,20 @@ const KEYS = {
   ArrowLeft: "back", ArrowRight: "step", "Shift ArrowLeft": "back-transition", "Shift ArrowRight": "transition",
   " ": "play", c: "continue", f: "follow", Home: "start", End: "end", "+": "zoom-in", "=": "zoom-in", "-": "zoom-out", 0: "zoom-all",
   "]": "next-element", "[": "last-element", v: "right", V: "left", "?": "help", d: "difference",
+  p: "present", n: "notes-button", N: "notes-window",
 };
-document.addEventListener("keydown", (event) => {
+function pressed(event) {
   if (event.altKey || event.ctrlKey || event.metaKey || event.defaultPrevented || $("#keys").open) return;
   if (event.target.closest("select, input[type=text]")) return;
   if (event.key === " " && event.target.closest("button, summary, [role=button]")) return;
   const action = KEYS[(event.shiftKey && event.key.startsWith("Arrow") ? "Shift " : "") + event.key];
-  if (/^[1-9]$/.test(event.key)) chooseElement(Number(event.key) - 1);
+  if (/^[1-9]$/.test(event.key)) (presenting.on ? chooseSlide : chooseElement)(Number(event.key) - 1);
+  else if (event.key === "Escape" && presenting.on) leave();
   else if (action) actions[action]();
   else return;
   event.preventDefault();
-});
+}
+document.addEventListener("keydown", pressed);
 for (const button of $$("#controls button")) button.addEventListener("click", actions[button.id]);
 
 // ------------------------------------------------------------------ the scrubber, in time or in rows

@@ -2,7 +2,7 @@
 // The plots over time, of one run or of two in the same plots. All share one time axis, a cursor at the row shown and a
 // crosshair under the mouse; the head of each plot tells its value at the crosshair, or else at the cursor.
 const AXIS = 58, GAP = 10, TIME_AXIS = 20; // px to the left and to the right of the plots, and below them
-const LEAST = 46, BARE = 14; // px, of a plot, and of one that is an axis only
+const LEAST = 46, PRESENTED = 30, BARE = 14; // px, of a plot, of one in a presentation, and of one that is an axis only
 const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
 const elementStep = (i, n) => (n > 1 ? Math.round((i * (COLOURS - 1)) / (n - 1)) : 0); // of the ramp from the first element to the last
@@ -25,7 +25,7 @@ class TimePlots {
     box.classList.add("plots");
     this.body = make("div", box, "", { class: "stack" });
     box.addEventListener("mousemove", (event) => {
-      const left = this.body.getBoundingClientRect().left + AXIS, part = (event.clientX - left) / this.width();
+      const left = this.body.getBoundingClientRect().left + AXIS * large, part = (event.clientX - left) / (this.width() * large);
       pointAt(part >= 0 && part <= 1 ? lastAt(frames.t, span.min + part * (span.max - span.min)) : null);
     });
     box.addEventListener("mouseleave", () => pointAt(null));
@@ -60,14 +60,14 @@ class TimePlots {
     const power = powerOf(largest(extent(lines.map(({ get, run }) => ({ get, rows: run.rows })))), unit);
     name.textContent = unit ? `${title} [${PREFIXES[power]}${unit}]` : title;
     const ink = (stroke) => () => colour(stroke);
-    const axis = { stroke: ink("--ink"), grid: { stroke: ink("--grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
+    const axis = { stroke: ink("--ink"), grid: { stroke: ink("--grid"), width: 1 }, ticks: { show: false }, gap: 5 * large, font: `${Math.round(11 * large)}px system-ui, sans-serif` };
     const marks = (factor) => (u, splits, _axis, _space, gap) => splits.map((s) => (s / factor).toFixed(decimals(gap / factor)).replace("-", "−"));
     const plot = new uPlot({
-      width: 300, height: 100, padding: [7, GAP, isLast ? 2 : 7, 0], pxAlign: false, legend: { show: false },
+      width: 300, height: 100, padding: [7, GAP, isLast ? 2 : 7, 0].map((u) => u * large), pxAlign: false, legend: { show: false },
       scales: { x: { time: false } },
-      axes: [isLast ? { ...axis, size: TIME_AXIS, values: marks(10 ** TIME_POWER) } : { ...axis, size: 0, values: (u, splits) => splits.map(() => "") }, { ...axis, size: AXIS, values: marks(10 ** power), space: 20, ...(bare && { values: () => [""], splits: () => [0] }) }],
+      axes: [isLast ? { ...axis, size: TIME_AXIS * large, space: 50 * large, values: marks(10 ** TIME_POWER) } : { ...axis, size: 0, values: (u, splits) => splits.map(() => "") }, { ...axis, size: AXIS * large, values: marks(10 ** power), space: (presenting.on ? 14 : 20) * large, ...(bare && { values: () => [""], splits: () => [0] }) }],
       series: [{}, ...lines.map(({ stroke, dash = [], width = 1.3 }) => ({
-        stroke: ink(stroke), dash, width, points: { size: 4 }, ...(step && { paths: uPlot.paths.stepped({ align: 1 }) }),
+        stroke: ink(stroke), dash: dash.map((u) => u * large), width: width * large, points: { size: 4 * large }, ...(step && { paths: uPlot.paths.stepped({ align: 1 }) }),
       }))],
       cursor: { y: false, x: false, points: { show: false } },
       hooks: { ...(band && { drawAxes: [(u) => fillBetween(u, lines)] }), setScale: [(u, key) => key === "x" && zoomTo(u.scales.x.min, u.scales.x.max, u)] },
@@ -106,10 +106,11 @@ class TimePlots {
     if (!width || !this.plots.length) return;
     const heads = this.plots.reduce((sum, { value }) => sum + value.parentNode.offsetHeight, 0);
     const left = this.box.clientHeight - heads - (this.ribbons?.offsetHeight ?? 0) - TIME_AXIS - 2;
-    const height = last.bare ? BARE : isWide() ? Math.max(Math.floor(left / this.plots.length), LEAST) : 92;
+    const height = last.bare ? BARE : isWide() ? Math.max(Math.floor(left / this.plots.length), presenting.on ? PRESENTED : LEAST) : 92;
     for (const each of this.plots) {
       const own = each === last ? height + TIME_AXIS : height;
-      if (each.plot.width !== width || each.plot.height !== own) each.plot.setSize({ width, height: own });
+      const size = { width: Math.floor(width * large), height: Math.floor(own * large) }; // the style sheet shows it as it is
+      if (each.plot.width !== size.width || each.plot.height !== size.height) each.plot.setSize(size);
     }
     this.drawRibbons();
     this.placeCursor();
@@ -230,7 +231,7 @@ class TimePane extends TimePlots {
     };
     if (force) compare(force, runs.length > 1 ? "dashed: run 2" : "");
     const inner = contact.velocity && this.addInner();
-    for (const name of rest) compare(name);
+    for (const name of rest) if (!(presenting.on && name === "x")) compare(name); // for which a large view has no room
     this.addAll();
     this.inner = inner && this.plots[1].plot;
     this.addRibbons(this.contacts);
@@ -266,7 +267,7 @@ class TimePane extends TimePlots {
       const { series } = this.inner, first = series.length - this.innerLines.length;
       this.innerLines.forEach(({ i, of }, k) => {
         const on = i === element, each = series[first + k];
-        if (runs.length < 2 && of.n > 1) each.width = on ? 2.6 : 1.2;
+        if (runs.length < 2 && of.n > 1) each.width = (on ? 2.6 : 1.2) * large;
         else if (runs.length > 1 && each.show !== on) this.inner.setSeries(first + k, { show: on });
       });
       if (runs.length < 2 && contact.n > 1 && frames.t.length * contact.n < MOST_POINTS) this.inner.redraw(false, false); // else with the next zoom

@@ -87,6 +87,14 @@ class RunView {
 
   close() { for (const { pane } of Object.values(this.panes)) pane?.close?.(); }
 
+  // It is made anew when it is opened again.
+  clearPane(each) {
+    const box = each.box.cloneNode(false);
+    each.pane.close?.();
+    each.box.replaceWith(box);
+    Object.assign(each, { box, pane: undefined });
+  }
+
   // ---------------------------------------------------------------- the row
   choose(contact, element) {
     const other = contact !== this.contact;
@@ -245,9 +253,9 @@ function waiting(contact, element, row) {
 
 // Scrolls only the box, and only if needed: the page itself stays where it is.
 function reveal(node, box, lines = 1, covered = 0) {
-  const outer = box.getBoundingClientRect(), inner = node.getBoundingClientRect(), height = inner.height * lines, top = outer.top + covered;
-  if (inner.top < top || inner.top + height > outer.bottom) box.scrollTop += inner.top - top - 2;
-  if (inner.left < outer.left || inner.right > outer.right) box.scrollLeft += inner.left - outer.left;
+  const outer = box.getBoundingClientRect(), inner = node.getBoundingClientRect(), height = inner.height * lines, top = outer.top + covered * large;
+  if (inner.top < top || inner.top + height > outer.bottom) box.scrollTop += (inner.top - top) / large - 2;
+  if (inner.left < outer.left || inner.right > outer.right) box.scrollLeft += (inner.left - outer.left) / large;
 }
 
 // The clause that holds back an edge: the false one that is furthest from its boundary, relative to its sides. One without
@@ -361,9 +369,9 @@ class ChartPane {
   // scrolls, or on a narrow screen the page.
   fit() {
     if (!this.svg) return;
-    const { least } = this, across = this.box.clientWidth, high = isWide() ? this.box.clientHeight : SHARE * innerHeight;
+    const least = this.least * (presenting.on && views.length > 1 ? HALF : 1), across = this.box.clientWidth, high = isWide() ? this.box.clientHeight : SHARE * innerHeight;
     const region = $(`.region[data-slot="${this.view.element}"]`, this.svg), [, , width, height] = this.whole.split(" ").map(Number);
-    const enough = region && isWide() ? OVERVIEW : least;
+    const enough = region && isWide() && !presenting.on ? OVERVIEW : least;
     let shown = this.whole;
     this.region = region && Math.min(across / width, high / height) < enough ? region.parentNode : null;
     if (this.region) {
@@ -378,5 +386,6 @@ class ChartPane {
 }
 const SMALLEST = 11.01; // px of text: browsers round lengths down
 const OVERVIEW = 0.85, LARGEST = 1.5; // px per point of the chart: of all elements on a wide screen, and of any chart
+const HALF = 0.7; // times that, of two charts side by side in a presentation
 const SHARE = 0.4; // of the height of a narrow screen
 PANES.push(ChartPane);

@@ -134,8 +134,8 @@ class MicroscopePane {
     this.line = make("div", this.wide, "", { class: "line" });
     this.scroller.addEventListener("scroll", () => this.drawView());
     this.wide.addEventListener("click", (event) => {
-      const x = event.clientX - this.wide.getBoundingClientRect().left - this.labels;
-      if (event.clientX - this.scroller.getBoundingClientRect().left < this.labels) return;
+      const x = (event.clientX - this.wide.getBoundingClientRect().left) / large - this.labels;
+      if ((event.clientX - this.scroller.getBoundingClientRect().left) / large < this.labels) return;
       go(frames.of[this.view.place][this.strip.rowAt(x)]);
     });
   }

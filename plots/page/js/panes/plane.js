@@ -94,7 +94,7 @@ class Plane {
   // Of a pointer event, in px of the drawing.
   point(event) {
     const box = this.svg.getBoundingClientRect();
-    return [event.clientX - box.left, event.clientY - box.top];
+    return [(event.clientX - box.left) / large, (event.clientY - box.top) / large];
   }
 
   drawMarks() {
