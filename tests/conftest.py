@@ -11,6 +11,8 @@ import pytest
 
 from tests.scenario_files import CommandLine, command_line
 
+gc.disable()  # while tests are collected: it finds nothing there, and takes a third of the time
+
 # Typer makes all its commands anew in every call of a program; hundreds of tests call it.
 if importlib.util.find_spec("typer"):
     import typer.main
@@ -40,6 +42,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     """Let the collector of garbage leave alone what lives to the end: ten thousand tests."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -268,6 +268,35 @@ def explain(trace: Trace, row: int, element: int) -> Why:
     >>> forward.edge.name, [(c.text, c.holds, round(c.margin, 3)) for c in forward.clauses]
     ('break_away_forward', [('z >= s', False, -0.2), ('v > v_c', True, 0.2)])
     """
+    why = explain_alone(trace, row, element)
+    later = int(np.searchsorted(trace.t, why.t, side="right"))
+    until = float(trace.t[later]) if later < len(trace) else math.inf
+    doubts = tuple(
+        str(each)
+        for each in trace.trust()
+        if each.element == element and any(why.t <= time < until for time in each.times)
+    )
+    return replace(why, doubts=doubts)
+
+
+def explain_alone(trace: Trace, row: int, element: int) -> Why:
+    """Explain the edges as `explain` does, without the doubts: those are judged over a whole run.
+
+    Parameters
+    ----------
+    trace, row, element
+        See `explain`.
+
+    Returns
+    -------
+    Why
+        One `Explanation` per edge.
+
+    Raises
+    ------
+    IndexError
+        If there is no such row or element.
+    """
     if not -len(trace) <= row < len(trace) or not 0 <= element < trace.n:
         raise IndexError(
             f"row {row}, element {element}: the trace has {len(trace)} rows, {trace.n} elements"
@@ -280,14 +309,8 @@ def explain(trace: Trace, row: int, element: int) -> Why:
     edges = explain_state(chart, source, values_at(trace, before, element), fired)
     left = source if fired else ""
     contact = trace.what.whose(trace.places.name)
-    t = float(trace.t[row])
-    until = float(np.append(trace.t[trace.t > t], np.inf)[0])
-    doubts = tuple(
-        str(each)
-        for each in trace.trust()
-        if each.element == element and any(t <= time < until for time in each.times)
-    )
-    return Why(element, t, now, left, tuple(edges), trace.sigma(row), contact, doubts=doubts)
+    t, sigma = float(trace.t[row]), trace.sigma(row)
+    return Why(element, t, now, left, tuple(edges), sigma, contact)
 
 
 def explain_state(

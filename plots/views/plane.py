@@ -38,7 +38,7 @@ from gms_fsm.language import (
 )
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.language.tree import walk
-from gms_fsm.session.explain import Why, explain, values_at
+from gms_fsm.session.explain import Why, explain_alone, values_at
 from gms_fsm.systems.system import loaded
 from gms_fsm.traces.trace import Trace
 
@@ -141,7 +141,7 @@ class Plane:
         """Return the plane of an element at a row."""
         chart = trace.model.chart
         names = checked_axes(chart)
-        why = explain(trace, row, element)
+        why = explain_alone(trace, row, element)
         row = row % len(trace) - bool(why.left)
         start: dict[str, Value] = {}
         # Under a load s is that of the row, also at other velocities.

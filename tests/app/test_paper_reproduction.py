@@ -190,7 +190,7 @@ def test_a_run_that_fails_leaves_its_part_and_the_runs_before_it(tmp_path: Path)
 
 def test_custom_signals_are_used_and_not_assessed(monkeypatch: pytest.MonkeyPatch) -> None:
     signals = ("0.1*t", "0.1*sin(t)")
-    short = [replace(each, t_end=0.5) for each in experiments(*signals)]
+    short = [replace(each, t_end=0.5) for each in held_by_the_fastest(*signals)]
     monkeypatch.setattr("gms_fsm.app.paper.experiments.experiments", lambda *_: short)
     text = claims_text(run(*signals), *signals)
     assert "F_a = 0.1*t" in text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,6 +16,8 @@ from gms_fsm.lowering.program import Program
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import FOR_A_GUARD
+
+BLOCK = 4096  # rows
 
 
 @dataclass(frozen=True)
@@ -67,10 +69,32 @@ class Track:
         rows = self.rows
         return float(rows.t[row]), rows.y[row].tolist(), rows.mode[row].tolist()
 
+    def every(self) -> Iterator[tuple[float, list[float], list[int]]]:
+        """Yield time, state and modes of all rows."""
+        t, y, mode = self.rows.t, self.rows.y, self.rows.mode
+        for begin in range(0, len(t), BLOCK):  # at once they would take much memory
+            part = slice(begin, begin + BLOCK)
+            yield from zip(t[part].tolist(), y[part].tolist(), mode[part].tolist(), strict=True)
+
     @cached_property
     def margins(self) -> FloatArray:
         """The margin of every comparison at every row, shape (rows, comparisons)."""
-        return np.array([self.margins_at(*self.at(row)) for row in range(len(self.rows))])
+        program, number = self.program, len(self.program.strict)
+        margins, p, asked = program.ieee["margins"], program.p, [FOR_A_GUARD] * number
+        found = np.empty((len(self.rows), number))
+        for row, (t, y, mode) in enumerate(self.every()):
+            out = [0.0] * number
+            margins(t, y, mode, p, asked, out)
+            found[row] = out
+        return found
+
+    @cached_property
+    def crossed(self) -> NDArray[np.bool_]:
+        """Which margins have changed their sign since the row before, shape (rows, comparisons)."""
+        m, found = self.margins, np.zeros(self.margins.shape, dtype=np.bool_)
+        truth = np.where(np.array(self.program.strict, dtype=np.bool_), m > 0.0, m >= 0.0)
+        found[1:] = truth[1:] != truth[:-1]
+        return found
 
     def margins_at(self, t: float, y: list[float], mode: list[int]) -> list[float]:
         """Return the margin of every comparison."""
@@ -83,13 +107,13 @@ class Track:
     def watched(self) -> NDArray[np.bool_]:
         """Which comparisons keep a guard false at each row, shape (rows, comparisons)."""
         program, number = self.program, len(self.program.strict)
-        found = np.zeros((len(self.rows), number), dtype=np.bool_)
-        for row in range(len(self.rows)):
-            t, y, mode = self.at(row)
+        arm, p = program.ieee["arm"], program.p
+        found = np.zeros((len(self.rows), number), dtype=np.int64)
+        for row, (t, y, mode) in enumerate(self.every()):
             held, watch = [0.0] * program.held, [0] * number
-            program.ieee["arm"](t, y, mode, program.p, held, watch)
-            found[row] = [bool(bits & FOR_A_GUARD) for bits in watch]
-        return found
+            arm(t, y, mode, p, held, watch)
+            found[row] = watch
+        return (found & FOR_A_GUARD).astype(np.bool_)
 
     def enabled(self, t: float, y: list[float], mode: Sequence[int]) -> list[int]:
         """Return the edge of each machine that would be taken, or -1."""

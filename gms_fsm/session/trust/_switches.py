@@ -107,7 +107,7 @@ def _judge_crossing(path: Track, row: int, found: Gathering) -> None:
     t, y, mode = path.at(row)
     edges = path.enabled(t, y, mode)
     machines = [i for i, edge in enumerate(edges) if edge >= 0]
-    crossed = [r for r in _crossed(path, row) if path.watched[row - 1, r]]
+    crossed = np.flatnonzero(path.crossed[row] & path.watched[row - 1]).tolist()
     if not machines or not crossed:
         return
     i = machines[0]
@@ -152,19 +152,11 @@ def _judge_crossing(path: Track, row: int, found: Gathering) -> None:
         found.add("order", same, t, text, severity="note" if same else "warning")
 
 
-def _crossed(path: Track, row: int) -> list[int]:
-    """Return the comparisons whose margin has changed its sign since the row before."""
-    before, now = path.margins[row - 1], path.margins[row]
-    strict = np.array(path.program.strict)
-    truth = [np.where(strict, m > 0.0, m >= 0.0) for m in (before, now)]
-    return np.flatnonzero(truth[0] != truth[1]).tolist()
-
-
 def _shape(
     path: Track, row: int, chosen: Sequence[int], step: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return some margins at a row, their rates and their curvatures along its flow."""
-    h = NEARBY * max(step, SHORTEST * float(np.ptp(path.rows.t)))
+    h = NEARBY * max(step, SHORTEST * float(path.rows.t[-1] - path.rows.t[0]))
     mode = path.at(row)[2]
     before, after = (
         np.array(path.margins_at(*path.moved(row, by), mode))[list(chosen)] for by in (-h, h)
@@ -185,13 +177,10 @@ def _is_undone(m: float, rate: float, bend: float, doubt: float, within: float) 
 # --------------------------------------------------------------------------- not taken
 def _unanswered(path: Track, fired: set[int]) -> Iterator[tuple[int, int]]:
     """Yield rows at which a comparison turned that kept a guard false, and nothing fired."""
-    t = path.rows.t
-    for row in range(1, len(path.rows)):
-        if row in fired or not t[row] > t[row - 1]:
-            continue
-        for r in _crossed(path, row):
-            if path.watched[row - 1, r]:
-                yield row, r
+    t, turned = path.rows.t, path.crossed[1:] & path.watched[:-1]
+    for before, r in np.argwhere(turned & (t[1:] > t[:-1])[:, None]).tolist():
+        if before + 1 not in fired:
+            yield before + 1, r
 
 
 def _judge_refusal(path: Track, row: int, relation: int, found: Gathering) -> None:

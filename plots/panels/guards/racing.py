@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from gms_fsm.foundation.quantities import trimmed
-from gms_fsm.session.explain import Clause, Explanation, Why, explain
+from gms_fsm.session.explain import Clause, Explanation, Why, explain_alone
 from gms_fsm.traces.trace import Trace
 from plots.charts.labels import FALSE, TRUE
 from plots.panels.parts.axes import Artists, note
@@ -80,7 +80,7 @@ def race(ax: Axes, trace: Trace, element: int, *, row: int = -1) -> Artists:
         For each lane its swatch, its name and its verdict, then for each clause text, numbers and,
         if it has two sides, a bar.
     """
-    why = explain(trace, checked_row(trace, row), one_element(trace, element))
+    why = explain_alone(trace, checked_row(trace, row), one_element(trace, element))
     ax.spines[:].set_visible(False)
     if not why.edges:
         ax.set_xticks([])
