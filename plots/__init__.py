@@ -18,6 +18,7 @@ from plots.charts.live_chart import LiveChart, live_statechart
 from plots.charts.statechart import layout, statechart
 from plots.output.mermaid import mermaid
 from plots.output.render import render
+from plots.page.live import play
 from plots.page.replay import replay, write_replay
 from plots.style.presets import preset
 from plots.systems.block_diagram import block_diagram
@@ -48,6 +49,7 @@ __all__ = [
     "mermaid",
     "overview",
     "phase",
+    "play",
     "preset",
     "render",
     "replay",

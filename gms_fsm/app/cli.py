@@ -43,7 +43,7 @@ from gms_fsm.app.verbs.runs import (
     schema_command,
     sweep_command,
 )
-from gms_fsm.app.verbs.traces import animate_command, plot_command, replay_command
+from gms_fsm.app.verbs.traces import animate_command, play_command, plot_command, replay_command
 from gms_fsm.errors import GMSError
 
 
@@ -63,6 +63,7 @@ _MEANT = {
     "verify": "check",
     "compare": "diff",
     "film": "animate",
+    "live": "play",
     "step": "debug",
     "identify": "fit",
     "teach": "lesson",
@@ -226,6 +227,7 @@ app.command("handout", cls=_Drawing)(handout_command)
 app.command("plot", cls=_Verb)(plot_command)
 app.command("animate", cls=_Drawing)(animate_command)
 app.command("replay", cls=_Drawing)(replay_command)
+app.command("play", cls=_Drawing)(play_command)
 app.command("debug", cls=_Verb)(debug_command)
 app.command("dap", cls=_Verb)(dap_command)
 app.command("lesson", cls=_Verb)(lesson_command)

@@ -40,6 +40,22 @@ def observe_rows(
     return count
 
 
+def value_rows(
+    values: Callable[..., Any],
+    p: Any,
+    calm: list[int],
+    t: Vector,
+    y: list[Vector],
+    mode: list[list[int]],
+    table: list[Vector],
+    count: int,
+) -> int:
+    """Compute what can be read at many rows; no velocity has jumped at any."""
+    for row in range(count):
+        values(t[row], y[row], mode[row], p, calm, table[row])
+    return count
+
+
 def observe_row(
     observe: Callable[..., Any], on: Held, t: float, y: Vector, mode: list[int], out: Vector
 ) -> None:

@@ -70,6 +70,7 @@ SCRIPTS = (
     "js/presenting.js",
     "js/page.js",
 )
+START = ("js/start.js",)
 HATCH_ANGLES = (None, 45, 135, 0, 90)  # of the states' ribbons, degrees
 # uPlot's licence must accompany every copy, but the package's file only names it.
 MIT = """\
@@ -274,10 +275,14 @@ def page_data(
         run = stored_run(page, [charts.index(picture) for picture in pictures], reports)
         head = [*names[i : i + 1], each.title]
         runs.append({"title": visible(": ".join(head)), "of": len(each), **run})
-    data = {
-        "title": visible(title or " and ".join(dict.fromkeys(map(_heading, traces)))),
-        "runs": runs,
-        "notes": _notes(notes, traces),
+    heading = title or " and ".join(dict.fromkeys(map(_heading, traces)))
+    own = {"title": visible(heading), "runs": runs, "notes": _notes(notes, traces)}
+    return {**own, **common_data()}, charts
+
+
+def common_data() -> dict[str, Any]:
+    """Return what a page knows of any run: the language, units, words."""
+    return {
         "language": _language(),
         "quantities": {
             "prefixes": PREFIXES,
@@ -288,18 +293,24 @@ def page_data(
         "rounding": ROUNDING,
         "nothing": NOTHING,
     }
-    return data, charts
 
 
-def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
-    """Return a page that shows data from `page_data`."""
+def page_html(
+    data: Mapping[str, Any],
+    charts: Sequence[str],
+    engine: str = "",
+    more: Sequence[str] = START,
+    styles: Sequence[str] = ("page.css",),
+) -> str:
+    """Return a page that shows data from `page_data`, with further scripts of its own."""
     plot_script, plot_style = _uplot()
-    script = "".join([_elementary(), *map(_part, SCRIPTS)])
-    style = _theme() + plot_style + _part("page.css")
-    scripts = " ".join(map(_hash, (plot_script, script)))
+    script = "".join([_elementary(), *map(part_text, (*SCRIPTS, *more))])
+    style = "".join([_theme(), plot_style, *map(part_text, styles)])
+    scripts = " ".join(map(_hash, filter(None, (plot_script, engine, script))))
+    worker = "worker-src blob:; " * bool(engine)  # which has the policy of the page
     parts = {
         # Only the scripts written here may run; text from a trace cannot, even as markup.
-        "policy": f"default-src 'none'; script-src {scripts}; style-src {_hash(style)}; "
+        "policy": f"default-src 'none'; script-src {scripts}; style-src {_hash(style)}; {worker}"
         "base-uri 'none'; form-action 'none'",
         "style": style,
         "charts": "".join(
@@ -308,10 +319,11 @@ def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
         "data": _inert(data),
         "licence": f"uPlot, {_copyright(plot_script)}\n\n{MIT}",
         "uplot": plot_script,
+        "engine": f'<script id="engine">{engine}</script>\n' if engine else "",
         "script": script,
     }
     # In one pass, so that placeholders inside the parts are left unchanged.
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _part("template.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], part_text("template.html"))
 
 
 def _notes(notes: Mapping[Any, str], traces: Sequence[Trace]) -> list[dict[str, Any]]:
@@ -383,7 +395,8 @@ def _text(path: Path | Traversable) -> str:
     return path.read_text(encoding="utf-8").replace("\r\n", "\n")
 
 
-def _part(name: str) -> str:
+def part_text(name: str) -> str:
+    """Return a file of the page's own."""
     return _text(resources.files("plots.page").joinpath(name))
 
 

@@ -8,7 +8,6 @@ values of a slider the latest wins.
 from __future__ import annotations
 
 import importlib.util
-import math
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
@@ -21,13 +20,12 @@ import traitlets
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.gms import GMS_ELEMENT
-from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, SessionError
 from gms_fsm.foundation.arguments import checked_integer
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.session.results import BranchComparison
 from gms_fsm.session.session import Session
-from gms_fsm.session.tree.branches import Fork, Tree
+from gms_fsm.session.tree.branches import Fork
 from gms_fsm.session.tree.poking import pokeable
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.numbers import law_of
@@ -37,6 +35,7 @@ from gms_fsm.traces.trace import Trace
 from plots.page.chart import chart_svg
 from plots.page.replay import page_data, page_html
 from plots.style import Theme, colour
+from plots.views.ranges import checked_ranges
 
 __all__ = ["Explorer"]
 
@@ -94,7 +93,7 @@ class Explorer(anywidget.AnyWidget):
         self._tree = Session(
             model, rig, t_end, t_start=t_start, initial=initial, settings=settings, **options
         ).tree
-        self._sliders = _checked_sliders(self._tree, sliders)
+        self._sliders = checked_ranges("sliders", sliders, lambda name: self._tree.number(name, 0))
         self._shown: tuple[int, ...] = (0,)
         self._pictures: list[tuple[Chart, int, str]] = []
         self._answer: dict[str, Any] = {"done": "", "said": "", "file": None}
@@ -413,32 +412,3 @@ class Explorer(anywidget.AnyWidget):
             named = self._tree.branch().start.what.named
             edits = {"variables": {what: value}} if named else {"v": value}
         self.poke(**edits, t=t, microstep=microstep)
-
-
-def _checked_sliders(
-    tree: Tree, sliders: Mapping[str, tuple[float, float]]
-) -> dict[str, tuple[float, float]]:
-    """Return the ranges of the sliders; raise `ParameterError` for one that is none."""
-    if not isinstance(sliders, Mapping):
-        raise ParameterError(
-            "give ranges by name, for example {'F_s': (1.0, 3.0)}", place="sliders", value=sliders
-        )
-    found = {}
-    for name, ends in sliders.items():
-        number = tree.number(name, 0)
-        try:
-            low, high = (checked_scalar(f"sliders[{name!r}]", end, "finite") for end in ends)
-        except (TypeError, ValueError) as error:
-            if isinstance(error, GMSError):
-                raise
-            raise ParameterError(
-                "give its lowest and its highest value", place=f"sliders[{name!r}]", value=ends
-            ) from None
-        if not (low < high and low <= number.value <= high and math.isfinite(high - low)):
-            raise ParameterError(
-                f"it must be a range around {number.value!r}, the value of the model",
-                place=f"sliders[{name!r}]",
-                value=ends,
-            )
-        found[name] = (low, high)
-    return found

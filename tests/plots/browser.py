@@ -170,8 +170,15 @@ def open_page(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Ite
     hear: dict[Any, Any] = {
         "console": lambda message: wrong.append(message.text),
         "pageerror": lambda error: wrong.append(str(error)),
-        "request": lambda r: r.url in asked or wrong.append(f"asked for {r.url}"),
+        "request": lambda r: (
+            r.url.startswith(("blob:", "data:"))
+            or r.url.split("#")[0] in asked
+            or wrong.append(f"asked for {r.url}")
+        ),
     }
+
+    def is_own(url: str) -> bool:  # a page's worker is a blob of its own
+        return url.startswith("blob:") or url.partition("#")[0] in asked
 
     def tab_of(options: dict[str, Any]) -> Page:
         if options:

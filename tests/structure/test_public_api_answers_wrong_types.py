@@ -84,7 +84,7 @@ FEWER = {
     "Fit.report.folder": (object(), -1),
 }
 # These take long to draw; landscape, animate and the methods of LiveChart stand for them.
-DRAWN = {"handout", "phase", "LiveChart", "live_statechart", "explore"}
+DRAWN = {"handout", "phase", "LiveChart", "live_statechart", "explore", "play"}
 # Classes that only the package creates, for users to read.
 RECORDS = {"Coverage", "Finding", "Fit", "PhenomenaTable", "Record", "Report", "Sweep", "Trace"}
 RECORDS |= {"Model", "Rig", "Signal"}  # protocols
@@ -261,6 +261,7 @@ def _by_entry() -> dict[str, dict[str, Any]]:
         "initial_bank": {"n": 2, "v_c": None},
         "live_statechart": {"row": 0},
         "measure_phenomena": {"models": ["stiction"], "phenomena": ["stick-slip"]},
+        "play": {"t_end": 1.0, "vary": {"v_c": (1e-9, 2.0)}},
         "preset": {"chosen": "ieee1"},
         "render": {"path": Path("a.dot")},
         "schematic": {"system": SYSTEM},
@@ -276,7 +277,7 @@ def _right(name: str, call: Callable[..., Any], skipped: int) -> dict[str, Any]:
     found = {}
     for each in list(inspect.signature(call).parameters.values())[skipped:]:
         if each.kind is each.VAR_KEYWORD:
-            if name in ("simulate", "sweep", "Session", "explore"):
+            if name in ("simulate", "sweep", "Session", "explore", "play"):
                 found |= {one.name: one.default for one in fields(Settings)}
             mine = [key for key in right() if key.rpartition(".")[0] == name]
             found |= {key.rpartition(".")[2]: right()[key] for key in mine}

@@ -1,18 +1,28 @@
-"""Verbs that show a trace: figures, an animation, a replay page."""
+"""Verbs that show a run: figures, an animation, a replay page, a live page."""
 
 from __future__ import annotations
 
+import math
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gms_fsm.app.verbs.console import progress_bars, put
-from gms_fsm.app.verbs.options import ContactName, End, OutputFolder, PresetName, Start, TraceFile
+from gms_fsm.app.verbs.console import messages, progress_bars, put
+from gms_fsm.app.verbs.options import (
+    ContactName,
+    End,
+    OutputFolder,
+    Overrides,
+    PresetName,
+    Start,
+    TraceFile,
+)
 from gms_fsm.errors import ParameterError, TraceFileError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.files import output_folder, refuse_input
+from gms_fsm.scenarios import shipped
 
 if TYPE_CHECKING:
     from gms_fsm import Chart, Trace
@@ -186,3 +196,80 @@ def replay_command(
         output, *runs, title=title, names=names, window=window, checks=reports, notes=told
     )
     put(str(page))
+
+
+def play_command(
+    scenario: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Scenario file, or the name of one of the package (`gms-fsm run --list`).",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Output file, ending in {page}; NAME.html by default."),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A slider to show first, as name=lowest..highest, such as F_s=0.5..3, or by its "
+            "name. Repeat the option for others.",
+        ),
+    ] = None,
+    overrides: Overrides = None,
+    title: Annotated[str, typer.Option(help="Title of the page.")] = "",
+    every: Annotated[
+        bool,
+        typer.Option(
+            "--all", help="All scenarios of the package; -o is a folder, play by default."
+        ),
+    ] = False,
+) -> None:
+    """Write a scenario as a live page: sliders compute the run again, in the browser."""
+    if every != (scenario is None):
+        raise typer.BadParameter("give a scenario, or --all", param_hint="SCENARIO")
+    if scenario is not None:
+        _write(
+            scenario, output or Path(f"{scenario.stem}.html"), vary or [], overrides or [], title
+        )
+        return
+    folder = output or Path("play")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in shipped():
+        _write(Path(name), folder / f"{name}.html", [], [], "")
+
+
+def _write(scenario: Path, output: Path, vary: list[str], overrides: list[str], title: str) -> None:
+    from gms_fsm.app.scenario import load_scenario
+    from plots import play
+    from plots.output import formats
+
+    formats.chosen(output, "page")  # before any work
+    loaded = load_scenario(scenario, overrides)
+    refuse_input(output, *loaded.inputs)
+    given: dict[str, Any] = dict(loaded.arguments)
+    for name in ("t_end", "t_eval", "engine", "monitors"):
+        given.pop(name, None)
+    ranges = dict(map(_range, vary))
+    with messages().status(f"writing {output}"):
+        page = play(*loaded.subject, vary=ranges, title=title or loaded.title, **given)
+        page.save(output)
+    put(str(output))
+
+
+def _range(text: str) -> tuple[str, tuple[float, float] | None]:
+    """Return a name and its range, of ``F_s=0.5..3`` or ``F_s``."""
+    name, given, ends = text.partition("=")
+    if not given:
+        return name.strip(), None
+    low, _, high = ends.partition("..")
+    try:
+        found = float(low), float(high)
+    except ValueError:
+        found = math.nan, math.nan
+    if not all(map(math.isfinite, found)):
+        raise ParameterError(
+            "it must be a name and a range, such as F_s=0.5..3", place="--vary", value=text
+        )
+    return name.strip(), found

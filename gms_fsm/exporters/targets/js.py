@@ -42,7 +42,7 @@ from integrators.machine_code.javascript import javascript_text, script_number, 
 from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.tree import Local
 from integrators.runners import columns
-from integrators.runners.compiled import INLINE, RECORD, is_known
+from integrators.runners.compiled import INLINE, RECORD, RecordArguments, is_known
 from integrators.runners.observing import observe_rows
 from integrators.runners.stepping import FULL_LOG
 
@@ -80,7 +80,7 @@ class Whole(NamedTuple):
 def js(subject: Subject) -> dict[str, str]:
     """Return a module, its types and a README."""
     name = subject.name
-    made = _Friction(subject) if subject.alone else _Run(subject)
+    made = _Friction(subject) if subject.alone else RunModule(subject)
     return {
         f"{name}.mjs": made.module(),
         f"{name}.d.mts": made.types(),
@@ -130,7 +130,7 @@ class _Module(ABC):
         entries = self.entries(translator)
         code = javascript_text(translator.module)
         _, tables = tables_of(translator.module)
-        image, true = _image(MemoryBlock(self.layout, self.arguments))
+        image, true = self.image()
         return filled(
             "js/js.mjs",
             name=self.subject.name,
@@ -146,7 +146,7 @@ class _Module(ABC):
             time_scale=self.layout.offset("buffers.plan.control.time_scale"),
             numbers=_table({each.name: self._number(each) for each in self.numbers}),
             outputs=_table({each.name: self.output(each) for each in self.outputs}),
-            failures=_table(self._failures()),
+            failures=_table(self.failures()),
             states=_table(
                 {
                     contact.name: [state.name for state in contact.chart.states]
@@ -200,8 +200,16 @@ class _Module(ABC):
             )
         return {"outputs": "\n".join(lines)}
 
+    def image(self) -> tuple[list[tuple[int, str]], list[int]]:
+        """Return the words that are not zero at the start, and the bytes that are true."""
+        return _image(MemoryBlock(self.layout, self.arguments))
+
     def _columns(self) -> str:
-        contents, found = self.columns(), dict[str, Any]()
+        return _inside(_table(self.growing()))
+
+    def growing(self) -> dict[str, dict[str, Any]]:
+        """Return where the block has the columns outside it, and what is in them at first."""
+        contents, found = self.columns(), dict[str, dict[str, Any]]()
         paths = self.layout.column_offsets
         for path, (offset, lengths, width) in paths.items():
             data: Any = np.asarray(contents.get(path, ()), dtype=np.float64)
@@ -213,7 +221,7 @@ class _Module(ABC):
                 "rows": data.shape[0],
                 "data": data.ravel().tolist(),
             }
-        return _inside(_table(found))
+        return found
 
     def _number(self, each: Quantity) -> dict[str, Any]:
         value = each.values[0] if each.length is None else list(each.values)
@@ -221,7 +229,8 @@ class _Module(ABC):
         known = {"place": place, "unit": each.unit, "meaning": each.meaning, "value": value}
         return known if each.length is None else {**known, "length": each.length}
 
-    def _failures(self) -> dict[str, str]:
+    def failures(self) -> dict[str, str]:
+        """Return what the codes of calls that cannot go on mean."""
         return {str(code): reason for code, (_, reason) in FAILURES.items()}
 
     def _edges(self) -> list[dict[str, str]]:
@@ -237,7 +246,7 @@ class _Module(ABC):
         ]
 
 
-class _Run(_Module):
+class RunModule(_Module):
     """A system, from its start to its end."""
 
     face = "js_run"
@@ -277,13 +286,14 @@ class _Run(_Module):
                 place="settings",
                 advice='leave method and output out, or choose method="dp45"',
             )
-        run = example_of(start)
-        table: Any = OuterArray("f", start.program.layout.observed.size)
-        whole = Whole(
-            run.functions, run.machines, run.buffers, run.log, run.recorded, run.tally,
-            adapting_of(start), table,
-        )  # fmt: skip
+        whole = self.whole(start, example_of(start), adapting_of(start))
         super().__init__(subject, start, whole, alone=False)
+
+    def whole(self, start: Problem, run: RecordArguments, adapting: Adapting) -> Any:
+        """Return the arguments of all entries."""
+        table: Any = OuterArray("f", start.program.layout.observed.size)
+        parts = run.functions, run.machines, run.buffers, run.log, run.recorded, run.tally
+        return Whole(*parts, adapting, table)
 
     def entries(self, translator: Translator) -> list[str]:
         """Translate the run, what follows from its numbers, and what is observed of its rows."""
@@ -320,11 +330,6 @@ class _Run(_Module):
     def holes(self) -> dict[str, object]:
         """Return codes, sizes, and places in the block."""
         start, place, layout = self.start, self.layout.offset, self.start.program.layout
-        names = [
-            f"element {i + 1}" + (f" of {bank.name}" if len(layout.banks) > 1 else "")
-            for bank in layout.banks
-            for i in range(bank.n)
-        ]
         return {
             "ROWS": loop.ROWS,
             "DONE": loop.DONE,
@@ -341,12 +346,22 @@ class _Run(_Module):
             "t_end": repr(start.t_end),
             "times": "undefined" if start.options.times is None else len(start.options.times),
             "first_elements": _table({bank.name: bank.first for bank in layout.banks}),
-            "elements": json.dumps(names),
+            "elements": json.dumps(self.elements()),
         }
 
-    def _failures(self) -> dict[str, str]:
+    def elements(self) -> list[str]:
+        """Return what the elements are called in messages."""
+        banks = self.start.program.layout.banks
+        return [
+            f"element {i + 1}" + (f" of {bank.name}" if len(banks) > 1 else "")
+            for bank in banks
+            for i in range(bank.n)
+        ]
+
+    def failures(self) -> dict[str, str]:
+        """Return what the codes of runs that cannot go on mean."""
         steps = f"it needs more than {self.start.options.max_steps:,} steps"
-        return {**super()._failures(), str(loop.TOO_MANY_STEPS): steps}
+        return {**super().failures(), str(loop.TOO_MANY_STEPS): steps}
 
     def example(self) -> str:
         """Return a program that runs the module."""

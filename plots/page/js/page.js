@@ -5,8 +5,10 @@ const whole = {}, span = {};
 const breakpoints = new Map();
 let frame = 0, following = true, zooming = false;
 const views = [];
+// The runs with a view of their own: not one that is only drawn behind another.
+const shownRuns = () => runs.filter(({ ghost }) => !ghost);
 // A wide screen: the page fills it and does not scroll; two runs need more of it than one.
-const isWide = () => presenting.on || (innerHeight >= 520 && innerWidth >= (runs.length > 1 ? 1240 : 1000));
+const isWide = () => presenting.on || (innerHeight >= 520 && innerWidth >= (shownRuns().length > 1 ? 1240 : 1000));
 const keyOf = (view, contact, element, edge) => `${view.place}/${contact.name}/${element}/${edge}`;
 
 function show(k, words = "") {
@@ -190,7 +192,7 @@ const KEYS = {
 };
 function pressed(event) {
   if (event.altKey || event.ctrlKey || event.metaKey || event.defaultPrevented || $("#keys").open) return;
-  if (event.target.closest("select, input[type=text]")) return;
+  if (event.target.closest("select, input:not(#scrubber)")) return;
   if (event.key === " " && event.target.closest("button, summary, [role=button]")) return;
   const action = KEYS[(event.shiftKey && event.key.startsWith("Arrow") ? "Shift " : "") + event.key];
   if (/^[1-9]$/.test(event.key)) (presenting.on ? chooseSlide : chooseElement)(Number(event.key) - 1);
@@ -236,7 +238,7 @@ function difference() {
   while (k < Math.min(a.length, b.length) && text(a[k]) === text(b[k])) k += 1;
   if (k === Math.max(a.length, b.length)) return { frame: null, told: "both runs make the same transitions in the same order" };
   const entries = [a[k], b[k]], at = entries.map((entry, i) => (entry ? frames.of[i][entry.row] : Infinity)), least = Math.min(...at);
-  const told = entries.map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${timeText(entry.t, 7)}` : "no further transition"}`);
+  const told = entries.map((entry, i) => `${runs[i].label}: ${entry ? `${text(entry)} at ${timeText(entry.t, 7)}` : "no further transition"}`);
   // Why the later run did not do the same then; of two at one time, the one that was held back.
   const words = entries.map((entry, i) => (frames.t[at[i]] === frames.t[least] ? heldInOther(entry, i, at[i]) : ""));
   const why = words.find((each) => each && !each.endsWith("fires next")) ?? words.find(Boolean);
@@ -246,7 +248,7 @@ function difference() {
 // What the element of a firing waits for in the other run, at the row where it fired.
 function heldInOther({ contact, element }, i, at) {
   const same = runs[1 - i].contacts.find(({ name, n }) => name === contact.name && n > element);
-  return same && !runs[1 - i].ended(frames.t[at]) ? `in run ${2 - i} ${waiting(same, element, frames.rows[1 - i][at])}` : "";
+  return same && !runs[1 - i].ended(frames.t[at]) ? `in ${runs[1 - i].label} ${waiting(same, element, frames.rows[1 - i][at])}` : "";
 }
 
 function firstDifference() {
@@ -258,14 +260,9 @@ function firstDifference() {
 // A time, in the unit of the time axis.
 function timeText(t, digits) { return inUnit(t, "s", TIME_POWER, digits); }
 
-// Shows other data in the place of those shown, if any; time, zoom, selection, breakpoints and open tabs stay.
-function load(given) {
+// What follows from the rows of the runs; the time shown, the zoom and breakpoints stay.
+function measure() {
   const t = frames?.t[frame] ?? -Infinity, zoomed = frames && (span.min !== whole.min || span.max !== whole.max) && { ...span };
-  const kept = views.map(({ contact, element, panes }) => ({ name: contact.name, element, panes }));
-  const tabs = Object.values(kept[0]?.panes ?? {}).filter(({ tab }) => tab.getAttribute("aria-selected") === "true").map(({ Pane }) => [Pane.side, Pane.key]);
-  for (const view of views.splice(0)) { view.close(); view.root.remove(); }
-  data = given;
-  runs = data.runs.map((stored, place) => new RunData(stored, place));
   frames = new Frames(runs);
   last = frames.t.length - 1;
   Object.assign(whole, { min: frames.t[0], max: frames.t[last] });
@@ -280,13 +277,23 @@ function load(given) {
     if (!(contact?.n > element && contact.edges[edge])) breakpoints.delete(key);
     else breakpoints.set(key, { ...point, place, name, element, edge, frames: framesOf(place, contact, element, edge) });
   }
+  $("#facts").textContent = runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" ");
+}
+
+// Shows other data in the place of those shown, if any; selection and open tabs stay.
+function load(given) {
+  const kept = views.map(({ contact, element, panes }) => ({ name: contact.name, element, panes }));
+  const tabs = Object.values(kept[0]?.panes ?? {}).filter(({ tab }) => tab.getAttribute("aria-selected") === "true").map(({ Pane }) => [Pane.side, Pane.key]);
+  for (const view of views.splice(0)) { view.close(); view.root.remove(); }
+  data = given;
+  runs = data.runs.map((stored, place) => (stored instanceof RunData ? stored : new RunData(stored, place)));
+  measure();
   document.title = $("#title").textContent = data.title;
-  $("#runs").className = runs.length > 1 ? "two" : "one";
+  $("#runs").className = shownRuns().length > 1 ? "two" : "one";
   document.documentElement.classList.toggle("wide", isWide());
   const [{ name, states }, another] = runs[0].contacts;
   $("#names").textContent = `${Object.keys(runs[0].names).join(", ")}, ${another ? `${name}.` : ""}state(1) == ${states.at(-1)}`;
-  $("#facts").textContent = runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" ");
-  for (const run of runs) views.push(new RunView(run));
+  for (const run of shownRuns()) views.push(new RunView(run));
   views.forEach((view, place) => {
     const { name, element } = kept[place] ?? kept[0] ?? { name: "", element: 0 };
     view.choose(view.run.contacts.find((each) => each.name === name) ?? view.contact, element);
@@ -298,8 +305,15 @@ function load(given) {
   show(frame);
 }
 
+// Shows other rows of the same runs.
+function renew(words = () => "") {
+  measure();
+  for (const view of views) view.renew();
+  setScale($("#scale").value);
+  show(frame, words());
+}
+
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) $("#speed").value = "rows";
-load(data);
 addEventListener("resize", () => document.documentElement.classList.toggle("wide", isWide()));
 new ResizeObserver(() => { for (const view of views) view.fit(); }).observe($("#runs"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => eachPlots((pane) => pane.recolour()));

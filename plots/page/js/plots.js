@@ -24,11 +24,11 @@ class TimePlots {
     this.clear();
     box.classList.add("plots");
     this.body = make("div", box, "", { class: "stack" });
-    box.addEventListener("mousemove", (event) => {
+    this.body.addEventListener("mousemove", (event) => {
       const left = this.body.getBoundingClientRect().left + AXIS * large, part = (event.clientX - left) / (this.width() * large);
       pointAt(part >= 0 && part <= 1 ? lastAt(frames.t, span.min + part * (span.max - span.min)) : null);
     });
-    box.addEventListener("mouseleave", () => pointAt(null));
+    this.body.addEventListener("mouseleave", () => pointAt(null));
   }
 
   clear() { Object.assign(this, { plots: [], tracks: [], wanted: [], marks: { cursor: [], hair: [], pin: [] } }); }
@@ -43,7 +43,7 @@ class TimePlots {
   // A plot of a value of both runs: `of` finds it in a run, undefined where there is none.
   compare(title, unit, of, { band = false, ...options } = {}) {
     const lines = runs.map((run, k) => ({ ...RUNS[k], run, get: of(run) })).filter(({ get }) => get);
-    this.add({ title, unit, lines, band: band && lines.length > 1, at: (power) => readings(lines, unit, power), ...options });
+    this.add({ title, unit, lines, band: band && lines.length > 1 && !runs[1].ghost, at: (power) => readings(lines, unit, power), ...options });
   }
 
   add(plot) { this.wanted.push(plot); }
@@ -57,7 +57,7 @@ class TimePlots {
 
   made({ title, note = "", unit = "", lines, at, step = false, band = false, bare = false }, isLast) {
     const head = make("h3", this.body, ""), name = make("span", head), value = make("output", head);
-    const power = powerOf(largest(extent(lines.map(({ get, run }) => ({ get, rows: run.rows })))), unit);
+    const power = powerFor(lines, unit);
     name.textContent = unit ? `${title} [${PREFIXES[power]}${unit}]` : title;
     const ink = (stroke) => () => colour(stroke);
     const axis = { stroke: ink("--ink"), grid: { stroke: ink("--grid"), width: 1 }, ticks: { show: false }, gap: 5 * large, font: `${Math.round(11 * large)}px system-ui, sans-serif` };
@@ -81,22 +81,41 @@ class TimePlots {
       if (Math.abs(event.clientX - down) < 4) go(Math.max(lastAt(frames.t, plot.posToVal(event.offsetX, "x")), 0));
     });
     if (note) make("small", head, note);
-    return { plot, value, at: () => at(power), bare };
+    return { plot, value, at: () => at(power), bare, lines, unit, power };
+  }
+
+  // The runs have other rows. Where values need another unit, the plots are made anew.
+  renew() {
+    if (this.plots.some(({ lines, unit, power }) => powerFor(lines, unit) !== power)) {
+      this.close();
+      this.fill();
+      this.fit();
+      return true;
+    }
+    zooming = true; // of its own accord
+    for (const { plot, lines } of this.plots) {
+      plot.setData([frames.t, ...lines.map(alongFrames)], false);
+      plot.setScale("x", { ...span });
+    }
+    zooming = false;
+    this.drawRibbons();
+    return true;
   }
 
   // The states of every element; of two runs both, one under the other.
   addRibbons(contacts) {
     const frame = make("div", this.body, "", { class: "ribbon-frame" }), several = contacts.length > runs.length;
+    contacts = contacts.filter(({ run }) => !run.ghost);
     this.ribbons = make("div", frame, "", { class: "ribbons", tabindex: 0, role: "group", "aria-label": "Active states over time" });
     this.mark(make("div", frame, "", { class: "over-ribbons" }));
-    const tracks = contacts.filter(({ states }) => states.length > 1).flatMap((contact) => contact.pieces.map((pieces, i) => ({ contact, i, pieces })));
+    const tracks = contacts.filter(({ states }) => states.length > 1).flatMap((contact) => contact.pieces.map((_, i) => ({ contact, i })));
     const names = contacts.map(({ name }) => name);
     tracks.sort((a, b) => names.indexOf(a.contact.name) - names.indexOf(b.contact.name) || a.i - b.i);
-    for (const { contact, i, pieces } of tracks) {
-      const { place } = contact.run, [short, long] = runs.length > 1 ? [`${place + 1}: `, `run ${place + 1}, `] : ["", ""];
+    for (const { contact, i } of tracks) {
+      const { place } = contact.run, [short, long] = shownRuns().length > 1 ? [`${place + 1}: `, `run ${place + 1}, `] : ["", ""];
       const ribbon = make("div", this.ribbons, "", { class: "ribbon", role: "img", "aria-label": `States of ${long}${nameOf(contact, i)} over time` });
       make("b", ribbon, `${short}${several || !contact.velocity ? `${contact.name}${contact.n > 1 ? ` ${i + 1}` : ""}` : `E${i + 1}`}`, { title: nameOf(contact, i) });
-      this.tracks.push({ contact, i, pieces, ribbon, track: make("div", ribbon) });
+      this.tracks.push({ contact, i, ribbon, track: make("div", ribbon) });
     }
   }
 
@@ -134,8 +153,8 @@ class TimePlots {
 
   drawRibbons() {
     const wide = span.max - span.min;
-    for (const { contact, pieces, track } of this.tracks) {
-      const { run } = contact;
+    for (const { contact, i, track } of this.tracks) {
+      const { run } = contact, pieces = contact.pieces[i];
       track.replaceChildren();
       for (let k = 0, to = 0; k < pieces.length; k++) {
         const from = Math.max(k ? run.t(pieces[k].from) : -Infinity, span.min);
@@ -166,6 +185,9 @@ class TimePlots {
     }
   }
 }
+
+// The power of ten of the unit of some lines.
+const powerFor = (lines, unit) => powerOf(largest(extent(lines.map(({ get, run }) => ({ get, rows: run.rows })))), unit);
 
 // A line by frame. Where its run has no row, it continues (undefined); a value that is not a number is a gap (null).
 function alongFrames({ get, run }) {
@@ -207,7 +229,7 @@ function valueAt({ get, run }, frame, t) {
 function readings(lines, unit, power) {
   const k = pointed ?? frame, t = frames.t[k], at = lines.map(({ get, run }) => inUnit(get(frames.rows[run.place][k]), unit, power, 5));
   if (runs.length < 2) return at[0];
-  const texts = at.map((text, i) => `${lines[i].run.place + 1}: ${text}`);
+  const texts = at.map((text, i) => `${lines[i].run.short}: ${text}`);
   if (lines.length < 2 || runs.some((each) => each.ended(t))) return texts.join("  ");
   const [one, two] = lines.map((line) => valueAt(line, k, t));
   return `${texts.join("  ")}  Δ ${inUnit(two - one, unit, power, 3)}`;
@@ -229,7 +251,7 @@ class TimePane extends TimePlots {
       const moves = name === contact.velocity, column = ({ place }) => this.contacts[place].column(moves ? this.contacts[place].velocity : name);
       this.compare(moves ? "v" : name, unitOf(contact, name), column, { band: !moves, note });
     };
-    if (force) compare(force, runs.length > 1 ? "dashed: run 2" : "");
+    if (force) compare(force, runs.length > 1 ? `dashed: ${runs[1].label}` : "");
     const inner = contact.velocity && this.addInner();
     for (const name of rest) if (!(presenting.on && name === "x")) compare(name); // for which a large view has no room
     this.addAll();
@@ -246,7 +268,7 @@ class TimePane extends TimePlots {
     const over = contact.threshold && contact.columns.s;
     const get = (of, i) => (over ? (row) => of.value(name, i, row) / of.value("s", i, row) : (row) => of.value(name, i, row));
     const lines = this.contacts.flatMap((of) => of.modes.map((_, i) => ({
-      get: get(of, i), run: of.run, of, i, ...(runs.length > 1 ? RUNS[of.run.place] : { stroke: `--e${elementStep(i, of.n)}`, dash: DASHES[i % DASHES.length] }),
+      get: get(of, i), run: of.run, of, i, ...(shownRuns().length > 1 || of.run.ghost ? RUNS[of.run.place] : { stroke: `--e${elementStep(i, of.n)}`, dash: DASHES[i % DASHES.length] }),
     })));
     const { run } = contact, bounds = over ? [1, -1].map((u) => ({ get: () => u, run, stroke: "--line" })) : [];
     const unit = over ? "" : contact.units[name] ?? "";
@@ -264,13 +286,14 @@ class TimePane extends TimePlots {
     const { element, contact } = this.view;
     if (this.inner && this.lit !== element) {
       this.lit = element;
+      const alone = shownRuns().length < 2;
       const { series } = this.inner, first = series.length - this.innerLines.length;
       this.innerLines.forEach(({ i, of }, k) => {
         const on = i === element, each = series[first + k];
-        if (runs.length < 2 && of.n > 1) each.width = (on ? 2.6 : 1.2) * large;
+        if (alone && !of.run.ghost && of.n > 1) each.width = (on ? 2.6 : 1.2) * large;
         else if (runs.length > 1 && each.show !== on) this.inner.setSeries(first + k, { show: on });
       });
-      if (runs.length < 2 && contact.n > 1 && frames.t.length * contact.n < MOST_POINTS) this.inner.redraw(false, false); // else with the next zoom
+      if (alone && contact.n > 1 && frames.t.length * contact.n < MOST_POINTS) this.inner.redraw(false, false); // else with the next zoom
     }
     this.tracks.forEach(({ ribbon, i }) => {
       const on = i === element;
@@ -285,8 +308,11 @@ class SystemPane extends TimePlots {
   static side = "right"; static key = "system"; static title = "System"; static shared = true;
   static of() { return runs.some(({ system }) => system); }
 
-  constructor(view, box) {
-    super(view, box);
+  constructor(view, box) { super(view, box); this.fill(); }
+
+  fill() {
+    this.body.replaceChildren();
+    this.clear();
     const systems = runs.map(({ system }) => system ?? { bodies: [], values: [] });
     // What has a name in either run, and a column of it in each.
     const every = (list, act) => {

@@ -20,16 +20,31 @@ const BETWEEN = ["", "after ", "before "]; // where a row of the page lies, seen
 
 class RunData {
   constructor(stored, place) {
-    Object.assign(this, { place, title: stored.title, of: stored.of, rows: stored.rows, system: stored.system, trust: stored.trust ?? [] });
-    for (const name of ["instants", "number", "between", "microstep"]) this[name] = integers(stored[name]);
-    this.pool = stored.pool.map(([kind, on, text]) => {
-      const values = unpacked(kind, text), { instants } = this;
-      if (on === "constant") return () => values[0];
-      return on === "instants" ? (row) => values[instants[row]] : (row) => values[row];
-    });
+    const { title, system, trust = [], ghost = false, label = `run ${place + 1}`, short = place + 1 } = stored;
+    Object.assign(this, { place, title, system, trust, ghost, label, short });
+    this.pool = stored.pool.map((each) => this.getter(each));
     this.t = this.column(stored.t);
     this.contacts = stored.contacts.map((each) => new Contact(each, this));
     this.names = Object.fromEntries(Object.entries(stored.names).map(([name, each]) => [name, this.column(each)]));
+    this.take(this.read(stored));
+  }
+
+  // The rows that were written into the page.
+  read({ rows, of, instants, number, between, microstep, contacts }) {
+    const logs = contacts.map(({ log, switches, initial }) => ({ initial, switches: switches.map(integers), log: [...log.slice(0, 4).map(integers), log[4]] }));
+    return { rows, of, contacts: logs, instants: integers(instants), number: integers(number), between: integers(between), microstep: integers(microstep) };
+  }
+
+  getter([kind, on, text]) {
+    const values = unpacked(kind, text);
+    if (on === "constant") return () => values[0];
+    return on === "instants" ? (row) => values[this.instants[row]] : (row) => values[row];
+  }
+
+  // Rows with their states and firings, in the place of those before; what reads them stays.
+  take({ contacts, ...rows }) {
+    Object.assign(this, rows);
+    contacts.forEach((each, k) => this.contacts[k].take(each));
     this.fired = new Map(); // by row: the firing that made it
     this.late = new Map(); // by row: firings between requested times, which have no row of their own
     this.log = this.contacts.flatMap((contact) => contact.log).sort((a, b) => a.row - b.row || a.t - b.t);
@@ -71,15 +86,20 @@ class Contact {
     this.flowTrees = stored.flows;
     this.flows = stored.flows.map((flows) => Object.fromEntries(Object.entries(flows).map(([name, tree]) => [name, compiled(tree)])));
     this.curveAt = stored.curve && compiled(stored.curve.tree);
-    this.readSwitches(stored);
-    const [rows, elements, edges, made] = stored.log.slice(0, 4).map(integers), late = [...stored.log[4]];
-    this.log = Array.from(rows, (row, k) => ({
-      row, contact: this, element: elements[k], edge: edges[k], made: made[k] === 1, t: made[k] ? run.t(row) : late.shift(),
+    this.away = (row) => this.modes.reduce((count, mode) => count + (mode[row] !== 0), 0);
+  }
+
+  take({ initial, switches, log }) {
+    const { run } = this, [fired, elements, edges, made, late] = log;
+    this.powers = {};
+    this.readSwitches(initial, switches);
+    let next = 0;
+    this.log = Array.from(fired, (row, k) => ({
+      row, contact: this, element: elements[k], edge: edges[k], made: made[k] === 1, t: made[k] ? run.t(row) : late[next++],
     }));
   }
 
-  readSwitches({ initial, switches }) {
-    const [rows, elements, modes] = switches.map(integers);
+  readSwitches(initial, [rows, elements, modes]) {
     this.pieces = initial.map((mode) => [{ mode, from: 0 }]); // constant state from this row on
     rows.forEach((row, k) => this.pieces[elements[k]].push({ mode: modes[k], from: row }));
     this.modes = this.pieces.map((pieces) => {
@@ -87,12 +107,10 @@ class Contact {
       pieces.forEach(({ mode, from }, k) => found.fill(mode, from, pieces[k + 1]?.from));
       return found;
     });
-    this.away = (row) => this.modes.reduce((count, mode) => count + (mode[row] !== 0), 0);
   }
 
   // A value of a quantity as text, in one unit for all rows and runs: a threshold in that of the variable it bounds.
   tell(name, u, digits) {
-    this.powers ??= {};
     const key = name === "s" ? this.variables[0] ?? name : name, unit = unitOf(this, name);
     this.powers[key] ??= powerOf(largest(extent(runs.flatMap(({ contacts, rows }) => {
       const found = contacts.filter((each) => each.name === this.name).flatMap((each) => each.columns[key] ?? []);
@@ -189,20 +207,24 @@ class Frames {
       for (let row = 1; row < run.rows; row++) order[row] = times[row] === times[row - 1] ? order[row - 1] + 1 : 0;
       return { times, order };
     });
-    const at = runs.map(() => 0), t = [], rows = runs.map(() => []);
-    for (;;) {
-      let least = null;
-      own.forEach(({ times, order }, k) => {
-        const i = at[k];
-        if (i < times.length && (!least || times[i] < least[0] || (times[i] === least[0] && order[i] < least[1]))) least = [times[i], order[i]];
-      });
-      if (!least) break;
-      own.forEach(({ times, order }, k) => { if (times[at[k]] === least[0] && order[at[k]] === least[1]) at[k] += 1; });
-      t.push(least[0]);
-      rows.forEach((each, k) => each.push(Math.max(at[k] - 1, 0)));
+    const most = runs.reduce((sum, { rows }) => sum + rows, 0), t = new Float64Array(most), rows = runs.map(() => new Uint32Array(most));
+    const at = runs.map(() => 0);
+    let count = 0;
+    for (; ; count++) {
+      let least = Infinity, order = 0;
+      for (let k = 0; k < own.length; k++) {
+        const i = at[k], { times, order: orders } = own[k];
+        if (i < times.length && (times[i] < least || (times[i] === least && orders[i] < order))) [least, order] = [times[i], orders[i]];
+      }
+      if (least === Infinity) break;
+      t[count] = least;
+      for (let k = 0; k < own.length; k++) {
+        if (own[k].times[at[k]] === least && own[k].order[at[k]] === order) at[k] += 1;
+        rows[k][count] = Math.max(at[k] - 1, 0);
+      }
     }
-    this.t = Float64Array.from(t);
-    this.rows = rows.map((each) => Uint32Array.from(each));
+    this.t = t.slice(0, count);
+    this.rows = rows.map((each) => each.slice(0, count));
     // The first frame that shows each row.
     this.of = runs.map((run, k) => {
       const found = new Uint32Array(run.rows);

@@ -12,7 +12,7 @@ class RunView {
     Object.assign(this, { run, place: run.place, row: 0, element: 0, contact: run.contacts[0], panes: {}, open: {} });
     this.root = $("#run").content.cloneNode(true).firstElementChild;
     $("#runs").append(this.root);
-    $("h2", this.root).textContent = (data.runs.length > 1 ? `Run ${this.place + 1}: ` : "") + run.title;
+    $("h2", this.root).textContent = (shownRuns().length > 1 ? `Run ${this.place + 1}: ` : "") + run.title;
     const trust = $(".trust", this.root), warned = run.trust.filter((text) => text.startsWith("warning")).length;
     trust.hidden = !run.trust.length;
     $("summary", trust).textContent = `trust: ${counted(warned, "warning")}, ${counted(run.trust.length - warned, "note")}`;
@@ -56,7 +56,7 @@ class RunView {
     const each = this.panes[key];
     if (!each && !this.place) return;
     $(`.${side}`, this.root).hidden = !each; // shared, and shown by the first run
-    if (side === "right") $(".of", this.root).hidden = runs.length < 2 || Boolean(each?.Pane.shared);
+    if (side === "right") $(".of", this.root).hidden = shownRuns().length < 2 || Boolean(each?.Pane.shared);
     delete this.open[side];
     for (const { Pane, tab, box } of Object.values(this.panes)) {
       if (Pane.side !== side) continue;
@@ -93,6 +93,24 @@ class RunView {
     each.pane.close?.();
     each.box.replaceWith(box);
     Object.assign(each, { box, pane: undefined });
+  }
+
+  // The run has other rows. A pane that cannot change is made anew, when it is in view.
+  renew() {
+    this.explained = "";
+    for (const each of Object.values(this.panes)) {
+      const { pane, box, Pane } = each;
+      if (!pane || (this.open[Pane.side] === pane && pane.renew?.())) continue;
+      pane.close?.();
+      box.replaceChildren();
+      each.pane = null;
+    }
+    for (const [side, pane] of Object.entries(this.open)) {
+      const each = Object.values(this.panes).find(({ Pane }) => pane instanceof Pane);
+      if (each.pane) continue;
+      this.open[side] = each.pane = new each.Pane(this, each.box);
+      each.pane.fit?.();
+    }
   }
 
   // ---------------------------------------------------------------- the row
@@ -364,6 +382,8 @@ class ChartPane {
       }
     }
   }
+
+  renew() { return true; } // it shows a row, as always
 
   // Where all elements would be too small to read, only the selected one is in view; where that would be, too, the pane
   // scrolls, or on a narrow screen the page.

@@ -1,0 +1,91 @@
+"use strict";
+// A run computed here: the memory of an engine that gms-fsm has printed. This text also runs in a worker, by itself.
+const STEPS_AT_ONCE = 2000; // between two looks at the clock
+const GROWING = { // columns by what there is one entry of
+  rows: ["rows_t", "rows_y", "rows_microstep", "rows_mode", "table", "shown"],
+  firings: ["log_t", "log_machine", "log_edge", "log_numbers"],
+};
+
+function floats(text = "") {
+  const letters = atob(text), bytes = new Uint8Array(letters.length);
+  for (let k = 0; k < letters.length; k++) bytes[k] = letters.charCodeAt(k);
+  return new Float64Array(bytes.buffer);
+}
+
+class Engine {
+  constructor({ known, image, functions }) {
+    Object.assign(this, { known, image, make: functions, tables: floats(known.tables), rooms: { rows: 1024, firings: 256 } });
+    this.fixed = Object.fromEntries(Object.entries(known.columns).map(([name, { data }]) => [name, floats(data)]));
+    this.build();
+  }
+
+  // The memory with room for so many rows and firings, as it is before a run.
+  build() {
+    const { known: { words, columns, true: bytes }, tables, fixed, rooms } = this, places = {};
+    const count = (name) => rooms[Object.keys(GROWING).find((kind) => GROWING[kind].includes(name))] ?? columns[name].rows;
+    this.block = tables.length;
+    let size = this.block + words;
+    for (const name of Object.keys(columns)) {
+      places[name] = size;
+      size += count(name) * columns[name].width;
+    }
+    const F = new Float64Array(size), B = new Uint8Array(F.buffer);
+    F.set(tables);
+    for (const [name, { offset, width, lengths }] of Object.entries(columns)) {
+      [places[name], count(name), width].slice(0, 1 + lengths).forEach((u, k) => { F[this.block + offset + k] = u; });
+      F.set(fixed[name], places[name]);
+    }
+    for (let k = 0; k < this.image.length; k += 2) F[this.block + this.image[k]] = this.image[k + 1];
+    for (const place of bytes) B[8 * this.block + place] = 1;
+    Object.assign(this, { F, places, first: F.slice(0, this.block + words), functions: this.make(F, B) });
+  }
+
+  word(name) { return this.F[this.block + this.known.places[name]]; }
+
+  get isFull() { return { rows: this.word("row") + 1 >= this.rooms.rows, firings: this.word("firings") >= this.rooms.firings }; }
+
+  // A run with other numbers: [word, value] pairs. What it finds lies in the memory until the next run. After `most` ms it
+  // is given up, and there is no result.
+  run(numbers, most = Infinity) {
+    const { codes } = this.known, until = performance.now() + most;
+    let event = this.begin(numbers);
+    while (event === codes.ROWS) {
+      event = this.functions.record(this.block, STEPS_AT_ONCE, 0);
+      if (event !== codes.ROWS) break;
+      if (performance.now() > until) return null;
+      const { rows, firings } = this.isFull;
+      if (!rows && !firings) continue;
+      if (rows) this.rooms.rows *= 2;
+      if (firings) this.rooms.firings *= 2;
+      this.build();
+      event = this.begin(numbers); // again from the start: growing is rare, copying would be a second way
+    }
+    return this.found(event);
+  }
+
+  begin(numbers) {
+    this.F.set(this.first);
+    for (const [word, value] of numbers) this.F[this.block + word] = value;
+    this.F[this.block + this.known.places.time_scale] = this.functions.adapt(this.block);
+    return this.known.codes.ROWS;
+  }
+
+  found(event) {
+    const { known: { codes, sizes, failures, elements }, F, places } = this, count = this.word("row"), fired = this.word("firings");
+    this.functions.show(this.block, 0, count);
+    this.functions.values(this.block, count);
+    const part = (name, length) => F.subarray(places[name], places[name] + length);
+    const stopped = event === codes.DONE ? "" : `t = ${this.word("clock")} s: ${event === codes.LIVELOCK ? `${elements[this.word("machine")]}: ` : ""}${failures[event] ?? "it stopped"}`;
+    return {
+      count, fired, stopped,
+      t: part("rows_t", count), microstep: part("rows_microstep", count),
+      y: part("rows_y", count * sizes.y), mode: part("rows_mode", count * sizes.mode),
+      seen: part("table", count * sizes.seen), shown: part("shown", count * sizes.shown),
+      log_t: part("log_t", fired), log_machine: part("log_machine", fired), log_edge: part("log_edge", fired),
+      words: F.subarray(this.block, this.block + this.known.words),
+    };
+  }
+}
+
+// What was found, in memory of its own.
+const kept = (found) => Object.fromEntries(Object.entries(found).map(([name, each]) => [name, each instanceof Float64Array ? each.slice() : each]));

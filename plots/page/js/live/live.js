@@ -1,0 +1,226 @@
+"use strict";
+// The live page: a change of a number computes the run again, and the page shows its rows. The run as it was written stays
+// behind it. A run that takes long is computed in a worker, and of the changes meanwhile the latest wins.
+const PATIENCE = 80; // ms that a run may hold up the page
+const SETTLED = 400; // ms without a change, after which the address is written and what changed is read aloud
+const IN_WORKER = `
+const engines = [];
+onmessage = ({ data: { id, number, numbers } }) => {
+  const begin = performance.now(), found = kept((engines[number] ??= new Engine(ENGINES[number])).run(numbers));
+  const buffers = Object.values(found).filter((each) => each instanceof Float64Array).map(({ buffer }) => buffer);
+  postMessage({ id, found, took: performance.now() - begin }, buffers);
+};
+`;
+
+const dials = new Map(); // by name
+const live = { number: 0, engines: [], slow: false, asked: 0, busy: false, waiting: null, took: 0 };
+const engineNow = () => (live.engines[live.number] ??= new Engine(ENGINES[live.number]));
+
+// ------------------------------------------------------------------ runs
+// The words of the numbers that are not those written.
+function wordsNow() {
+  const words = data.live.engine;
+  return [...dials.values()].filter((dial) => !dial.parts && dial.value !== dial.given.value).flatMap(({ name, value }) => words[name].map((word) => [word, value]));
+}
+
+// Computes a run, here or in the worker, and hands it over; `null` to the one before if another was asked for meanwhile.
+function compute(numbers, then) {
+  if (!live.slow) {
+    const begin = performance.now(), found = engineNow().run(numbers, PATIENCE);
+    live.took = performance.now() - begin;
+    if (found) { then(found); return; }
+    live.slow = true;
+  }
+  live.waiting = { numbers, then };
+  if (!live.busy) askWorker();
+}
+
+function askWorker() {
+  const { numbers, then } = live.waiting;
+  Object.assign(live, { waiting: null, busy: true, asked: live.asked + 1 });
+  $("#numbers")?.classList.add("busy");
+  live.worker ??= new Worker(URL.createObjectURL(new Blob([$("#engine").textContent, IN_WORKER], { type: "text/javascript" })));
+  live.worker.onmessage = ({ data: { found, took } }) => {
+    Object.assign(live, { busy: false, took, slow: took > PATIENCE / 2 });
+    $("#numbers")?.classList.remove("busy");
+    then(found);
+    if (live.waiting) askWorker();
+  };
+  live.worker.postMessage({ id: live.asked, number: live.number, numbers });
+}
+
+// ------------------------------------------------------------------ changes
+let frameAsked = false, settling = 0;
+function changed() {
+  for (const dial of dials.values()) dial.show();
+  settle();
+  if (frameAsked) return;
+  frameAsked = true; // as often as the screen
+  requestAnimationFrame(() => { frameAsked = false; compute(wordsNow(), showRun); });
+}
+
+// A start in a state that holds a velocity, and it moves: Python refuses it, too.
+function movesLocked(run) {
+  const fastest = Math.max(0, ...data.live.velocities.map((place) => Math.abs(run.found.y[place])));
+  for (const contact of run.contacts) {
+    for (const mode of contact.modes) {
+      const name = contact.locked[mode[0]] && contact.velocities.find((each) => Math.abs(contact.value(each, 0, 0)) > data.live.still * fastest);
+      if (name) return `${contact.name || "the element"} starts in ${contact.states[mode[0]]}, which holds ${name} at 0, with ${name} = ${eng(contact.value(name, 0, 0), unitOf(contact, name))}`;
+    }
+  }
+  return "";
+}
+
+function showRun(found) {
+  runs[0].renew(found);
+  const wrong = movesLocked(runs[0]);
+  if (wrong || $("#refused").dataset.of === "start") say($("#refused"), wrong);
+  $("#refused").dataset.of = wrong ? "start" : "";
+  renew(() => found.stopped || (isChanged() ? first.told : ""));
+  say($("#took"), `${runs[0].rows.toLocaleString("en")} rows, ${counted(runs[0].log.length, "transition")}, in ${live.took.toFixed(1)} ms`);
+}
+
+const isChanged = () => [...dials.values()].some(({ value, given }) => value !== given.value);
+
+// A number that its rules allow; of all elements it is that of each.
+function turn(dial, u) {
+  const wrong = against(dial, u, dials);
+  refuse(dial, wrong);
+  if (wrong) return;
+  setValue(dial, u);
+  changed();
+}
+
+function setValue(dial, u) {
+  for (const each of dial.parts ?? []) each.value = u;
+  dial.value = u;
+  const { all } = dial;
+  if (all) all.value = all.parts.every(({ value }) => value === u) ? u : NaN;
+}
+
+function refuse(dial, words) {
+  for (const each of dials.values()) each.box.removeAttribute("aria-invalid");
+  if (words) dial.box.setAttribute("aria-invalid", "true");
+  say($("#refused"), words);
+}
+
+function settle() {
+  $("#say").setAttribute("aria-live", "off"); // a screen reader would not keep up
+  clearTimeout(settling);
+  settling = setTimeout(() => {
+    $("#say").setAttribute("aria-live", "polite");
+    writeAddress();
+  }, SETTLED);
+}
+
+// ------------------------------------------------------------------ the state in the address, exactly
+function stateText() {
+  const state = new URLSearchParams();
+  for (const { name, value, given, parts, all } of dials.values()) {
+    if (Number.isNaN(value) || value === given.value || (all && !Number.isNaN(all.value))) continue;
+    if (!parts || parts.every((each) => each.value === value)) state.set(name, String(value));
+  }
+  if (frame > 0) state.set("t", String(frames.t[frame]));
+  return state.toString();
+}
+
+function writeAddress() {
+  try { history.replaceState(null, "", `#${stateText()}`); } catch { /* a page inside another has no address of its own */ }
+}
+
+// Takes the numbers of an address; what is not understood is named.
+function readAddress() {
+  const state = new URLSearchParams(location.hash.slice(1)), wrong = [];
+  for (const dial of dials.values()) setValue(dial, dial.given.value);
+  for (const [name, text] of state) {
+    if (name === "t") continue;
+    const dial = dials.get(name), u = text === "" ? NaN : Number(text);
+    if (dial && Number.isFinite(u)) setValue(dial, u);
+    else wrong.push(`${name}=${text}`);
+  }
+  for (const dial of dials.values()) {
+    const words = dial.parts || dial.value === dial.given.value ? "" : against(dial, dial.value, dials);
+    if (words) { wrong.push(words); setValue(dial, dial.given.value); }
+  }
+  say($("#refused"), wrong.length ? `not taken from the address: ${wrong.join("; ")}` : "");
+  return Number(state.get("t") ?? NaN);
+}
+
+async function share() {
+  writeAddress();
+  const link = location.href.split("#")[0] + `#${stateText()}`, box = $("#link");
+  box.hidden = false;
+  box.value = link;
+  box.focus();
+  box.select();
+  const copied = await navigator.clipboard?.writeText(link).then(() => true, () => false);
+  $("#say").textContent = copied ? "the link is copied: it has all numbers, exactly" : "copy the link: it has all numbers, exactly";
+}
+
+// ------------------------------------------------------------------ the scenario
+function scenarioText() {
+  const number = (u) => (Number.isInteger(u) && Math.abs(u) < 1e21 ? `${u}.0` : String(u));
+  const values = (name, wide) => {
+    const dial = dials.get(name), parts = dial?.parts ?? [...dials.values()].filter((each) => each.whole === name && each.element !== null);
+    if (dial && !wide) return number(dial.value);
+    return `[${(parts.length ? parts : [dial]).map(({ value }) => number(value)).join(", ")}]`;
+  };
+  return data.live.scenario.map((part) => (typeof part === "string" ? part : part.text && !knows(part.number) ? part.text : values(part.number, part.wide))).join("");
+}
+const knows = (name) => dials.has(name) || [...dials.values()].some(({ whole }) => whole === name);
+
+function save(text, name) {
+  const address = URL.createObjectURL(new Blob([text], { type: "application/toml" }));
+  const link = make("a", document.body, "", { href: address, download: name });
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(address), 1000);
+}
+
+// ------------------------------------------------------------------ start
+function buildPanel() {
+  const panel = make("section", document.body, "", { id: "numbers", "aria-label": "Numbers" });
+  $("#top").after(panel);
+  const before = make("div", panel, "", { class: "dials" }), more = make("details", panel);
+  make("summary", more, "more numbers");
+  const rest = make("div", more, "", { class: "dials" });
+  for (const given of data.live.numbers) dials.set(given.name, new Dial(given.first ? before : rest, given, turn));
+  for (const dial of dials.values()) {
+    if (dial.element !== null) continue;
+    const parts = [...dials.values()].filter(({ whole, element }) => whole === dial.whole && element !== null);
+    if (!parts.length) continue;
+    dial.parts = parts;
+    for (const each of parts) each.all = dial;
+  }
+  more.hidden = !rest.children.length;
+  const acts = make("div", panel, "", { class: "acts" });
+  const act = (name, title, action) => make("button", acts, name, { title }).addEventListener("click", action);
+  act("reset", "All numbers as they were written", () => { for (const dial of dials.values()) setValue(dial, dial.given.value); refuse(null, ""); changed(); });
+  act("share", "A link with all numbers", share);
+  if (data.live.scenario.length) act("scenario", "The scenario with these numbers, a TOML file for gms-fsm run", () => save(scenarioText(), "scenario.toml"));
+  make("input", acts, "", { id: "link", type: "text", readonly: "", "aria-label": "Link to this state", size: 30 }).hidden = true;
+  make("output", acts, "", { id: "took" });
+  make("p", panel, "", { id: "refused", role: "alert" });
+  $("#say").tabIndex = 0; // what it says may be longer than its place
+}
+
+function beginLive() {
+  const [stored] = data.runs;
+  buildPanel();
+  const t = readAddress();
+  compute([], (found) => {
+    const written = kept(found), make = (more, place) => new LiveRun({ ...stored, ...more }, place, engineNow(), written);
+    const base = make({ label: "base run", short: "base", ghost: true }, 1), now = make({ label: "this run", short: "now" }, 0);
+    load({ ...data, runs: [now, base] });
+    if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
+    if (isChanged()) changed();
+    else showRun(written);
+  });
+  addEventListener("hashchange", () => {
+    const t = readAddress();
+    changed();
+    if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
+  });
+}
+
+beginLive();

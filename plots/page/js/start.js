@@ -1,0 +1,3 @@
+"use strict";
+// A replay page shows the data it was written with.
+load(data);

@@ -1,0 +1,185 @@
+"""A live page: the replay page over a run that the page itself computes, again at every change.
+
+Python writes the engine of the run as JavaScript (`gms_fsm.exporters.live`), where the values of
+its rows are (`plots.page._sources`), and the numbers that can be changed, with units and rules.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Unpack
+
+from gms_fsm.errors import OutputError
+from gms_fsm.exporters.live import LiveEngine, live_engine
+from gms_fsm.foundation.arguments import refusing
+from gms_fsm.foundation.text import visible
+from gms_fsm.run.problem import ROUNDING, Problem
+from gms_fsm.run.settings import SettingOptions, Settings
+from gms_fsm.session.session import Session
+from gms_fsm.session.tree.export import save_scenario
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import NUMBERS, NamedNumber, known_in, number_of, numbers_of
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.system import System
+from plots.page._sources import live_run
+from plots.page.replay import Replay, page_data, page_html, part_text
+from plots.views.ranges import Ends, checked_ranges, is_logarithmic, usual_range
+
+LIVE = ("js/live/rows.js", "js/live/numbers.js", "js/live/live.js")
+ENGINE = "js/live/engine.js"
+_TABLE = re.compile(r"\[\[?([\w.]+)\]\]?")
+_LINE = re.compile(r"([\w.]+) = (-?[\d.]\S*|\[[-\d.e+, ]+\])")
+
+
+@refusing()
+def play(
+    model: Model | System,
+    rig: Rig | float,
+    t_end: float | None = None,
+    *,
+    vary: Mapping[str, Ends | None] | None = None,
+    title: str = "",
+    t_start: float = 0.0,
+    initial: Mapping[str, Any] | None = None,
+    settings: Settings | None = None,
+    **options: Unpack[SettingOptions],
+) -> Replay:
+    """Make a live page: a run that the page computes again when a slider moves.
+
+    It is the replay page, with an engine: the run has the bits of `gms_fsm.simulate`. The run as it
+    was written stays behind the present one, and their first difference is named.
+
+    Parameters
+    ----------
+    model, rig, t_end
+        As for `gms_fsm.simulate`: ``play(model, rig, t_end)``, or ``play(system, t_end)``.
+    vary : mapping of str to (float, float) or None, optional
+        The sliders that are shown first, by the names of the numbers, with their lowest and highest
+        values: ``{"F_s": (0.5, 3.0), "k2": None}``; None is a decade around the value. In a system
+        ``{"numbers.m": (0.5, 2.0), "pad.F_s": None}``. By default all numbers but those of single
+        elements.
+    title : str, optional
+        Of the page; by default what runs.
+    t_start, initial, settings, **options
+        As for `gms_fsm.simulate`. Requested times are ignored: every step is a row.
+
+    Returns
+    -------
+    Replay
+        The page; ``save`` writes it to a file, and a notebook shows it.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such number, its range does not contain the value of the model, or the run
+        cannot be printed: a signal is a Python function, or the method is not one of ours.
+    MissingExtraError
+        If uPlot is not installed.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, PulledSlider
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> page = play(model, PulledSlider(1.0, 2.0, 0.1), 60.0, vary={"F_s": (0.5, 3.0)})
+    >>> page.save("page.html")  # doctest: +SKIP
+    """
+    given = {} if vary is None else vary
+    if settings is None and "engine" not in options:
+        fast = importlib.util.find_spec("llvmlite") is not None
+        options["engine"] = "compiled" if fast else "ifelse"
+    options.pop("t_eval", None)
+    more: Any = {"t_start": t_start, "initial": initial, "settings": settings}
+    tree = Session(model, rig, t_end, **more, **options).tree
+    start, trace = tree.branch().start, tree.trace(0)
+    engine = live_engine(start, trace.title)
+    what, layout = start.what, start.program.layout
+    data, charts = page_data([trace], title=title)
+    (stored,) = data["runs"]
+    data["runs"] = [live_run(stored, trace, engine)]
+    data["live"] = {
+        "numbers": _numbers(what, engine, _ranges(what, given)),
+        "engine": engine.numbers,
+        "velocities": [layout.y.index(b.v) for b in start.system.bodies if not b.driven],
+        "still": ROUNDING,
+        "scenario": _scenario(start, data["title"]),
+    }
+    text = f"{part_text(ENGINE)}const ENGINES = [\n{engine.text},\n];\n"
+    return Replay(page_html(data, charts, text, LIVE, ("page.css", "js/live/live.css")))
+
+
+def _ranges(what: Mounted, vary: Mapping[str, Ends | None]) -> dict[str, Ends]:
+    usual = (
+        [name for name, ends in vary.items() if ends is None] if isinstance(vary, Mapping) else []
+    )
+    given: Any = {name: ends for name, ends in vary.items() if name not in usual} if usual else vary
+    found = checked_ranges("vary", given, lambda name: number_of(what, name))
+    return found | {name: usual_range(number_of(what, name)) for name in usual}
+
+
+def _numbers(what: Mounted, engine: LiveEngine, vary: Mapping[str, Ends]) -> list[dict[str, Any]]:
+    """Return the numbers that the page can change, those to be shown first with ``first``."""
+    every = {name: each for name, each in numbers_of(what).items() if name in engine.numbers}
+    plain = [name for name, each in every.items() if each.element is None]
+    first = [*vary] or plain or [*every]
+    order = [*first, *(name for name in every if name not in first)]
+    return [_number(every[name], vary.get(name), name in first) for name in order]
+
+
+def _number(number: NamedNumber, ends: Ends | None, first: bool) -> dict[str, Any]:
+    low, high = usual_range(number) if ends is None else ends
+    parameter = number.parameter
+    owner = number.whole.rpartition(".")[0]
+    return {
+        "name": number.name,
+        "whole": number.whole,
+        "owner": owner,
+        "element": number.element,
+        "unit": parameter.unit,
+        "meaning": visible(parameter.meaning),
+        "rule": [[each.op, each.limit] for each in parameter.bounds],
+        "value": number.value,
+        "low": low,
+        "high": high,
+        "log": is_logarithmic(low, high),
+        "first": first,
+    }
+
+
+def _scenario(start: Problem, title: str) -> list[Any]:
+    """Return the scenario in parts; nothing if its signals are too long for a scenario file."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            path = save_scenario(Path(folder, "scenario.toml"), start, title, "")
+        except OutputError:
+            return []
+        return _parts(path.read_text(encoding="utf-8"), start.what)
+
+
+def _parts(text: str, what: Mounted) -> list[Any]:
+    """Return the text of a scenario as texts, and the numbers that stand between them."""
+    known, table, owner = known_in(what), "", ""
+    parts: list[Any] = [""]
+    for line in text.splitlines(keepends=True):
+        if found := _TABLE.match(line):
+            table = found[1]
+        elif table in ("contact", "supervisor") and line.startswith("name = "):
+            owner = line.partition('"')[2].rpartition('"')[0]
+        found = _LINE.fullmatch(line.rstrip())
+        name = found[1].rpartition(".")[2] if found else ""
+        number = ""
+        if table == "numbers":
+            number = what.of(NUMBERS, name)
+        elif table.endswith((".model", ".values")) or (found and found[1].startswith("values.")):
+            number = what.of(owner, name)
+        if found is None or number not in known:
+            parts[-1] += line
+            continue
+        parts[-1] += f"{found[1]} = "
+        wide = found[2].startswith("[")
+        parts += [{"number": number, "wide": wide, "text": found[2]}, "\n"]
+    return parts

@@ -1,0 +1,224 @@
+"""A live page computes the run of `simulate`, with other numbers too, and shows its rows."""
+
+from __future__ import annotations
+
+import base64
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.errors import ParameterError
+from gms_fsm.systems.numbers import numbers_of
+from plots.page._rows import PageRows
+from plots.page._run import stored_run, views_of
+from tests.plots.browser import SIZES, Open, browser, faults, open_page, said, wait
+from tests.plots.live_pages import FOUND, differing, live_scenario
+from tests.plots.stored import column
+
+__all__ = ["browser", "open_page"]
+
+pytestmark = pytest.mark.slow
+
+PAGES: dict[str, Path] = {}
+COLUMNS = """() => {
+    const run = runs[0], text = (get) => {
+        const column = Float64Array.from({ length: run.rows }, (_, row) => get(row));
+        const bytes = new Uint8Array(column.buffer), letters = [];
+        for (let k = 0; k < bytes.length; k += 8192)
+            letters.push(String.fromCharCode(...bytes.subarray(k, k + 8192)));
+        return btoa(letters.join(""));
+    };
+    const all = (columns) => Object.fromEntries(
+        Object.entries(columns).map(([name, each]) => [name, [each].flat().map(text)]));
+    return {
+        contacts: run.contacts.map((contact) => ({
+            values: all(contact.columns),
+            forces: contact.forces.map(text),
+            modes: contact.modes.map((mode) => Array.from(mode)),
+            log: contact.log.map(({ row, element, edge }) => [row, element, edge]),
+        })),
+        names: all(run.names),
+    };
+}"""
+
+
+@pytest.fixture
+def live(open_page: Open, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Open the live page of a scenario; each is written once."""
+
+    def opened(name: str, fragment: str = "", **options: Any) -> Any:
+        if name not in PAGES:
+            path = tmp_path_factory.mktemp("live") / "page.html"
+            PAGES[name] = live_scenario(name).page(path, title=name)
+        page = open_page(PAGES[name], **options)
+        if fragment:
+            page.evaluate(f"location.hash = {fragment!r}")
+        wait(page, "typeof runs === 'object' && document.querySelector('#took').textContent !== ''")
+        return page
+
+    return opened
+
+
+def turned(page: Any, numbers: dict[str, float]) -> None:
+    """Change numbers, and wait for their run."""
+    page.evaluate(
+        "(given) => { for (const [name, u] of Object.entries(given)) turn(dials.get(name), u); }",
+        numbers,
+    )
+    wait(page, "!frameAsked && !live.busy")
+
+
+@pytest.mark.parametrize("name", ["pulled_mass", "servo", "ball_screw_table"])
+def test_its_floats_are_those_of_python(live: Any, name: str) -> None:
+    scenario, page = live_scenario(name), live(name)
+    sets = scenario.sets(4, page.evaluate("Object.keys(data.live.engine)"))
+    for numbers, found in zip(sets, page.evaluate(FOUND, sets), strict=True):
+        bad, count = differing(found, scenario.run(numbers))
+        assert bad == 0
+        assert count > 1000
+
+
+@pytest.mark.parametrize("name", ["pulled_mass", "servo", "two_blocks_on_a_belt"])
+def test_its_columns_are_those_that_a_replay_page_stores(live: Any, name: str) -> None:
+    scenario, page = live_scenario(name), live(name)
+    (numbers,) = scenario.sets(1, page.evaluate("Object.keys(data.live.engine)"), seed=4)
+    turned(page, numbers)
+    trace, shown = scenario.run(numbers), page.evaluate(COLUMNS)
+    rows = np.arange(len(trace))
+    page_rows = PageRows(trace, rows, np.zeros_like(rows))
+    stored = stored_run(page_rows, [0] * len(views_of(trace)), ())
+
+    def same(text: str, number: Any) -> bool:
+        made, wanted = np.frombuffer(base64.b64decode(text)), column(stored, number)
+        if wanted.dtype == np.float32:  # forces that nothing but plots read
+            return np.array_equal(made.astype(np.float32), wanted, equal_nan=True)
+        return np.array_equal(made, wanted, equal_nan=True)
+
+    for name, number in stored["names"].items():
+        assert same(shown["names"][name][0], number), name
+    for mine, theirs in zip(shown["contacts"], stored["contacts"], strict=True):
+        for name, each in theirs["values"].items():
+            wanted = each.get("by") or [each["all"]]
+            if not name.startswith("#"):
+                assert all(map(same, mine["values"][name], wanted)), name
+        assert all(map(same, mine["forces"], theirs["forces"]))
+    views = views_of(trace)
+    for mine, theirs, view in zip(shown["contacts"], stored["contacts"], views, strict=True):
+        assert np.array_equal(np.array(mine["modes"]).T, view.modes)
+        edges = [theirs["edges"][edge]["name"] for _, _, edge in mine["log"]]
+        assert edges == view.transitions.edge.tolist()
+        assert [each for _, each, _ in mine["log"]] == view.transitions.element.tolist()
+        assert np.array_equal(view.t[[row for row, _, _ in mine["log"]]], view.transitions.t)
+
+
+def test_sliders_have_the_numbers_units_and_rules(live: Any) -> None:
+    page, known = live("pulled_mass"), numbers_of(live_scenario("pulled_mass").what)
+    for name, value, unit in page.evaluate(
+        "data.live.numbers.map((u) => [u.name, u.value, u.unit])"
+    ):
+        assert (value, unit) == (known[name].value, known[name].parameter.unit)
+    page.fill("[data-name=F_s] input[type=text]", "500 mN")
+    page.press("[data-name=F_s] input[type=text]", "Enter")
+    assert page.inner_text("#refused") == "F_s must be at least F_c, 1"
+    page.fill("[data-name=F_s] input[type=text]", "1800 mN")
+    page.press("[data-name=F_s] input[type=text]", "Enter")
+    assert page.inner_text("#refused") == ""
+    assert page.evaluate("dials.get('F_s').value") == 1.8
+    page.fill("[data-name=F_c] input[type=text]", "1 m")
+    page.press("[data-name=F_c] input[type=text]", "Enter")
+    assert "is not a number, or not in N" in page.inner_text("#refused")
+
+
+def test_the_base_run_stays_behind_and_the_first_difference_is_named(live: Any) -> None:
+    page = live("servo")
+    before = page.evaluate("[runs[1].rows, runs[1].t(runs[1].rows - 1)]")
+    turned(page, {"numbers.k_p": 500.0})
+    assert said(page).startswith("first difference, transition ")
+    assert "base run: " in said(page)
+    assert page.evaluate("[runs[1].rows, runs[1].t(runs[1].rows - 1)]") == before
+    page.get_by_role("button", name="reset").click()
+    wait(page, "!frameAsked && !isChanged()")
+    assert page.evaluate("runs[0].rows === runs[1].rows && first.frame === null")
+
+
+def test_an_address_has_the_state_exactly(live: Any) -> None:
+    page = live("pulled_mass")
+    numbers = {"F_s": 1.1 + 0.7000000000000003, "k2": 123456.78901234567, "speed": 1e-3 / 3}
+    turned(page, numbers)
+    page.evaluate("go(100)")
+    text = page.evaluate("stateText()")
+    time = page.evaluate("frames.t[frame]")
+    page.get_by_role("button", name="reset").click()
+    wait(page, "!frameAsked && !isChanged() && !location.hash.includes('F_s')")
+    page.evaluate(f"location.hash = {text!r}")
+    wait(page, "isChanged() && !frameAsked")
+    found = page.evaluate(
+        "Object.fromEntries([...dials].map(([name, { value }]) => [name, value]))"
+    )
+    assert {name: found[name] for name in numbers} == numbers
+    assert page.evaluate("frames.t[frame]") == time
+    page.evaluate("location.hash = 'F_s=0.1&nothing=3'")
+    wait(page, "document.querySelector('#refused').textContent !== ''")
+    refused = page.inner_text("#refused")
+    assert refused == "not taken from the address: nothing=3; F_s must be at least F_c, 1"
+
+
+@pytest.mark.parametrize("name", ["pulled_mass", "ball_screw_table"])
+def test_the_scenario_of_a_page_is_its_run(live: Any, name: str, tmp_path: Path) -> None:
+    scenario, page = live_scenario(name), live(name)
+    (numbers,) = scenario.sets(1, page.evaluate("Object.keys(data.live.engine)"), seed=2)
+    turned(page, numbers)
+    text = page.evaluate("scenarioText()")
+    tomllib.loads(text)
+    (tmp_path / "scenario.toml").write_text(text, encoding="utf-8")
+    trace, wanted = load_scenario(tmp_path / "scenario.toml").simulate(), scenario.run(numbers)
+    assert np.array_equal(trace.t, wanted.t)
+    assert np.array_equal(np.asarray(trace.rows.y), np.asarray(wanted.rows.y))
+
+
+def test_a_run_that_cannot_begin_is_refused_as_by_python(live: Any) -> None:
+    page = live("two_blocks_on_a_belt")
+    turned(page, {"numbers.V": 0.13})
+    assert page.inner_text("#refused").startswith(
+        "pad_1 starts in stuck, which holds v at 0, with v = −30"
+    )
+    with pytest.raises(ParameterError, match="starts in state 'stuck', which holds v at 0"):
+        live_scenario("two_blocks_on_a_belt").start({"numbers.V": 0.13})
+
+
+def test_a_long_run_is_computed_in_a_worker_with_the_same_bits(live: Any) -> None:
+    page = live("pulled_mass")
+    turned(page, {"F_s": 1.7})
+    here = page.evaluate("Array.from(runs[0].found.y)")
+    page.evaluate("live.slow = true")
+    for value in (1.9, 1.8, 1.7):  # of several the latest wins
+        page.evaluate(f"turn(dials.get('F_s'), {value}); compute(wordsNow(), showRun)")
+    wait(page, "!live.busy && !frameAsked")
+    assert page.evaluate("Array.from(runs[0].found.y)") == here
+
+
+def test_its_policy_has_hashes_only(live: Any) -> None:
+    live("servo")
+    text = PAGES["servo"].read_text(encoding="utf-8")
+    found = re.search(r'Content-Security-Policy" content="([^"]*)"', text)
+    assert found is not None
+    rules = dict(each.strip().partition(" ")[::2] for each in found[1].split(";"))
+    assert rules["default-src"] == "'none'"
+    assert rules["worker-src"] == "blob:"
+    for name in ("script-src", "style-src"):
+        assert all(re.fullmatch(r"'sha256-[\w+/]+='", each) for each in rules[name].split())
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_axe_finds_nothing(live: Any, size: str) -> None:
+    page = live("pulled_mass", size=size)
+    page.evaluate("document.querySelector('#numbers details').open = true")
+    turned(page, {"F_s": 1.8})
+    assert faults(page) == []
+    page.emulate_media(color_scheme="dark")
+    assert faults(page) == []
