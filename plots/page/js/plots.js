@@ -172,16 +172,17 @@ class TimePlots {
 
   // Nothing is laid out, so that a film can move it in every frame.
   placeCursor(t = frames.t[frame]) {
-    this.put("cursor", t);
-    this.put("hair", frames.t[pointed]);
-    this.put("pin", frames.t[pinned]);
+    const width = this.width(); // asked once: to ask is a layout
+    this.put("cursor", t, width);
+    this.put("hair", frames.t[pointed], width);
+    this.put("pin", frames.t[pinned], width);
   }
 
-  put(name, t) {
+  put(name, t, width) {
     const part = (t - span.min) / (span.max - span.min), seen = part >= 0 && part <= 1; // no time is NaN
     for (const line of this.marks[name]) {
       line.style.visibility = seen ? "visible" : "hidden";
-      if (seen) line.style.transform = `translateX(${part * this.width()}px)`;
+      if (seen) line.style.transform = `translateX(${part * width}px)`;
     }
   }
 }

@@ -248,7 +248,9 @@ class RunView {
       truth.textContent = { 1: "✓ true", 0: "✗ false" }[clause.truth] ?? "? unknown";
       truth.className = clause.truth === 1 ? "true" : "";
     }));
-    this.fitTable();
+    const asked = [contact.name, element, state, fired].join();
+    if (this.asked !== asked) this.fitTable();
+    this.asked = asked;
   }
 
   // The rows of the edge that fired, or else of the first that is checked, are in view.
