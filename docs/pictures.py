@@ -1,28 +1,27 @@
-"""Pictures of the site: light and dark versions, cards of the gallery, sliders, the replay.
+"""Pictures of the site: light and dark versions, cards of the gallery, live pages, the replay.
 
-Three directives: ``{cards}`` shows the entries of its own page with thumbnails, ``{frames} NAME`` a
-slider of `frames.SLIDERS`, and ``{replay}`` the run on the first page. Without JavaScript a slider
-is its first picture, and the replay a picture with a link.
+Three directives: ``{cards}`` shows the entries of its own page with thumbnails, ``{live} NAME`` a
+page of `live_pages.PAGES`, and ``{replay}`` the run on the first page. Without JavaScript a live
+page is a link, and the replay a picture with a link.
 """
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 from html import escape
 from pathlib import Path
 from typing import Any
 
-import frames
+import live_pages
 from dark import dark_picture, dark_svg, oklab, rgb, webp
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from PIL import Image
 from sphinx.application import Sphinx
 
-MADE = Path(__file__).parents[1] / ".docs-cache" / "frames"
-FOLDER = "_frames"  # in the site
+MADE = Path(__file__).parents[1] / ".docs-cache" / "live"
+FOLDER = "_live"  # in the site
 THUMB = (480, 320)  # pixels: twice the size of a card's picture
 AREA = re.compile(r'<rect fill="(#\w{6})"[^>]*? width="([\d.]+)" height="([\d.]+)"')
 SIZE = re.compile(r'<svg[^>]*?viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
@@ -183,58 +182,7 @@ def _group(app: Sphinx, group: nodes.section, folder: Path, root: str) -> str:
     )
 
 
-# --------------------------------------------------------------------------- sliders and replay
-def with_subscript(name: str) -> str:
-    """Return a symbol as HTML."""
-    letter, _, below = name.partition("_")
-    return f"<i>{letter}</i><sub>{below}</sub>" if below else f"<i>{letter}</i>"
-
-
-def room(size: tuple[int, int], ending: str) -> str:
-    """Return the style of a picture's place: how wide it may be, and where it gets its own line."""
-    widest = size[0] / (16 if ending == ".svg" else 18)  # rem, at which letters have one size
-    return f'style="flex:{widest:.1f} 1 {0.62 * widest:.1f}rem;max-width:{widest:.1f}rem"'
-
-
-class Frames(Directive):
-    """A slider whose pictures are made in advance."""
-
-    required_arguments = 1
-
-    def run(self) -> list[nodes.Node]:
-        """Return the slider at its first position."""
-        (name,) = self.arguments
-        env = self.state.document.settings.env
-        root = "../" * env.docname.count("/") + f"{FOLDER}/"
-        env.note_dependency(str(MADE / "stamp"))
-        known = json.loads((MADE / f"{name}.json").read_text(encoding="utf-8"))
-        start, ending = known["start"], known["ending"]
-        value, said, at = known["frames"][start]
-        shown = ""
-        for part in known["parts"]:
-            stem = f"{name}_{start:02}{part}"
-            size = size_of(MADE / f"{stem}{ending}")
-            addresses = f"{root}{stem}{ending}", f"{root}{stem}_dark{ending}"
-            images = pair(*addresses, said if part == "a" else "", size)
-            shown += f'<div class="frame" data-part="{part}" {room(size, ending)}>{images}</div>'
-        beside = MADE / f"{name}_beside.webp"
-        if beside.exists():
-            curve, size = f"{root}{name}_beside", size_of(beside)
-            curves = pair(f"{curve}.webp", f"{curve}_dark.webp", "", size)
-            cursor = f'<i class="cursor" style="left:{100 * at}%"></i>'
-            shown += f'<div class="beside" {room(size, ".webp")}>{curves}{cursor}</div>'
-        data = json.dumps({**known, "first": f"{root}{name}_"}).replace("<", "\\u003c")
-        text = (
-            f'<figure class="frames" id="frames-{name}"><div class="shown">{shown}</div>\n'
-            f"<label hidden><span>{with_subscript(known['label'])} = "
-            f"<output>{value}</output></span>"
-            f'<input type="range" min="0" max="{len(known["frames"]) - 1}" value="{start}">'
-            f"</label>\n<figcaption>{escape(said)}</figcaption>\n"
-            f'<script type="application/json">{data}</script></figure>\n'
-        )
-        return [nodes.raw("", text, format="html")]
-
-
+# --------------------------------------------------------------------------- pages in frames
 class Replay(Directive):
     """The replay of a run in a frame of its own."""
 
@@ -247,30 +195,48 @@ class Replay(Directive):
         words = "Chart of four elements of the pulled mass, two of them slipping; opens the replay"
         shown = pair(f"{root}replay.svg", f"{root}replay_dark.svg", words, size)
         page = f"{root}replay.html"
-        text = f'<div class="replay" data-page="{page}"><a href="{page}">{shown}</a></div>\n'
+        about = f'data-page="{page}" data-title="Replay of the pulled mass"'
+        text = f'<div class="replay" {about}><a href="{page}">{shown}</a></div>\n'
         return [nodes.raw("", text, format="html")]
 
 
-def make_frames(app: Sphinx) -> None:
-    """Make the frames whose sources have changed; a draft has few."""
-    frames.write_all(MADE, every=4 if app.tags.has("draft") else 1)
+class Live(Directive):
+    """A live page in a frame of its own."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Return a link, which JavaScript replaces by the page."""
+        (name,) = self.arguments
+        env = self.state.document.settings.env
+        page = "../" * env.docname.count("/") + f"{FOLDER}/{name}.html"
+        env.note_dependency(str(MADE / "stamp"))
+        title = escape(live_pages.PAGES[name][0])
+        link = f'<p><a href="{page}">{title}: open the page alone</a></p>'
+        text = f'<div class="replay" data-page="{page}" data-title="{title}"></div>\n'
+        return [nodes.raw("", link + text, format="html")]
 
 
-def copy_frames(app: Sphinx, error: Exception | None) -> None:
-    """Copy the frames into the site."""
+def make_pages(_app: Sphinx) -> None:
+    """Make the pages whose sources have changed."""
+    live_pages.write_all(MADE)
+
+
+def copy_pages(app: Sphinx, error: Exception | None) -> None:
+    """Copy the pages into the site."""
     if error is None and app.builder.format == "html":
         to = Path(app.outdir) / FOLDER
         shutil.rmtree(to, ignore_errors=True)
-        shutil.copytree(MADE, to, ignore=shutil.ignore_patterns("stamp", "*.json"))
+        shutil.copytree(MADE, to, ignore=shutil.ignore_patterns("stamp"))
 
 
 def register(app: Sphinx) -> None:
     """Add directives and handlers to the site."""
     app.add_node(CardsNode)
     app.add_directive("cards", Cards)
-    app.add_directive("frames", Frames)
+    app.add_directive("live", Live)
     app.add_directive("replay", Replay)
-    app.connect("builder-inited", make_frames)
+    app.connect("builder-inited", make_pages)
     app.connect("doctree-resolved", fill_cards)
     app.connect("html-page-context", pair_pictures, priority=800)  # before parts become reachable
-    app.connect("build-finished", copy_frames)
+    app.connect("build-finished", copy_pages)

@@ -30,7 +30,7 @@ from plots.page._sources import live_run
 from plots.page.replay import Replay, page_data, page_html, part_text
 from plots.views.ranges import Ends, checked_ranges, is_logarithmic, usual_range
 
-LIVE = ("js/live/rows.js", "js/live/numbers.js", "js/live/live.js")
+LIVE = ("js/live/rows.js", "js/live/numbers.js", "js/live/sweep.js", "js/live/live.js")
 ENGINE = "js/live/engine.js"
 _TABLE = re.compile(r"\[\[?([\w.]+)\]\]?")
 _LINE = re.compile(r"([\w.]+) = (-?[\d.]\S*|\[[-\d.e+, ]+\])")

@@ -1,9 +1,8 @@
-"""The site works from disk in a browser: replay, sliders, cards, and both themes, for everybody."""
+"""The site works from disk in a browser: replay, live pages, cards, both themes."""
 
 from __future__ import annotations
 
 import importlib.util
-import json
 import re
 from collections.abc import Callable, Iterator
 
@@ -30,7 +29,14 @@ ONCE = {
     (400, "light"): ("gallery.html", "zoo/lugre.html"),
     (1366, "dark"): ("index.html", "play.html"),
 }
-SLIDERS = ("peak", "velocity", "elements", "time")
+LIVE = (
+    "pulled_mass",
+    "paper_fig4_stick_slip",
+    "two_blocks_on_a_belt",
+    "drill_string",
+    "servo",
+    "friction_damper",
+)
 GROUNDS = {"light": (255, 255, 255), "dark": (0x13, 0x14, 0x16)}
 # Of a picture when it has been loaded.
 WIDTH = "async (image) => { await image.decode(); return image.naturalWidth }"
@@ -64,7 +70,7 @@ def visit(browser: Browser, built: Built) -> Iterator[Visit]:
 
 def alive(page: Page) -> None:
     """Wait until the replay is there."""
-    page.locator(".replay.alive").wait_for()
+    page.locator(".replay.alive").first.wait_for()
 
 
 # --------------------------------------------------------------------------- the first page
@@ -96,51 +102,29 @@ def test_without_javascript_there_are_pictures_and_a_link(visit: Visit) -> None:
     page = visit("index.html", java_script_enabled=False)
     link = page.locator(".replay a")
     assert link.locator("img:visible").count() == 1
-    assert link.get_attribute("href") == "_frames/replay.html"
+    assert link.get_attribute("href") == "_live/replay.html"
     page = visit("play.html", java_script_enabled=False)
-    assert page.locator("figure.frames label:visible").count() == 0
-    assert page.locator("#frames-peak .frame img:visible").count() == 2
+    assert page.get_by_role("link", name="open the page alone").count() == len(LIVE)
 
 
-# --------------------------------------------------------------------------- sliders
-def test_sliders_change_picture_value_and_text_by_keys(visit: Visit) -> None:
-    page = visit("play.html")
-    for name in SLIDERS:
-        figure = page.locator(f"#frames-{name}")
-        picture, slider = figure.locator(".frame img:visible").first, figure.get_by_role("slider")
-        address, text = picture.get_attribute("src"), slider.get_attribute("aria-valuetext")
-        value = figure.locator("output").inner_text()
-        assert address is not None
-        slider.focus()
-        page.keyboard.press("ArrowRight")
-        expect(picture).not_to_have_attribute("src", address)
-        expect(figure.locator("output")).not_to_have_text(value)
-        assert slider.get_attribute("aria-valuetext") != text
-        assert picture.evaluate(WIDTH) > 100
-        page.keyboard.press("ArrowLeft")
-        expect(picture).to_have_attribute("src", address)
-        expect(figure.locator("output")).to_have_text(value)
+# --------------------------------------------------------------------------- live pages
+def test_a_live_page_computes_in_its_frame_and_has_the_theme_of_the_site(visit: Visit) -> None:
     page = visit("play.html", scheme="dark")
-    page.locator("#frames-peak").get_by_role("slider").focus()
+    alive(page)
+    frame = page.frame_locator('iframe[title="Pulled mass"]')
+    expect(frame.locator("#took")).to_contain_text("transitions")
+    before = frame.locator("#took").inner_text().partition(", in")[0]
+    frame.locator("[data-name=F_s] input[type=range]").focus()
     page.keyboard.press("End")
-    picture = page.locator("#frames-peak .frame img:visible").first
-    expect(picture).to_have_attribute("src", re.compile(r"peak_(03|15)a_dark\.webp$"))
+    expect(frame.locator("#took")).not_to_contain_text(before)
+    expect(frame.locator("html")).to_have_attribute("data-theme", "dark")
 
 
-def test_every_position_of_a_slider_has_its_pictures_and_its_own_text(built: Built) -> None:
-    assert (built.site / "_frames/replay.html").stat().st_size < 600_000
+def test_live_pages_are_single_files_of_the_site(built: Built) -> None:
     page = (built.site / "play.html").read_text(encoding="utf-8")
-    for name in SLIDERS:
-        figure = page.partition(f'id="frames-{name}"')[2]
-        known = json.loads(re.search(r'"application/json">(.*?)</script>', figure)[1])  # type: ignore
-        values = [value for value, _, _ in known["frames"]]
-        assert len(values) >= 3
-        assert len(set(values)) >= len(values) - 8
-        for k in range(len(known["frames"])):
-            for part in known["parts"]:
-                for theme in ("", "_dark"):
-                    path = built.site / f"{known['first']}{k:02}{part}{theme}{known['ending']}"
-                    assert 2000 < path.stat().st_size < 60_000, path.name
+    for name in LIVE:
+        assert f'data-page="_live/{name}.html"' in page
+        assert (built.site / f"_live/{name}.html").stat().st_size < 700_000
 
 
 # --------------------------------------------------------------------------- gallery and themes

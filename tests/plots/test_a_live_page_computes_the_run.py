@@ -222,3 +222,20 @@ def test_axe_finds_nothing(live: Any, size: str) -> None:
     assert faults(page) == []
     page.emulate_media(color_scheme="dark")
     assert faults(page) == []
+
+
+def test_a_sweep_has_the_extremes_and_switches_of_python(live: Any) -> None:
+    scenario, page = live_scenario("servo"), live("servo", tab="Sweep")
+    turned(page, {"numbers.k_p": 300.0})
+    page.locator(".sweep-of select").first.select_option("numbers.k_i")
+    pane = "views[0].open.right"
+    wait(page, f"{pane}.named === 'numbers.k_iv' && {pane}.found.length === 50")
+    found = page.evaluate(f"{pane}.found")
+    for each in found[::20]:
+        trace = scenario.run({"numbers.k_p": 300.0, "numbers.k_i": each["value"]})
+        view = trace.contact("bearing")
+        half = trace.t >= (trace.t[0] + trace.t[-1]) / 2
+        assert (each["low"], each["high"]) == (view.v[half].min(), view.v[half].max())
+        assert each["fired"] == len(view.transitions)
+    page.locator(".pane.sweep .plane").first.click(position={"x": 300, "y": 60})
+    wait(page, "dials.get('numbers.k_i').value !== 500")

@@ -35,11 +35,18 @@ function compute(numbers, then) {
   if (!live.busy) askWorker();
 }
 
+// A worker that has the engines, and does what a text says.
+function inWorker(text, heard) {
+  const worker = new Worker(URL.createObjectURL(new Blob([$("#engine").textContent, text], { type: "text/javascript" })));
+  if (heard) worker.onmessage = ({ data: each }) => heard(each);
+  return worker;
+}
+
 function askWorker() {
   const { numbers, then } = live.waiting;
   Object.assign(live, { waiting: null, busy: true, asked: live.asked + 1 });
   $("#numbers")?.classList.add("busy");
-  live.worker ??= new Worker(URL.createObjectURL(new Blob([$("#engine").textContent, IN_WORKER], { type: "text/javascript" })));
+  live.worker ??= inWorker(IN_WORKER);
   live.worker.onmessage = ({ data: { found, took } }) => {
     Object.assign(live, { busy: false, took, slow: took > PATIENCE / 2 });
     $("#numbers")?.classList.remove("busy");

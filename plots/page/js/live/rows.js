@@ -19,8 +19,8 @@ class LiveRun extends RunData {
     super({ ...stored, contacts, engine, found }, place);
   }
 
-  read({ engine, found, terms = {} }) {
-    Object.assign(this, { engine, terms: Object.fromEntries(Object.entries(terms).map(([name, each]) => [name, this.column(each)])) });
+  read({ engine, found, pool, terms = {} }) {
+    Object.assign(this, { engine, recipes: pool, terms: Object.fromEntries(Object.entries(terms).map(([name, each]) => [name, this.column(each)])) });
     return this.rowsOf(found);
   }
 
