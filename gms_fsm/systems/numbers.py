@@ -17,6 +17,7 @@ from gms_fsm.charts.gms import GMS_ELEMENT
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import one_of, unknown
+from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, ChartModel, Model, parameters_of
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.parts import Contact
@@ -261,3 +262,46 @@ def _lawful(model: Model, law: Any) -> Model:
         return model
     title = model.title.replace(f"{was} law", f"{law} law")
     return replace(model, chart=GMS_ELEMENT[law], title=title)
+
+
+# --------------------------------------------------------------------------- elements
+def elements_of(what: Mounted) -> int | None:
+    """Return the number of elements of the first GMS model; None without."""
+    return next((each.n for each in what.system.machines if _law_of(each.model)), None)
+
+
+def with_elements(what: Mounted, count: int) -> Mounted:
+    """Return the same with so many elements in the first GMS model: the last go, or are repeated.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMSParameters
+    >>> from gms_fsm.systems.rigs import Prescribed
+    >>> bank = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> with_elements(mounted(bank, Prescribed("0.1")), 5).model.values["C"].tolist()
+    [0.1, 0.05, 0.025, 0.0001, 0.0001]
+    """
+    first = next((each for each in what.system.machines if _law_of(each.model)), None)
+    if first is None:
+        raise ParameterError("only a GMS model has elements to add", place="count", value=count)
+    contacts = tuple(
+        each.with_model(_sized(each.model, count)) if each is first else each
+        for each in what.system.machines
+    )
+    return _remade(what, contacts, {})
+
+
+def _sized(model: Model | None, count: int) -> Model:
+    """Return a GMS model with another number of elements."""
+
+    def sized(values: FloatArray) -> FloatArray:
+        return values[np.minimum(np.arange(count), values.size - 1)]
+
+    if isinstance(model, GMS):
+        p = model.parameters
+        arrays: Any = {name: sized(getattr(p, name)) for name in ("k", "sigma", "C", "weights")}
+        shared: Any = {name: getattr(p, name) for name in ("sigma_2", "stribeck", "v_c")}
+        return GMS(GMSParameters(**arrays, **shared), law=model.law)
+    assert isinstance(model, ChartModel)
+    values = {k: sized(u) if np.ndim(u) else u for k, u in model.values.items()}  # type: ignore
+    return replace(model, values=values, weights=sized(model.weights), n=count)

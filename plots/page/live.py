@@ -6,26 +6,41 @@ its rows are (`plots.page._sources`), and the numbers that can be changed, with 
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
 
-from gms_fsm.errors import OutputError
+from gms_fsm.charts.gms import LAWS
+from gms_fsm.errors import OutputError, ParameterError
 from gms_fsm.exporters.live import LiveEngine, live_engine
 from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.text import visible
 from gms_fsm.run.problem import ROUNDING, Problem
 from gms_fsm.run.settings import SettingOptions, Settings
+from gms_fsm.run.simulate import simulate
 from gms_fsm.session.session import Session
 from gms_fsm.session.tree.export import save_scenario
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted
-from gms_fsm.systems.numbers import NUMBERS, NamedNumber, known_in, number_of, numbers_of
+from gms_fsm.systems.numbers import (
+    NUMBERS,
+    NamedNumber,
+    elements_of,
+    known_in,
+    law_of,
+    number_of,
+    numbers_of,
+    with_elements,
+    with_law,
+)
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
+from gms_fsm.traces.trace import Trace
 from plots.page._sources import live_run
 from plots.page.replay import Replay, page_data, page_html, part_text
 from plots.views.ranges import Ends, checked_ranges, is_logarithmic, usual_range
@@ -96,22 +111,73 @@ def play(
     more: Any = {"t_start": t_start, "initial": initial, "settings": settings}
     tree = Session(model, rig, t_end, **more, **options).tree
     start, trace = tree.branch().start, tree.trace(0)
-    engine = live_engine(start, trace.title)
-    what, layout = start.what, start.program.layout
-    data, charts = page_data([trace], title=title)
-    (stored,) = data["runs"]
-    data["runs"] = [live_run(stored, trace, engine)]
+    variants = [start, *_variants(start)]
+    traces = [trace, *(_beginning(each) for each in variants[1:])]
+    data, charts = page_data(traces, title=title)
+    engines = [live_engine(each, trace.title) for each in variants]
+    plane = {each["name"]: each["plane"] for each in data["runs"][0]["contacts"]}
+    parts = zip(data["runs"], traces, variants, engines, strict=True)
     data["live"] = {
-        "numbers": _numbers(what, engine, _ranges(what, given)),
-        "engine": engine.numbers,
-        "velocities": [layout.y.index(b.v) for b in start.system.bodies if not b.driven],
         "still": ROUNDING,
-        "scenario": _scenario(start, data["title"]),
+        "variants": [_variant(*each, given, plane, data["title"]) for each in parts],
     }
-    text = f"{part_text(ENGINE)}const ENGINES = [\n{engine.text},\n];\n"
+    data["runs"] = []
+    texts = ",\n".join(each.text for each in engines)
+    text = f"{part_text(ENGINE)}const ENGINES = [\n{texts},\n];\n"
     return Replay(page_html(data, charts, text, LIVE, ("page.css", "js/live/live.css")))
 
 
+# --------------------------------------------------------------------------- variants
+def _variants(start: Problem) -> Iterator[Problem]:
+    """Yield the same run with another slip law, with an element less and with one more."""
+    what = start.what
+    more: Any = {"t_start": start.t_start, "initial": start.initial}
+    law, count = law_of(what), elements_of(what)
+    if law is None or count is None:
+        return
+    changes: list[tuple[Any, Any]] = [(with_law, each) for each in LAWS if each != law]
+    changes += [(with_elements, n) for n in (count - 1, count + 1) if n]
+    for change, to in changes:
+        with contextlib.suppress(ParameterError):  # no published law where F_s = F_c
+            yield Problem.on(change(what, to), start.t_end, start.chosen, **more)
+
+
+def _beginning(start: Problem) -> Trace:
+    """Return the first part of a run; a page has no rows of it."""
+    what, t_end = start.what, start.t_start + 1e-3 * (start.t_end - start.t_start)
+    settings = replace(start.chosen, engine="ifelse")
+    more: Any = {"t_start": start.t_start, "initial": start.initial, "settings": settings}
+    if what.named:
+        return simulate(what.system, t_end, **more)
+    return simulate(what.model, what.rig, t_end, **more)
+
+
+def _variant(
+    stored: Mapping[str, Any],
+    trace: Trace,
+    start: Problem,
+    engine: LiveEngine,
+    vary: Mapping[str, Ends | None],
+    planes: Mapping[str, Any],
+    title: str,
+) -> dict[str, Any]:
+    """Return what a page knows of one engine."""
+    what, layout = start.what, start.program.layout
+    run = live_run(stored, trace, engine)
+    for contact in run["contacts"]:
+        contact["plane"] = planes[contact["name"]]  # as wide for all
+    return {
+        "run": run,
+        "law": law_of(what),
+        "elements": elements_of(what),
+        "numbers": _numbers(what, engine, _ranges(what, vary)),
+        "engine": engine.numbers,
+        "velocities": [layout.y.index(b.v) for b in start.system.bodies if not b.driven],
+        "scenario": _scenario(start, title),
+    }
+
+
+# --------------------------------------------------------------------------- numbers
 def _ranges(what: Mounted, vary: Mapping[str, Ends | None]) -> dict[str, Ends]:
     usual = (
         [name for name, ends in vary.items() if ends is None] if isinstance(vary, Mapping) else []
@@ -124,10 +190,21 @@ def _ranges(what: Mounted, vary: Mapping[str, Ends | None]) -> dict[str, Ends]:
 def _numbers(what: Mounted, engine: LiveEngine, vary: Mapping[str, Ends]) -> list[dict[str, Any]]:
     """Return the numbers that the page can change, those to be shown first with ``first``."""
     every = {name: each for name, each in numbers_of(what).items() if name in engine.numbers}
+    for name in vary:
+        if name not in every:
+            raise ParameterError(
+                "the run has no such number: it is printed with this value",
+                place=f"vary[{name!r}]",
+                value=numbers_of(what)[name].value,
+            )
     plain = [name for name, each in every.items() if each.element is None]
     first = [*vary] or plain or [*every]
     order = [*first, *(name for name in every if name not in first)]
-    return [_number(every[name], vary.get(name), name in first) for name in order]
+    made = [_number(every[name], vary.get(name), name in first) for name in order]
+    if law_of(what) == "published":  # it is refused where both are equal
+        for each in made:
+            each["rule"] = [[">", u] if u == "F_c" else [op, u] for op, u in each["rule"]]
+    return made
 
 
 def _number(number: NamedNumber, ends: Ends | None, first: bool) -> dict[str, Any]:

@@ -52,7 +52,7 @@ def test_all_floats_are_those_of_python(browser: Any, name: str, tmp_path: Path)
     while not page.evaluate("(document.querySelector('#took') ?? {}).textContent"):
         page.wait_for_timeout(50)
     first = page.evaluate("live.took")
-    sets = scenario.sets(SETS, page.evaluate("Object.keys(data.live.engine)"))
+    sets = scenario.sets(SETS, page.evaluate("Object.keys(variant().engine)"))
     bad = count = switches = 0
     for k in range(0, SETS, AT_ONCE):
         for numbers, found in zip(

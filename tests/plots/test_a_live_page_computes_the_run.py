@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import ParameterError
-from gms_fsm.systems.numbers import numbers_of
+from gms_fsm.systems.numbers import numbers_of, with_elements, with_law
 from plots.page._rows import PageRows
 from plots.page._run import stored_run, views_of
 from tests.plots.browser import SIZES, Open, browser, faults, open_page, said, wait
@@ -76,7 +77,7 @@ def turned(page: Any, numbers: dict[str, float]) -> None:
 @pytest.mark.parametrize("name", ["pulled_mass", "servo", "ball_screw_table"])
 def test_its_floats_are_those_of_python(live: Any, name: str) -> None:
     scenario, page = live_scenario(name), live(name)
-    sets = scenario.sets(4, page.evaluate("Object.keys(data.live.engine)"))
+    sets = scenario.sets(4, page.evaluate("Object.keys(variant().engine)"))
     for numbers, found in zip(sets, page.evaluate(FOUND, sets), strict=True):
         bad, count = differing(found, scenario.run(numbers))
         assert bad == 0
@@ -86,7 +87,7 @@ def test_its_floats_are_those_of_python(live: Any, name: str) -> None:
 @pytest.mark.parametrize("name", ["pulled_mass", "servo", "two_blocks_on_a_belt"])
 def test_its_columns_are_those_that_a_replay_page_stores(live: Any, name: str) -> None:
     scenario, page = live_scenario(name), live(name)
-    (numbers,) = scenario.sets(1, page.evaluate("Object.keys(data.live.engine)"), seed=4)
+    (numbers,) = scenario.sets(1, page.evaluate("Object.keys(variant().engine)"), seed=4)
     turned(page, numbers)
     trace, shown = scenario.run(numbers), page.evaluate(COLUMNS)
     rows = np.arange(len(trace))
@@ -119,7 +120,7 @@ def test_its_columns_are_those_that_a_replay_page_stores(live: Any, name: str) -
 def test_sliders_have_the_numbers_units_and_rules(live: Any) -> None:
     page, known = live("pulled_mass"), numbers_of(live_scenario("pulled_mass").what)
     for name, value, unit in page.evaluate(
-        "data.live.numbers.map((u) => [u.name, u.value, u.unit])"
+        "variant().numbers.map((u) => [u.name, u.value, u.unit])"
     ):
         assert (value, unit) == (known[name].value, known[name].parameter.unit)
     page.fill("[data-name=F_s] input[type=text]", "500 mN")
@@ -171,7 +172,7 @@ def test_an_address_has_the_state_exactly(live: Any) -> None:
 @pytest.mark.parametrize("name", ["pulled_mass", "ball_screw_table"])
 def test_the_scenario_of_a_page_is_its_run(live: Any, name: str, tmp_path: Path) -> None:
     scenario, page = live_scenario(name), live(name)
-    (numbers,) = scenario.sets(1, page.evaluate("Object.keys(data.live.engine)"), seed=2)
+    (numbers,) = scenario.sets(1, page.evaluate("Object.keys(variant().engine)"), seed=2)
     turned(page, numbers)
     text = page.evaluate("scenarioText()")
     tomllib.loads(text)
@@ -239,3 +240,27 @@ def test_a_sweep_has_the_extremes_and_switches_of_python(live: Any) -> None:
         assert each["fired"] == len(view.transitions)
     page.locator(".pane.sweep .plane").first.click(position={"x": 300, "y": 60})
     wait(page, "dials.get('numbers.k_i').value !== 500")
+
+
+@pytest.mark.parametrize(("law", "elements"), [("published", 4), ("signed", 3), ("signed", 5)])
+def test_another_law_or_an_element_more_or_less_is_the_run_of_python(
+    live: Any, law: str, elements: int
+) -> None:
+    scenario, page = live_scenario("pulled_mass"), live("pulled_mass")
+    turned(page, {"F_s": 1.4})
+    page.evaluate(f"take({law!r}, {elements})")
+    wait(page, "!frameAsked && !live.busy && runs[0].number === live.number")
+    assert page.evaluate("[variant().law, runs[0].contacts[0].n]") == [law, elements]
+    other = replace(scenario, what=with_elements(with_law(scenario.what, law), elements))
+    (found,) = page.evaluate(FOUND, [{"F_s": 1.4}])
+    bad, count = differing(found, other.run({"F_s": 1.4}))
+    assert bad == 0
+    assert count > 1000
+    assert said(page).startswith(("first difference", "both runs"))
+    page.evaluate("openPane('right', 'phase'); openPane('left', 'bristles')")
+    text = page.evaluate("stateText()")
+    page.get_by_role("button", name="reset").click()
+    wait(page, "!frameAsked && !isChanged() && !location.hash.includes('F_s')")
+    page.evaluate(f"location.hash = {text!r}")
+    wait(page, "isChanged() && !frameAsked && !live.busy")
+    assert page.evaluate("[variant().law, runs[0].contacts[0].n]") == [law, elements]

@@ -14,24 +14,27 @@ onmessage = ({ data: { id, number, numbers } }) => {
 
 const dials = new Map(); // by name
 const live = { number: 0, engines: [], slow: false, asked: 0, busy: false, waiting: null, took: 0 };
-const engineNow = () => (live.engines[live.number] ??= new Engine(ENGINES[live.number]));
+const engineOf = (number) => (live.engines[number] ??= new Engine(ENGINES[number]));
+const engineNow = () => engineOf(live.number);
+const variant = () => data.live.variants[live.number];
 
 // ------------------------------------------------------------------ runs
 // The words of the numbers that are not those written.
 function wordsNow() {
-  const words = data.live.engine;
+  const words = variant().engine;
   return [...dials.values()].filter((dial) => !dial.parts && dial.value !== dial.given.value).flatMap(({ name, value }) => words[name].map((word) => [word, value]));
 }
 
-// Computes a run, here or in the worker, and hands it over; `null` to the one before if another was asked for meanwhile.
+// Computes a run, here or in the worker, and hands it over with the number of its engine.
 function compute(numbers, then) {
+  const { number } = live;
   if (!live.slow) {
     const begin = performance.now(), found = engineNow().run(numbers, PATIENCE);
     live.took = performance.now() - begin;
-    if (found) { then(found); return; }
+    if (found) { then(found, number); return; }
     live.slow = true;
   }
-  live.waiting = { numbers, then };
+  live.waiting = { number, numbers, then };
   if (!live.busy) askWorker();
 }
 
@@ -43,17 +46,17 @@ function inWorker(text, heard) {
 }
 
 function askWorker() {
-  const { numbers, then } = live.waiting;
+  const { number, numbers, then } = live.waiting;
   Object.assign(live, { waiting: null, busy: true, asked: live.asked + 1 });
   $("#numbers")?.classList.add("busy");
   live.worker ??= inWorker(IN_WORKER);
   live.worker.onmessage = ({ data: { found, took } }) => {
     Object.assign(live, { busy: false, took, slow: took > PATIENCE / 2 });
     $("#numbers")?.classList.remove("busy");
-    then(found);
+    then(found, number);
     if (live.waiting) askWorker();
   };
-  live.worker.postMessage({ id: live.asked, number: live.number, numbers });
+  live.worker.postMessage({ id: live.asked, number, numbers });
 }
 
 // ------------------------------------------------------------------ changes
@@ -68,7 +71,7 @@ function changed() {
 
 // A start in a state that holds a velocity, and it moves: Python refuses it, too.
 function movesLocked(run) {
-  const fastest = Math.max(0, ...data.live.velocities.map((place) => Math.abs(run.found.y[place])));
+  const fastest = Math.max(0, ...variant().velocities.map((place) => Math.abs(run.found.y[place])));
   for (const contact of run.contacts) {
     for (const mode of contact.modes) {
       const name = contact.locked[mode[0]] && contact.velocities.find((each) => Math.abs(contact.value(each, 0, 0)) > data.live.still * fastest);
@@ -78,16 +81,27 @@ function movesLocked(run) {
   return "";
 }
 
-function showRun(found) {
-  runs[0].renew(found);
+// The run that was computed: other rows, or those of another engine.
+function showRun(found, number) {
+  if (runs[0].number === number) {
+    runs[0].renew(found);
+    renew(() => found.stopped || (isChanged() ? first.told : ""));
+  } else {
+    load({ ...data, runs: [runOf(number, found, { label: "this run", short: "now" }, 0), runs[1]] });
+    show(frame, found.stopped || first.told);
+  }
   const wrong = movesLocked(runs[0]);
   if (wrong || $("#refused").dataset.of === "start") say($("#refused"), wrong);
   $("#refused").dataset.of = wrong ? "start" : "";
-  renew(() => found.stopped || (isChanged() ? first.told : ""));
   say($("#took"), `${runs[0].rows.toLocaleString("en")} rows, ${counted(runs[0].log.length, "transition")}, in ${live.took.toFixed(1)} ms`);
 }
 
-const isChanged = () => [...dials.values()].some(({ value, given }) => value !== given.value);
+function runOf(number, found, more, place) {
+  const run = new LiveRun({ ...data.live.variants[number].run, ...more }, place, engineOf(number), found);
+  return Object.assign(run, { number });
+}
+
+const isChanged = () => live.number > 0 || [...dials.values()].some(({ value, given }) => value !== given.value);
 
 // A number that its rules allow; of all elements it is that of each.
 function turn(dial, u) {
@@ -122,12 +136,13 @@ function settle() {
 
 // ------------------------------------------------------------------ the state in the address, exactly
 function stateText() {
-  const state = new URLSearchParams();
+  const state = new URLSearchParams(), written = data.live.variants[0];
+  for (const name of ["law", "elements"]) if (variant()[name] !== written[name]) state.set(`@${name}`, variant()[name]);
   for (const { name, value, given, parts, all } of dials.values()) {
     if (Number.isNaN(value) || value === given.value || (all && !Number.isNaN(all.value))) continue;
     if (!parts || parts.every((each) => each.value === value)) state.set(name, String(value));
   }
-  if (frame > 0) state.set("t", String(frames.t[frame]));
+  if (frame > 0) state.set("@t", String(frames.t[frame]));
   return state.toString();
 }
 
@@ -137,10 +152,13 @@ function writeAddress() {
 
 // Takes the numbers of an address; what is not understood is named.
 function readAddress() {
-  const state = new URLSearchParams(location.hash.slice(1)), wrong = [];
+  const state = new URLSearchParams(location.hash.slice(1)), wrong = [], written = data.live.variants[0];
+  const law = state.get("@law") ?? written.law, elements = Number(state.get("@elements") ?? written.elements);
+  live.number = Math.max(live.law ? find(law, elements) : 0, 0);
+  fillDials();
   for (const dial of dials.values()) setValue(dial, dial.given.value);
   for (const [name, text] of state) {
-    if (name === "t") continue;
+    if (name.startsWith("@")) continue;
     const dial = dials.get(name), u = text === "" ? NaN : Number(text);
     if (dial && Number.isFinite(u)) setValue(dial, u);
     else wrong.push(`${name}=${text}`);
@@ -150,7 +168,7 @@ function readAddress() {
     if (words) { wrong.push(words); setValue(dial, dial.given.value); }
   }
   say($("#refused"), wrong.length ? `not taken from the address: ${wrong.join("; ")}` : "");
-  return Number(state.get("t") ?? NaN);
+  return Number(state.get("@t") ?? NaN);
 }
 
 async function share() {
@@ -172,7 +190,7 @@ function scenarioText() {
     if (dial && !wide) return number(dial.value);
     return `[${(parts.length ? parts : [dial]).map(({ value }) => number(value)).join(", ")}]`;
   };
-  return data.live.scenario.map((part) => (typeof part === "string" ? part : part.text && !knows(part.number) ? part.text : values(part.number, part.wide))).join("");
+  return variant().scenario.map((part) => (typeof part === "string" ? part : part.text && !knows(part.number) ? part.text : values(part.number, part.wide))).join("");
 }
 const knows = (name) => dials.has(name) || [...dials.values()].some(({ whole }) => whole === name);
 
@@ -188,10 +206,47 @@ function save(text, name) {
 function buildPanel() {
   const panel = make("section", document.body, "", { id: "numbers", "aria-label": "Numbers" });
   $("#top").after(panel);
-  const before = make("div", panel, "", { class: "dials" }), more = make("details", panel);
+  live.boxes = [make("div", panel, "", { class: "dials" })];
+  const more = make("details", panel);
   make("summary", more, "more numbers");
-  const rest = make("div", more, "", { class: "dials" });
-  for (const given of data.live.numbers) dials.set(given.name, new Dial(given.first ? before : rest, given, turn));
+  live.boxes.push(make("div", more, "", { class: "dials" }));
+  const acts = make("div", panel, "", { class: "acts" });
+  const act = (name, title, action) => {
+    const button = make("button", acts, name, { title });
+    button.addEventListener("click", action);
+    return button;
+  };
+  const { law, elements } = variant();
+  if (data.live.variants.length > 1) {
+    live.law = make("select", make("label", acts, "law "), "", { title: "Slip law" });
+    for (const each of new Set(data.live.variants.map((one) => one.law))) make("option", live.law, each);
+    live.law.addEventListener("change", () => take(live.law.value, variant().elements));
+    const group = make("span", acts, "elements ", { role: "group", "aria-label": "Elements" });
+    const step = (way, name) => {
+      const button = make("button", group, way > 0 ? "+" : "−", { "aria-label": name, title: name });
+      button.addEventListener("click", () => take(variant().law, variant().elements + way));
+      return button;
+    };
+    live.fewer = step(-1, "Remove the last element");
+    live.count = make("output", group, "");
+    live.more = step(1, "Add an element like the last");
+  }
+  act("reset", "All as it was written", reset);
+  act("share", "A link with all numbers", share);
+  if (variant().scenario.length) act("scenario", "The scenario with these numbers, a TOML file for gms-fsm run", () => save(scenarioText(), "scenario.toml"));
+  make("input", acts, "", { id: "link", type: "text", readonly: "", "aria-label": "Link to this state", size: 30 }).hidden = true;
+  make("output", acts, "", { id: "took" });
+  make("p", panel, "", { id: "refused", role: "alert" });
+  $("#say").tabIndex = 0; // what it says may be longer than its place
+  fillDials();
+}
+
+// The dials of the present engine; those that are changed stay so.
+function fillDials() {
+  const changes = [...dials.values()].filter((dial) => !dial.parts && dial.value !== dial.given.value).map(({ name, value }) => [name, value]);
+  dials.clear();
+  for (const box of live.boxes) box.replaceChildren();
+  for (const given of variant().numbers) dials.set(given.name, new Dial(live.boxes[given.first ? 0 : 1], given, turn));
   for (const dial of dials.values()) {
     if (dial.element !== null) continue;
     const parts = [...dials.values()].filter(({ whole, element }) => whole === dial.whole && element !== null);
@@ -199,29 +254,46 @@ function buildPanel() {
     dial.parts = parts;
     for (const each of parts) each.all = dial;
   }
-  more.hidden = !rest.children.length;
-  const acts = make("div", panel, "", { class: "acts" });
-  const act = (name, title, action) => make("button", acts, name, { title }).addEventListener("click", action);
-  act("reset", "All numbers as they were written", () => { for (const dial of dials.values()) setValue(dial, dial.given.value); refuse(null, ""); changed(); });
-  act("share", "A link with all numbers", share);
-  if (data.live.scenario.length) act("scenario", "The scenario with these numbers, a TOML file for gms-fsm run", () => save(scenarioText(), "scenario.toml"));
-  make("input", acts, "", { id: "link", type: "text", readonly: "", "aria-label": "Link to this state", size: 30 }).hidden = true;
-  make("output", acts, "", { id: "took" });
-  make("p", panel, "", { id: "refused", role: "alert" });
-  $("#say").tabIndex = 0; // what it says may be longer than its place
+  for (const [name, value] of changes) if (dials.has(name)) setValue(dials.get(name), value);
+  live.boxes[1].parentNode.hidden = !live.boxes[1].children.length;
+  if (!live.law) return;
+  const { law, elements } = variant(), has = (way) => find(law, elements + way) >= 0;
+  live.law.value = law;
+  say(live.count, String(elements));
+  live.fewer.disabled = !has(-1);
+  live.more.disabled = !has(1);
+}
+
+// ------------------------------------------------------------------ another law, or an element more or less
+const find = (law, elements) => data.live.variants.findIndex((each) => each.law === law && each.elements === elements);
+
+// Where there is no engine for both, the law that is asked for has as many elements as were written, and the reverse.
+function take(law, elements) {
+  const written = data.live.variants[0], at = [find(law, elements), law === variant().law ? find(written.law, elements) : find(law, written.elements)].find((k) => k >= 0);
+  live.number = at ?? live.number;
+  fillDials();
+  changed();
+}
+
+function reset() {
+  live.number = 0;
+  for (const dial of dials.values()) setValue(dial, dial.given.value);
+  fillDials();
+  refuse(null, "");
+  changed();
 }
 
 function beginLive() {
-  const [stored] = data.runs;
   buildPanel();
-  const t = readAddress();
+  const t = readAddress(), { number } = live;
+  live.number = 0;
   compute([], (found) => {
-    const written = kept(found), make = (more, place) => new LiveRun({ ...stored, ...more }, place, engineNow(), written);
-    const base = make({ label: "base run", short: "base", ghost: true }, 1), now = make({ label: "this run", short: "now" }, 0);
-    load({ ...data, runs: [now, base] });
+    const written = kept(found), base = runOf(0, written, { label: "base run", short: "base", ghost: true }, 1);
+    live.number = number;
+    load({ ...data, runs: [runOf(0, written, { label: "this run", short: "now" }, 0), base] });
     if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
     if (isChanged()) changed();
-    else showRun(written);
+    else showRun(written, 0);
   });
   addEventListener("hashchange", () => {
     const t = readAddress();

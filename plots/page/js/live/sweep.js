@@ -83,7 +83,7 @@ class SweepPane {
   // The runs, if another number than the one swept is not that of the last time.
   ask() {
     const { dial, of, view } = this, [kind, place] = view.run.recipes[view.contact.values[of.value].all] ?? [];
-    const swept = new Set(data.live.engine[dial.name]), numbers = wordsNow().filter(([word]) => !swept.has(word));
+    const swept = new Set(variant().engine[dial.name]), numbers = wordsNow().filter(([word]) => !swept.has(word));
     const key = JSON.stringify([dial.name, of.value, view.contact.name, numbers, live.number]);
     if (key === this.asked || !["y", "seen"].includes(kind)) return;
     Object.assign(this, { asked: key, id: this.id + 1, found: this.named === dial.name + of.value ? this.found : [], named: dial.name + of.value });
