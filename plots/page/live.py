@@ -20,6 +20,7 @@ from gms_fsm.errors import OutputError, ParameterError
 from gms_fsm.exporters.live import LiveEngine, live_engine
 from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.text import visible
+from gms_fsm.language import Name
 from gms_fsm.run.problem import ROUNDING, Problem
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import simulate
@@ -45,7 +46,13 @@ from plots.page._sources import live_run
 from plots.page.replay import Replay, page_data, page_html, part_text
 from plots.views.ranges import Ends, checked_ranges, is_logarithmic, usual_range
 
-LIVE = ("js/live/rows.js", "js/live/numbers.js", "js/live/sweep.js", "js/live/live.js")
+LIVE = (
+    "js/live/rows.js",
+    "js/live/numbers.js",
+    "js/live/sweep.js",
+    "js/live/dragging.js",
+    "js/live/live.js",
+)
 ENGINE = "js/live/engine.js"
 _TABLE = re.compile(r"\[\[?([\w.]+)\]\]?")
 _LINE = re.compile(r"([\w.]+) = (-?[\d.]\S*|\[[-\d.e+, ]+\])")
@@ -173,8 +180,20 @@ def _variant(
         "numbers": _numbers(what, engine, _ranges(what, vary)),
         "engine": engine.numbers,
         "velocities": [layout.y.index(b.v) for b in start.system.bodies if not b.driven],
+        "masses": _masses(start),
         "scenario": _scenario(start, title),
     }
+
+
+def _masses(start: Problem) -> dict[str, str]:
+    """Return by contact the number that is the mass of a body that it acts on."""
+    what, read, found = start.what, start.program.plan.read, dict[str, str]()
+    for bank in read.banks:
+        for body in (body for row in bank.jacobian for body in row):
+            inertia = read.inertias.get(body)
+            if isinstance(inertia, Name) and inertia.id in what.rig.numbers:
+                found[what.whose(bank.name)] = what.of(NUMBERS, inertia.id)
+    return found
 
 
 # --------------------------------------------------------------------------- numbers

@@ -249,7 +249,7 @@ def test_another_law_or_an_element_more_or_less_is_the_run_of_python(
     scenario, page = live_scenario("pulled_mass"), live("pulled_mass")
     turned(page, {"F_s": 1.4})
     page.evaluate(f"take({law!r}, {elements})")
-    wait(page, "!frameAsked && !live.busy && runs[0].number === live.number")
+    wait(page, "!frameAsked && !live.busy && runs[0].engineNumber === live.number")
     assert page.evaluate("[variant().law, runs[0].contacts[0].n]") == [law, elements]
     other = replace(scenario, what=with_elements(with_law(scenario.what, law), elements))
     (found,) = page.evaluate(FOUND, [{"F_s": 1.4}])
@@ -264,3 +264,37 @@ def test_another_law_or_an_element_more_or_less_is_the_run_of_python(
     page.evaluate(f"location.hash = {text!r}")
     wait(page, "isChanged() && !frameAsked && !live.busy")
     assert page.evaluate("[variant().law, runs[0].contacts[0].n]") == [law, elements]
+
+
+def test_thresholds_masses_and_numbers_of_guards_are_changed_in_the_picture(live: Any) -> None:
+    page = live("pulled_mass", tab="Landscape")
+    page.evaluate("go(300)")
+    at = page.evaluate("""() => {
+        const pane = views[0].open.right, { left, top } = pane.plane.svg.getBoundingClientRect();
+        for (let x = 80; x < pane.plane.width; x += 10)
+            for (let y = 20; y < pane.plane.height - 60; y += 4)
+                if (thresholdAt(pane, [x, y])?.name === "F_s") return [x + left, y + top];
+    }""")
+    page.mouse.move(*at)
+    page.mouse.down()
+    for k in range(1, 4):
+        page.mouse.move(at[0], at[1] - 5 * k)
+    wait(page, "dials.get('F_s').value !== 1.5 && !frameAsked")
+    page.mouse.up()
+    value = page.evaluate("dials.get('F_s').value")
+    page.mouse.move(at[0], at[1] - 40)
+    assert page.evaluate("dials.get('F_s').value") == value
+    page.evaluate("openPane('left', 'bristles')")
+    block = page.locator(".pane.bristles .elements .slider").bounding_box()
+    assert block is not None
+    page.mouse.move(block["x"] + 5, block["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(block["x"] + 5 + 300, block["y"] + 20)
+    page.mouse.up()
+    assert page.evaluate("dials.get('mass').value") == pytest.approx(3.2)  # the slider's end
+    box = page.get_by_label("v_c in this guard").first
+    box.fill("2 um/s")
+    box.press("Enter")
+    assert page.evaluate("dials.get('v_c').value") == 2e-6
+    wait(page, "!frameAsked && !live.busy")
+    assert page.evaluate("runs[0].contacts[0].parameters.v_c") == 2e-6

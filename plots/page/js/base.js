@@ -31,6 +31,9 @@ function place(node, attributes) {
 // Changes a text only if it is another one: a change costs a layout, and is read aloud where a node is live.
 function say(node, text) { if (node.textContent !== text) node.textContent = text; }
 
+// What a page with more scripts adds to a clause in the table of guards.
+const hooks = { clause: () => {} };
+
 const counted = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
 
 // How many times as large a presentation shows what is in `main`, by CSS: sizes of nodes are in px before, places of the mouse

@@ -12,7 +12,6 @@ onmessage = ({ data: { id, number, numbers } }) => {
 };
 `;
 
-const dials = new Map(); // by name
 const live = { number: 0, engines: [], slow: false, asked: 0, busy: false, waiting: null, took: 0 };
 const engineOf = (number) => (live.engines[number] ??= new Engine(ENGINES[number]));
 const engineNow = () => engineOf(live.number);
@@ -83,7 +82,7 @@ function movesLocked(run) {
 
 // The run that was computed: other rows, or those of another engine.
 function showRun(found, number) {
-  if (runs[0].number === number) {
+  if (runs[0].engineNumber === number) {
     runs[0].renew(found);
     renew(() => found.stopped || (isChanged() ? first.told : ""));
   } else {
@@ -98,7 +97,7 @@ function showRun(found, number) {
 
 function runOf(number, found, more, place) {
   const run = new LiveRun({ ...data.live.variants[number].run, ...more }, place, engineOf(number), found);
-  return Object.assign(run, { number });
+  return Object.assign(run, { engineNumber: number });
 }
 
 const isChanged = () => live.number > 0 || [...dials.values()].some(({ value, given }) => value !== given.value);

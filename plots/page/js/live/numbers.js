@@ -1,6 +1,7 @@
 "use strict";
 // The numbers that can be changed: a slider each, and a box that takes a number with a unit. A value is the number written,
 // exactly; of a slider it has four digits.
+const dials = new Map(); // by name
 const SLIDER_STEPS = 1000;
 const HOLDS = { ">": (a, b) => a > b, ">=": (a, b) => a >= b, "<": (a, b) => a < b, "<=": (a, b) => a <= b };
 const IN_WORDS = { ">": "greater than", ">=": "at least", "<": "less than", "<=": "at most" };
@@ -25,13 +26,12 @@ class Dial {
     this.box = make("input", this.root, "", { type: "text", size: 9, inputmode: "decimal", spellcheck: "false", autocomplete: "off", "aria-label": `${named}, exact`, "aria-describedby": "refused" });
     this.range = make("input", this.root, "", { type: "range", min: 0, max: SLIDER_STEPS, step: 1, id, "aria-describedby": "refused" });
     this.range.addEventListener("input", () => this.turn(this.valueAt(Number(this.range.value))));
-    this.box.addEventListener("change", () => {
-      const u = typed(this.box.value, unit);
-      if (Number.isNaN(u)) refuse(this, `${name}: ${JSON.stringify(this.box.value)} is not a number${unit && unit !== "1" ? `, or not in ${unit}` : ""}`);
-      else this.turn(u);
-    });
+    this.box.addEventListener("change", () => this.type(this.box.value));
     this.show();
   }
+
+  // Another box for the number, in a guard.
+  link(box) { this.linked = [...(this.linked ?? []).filter((each) => each.isConnected), box]; this.show(); }
 
   limits() { return this.rule.map(([op, limit]) => `${IN_WORDS[op]} ${limit}`); }
 
@@ -44,12 +44,19 @@ class Dial {
 
   turn(u) { this.changed(this, u); }
 
+  type(text) {
+    const { name, unit } = this, u = typed(text, unit);
+    if (Number.isNaN(u)) refuse(this, `${name}: ${JSON.stringify(text)} is not a number${unit && unit !== "1" ? `, or not in ${unit}` : ""}`);
+    else this.turn(u);
+  }
+
   // The value, where the slider has it and the box names it.
   show() {
     const { value: u, low, high, log, unit } = this, part = log ? Math.log(u / low) / Math.log(high / low) : (u - low) / (high - low);
     this.range.value = Math.round(SLIDER_STEPS * clamp(Number.isNaN(part) ? 0 : part, 0, 1));
     this.range.setAttribute("aria-valuetext", eng(u, unit === "1" ? "" : unit, 4));
     if (document.activeElement !== this.box || this.box.getAttribute("aria-invalid") !== "true") this.box.value = String(u);
+    for (const box of this.linked ?? []) box.value = String(u);
     this.root.classList.toggle("changed", u !== this.given.value);
   }
 }
@@ -75,3 +82,15 @@ function limitOf(numbers, owner, limit, element, whole = false) {
   const found = numbers.get(owner ? `${owner}.${limit}` : limit) ?? numbers.get(`${owner ? `${owner}.` : ""}${limit}${(element ?? 0) + 1}`);
   return whole ? found : found?.value;
 }
+
+// The numbers that a clause of a guard reads can be changed where they stand.
+hooks.clause = (cell, contact, clause) => {
+  for (const name of namesIn(clause.tree)) {
+    const dial = dials.get(contact.name ? `${contact.name}.${name}` : name);
+    if (!dial || Number.isNaN(dial.value) || !Object.hasOwn(contact.parameters, name)) continue;
+    const label = make("label", cell, ` ${name} `, { class: "in-guard" });
+    const box = make("input", label, "", { type: "text", size: 7, inputmode: "decimal", spellcheck: "false", autocomplete: "off", "aria-label": `${name} in this guard` });
+    box.addEventListener("change", () => dials.get(dial.name).type(box.value));
+    dial.link(box);
+  }
+};

@@ -216,7 +216,7 @@ class RunView {
         const small = make("small", head, `${contact.states[edge.source]} → ${contact.states[edge.target]}${contact.sends(k)} `);
         found.word = make("em", small);
       }
-      make("td", line, clause.event ? `event ${clause.event}` : clause.text);
+      hooks.clause(make("td", line, clause.event ? `event ${clause.event}` : clause.text), contact, clause);
       found.truth = make("td", line);
       found.sides = ["margin", "left", "right"].map((name) => make("td", line, "", { class: "number", "data-name": clause.compares ? name : "" }));
       return found;

@@ -104,6 +104,17 @@ class LandscapePane {
     this.show();
   }
 
+  // The run has other rows. While a threshold is dragged the axes stay.
+  renew() {
+    const { layouts } = this;
+    if (document.body.classList.contains("dragging")) for (const layout of layouts.values()) layout.track = null;
+    else layouts.clear();
+    this.drawings.clear();
+    Object.assign(this, { laid: "", drawn: "", at: -1 });
+    this.fit();
+    return true;
+  }
+
   // The axes of the selected element.
   lay() {
     const { view, plane, layouts } = this, { contact, element } = view, key = `${contact.name}/${element}`, [v, z] = contact.plane.names;
