@@ -508,6 +508,21 @@ rows = {
 group("grid of a sweep", ParameterError, grid, rows)
 
 
+def lively(*vary: str) -> None:
+    """Write a live page of the pulled mass with these sliders."""
+    verb("play", "pulled_mass", *(each for name in vary for each in ("--vary", name)))
+
+
+rows = {
+    "no number": ("--vary", "F_s=low..high", "F_s=low..high"),
+    "not a range": ("--vary", "F_s=2", "F_s=2"),
+    "beside the value": ("vary['F_s']", (2.0, 3.0), "F_s=2..3"),
+    "no such number": ("", ..., "F_x=2..3"),
+    "printed with its value": ("vary['delta']", 2.0, "delta"),
+}
+group("slider of a live page", ParameterError, lively, rows)
+
+
 def own(name: str, old: str, new: str, command: str) -> None:
     """Call a verb beside a system and a chart in files of one's own, one of them edited."""
     own_files.write(Path())

@@ -8,6 +8,7 @@ const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
 const elementStep = (i, n) => (n > 1 ? Math.round((i * (COLOURS - 1)) / (n - 1)) : 0); // of the ramp from the first element to the last
 const RUNS = [{ stroke: "--ink" }, { stroke: "--soft", dash: [7, 4] }]; // lines of the first run and of the second
 const MOST_POINTS = 60000; // of lines that are drawn again when another element is selected
+let sketching = false; // while the run changes with every picture
 let pointed = null, pinned = null; // frames: under the mouse, and where two runs first differ
 
 // Decimals that tell neighbouring marks of an axis apart.
@@ -31,9 +32,9 @@ class TimePlots {
     this.body.addEventListener("mouseleave", () => pointAt(null));
   }
 
-  clear() { Object.assign(this, { plots: [], tracks: [], wanted: [], marks: { cursor: [], hair: [], pin: [] } }); }
+  clear() { Object.assign(this, { sketched: false, plots: [], tracks: [], wanted: [], marks: { cursor: [], hair: [], pin: [] } }); }
 
-  width() { return this.body.clientWidth - AXIS - GAP; }
+  width() { return this.across - AXIS - GAP; } // since it was fitted: to ask the page is a layout
 
   // The cursor, the crosshair and the pin in a plot or over ribbons: not where readings stand.
   mark(box) {
@@ -93,6 +94,7 @@ class TimePlots {
       return true;
     }
     zooming = true; // of its own accord
+    this.sketch(sketching);
     for (const { plot, lines } of this.plots) {
       plot.setData([frames.t, ...lines.map(alongFrames)], false);
       plot.setScale("x", { ...span });
@@ -100,6 +102,19 @@ class TimePlots {
     zooming = false;
     this.drawRibbons();
     return true;
+  }
+
+  // Lines as thin as they can be, and solid: these take half the time. Then as they should be again.
+  sketch(on) {
+    if (Boolean(this.sketched) === on) return;
+    this.sketched = on;
+    for (const { plot } of this.plots) {
+      for (const each of plot.series.slice(1)) {
+        if (on) Object.assign(each, { fine: { width: each.width, dash: each.dash } }, { width: 1, dash: [] });
+        else Object.assign(each, each.fine);
+      }
+      if (!on) plot.redraw(false, false);
+    }
   }
 
   // The states of every element; of two runs both, one under the other.
@@ -123,6 +138,7 @@ class TimePlots {
   fit() {
     const width = this.body.clientWidth, last = this.plots.at(-1);
     if (!width || !this.plots.length) return;
+    this.across = width;
     const heads = this.plots.reduce((sum, { value }) => sum + value.parentNode.offsetHeight, 0);
     const left = this.box.clientHeight - heads - (this.ribbons?.offsetHeight ?? 0) - TIME_AXIS - 2;
     const height = last.bare ? BARE : isWide() ? Math.max(Math.floor(left / this.plots.length), presenting.on ? PRESENTED : LEAST) : 92;
@@ -172,17 +188,16 @@ class TimePlots {
 
   // Nothing is laid out, so that a film can move it in every frame.
   placeCursor(t = frames.t[frame]) {
-    const width = this.width(); // asked once: to ask is a layout
-    this.put("cursor", t, width);
-    this.put("hair", frames.t[pointed], width);
-    this.put("pin", frames.t[pinned], width);
+    this.put("cursor", t);
+    this.put("hair", frames.t[pointed]);
+    this.put("pin", frames.t[pinned]);
   }
 
-  put(name, t, width) {
+  put(name, t) {
     const part = (t - span.min) / (span.max - span.min), seen = part >= 0 && part <= 1; // no time is NaN
     for (const line of this.marks[name]) {
       line.style.visibility = seen ? "visible" : "hidden";
-      if (seen) line.style.transform = `translateX(${part * width}px)`;
+      if (seen) line.style.transform = `translateX(${part * this.width()}px)`;
     }
   }
 }

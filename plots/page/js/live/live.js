@@ -126,9 +126,12 @@ function refuse(dial, words) {
 
 function settle() {
   $("#say").setAttribute("aria-live", "off"); // a screen reader would not keep up
+  sketching = true;
   clearTimeout(settling);
   settling = setTimeout(() => {
     $("#say").setAttribute("aria-live", "polite");
+    sketching = false;
+    eachPlots((pane) => pane.sketch(false));
     writeAddress();
   }, SETTLED);
 }

@@ -85,10 +85,10 @@ function limitOf(numbers, owner, limit, element, whole = false) {
 
 // The numbers that a clause of a guard reads can be changed where they stand.
 hooks.clause = (cell, contact, clause) => {
-  for (const name of namesIn(clause.tree)) {
-    const dial = dials.get(contact.name ? `${contact.name}.${name}` : name);
-    if (!dial || Number.isNaN(dial.value) || !Object.hasOwn(contact.parameters, name)) continue;
-    const label = make("label", cell, ` ${name} `, { class: "in-guard" });
+  const dialFor = (name) => (Object.hasOwn(contact.parameters, name) ? dials.get(contact.name ? `${contact.name}.${name}` : name) : undefined);
+  const known = [...namesIn(clause.tree)].filter((name) => dialFor(name) && !Number.isNaN(dialFor(name).value));
+  for (const name of known) {
+    const dial = dialFor(name), label = make("label", cell, known.length > 1 ? ` ${name} ` : " ", { class: "in-guard" });
     const box = make("input", label, "", { type: "text", size: 7, inputmode: "decimal", spellcheck: "false", autocomplete: "off", "aria-label": `${name} in this guard` });
     box.addEventListener("change", () => dials.get(dial.name).type(box.value));
     dial.link(box);
