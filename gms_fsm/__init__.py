@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from gms_fsm.systems.models import ChartModel as ChartModel
     from gms_fsm.systems.models import LuGre as LuGre
     from gms_fsm.systems.models import Model as Model
+    from gms_fsm.systems.rigs import Belt as Belt
     from gms_fsm.systems.rigs import Prescribed as Prescribed
     from gms_fsm.systems.rigs import PulledSlider as PulledSlider
     from gms_fsm.systems.rigs import Rig as Rig
@@ -123,7 +124,7 @@ _HOMES = {
     "run.sweep": "Sweep sweep",
     "systems.gms_parameters": "GMSParameters",
     "systems.models": "ChartModel GMS LuGre Model",
-    "systems.rigs": "Prescribed PulledSlider Rig Slider",
+    "systems.rigs": "Belt Prescribed PulledSlider Rig Slider",
     "systems.signals": "Signal",
     "systems.system": "Body Contact Sampled Spring Supervisor System",
     "traces.coverage.total": "Coverage",

@@ -42,6 +42,7 @@ from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import CHARTS, gms_element, timetable
 from gms_fsm.charts.registry import entry
 from gms_fsm.errors import GMSError
+from gms_fsm.scenarios import shipped
 from gms_fsm.systems.models import demonstration
 from gms_fsm.systems.signals import Signal, as_signal
 from gms_fsm.traces.failures import (
@@ -58,7 +59,6 @@ from tests.helpers import (
     FASTEST,
     FIG3_FORCE,
     FIG4_SINE,
-    ROOT,
     FunctionBelt,
     banging,
     bank,
@@ -718,7 +718,8 @@ def _scenario(name: str) -> Maker:
     return made
 
 
-SCENARIOS = tuple(sorted(path.stem for path in (ROOT / "gms_fsm/scenarios").glob("*.toml")))
+OF_SCIPY = {"earthquake"}  # its steps are those of LAPACK, which differ between machines
+SCENARIOS = tuple(name for name in shipped() if name not in OF_SCIPY)
 SCENARIO_RUNS: dict[str, Maker] = {f"scenario {name}": _scenario(name) for name in SCENARIOS}
 
 

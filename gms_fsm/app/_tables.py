@@ -25,7 +25,7 @@ from gms_fsm.records.record import Column, Record
 from gms_fsm.run.settings import ENGINES, EVENTS, Settings
 from gms_fsm.systems.files.model_tables import ModelTable
 from gms_fsm.systems.files.toml import SystemFile
-from gms_fsm.systems.rigs import PulledSlider
+from gms_fsm.systems.rigs import Belt, PulledSlider
 from integrators import METHODS
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
@@ -116,6 +116,7 @@ _SIGNAL = "expression of t in quotes, ramps [[t, value], ...], or a record {file
 
 # --------------------------------------------------------------------------- rigs
 _DESCRIBED: Mapping[str, str] = {each.name: each.described for each in PulledSlider.parameters}
+_ON_BELT: Mapping[str, str] = {each.name: each.described for each in Belt.parameters}
 
 
 class PrescribedTable(Table):
@@ -146,6 +147,16 @@ class PulledTable(Table):
     mass: float = Field(description=_DESCRIBED["mass"])
     stiffness: float = Field(description=_DESCRIBED["stiffness"])
     speed: float = Field(description=_DESCRIBED["speed"])
+
+
+class BeltTable(Table):
+    """A mass on a moving belt, tied to a wall by a spring and a damper."""
+
+    kind: Literal["belt"]
+    mass: float = Field(description=_ON_BELT["mass"])
+    stiffness: float = Field(description=_ON_BELT["stiffness"])
+    speed: float = Field(description=_ON_BELT["speed"])
+    damping: float = Field(0.0, description=_ON_BELT["damping"])
 
 
 # --------------------------------------------------------------------------- the run
@@ -301,7 +312,8 @@ class Scenario(Table):
     notes: str = Field("", description="text for the summary")
     model: ModelTable
     rig: Annotated[
-        PrescribedTable | RecordedTable | SliderTable | PulledTable, Field(discriminator="kind")
+        PrescribedTable | RecordedTable | SliderTable | PulledTable | BeltTable,
+        Field(discriminator="kind"),
     ]
     record: RecordTable | None = None
     run: RunTable = RunTable()

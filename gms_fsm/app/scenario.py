@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from gms_fsm.app._tables import (
+    BeltTable,
     PrescribedTable,
     PulledTable,
     RecordTable,
@@ -40,7 +41,7 @@ from gms_fsm.scenarios import scenario_path, shipped
 from gms_fsm.session.session import Session
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import mounted, mounted_alone
-from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
+from gms_fsm.systems.rigs import Belt, Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.systems.signals import Corners, SignalLike, as_signal
 from gms_fsm.systems.system import System
 from gms_fsm.traces.failures import SimulationError
@@ -412,6 +413,9 @@ def _loaded(file: TomlFile, scenario: Scenario) -> Loaded:
         case PulledTable(mass=mass, stiffness=stiffness, speed=speed):
             with blaming(file, "rig"):
                 rig = PulledSlider(mass, stiffness, speed)
+        case BeltTable(mass=mass, stiffness=stiffness, speed=speed, damping=damping):
+            with blaming(file, "rig"):
+                rig = Belt(mass, stiffness, speed, damping)
         case _:
             assert scenario.record is not None
             record = read_record(file, scenario.record)

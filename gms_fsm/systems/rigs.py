@@ -21,6 +21,9 @@ from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring
 
 MASS = Parameter("mass", "kg", "> 0", per_element=False, meaning="mass")
+STIFFNESS = Parameter(
+    "stiffness", "N/m", "> 0", per_element=False, meaning="stiffness of the spring"
+)
 
 
 class Rig(Protocol):
@@ -148,7 +151,7 @@ class PulledSlider:
     springs = (Spring("spring", "body", k="stiffness", rest="speed * t"),)
     parameters: ClassVar[tuple[Parameter, ...]] = (
         MASS,
-        Parameter("stiffness", "N/m", "> 0", per_element=False, meaning="stiffness of the spring"),
+        STIFFNESS,
         Parameter("speed", "m/s", per_element=False, meaning="speed of the spring's far end"),
     )
 
@@ -163,6 +166,63 @@ class PulledSlider:
     @property
     def numbers(self) -> Mapping[str, float]:
         """The mass, stiffness and speed."""
+        return {each.name: getattr(self, each.name) for each in self.parameters}
+
+
+@refusing()
+@by_value()
+@dataclass(frozen=True, eq=False)
+class Belt:
+    """Closed loop: a mass on a moving belt, tied to a wall by a spring and a damper.
+
+    A string under a bow, a pad on a disc. x and v are the motion of the mass over the belt, as the
+    friction sees it: v is 0 while it sticks, and a run that starts at rest starts on the belt.
+    ``m dv/dt = -stiffness * (x + speed * t) - damping * v - F``; from where its spring is slack the
+    mass is at ``x + speed * t - damping * speed / stiffness``.
+
+    Parameters
+    ----------
+    mass : float
+        kg, > 0.
+    stiffness : float
+        Stiffness of the spring, N/m, > 0.
+    speed : float
+        Speed of the belt, m/s.
+    damping : float
+        Damping, Ns/m, >= 0.
+
+    Examples
+    --------
+    >>> Belt(1.0, 2.0, 0.1).numbers
+    {'mass': 1.0, 'stiffness': 2.0, 'speed': 0.1, 'damping': 0.0}
+    """
+
+    mass: float
+    stiffness: float
+    speed: float
+    damping: float = 0.0
+
+    title = "mass on a moving belt"
+    acceleration = "(stiffness * (-speed * t - x) - damping * v - F) / mass"
+    springs = (Spring("spring", "body", k="stiffness", d="damping", rest="-speed * t"),)
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        MASS,
+        STIFFNESS,
+        Parameter("speed", "m/s", per_element=False, meaning="speed of the belt"),
+        Parameter("damping", "Ns/m", ">= 0", per_element=False, meaning="damping of the spring"),
+    )
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """No signals."""
+        return {}
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """The mass, stiffness, speed and damping."""
         return {each.name: getattr(self, each.name) for each in self.parameters}
 
 
@@ -199,7 +259,7 @@ class TextRig:
         object.__setattr__(self, "signals", signals)
 
 
-def _check(rig: Slider | PulledSlider) -> None:
+def _check(rig: Slider | PulledSlider | Belt) -> None:
     for each in rig.parameters:
         number = checked_scalar(each.name, getattr(rig, each.name), each.rule)
         object.__setattr__(rig, each.name, number)

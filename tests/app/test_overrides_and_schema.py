@@ -112,7 +112,7 @@ def test_the_schema_is_that_of_the_reader(schema: dict[str, Any], on_a_rig: dict
     assert set(tables["GMSTable"]["required"]) == {"kind", "law"}
     assert tables["GMSTable"]["properties"]["law"]["enum"] == ["signed", "published"]
     rigs = on_a_rig["properties"]["rig"]["discriminator"]["mapping"]
-    assert set(rigs) == {"prescribed", "record", "slider", "pulled"}
+    assert set(rigs) == {"prescribed", "record", "slider", "pulled", "belt"}
     by_kind, by_chart = on_a_rig["properties"]["model"]["oneOf"]
     assert set(by_kind["discriminator"]["mapping"]) == {"GMS", "LuGre"}
     assert set(by_chart["discriminator"]["mapping"]) == set(registered())

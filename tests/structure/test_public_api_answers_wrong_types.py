@@ -21,6 +21,7 @@ import gms_fsm
 import plots
 from gms_fsm import (
     GMS,
+    Belt,
     Bench,
     Body,
     Chart,
@@ -138,6 +139,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "ChartModel": lambda: ChartModel(CHART, {"k": 1.0}),
     "Slider": lambda: Slider(1.0, "t"),
     "PulledSlider": lambda: PulledSlider(1.0, 1.0, 1.0),
+    "Belt": lambda: Belt(1.0, 1.0, 1.0),
     "Prescribed": lambda: Prescribed("t"),
     "Settings": Settings,
     "System": lambda: SYSTEM,

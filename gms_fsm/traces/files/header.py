@@ -17,17 +17,18 @@ from gms_fsm.systems.files.tables import (
     signal_table,
 )
 from gms_fsm.systems.mounted import Mounted, mounted
-from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider, TextRig
+from gms_fsm.systems.rigs import Belt, Prescribed, PulledSlider, Rig, Slider, TextRig
 from gms_fsm.systems.system import System
 from gms_fsm.traces.verdicts import Verdict
 
 FORMATS = ("gms-fsm trace 1", "gms-fsm trace 2")  # CSV files are of the first
 
-RigKind = Literal["Prescribed", "Slider", "PulledSlider", "custom"]
+RigKind = Literal["Prescribed", "Slider", "PulledSlider", "Belt", "custom"]
 RIGS: Mapping[type, RigKind] = {
     Prescribed: "Prescribed",
     Slider: "Slider",
     PulledSlider: "PulledSlider",
+    Belt: "Belt",
 }
 
 
@@ -69,6 +70,8 @@ class RigTable(Table):
                 return Slider(self.numbers["mass"], signals["F_a"])
             case "PulledSlider":
                 return PulledSlider(**self.numbers)
+            case "Belt":
+                return Belt(**self.numbers)
             case _:
                 return TextRig(self.title, self.acceleration, signals, self.numbers)
 
