@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import itertools
 import json
+import math
 import re
 import string
 import sys
@@ -17,9 +18,9 @@ import pytest
 
 from gms_fsm.app import lessons
 from gms_fsm.app.lessons import LESSONS, Result
-from gms_fsm.app.lessons.engine.lesson import Lesson, grid
+from gms_fsm.app.lessons.engine.lesson import LEVELS, Lesson, grid
 from gms_fsm.app.lessons.engine.notebooks import composed
-from gms_fsm.app.lessons.engine.predict import reveal, vary
+from gms_fsm.app.lessons.engine.predict import Question, judged, vary
 from gms_fsm.errors import MissingExtraError, ParameterError
 from tests.helpers import ROOT, matrix
 from tests.scenario_files import CommandLine, one_message
@@ -27,6 +28,35 @@ from tests.scenario_files import CommandLine, one_message
 FOLDER = ROOT / "docs" / "lessons"
 COUNTED = ("", "elements $n$", "switches found once per step", "elements in slip")  # without a unit
 FORMATTER = string.Formatter()
+# What a reader finds with pencil and paper from the data of a lesson, and what a hasty one says.
+COMPUTED: dict[int, tuple[float | str, ...]] = {
+    0: (28, "either", 1.5 / (2 * 0.1)),
+    1: (0.25 / 40 * 1e3, 0),
+    2: (8 * 0.1 * 0.25 / 1.2, 0),
+    3: (2 / (0.2 * 2 * math.pi / 20), 4),
+    4: (0.4, 0.4 - 0.8 * math.exp(0.1 * 4.9 / 0.4), "more"),
+    5: (100 / (4 * 4**2), 0),
+    6: (1.5, 1.04 - 0.64 * (1.5 - 1.04), (1.5 - 0.75) / 2 / 0.01 + math.pi / math.sqrt(2)),
+    7: ("higher", 50),
+    8: (0, (0.3 + 0.4 + 0.5 + 0.6) * 0.14, "larger"),
+    9: (1.5 / (2 * 0.1), 0, 0.04 / 0.05, 0.5 * 0.75 * (1 - 0.5**2)),
+    10: ("lugre", "gms-published", "gms-signed"),
+    11: ("weights2", math.sqrt(1.95 / 0.05), 2 / 0.5),
+}
+GUESSED: dict[int, tuple[float | str, ...]] = {
+    0: (15, "off", 15),
+    1: (25, 0.01),
+    2: (0, 0.2),
+    3: (1, 48),
+    4: (1.5, -0.4, "same"),
+    5: (25, 50),
+    6: (1, 0.5, 5),
+    7: ("lower", 600),
+    8: (10, 1e-3, "same"),
+    9: (5, 1e-3, 0.4, 0.5),
+    10: ("stiction", "lugre", "elasto-plastic"),
+    11: ("k2", 39, 1),
+}
 Ran = Callable[[int], Result]
 SLOW = sorted({*LESSONS} - {0, 1, 9})
 each_lesson = pytest.mark.parametrize(
@@ -63,18 +93,48 @@ def test_the_five_lines_say_what_was_measured(ran: Ran, number: int) -> None:
 
 
 @each_lesson
-def test_readers_predict_before_the_run_and_compare_after_it(ran: Ran, number: int) -> None:
-    cells = composed(number)
+def test_readers_predict_before_the_run_and_compare_after_it(
+    ran: Ran, number: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cells, questions = composed(number), LESSONS[number].questions
     (run,) = (i for i, (_, text) in enumerate(cells) if "this.run()" in text)
-    asked = "\n".join(text for kind, text in cells[:run] if kind == "code")
-    (answers,) = (text for kind, text in cells[run:] if kind == "code" and "reveal(" in text)
-    assert any("<details>" in text for kind, text in cells[run:] if kind == "markdown")
+    asked = [text for kind, text in cells[:run] if kind == "code"]
+    (compared,) = (text for kind, text in cells[run:] if kind == "code" and "compare(" in text)
+    assert any("<summary>Why?" in text for kind, text in cells[run:] if kind == "markdown")
     names: dict[str, Any] = {"result": ran(number)}
-    exec(asked, names)
-    predictions = [name for name, value in names.items() if value is None]
-    assert len(predictions) >= 2
-    assert re.findall(r"^reveal\((\w+), ", answers, re.MULTILINE) == predictions
-    exec(answers, names)  # every answer can be read from the run
+    exec("\n".join(asked), names)
+    answers = [f"{each.name} = None  # {each.hint}" for each in questions]
+    assert asked[-1].splitlines() == answers
+    assert all(names[each.name] is None for each in questions)
+    exec(compared, names)
+    assert capsys.readouterr().out.count("You predicted nothing. Measured: ") == len(questions)
+
+
+@each_lesson
+def test_every_item_is_a_question_that_the_run_answers(ran: Ran, number: int) -> None:
+    lesson, result = LESSONS[number], ran(number)
+    assert lesson.level in LEVELS
+    items = re.findall(r"^\d+\. ", lesson.words["before"], re.MULTILINE)
+    assert items == [f"{i}. " for i in range(1, len(lesson.questions) + 1)]
+    assert len(items) >= 2
+    for question in lesson.questions:
+        measured = result.values[question.name]
+        assert judged(question, measured, measured)[0], question
+        if question.choices:
+            assert measured in question.choices
+        else:
+            assert bool(question.rtol) != bool(question.atol)
+
+
+@each_lesson
+def test_who_computes_from_what_is_printed_is_right_and_who_does_not_is_not(
+    ran: Ran, number: int
+) -> None:
+    questions, result = LESSONS[number].questions, ran(number)
+    for answers, right in ((COMPUTED[number], True), (GUESSED[number], False)):
+        for question, answer in zip(questions, answers, strict=True):
+            verdict, said = judged(question, answer, result.values[question.name])
+            assert verdict == right, said
 
 
 @pytest.mark.slow
@@ -113,7 +173,7 @@ def test_a_page_without_its_parts_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     broken = ModuleType("broken", "Lesson 12: Nothing.\n\nWhat?\n\nNo sections.")
     monkeypatch.setitem(sys.modules, "broken", broken)
     with pytest.raises(ValueError, match="broken: its docstring is not the page of a lesson"):
-        _ = Lesson("broken", dict, (), grid("a", (1.0, 1.0))).title
+        _ = Lesson("broken", dict, (), grid("a", (1.0, 1.0)), level="school", questions=()).title
     with pytest.raises(AttributeError, match="nothing named shoes was measured"):
         _ = Result(LESSONS[1], {}).shoes
 
@@ -163,7 +223,7 @@ def test_a_notebook_runs_from_top_to_bottom(
     printed = "".join(each.get("text", "") for each in outputs)
     lesson = name.startswith("lesson")
     assert len(pictures) == 1 + text.count('"vary(')
-    assert printed.count("You predicted nothing. Measured: ") == text.count('"reveal(')
+    assert printed.count("You predicted nothing. Measured: ") == text.count(" = None  # ")
     assert (tmp_path / f"{name}_replay.html").is_file() == lesson
     assert lesson or "friction coefficient 0.30" in printed  # the record was made with 0.30
 
@@ -238,20 +298,35 @@ def test_without_the_extras_there_is_the_text_and_a_note(
 @pytest.mark.parametrize(
     ("predicted", "measured", "said"),
     [
-        (6.26, 6.25, "your answer is right"),
-        (3.0, 6.0, "50 % too low"),
-        (9.0, 6.0, "50 % too high"),
-        (-1.0, 6.0, "far off"),
-        (0.0, 0.0, "You predicted 0 N. Measured: 0 N."),
-        ("lower", "higher", "You predicted lower. Measured: higher."),
+        (6.26, 6.25, "Right, within 2 %."),
+        (6.0, 6.25, "Your answer is 4 % too low."),
+        (9.0, 6.0, "Your answer is 50 % too high."),
+        (0.0, 6.0, "Your answer is much too low."),
+        (-1.0, 6.0, "Your answer is too low."),
+        (math.inf, 6.0, "Your answer is too high."),
+        (math.nan, 6.0, "Your answer is too low."),
         (None, 6.0, "You predicted nothing. Measured: 6 N."),
     ],
 )
-def test_a_prediction_is_compared(
-    predicted: Any, measured: Any, said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    reveal(predicted, measured, "N")
-    assert said in capsys.readouterr().out
+def test_a_number_is_right_within_its_tolerance(predicted: Any, measured: Any, said: str) -> None:
+    right, words = judged(Question("F", "N", rtol=0.02), predicted, measured)
+    assert words.endswith(said)
+    assert right == said.startswith("Right")
+
+
+def test_nothing_is_right_for_what_is_rounding() -> None:
+    gap = Question("gap", "N", atol=1e-3)
+    assert judged(gap, 0.0, 5e-8) == (
+        True,
+        "You predicted 0 N. Measured: 5e-08 N. Right, within 0.001 N.",
+    )
+    assert judged(gap, 0.01, 5e-8)[1].endswith("Your answer is too high.")
+
+
+def test_words_are_right_in_any_case() -> None:
+    asked = Question("at_20", choices=("on", "off"))
+    assert judged(asked, " Off ", "off")[0]
+    assert judged(asked, "on", "off") == (False, "You predicted on. Measured: off. Not right.")
 
 
 def test_a_parameter_has_a_slider_where_ipywidgets_is_installed(

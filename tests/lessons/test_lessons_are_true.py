@@ -64,7 +64,7 @@ def test_a_room_warms_and_cools_between_two_exponentials(ran: Ran) -> None:
     close(r.on, first + (cool + heat) * np.arange(r.on.size), rtol=1e-8)
     close(r.off, first + heat + (cool + heat) * np.arange(r.off.size), rtol=1e-8)
     close([r.low, r.high, r.cycle], [19.0, 21.0, cool + heat], rtol=1e-8)
-    assert r.at_middle == "either"
+    assert r.heater_at_20 == "either"
     warming = r.u[r.there] == 1.0
     assert (np.diff(r.T)[r.there] > 0.0).tolist() == warming.tolist()
 
@@ -159,7 +159,7 @@ def test_lugre_drifts_and_gms_does_not_with_springs_only_or_after_a_slip(ran: Ra
     assert log.element.tolist() == [0, 0]
     assert log.z[0] == approx(log.s[0], rel=1e-9)
     lasting = (r.slipping.x - r.slipping.z[:, 0])[r.slipping.t > log.t[1]]
-    assert lasting.min() > 1e-2
+    assert lasting.min() > 1e-3
     assert np.ptp(lasting) < 1e-9  # a spring again
 
 

@@ -66,14 +66,8 @@ from gms_fsm.app.lessons.basics.l0_first_chart import ELEMENT
 ELEMENT
 ```
 
-3. A mass lies on this bristle and is pulled through a spring of 2 N/m, whose end moves at 0.1 m/s.
-   Friction can hold 1.5 N. After how many seconds does the element slip?
-
-```python
-red_to_red = None  # s
-heater_at_20 = None  # "on", "off" or "either"
-first_slip = None  # s
-```
+3. A mass of 1 kg lies on this bristle and is pulled from rest through a spring of 2 N/m, whose end
+   moves at 0.1 m/s. Friction can hold 1.5 N. After how many seconds does the element slip?
 
 ## Measure
 
@@ -83,7 +77,7 @@ Run: the light, and a button that is pressed every {EVERY:g} s; a room that the 
 
 Measured: {heard} of {presses} presses turn the light, and {red_to_red:g} s lie between two reds.
 The heater is switched on at {low:.1f} °C and off at {high:.1f} °C, every {cycle:.1f} s; at 20 °C it
-is {at_middle}: off while the room cools, on while it warms.
+is {heater_at_20}: off while the room cools, on while it warms.
 
 Measured: the element slips first after {slips[0]:.2f} s, bent by {bent!m:.1f} mm, and sticks again
 after {arrests[0]:.2f} s; then it slips every {period:.2f} s. The spring pulls with {pulls[0]:.2f} N
@@ -93,26 +87,13 @@ So: what happens next depends on the state and on what its edges wait for, in a 
 in friction. A room goes to and fro between two temperatures, and the pull of the spring between two
 forces: this is stick-slip.
 
-## Compare
-
-```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
-
-reveal(red_to_red, result.red_to_red, "s")
-reveal(heater_at_20, result.at_middle)
-reveal(first_slip, result.slips[0], "s")
-```
-
-<details>
-<summary>Why?</summary>
+## Why
 
 The light turns amber at 14 s, red at 17 s and green at 29 s. The press at 28 s finds it red: no
 edge out of red waits for it, so it is forgotten, and the next one is at 42 s. Between its two
 limits the thermostat keeps the state that it has; this is called hysteresis. The spring pulls with
 1.5 N after 1.5 / (2 · 0.1) = 7.5 s. The rest is the bristle, which lets the mass creep
 by 15 mm, and its damping.
-
-</details>
 
 ## Read the logs
 
@@ -186,6 +167,7 @@ from gms_fsm import (
 )
 from gms_fsm.app.lessons.basics.l6_stick_slip import MASS, SIGMA_2, SPEED, STIFFNESS, V_S, F_c, F_s
 from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
+from gms_fsm.app.lessons.engine.predict import Question
 from gms_fsm.charts import gms_element
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import INK, LINE_GREY
@@ -295,12 +277,13 @@ def run() -> dict[str, Any]:
     fine = warmed.sample(np.linspace(0.0, ENDS[1], 2001)[1:])
     T, u = fine.value("T"), fine.value("heater.u")
     there = np.flatnonzero(np.diff(T > MIDDLE))
-    at_middle = {frozenset({0.0}): "off", frozenset({1.0}): "on"}.get(frozenset(u[there]), "either")
+    only = {frozenset({0.0}): "off", frozenset({1.0}): "on"}
+    heater_at_20 = only.get(frozenset(u[there]), "either")
 
     pulled = simulate(mass(), ENDS[2])
     replayed, title = {"pulled mass": pulled}, BRISTLE.title
     slips, arrests = times(pulled, "break_away_forward"), times(pulled, "arrest")
-    bent, period = pulled.transitions.z[0], np.diff(slips)[-1]
+    bent, period, first_slip = pulled.transitions.z[0], np.diff(slips)[-1], slips[0]
     ends = pulled.sample([slips[-1], arrests[-1]])
     pulls = STIFFNESS * (SPEED * ends.t - ends.x)
     return locals()
@@ -361,5 +344,14 @@ def _shaded(ax: Any, trace: Trace, state: str) -> None:
 
 
 LESSON = Lesson(
-    __name__, run, (_light, _room, _bend, _speed), grid("a;b;c;d", (8.2, 7.4), (0.5, 1, 1, 1))
+    __name__,
+    run,
+    (_light, _room, _bend, _speed),
+    grid("a;b;c;d", (8.2, 7.4), (0.5, 1, 1, 1)),
+    level="school",
+    questions=(
+        Question("red_to_red", "s", rtol=0.01),
+        Question("heater_at_20", choices=("on", "off", "either")),
+        Question("first_slip", "s", rtol=0.05),
+    ),
 )

@@ -20,15 +20,8 @@ friction, 0.25 N. The contact is pulled slowly from 0, beyond the point where th
 
 1. Where does the first spring slip, in um?
 2. The motion then goes to and fro between reversal points: to A, back to B, up to C, down to D, and
-   up again beyond C and A. How far is the force from its old value when the motion is back at A: 0,
-   a little (0.01 N), or much (0.1 N)?
-
-Write your answers before you run the next cells.
-
-```python
-first_slip = None  # um
-gap_at_a = None  # N
-```
+   up again beyond C and A. How far is the force from its old value when the motion is back at A, in
+   N: 0, a little (0.01), or much (0.1)?
 
 ## Measure
 
@@ -47,23 +40,11 @@ by {lugre_gaps[0]:.3f} N and A by {lugre_gaps[1]:.3f} N.
 So: pre-sliding hysteresis comes from elements that slip one by one, and its memory from those that
 still stick. A single LuGre bristle also makes loops, but they do not close.
 
-## Compare
-
-```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
-
-reveal(first_slip, 1e6 * result.let_go.min(), "um")
-reveal(gap_at_a, abs(result.misses[1]), "N")
-```
-
-<details>
-<summary>Why?</summary>
+## Why
 
 The stiffest spring carries 0.25 N first: 0.25 N / 40 N/mm = 6.25 um. At A the force is that of the
 first visit, because an element that still sticks has returned to its old deflection, and one that
 slips has the same limit as before.
-
-</details>
 
 ## Vary a parameter
 
@@ -109,6 +90,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, Stribeck, simulate
 from gms_fsm.app.lessons.engine.lesson import DOTS, FIRST, GUIDE, Lesson, draw, grid, note
+from gms_fsm.app.lessons.engine.predict import Question
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY
 
@@ -137,9 +119,11 @@ def run() -> dict[str, Any]:
         trace.sample(back).F - trace.sample(turn_times[[2, 0]]).F for trace in (gms, lugre)
     )
     gaps, lugre_gaps = abs(misses), abs(lugre_misses)
+    gap_at_a = gaps[1]
     log, first, plateau = gms.transitions, gms.transitions[0], gms.F[-1]
     let_go = gms.sample([log.t[log.element == i][0] for i in range(gms.n)]).x
     stiffness = first.F_before / let_go[first.element]
+    first_slip = 1e6 * let_go.min()
     fine = gms.refined(4000)
     masing_error = abs(fine.F - masing(fine.t, fine.x, turn_times)).max()
     cycle = (fine.t >= turn_times[0]) & (fine.t <= back[1])
@@ -264,5 +248,10 @@ def _states(ax: Any, r: Any) -> str:
 
 
 LESSON = Lesson(
-    __name__, run, (_closed, _opened, _motion, _states), grid("ab;cc;dd", (8.2, 7.0), (3, 1, 1.1))
+    __name__,
+    run,
+    (_closed, _opened, _motion, _states),
+    grid("ab;cc;dd", (8.2, 7.0), (3, 1, 1.1)),
+    level="undergraduate",
+    questions=(Question("first_slip", "um", rtol=0.02), Question("gap_at_a", "N", atol=1e-3)),
 )

@@ -14,17 +14,13 @@ hardly depends on V. At a high speed the mass no longer comes to rest and slides
 ## Predict
 
 A mass of 1 kg is pulled through a spring of 2 N/m whose end moves at V. Friction is 1.5 N at rest
-and falls to 1 N in sliding.
+and falls to 1 N in sliding, from about 0.05 m/s on; to that comes a viscous friction of
+sigma_2 = 0.4 Ns/m.
 
 1. V = 0.1 m/s: with which force does the spring pull when the mass begins to slide, in N?
-2. And when it comes to rest again, in N? (1 N is not the answer.)
+2. And when it comes to rest again, in N? It swings about the force of sliding, and sigma_2 damps
+   the swing.
 3. At V = 0.01 m/s, how long is a period of stick and slip, in s?
-
-```python
-pull_at_slip = None  # N
-pull_at_stop = None  # N
-period = None  # s
-```
 
 ## Measure
 
@@ -44,26 +40,13 @@ So: stick-slip needs friction that falls with speed, and a slow pull; the wait i
 by V. At {last.V:g} m/s both are possible: started from rest the mass sticks and slips, started in
 motion it keeps sliding.
 
-## Compare
+## Why
 
-```python
-from gms_fsm.app.lessons.basics.l6_stick_slip import SPEED, SPEEDS
-from gms_fsm.app.lessons.engine.predict import reveal, vary
-
-here, slow = result.cycles[SPEEDS.index(SPEED)], result.cycles[0]
-reveal(pull_at_slip, here.pull_at_slip, "N")
-reveal(pull_at_stop, here.pull_at_stop, "N")
-reveal(period, slow.wait + slow.slip, "s")
-```
-
-<details>
-<summary>Why?</summary>
-
-The mass begins to slide at F_s. The surplus F_s - F_c accelerates it, and it overshoots: the spring
-ends about as far below F_c as it began above it, less what is lost on the way. The wait is the time
-to stretch the spring again, here by some 0.36 m, at 0.01 m/s.
-
-</details>
+The mass begins to slide at F_s. The surplus of 0.5 N accelerates it, and it overshoots. Without
+damping the spring would end as far below the force of sliding as it began above it. A mass of 1 kg
+on 2 N/m with 0.4 Ns/m has a damping ratio of 0.4/(2 √2) = 0.14, so that half a swing leaves 64 %:
+from about 0.46 N above 1.04 N to 0.3 N below it, 0.75 N. Friction does not fall at once, so that it
+is a little more. The wait is the time to stretch the spring again by some 0.36 m, at 0.01 m/s.
 
 ## Vary a parameter
 
@@ -106,6 +89,7 @@ import numpy as np
 
 from gms_fsm import GMS, GMSParameters, PulledSlider, Stribeck, Trace, simulate
 from gms_fsm.app.lessons.engine.lesson import GUIDE, Lesson, draw, grid, note, shown, ticks
+from gms_fsm.app.lessons.engine.predict import Question
 from plots.style import INK, LINE_GREY, TEXT_GREY
 
 MASS, STIFFNESS = 1.0, 2.0  # kg, N/m
@@ -147,6 +131,7 @@ def run() -> dict[str, Any]:
     # Long enough for the first pull and three cycles.
     cycles = [last_cycle(pulled(bank(), V, 2.0 / V + 20.0)) for V in SPEEDS]
     here, last = cycles[SPEEDS.index(SPEED)], cycles[-1]
+    pull_at_slip, pull_at_stop, period = here.pull_at_slip, here.pull_at_stop, cycles[0].period
     waits, slips = (np.array([getattr(each, name) for each in cycles]) for name in ("wait", "slip"))
     lengths = waits * SPEEDS
     shortest, longest = lengths.min(), lengths.max()
@@ -251,4 +236,10 @@ LESSON = Lesson(
         _parts,
     ),
     grid("aa;bb;cd", (8.2, 7.8), (1, 0.9, 2)),
+    level="undergraduate",
+    questions=(
+        Question("pull_at_slip", "N", rtol=0.05),
+        Question("pull_at_stop", "N", rtol=0.15),
+        Question("period", "s", rtol=0.1),
+    ),
 )

@@ -6,7 +6,7 @@ import re
 import string
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.util import find_spec
 from inspect import cleandoc
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gms_fsm.app.lessons.engine.predict import Question
 from gms_fsm.traces.trace import Trace
 from plots.style import INK, LINE_GREY, PALE_GREY, TEXT_GREY, compared_look
 
@@ -24,10 +25,12 @@ if TYPE_CHECKING:
 
 PAGE = re.compile(
     r"Lesson (?P<number>\d+): (?P<title>.+?)\.\n\n(?P<question>[^\n]+\?)\n\n"
-    r"(?P<explanation>.+?)\n\n(?P<before>## Predict\n.+?)\n\n"
-    r"## Measure\n\n(?P<said>.+?)\n\n(?P<after>## .+)",
+    r"(?P<explanation>.+?)\n\n## Predict\n\n(?P<before>.+?)\n\n"
+    r"## Measure\n\n(?P<said>.+?)\n\n## Why\n\n(?P<why>.+?)\n\n"
+    r"(?P<after>.*?)## Try\n\n(?P<tasks>.+?)(?:\n\n## Solutions\n\n(?P<solutions>.+))?",
     re.DOTALL,
 )
+LEVELS = ("school", "undergraduate", "graduate")
 FACTORS = {"m": 1e3, "u": 1e6, "p": 100.0, "k": 1e-3}  # {x!m} is x in thousandths; p: percent
 
 FASTEST = "compiled" if find_spec("llvmlite") else "ifelse"  # the same bits, forty times faster
@@ -60,8 +63,9 @@ class Lesson:
     """A question that is answered by a run.
 
     Its words are the docstring of its module: a title, a question and what happens, then sections
-    *Predict*, *Measure* and what follows. *Measure* is four paragraphs: the runs, two with measured
-    values, the conclusion. The numbers in braces are those of the run, or of the module.
+    *Predict* (its numbered items are the questions), *Measure*, *Why*, others, *Try*, and
+    *Solutions* of what to try, if it has them. *Measure* is four paragraphs: the runs, two with
+    measured values, the conclusion. The numbers in braces are those of the run, or of the module.
 
     Parameters
     ----------
@@ -74,20 +78,26 @@ class Lesson:
         ``panel(axes, result)`` draws, and returns the title of the panel.
     sheet : callable
         Makes the figure, for example `grid`.
+    level : {"school", "undergraduate", "graduate"}
+        For whom it is.
+    questions : tuple of Question
+        What is predicted, in the order of the items of *Predict*.
     """
 
     module: str
     measure: Callable[[], Mapping[str, Any]]
     panels: tuple[Panel, ...]
     sheet: Sheet
+    level: str = field(kw_only=True)
+    questions: tuple[Question, ...] = field(kw_only=True)
 
     @cached_property
     def words(self) -> Mapping[str, str]:
-        """The parts of the page by name: number, title, question, explanation, before, after."""
+        """The parts of the page by name: number, title, question, explanation, before, why ..."""
         found = PAGE.fullmatch(cleandoc(sys.modules[self.module].__doc__ or ""))
         if not found:
             raise ValueError(f"{self.module}: its docstring is not the page of a lesson")
-        return found.groupdict()
+        return {name: text or "" for name, text in found.groupdict().items()}
 
     @property
     def title(self) -> str:

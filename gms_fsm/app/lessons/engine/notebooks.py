@@ -12,7 +12,7 @@ from __future__ import annotations
 import inspect
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -21,6 +21,7 @@ from gms_fsm.app.lessons import lesson
 from gms_fsm.foundation.files import output_folder, write_text
 
 TEMPLATE = Template(Path(__file__).with_name("notebook.md").read_text(encoding="utf-8"))
+SOLUTIONS = "<details>\n<summary>Solutions</summary>\n\n{}\n\n</details>\n\n"
 NEW = "<!-- a new cell -->\n"
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
 # Left out of cells: comments, and pictures, which the cells draw themselves.
@@ -55,9 +56,29 @@ def composed(number: int) -> tuple[Cell, ...]:
     """
     chosen = lesson(number)
     words = dict(chosen.words) | {"explanation": _escaped(chosen.words["explanation"])}
-    source = inspect.getsource(chosen.measure)
-    page = TEMPLATE.substitute(words, module=chosen.module, source=source)
+    if words["solutions"]:
+        words["solutions"] = SOLUTIONS.format(words["solutions"])
+    page = TEMPLATE.substitute(
+        words,
+        module=chosen.module,
+        source=inspect.getsource(chosen.measure),
+        answers="".join(f"{each.name} = None  # {each.hint}\n" for each in chosen.questions),
+        compared=_compared([each.name for each in chosen.questions], words["after"]),
+    )
     return tuple(cell for part in page.split(NEW) for cell in cells_of(part))
+
+
+def _compared(names: Iterable[str], after: str) -> str:
+    """Return the cell that compares the answers, and imports what the cells after it call."""
+    called = "compare, vary" if "vary(" in after else "compare"
+    answers = "".join(f"    {name}={name},\n" for name in names)
+    return f"""\
+from gms_fsm.app.lessons.engine.predict import {called}
+
+compare(
+    result,
+{answers})
+"""
 
 
 def cells_of(text: str) -> tuple[Cell, ...]:

@@ -1,44 +1,120 @@
-"""What the cells of a lesson's notebook call: predictions are compared, a parameter is varied."""
+"""Questions: what a reader predicts, and the verdict. A slider for the notebooks of lessons."""
 
 from __future__ import annotations
 
 import inspect
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gms_fsm.app.lessons.engine.lesson import Result
 
 
-def reveal(predicted: float | str | None, measured: float | str, unit: str = "") -> None:
-    """Print what was predicted next to what was measured.
+@dataclass(frozen=True)
+class Question:
+    """What a reader predicts before a run, and when the prediction is right.
+
+    Parameters
+    ----------
+    name : str
+        What a notebook calls the answer; the run measures a value of the same name.
+    unit : str
+        Of both, if they are numbers.
+    choices : tuple of str
+        The possible answers, if they are words.
+    rtol, atol : float
+        A number is right within ``max(atol, rtol * abs(measured))``. Where the physics says "none",
+        what is measured is rounding, and only `atol` counts.
 
     Examples
     --------
-    >>> reveal(5.0, 6.25, "um")
-    You predicted 5 um. Measured: 6.25 um; your answer is 20 % too low.
-    >>> reveal("open", "closed")
-    You predicted open. Measured: closed.
-    >>> reveal(None, 6.25, "um")
-    You predicted nothing. Measured: 6.25 um.
+    >>> Question("first_slip", "um", rtol=0.05).hint, Question("lag", choices=("yes", "no")).hint
+    ('um, within 5 %', '"yes" or "no"')
     """
-    answer = "nothing" if predicted is None else _said(predicted, unit)
-    print(f"You predicted {answer}. Measured: {_said(measured, unit)}{_off(predicted, measured)}.")
+
+    name: str
+    unit: str = ""
+    choices: tuple[str, ...] = ()
+    rtol: float = 0.0
+    atol: float = 0.0
+
+    @property
+    def tolerance(self) -> str:
+        """Within what a number is right."""
+        parts = [f"{100 * self.rtol:.3g} %"] * bool(self.rtol)
+        parts += [f"{self.atol:g} {self.unit}".rstrip()] * bool(self.atol)
+        return " or ".join(parts)
+
+    @property
+    def hint(self) -> str:
+        """What an answer looks like."""
+        if self.choices:
+            *others, last = (f'"{each}"' for each in self.choices)
+            return f"{', '.join(others)} or {last}"
+        return ", ".join(filter(None, [self.unit, f"within {self.tolerance}"]))
+
+
+def judged(
+    question: Question, predicted: float | str | None, measured: float | str
+) -> tuple[bool, str]:
+    """Return whether a prediction is right, and what is said of it.
+
+    Examples
+    --------
+    >>> slip = Question("first_slip", "um", rtol=0.05)
+    >>> judged(slip, 5.0, 6.25)
+    (False, 'You predicted 5 um. Measured: 6.25 um. Your answer is 20 % too low.')
+    >>> judged(Question("gap", "N", atol=1e-3), 0, 5e-8)
+    (True, 'You predicted 0 N. Measured: 5e-08 N. Right, within 0.001 N.')
+    >>> judged(Question("at_20", choices=("on", "off")), "on", "off")
+    (False, 'You predicted on. Measured: off. Not right.')
+    """
+    unit = question.unit
+    if predicted is None:
+        return False, f"You predicted nothing. Measured: {_said(measured, unit)}."
+    head = f"You predicted {_said(predicted, unit)}. Measured: {_said(measured, unit)}."
+    if isinstance(predicted, str) or isinstance(measured, str):
+        right = str(predicted).strip().casefold() == str(measured).casefold()
+        return right, f"{head} {'Right.' if right else 'Not right.'}"
+    off = _off(float(predicted), float(measured), question.rtol, question.atol)
+    return not off, f"{head} {off or f'Right, within {question.tolerance}'}."
+
+
+def compare(result: Result, **predictions: float | str | None) -> None:
+    """Print what was predicted, what was measured, and the verdict, question by question.
+
+    Examples
+    --------
+    >>> from gms_fsm.app.lessons import lesson
+    >>> result = lesson(9).run()
+    >>> compare(result, released=7.5, speed_while_stuck=0)
+    You predicted 7.5 s. Measured: 7.5 s. Right, within 2 %.
+    You predicted 0 m/s. Measured: 0 m/s. Right, within 1e-09 m/s.
+    """
+    for question in result.lesson.questions:
+        if question.name in predictions:
+            print(judged(question, predictions[question.name], result.values[question.name])[1])
 
 
 def _said(value: float | str, unit: str) -> str:
     return value if isinstance(value, str) else f"{value:.4g} {unit}".rstrip()
 
 
-def _off(predicted: float | str | None, measured: float | str) -> str:
-    if predicted is None or isinstance(predicted, str) or isinstance(measured, str) or not measured:
+def _off(predicted: float, measured: float, rtol: float, atol: float) -> str:
+    """Return in words how far a number is off, or nothing; `judge.js` says the same."""
+    if abs(predicted - measured) <= max(atol, rtol * abs(measured)):
         return ""
-    error = 100 * (predicted / measured - 1)
-    if abs(error) < 0.5:
-        return "; your answer is right"
-    if not math.isfinite(error) or predicted / measured < 0 or abs(error) > 900:
-        return "; your answer is far off"
-    return f"; your answer is {abs(error):.0f} % too {'high' if error > 0 else 'low'}"
+    side = "high" if predicted > measured else "low"
+    if not math.isfinite(predicted) or abs(measured) <= atol or predicted * measured < 0:
+        return f"Your answer is too {side}"
+    ratio = predicted / measured
+    if 0.1 < ratio < 10:
+        return f"Your answer is {100 * abs(ratio - 1):.0f} % too {side}"
+    return f"Your answer is much too {side}"
 
 
 def vary(

@@ -22,18 +22,19 @@ remember the reversal. Its published law has the wrong sign for v < 0 (lesson 4)
 
 ## Predict
 
-Five models with the same friction are put on one bench: `stiction` (a contact that locks), `lugre`,
-`elasto-plastic`, `gms-signed` (four elements) and `gms-published`.
+Five models with the same friction are put on one bench:
+
+- `stiction`: the contact locks; it has no deflection;
+- `lugre`: one deflection z, which yields at any load: dz = v - sigma_0 |v| z / s(v);
+- `elasto-plastic`: the same, but elastic, dz = v, up to a break-away deflection;
+- `gms-signed`: four deflections, each elastic up to its own threshold; beyond it
+  dz = C (sgn(v) - z / s), which follows s(v) with a delay;
+- `gms-published`: the same, but dz = sgn(v) C (1 - z / s), which for v < 0 drives z away from s.
 
 1. Which one creeps under a load far below break-away, when it is shaken?
 2. Which one makes energy in a cycle?
-3. Which is the simplest one that rests, lags and remembers reversals?
-
-```python
-creeps = None  # "lugre" or another
-makes_energy = None
-does_all = None
-```
+3. Which one does all of this: it rests under that load; its friction is higher while the speed
+   rises than while it falls; an inner loop closes where it began; it makes no energy?
 
 ## Measure
 
@@ -55,24 +56,10 @@ So: choose the model with the fewest state variables that shows what matters and
 For a contact that rests: {chosen[0]}; that also lags: {chosen[1]}; that also remembers reversals:
 {chosen[2]}.
 
-## Compare
-
-```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
-from gms_fsm.app.lessons.practice.l10_which_model import MODELS
-
-reveal(creeps, max(MODELS, key=lambda model: result.number(model, "drift")))
-reveal(makes_energy, max(MODELS, key=lambda model: result.number(model, "passivity")))
-reveal(does_all, result.choice(["drift", "lag", "memory"]))
-```
-
-<details>
-<summary>Why?</summary>
+## Why
 
 LuGre has one deflection that yields under any load. The published law has the wrong sign for v < 0.
 Memory of reversals needs elements that still stick while others slip: a bank.
-
-</details>
 
 ## Choose a model
 
@@ -160,6 +147,7 @@ from typing import Any
 
 from gms_fsm import PhenomenaTable, measure_phenomena
 from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, Result, note
+from gms_fsm.app.lessons.engine.predict import Question
 from gms_fsm.phenomena.limits import LIMITS
 from gms_fsm.phenomena.measure import Bench
 from gms_fsm.phenomena.presliding import nested as inner_loops
@@ -202,6 +190,10 @@ def run() -> dict[str, Any]:
     choice = partial(smallest, table, states)
     wanted = (["drift"], ["drift", "lag"], ["drift", "lag", "memory"])
     chosen = [f"{model} ({states[model]})" for model in map(choice, wanted)]
+    creeps, makes_energy = (
+        max(MODELS, key=lambda model: number(model, each)) for each in ("drift", "passivity")
+    )
+    does_all = choice(["drift", "lag", "memory"])
     return locals()
 
 
@@ -273,4 +265,13 @@ def _energy(ax: Any, r: Any) -> str:
     return "energy in three cycles"
 
 
-LESSON = Lesson(__name__, run, (_drift, _memory, _energy), _sheet)
+LESSON = Lesson(
+    __name__,
+    run,
+    (_drift, _memory, _energy),
+    _sheet,
+    level="graduate",
+    questions=tuple(
+        Question(name, choices=MODELS) for name in ("creeps", "makes_energy", "does_all")
+    ),
+)

@@ -24,18 +24,12 @@ fit is to find k1, k2, weights1 and weights2 again.
 
 1. From a sine of ±160 µm the fit has R² = 0.9998. Which of the four parameters is nevertheless
    unknown?
-2. The noise of a second record is correlated by 0.95 from one row to the next. For how many
-   independent rows do 100 of its rows count?
-3. By which factor are intervals too short if all rows are taken for independent?
-4. In a third fit F_c is free as well. Two fits begin at F_c = 0.5 N and 2 N. What is the ratio of
-   the values of F_c that they find?
-
-```python
-unknown = None  # "k1" or another
-of_a_hundred = None
-too_short = None
-ratio = None
-```
+2. The noise of a second record is correlated by a = 0.95 from one row to the next: n of its rows
+   count for n (1 - a)/(1 + a). By which factor are intervals too short if all rows are taken for
+   independent?
+3. In a third fit F_c and F_s are free as well. A threshold is weight times s(v), and s(v) is
+   proportional to F_c and F_s. Two fits begin at F_c = 0.5 N and 2 N. What is the ratio of the
+   values of F_c that they find?
 
 ## Measure
 
@@ -59,35 +53,20 @@ of {thresholds} µm. They say: {weakest}.
 So: a good fit is no evidence for its numbers. Ask which elements slipped, count effective rows, fix
 one factor of each product, and design the motion before measuring.
 
-## Compare
-
-```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
-
-rows = result.correlated.training["rows"]
-found = [each["F_c"].value for each in result.products]
-reveal(unknown, ", ".join(result.on_sine.open))
-reveal(of_a_hundred, 100 * result.correlated.effective_rows / rows)
-reveal(too_short, result.too_short)
-reveal(ratio, max(found) / min(found))
-```
-
-<details>
-<summary>Why?</summary>
+## Why
 
 An element slips once it is deflected by its threshold. With ±160 µm the second element is a spring:
 every threshold above 160 µm gives the same force, and the fit returns the value at which it began.
 
 n rows count for n (1 - 0.95)/(1 + 0.95), about 1 in 39; intervals are therefore √39 = 6.2 times
-longer. The estimate from one record scatters around that. It is on the safe side here: it takes the
-noise at its slowest, where it is largest, and the motion is faster.
+longer. A fit estimates the correlation from its residuals, so that its factor scatters around that.
 
 Every threshold is w s(v). With twice the curve s(v) and half the weights w nothing changes, so that
 the ratio of the two values of F_c is that of the starts: the fit has no reason to move.
 
-</details>
+## What the tables say
 
-The tables say so. Each fit names what cannot be told, and the direction that changes the force
+Each fit names what cannot be told, and the direction that changes the force
 least:
 
 ```python
@@ -172,6 +151,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.app.lessons.engine.lesson import DOTS, FASTEST, GUIDE, Lesson, grid, note, ticks
+from gms_fsm.app.lessons.engine.predict import Question
 from gms_fsm.charts.parameters import FloatArray
 from plots.style import INK, LINE_GREY, PALE_GREY, TEXT_GREY
 
@@ -204,6 +184,7 @@ def run() -> dict[str, Any]:
 
     white = recorded(motion, 0.0, 2)
     designed, correlated = fitted(white), fitted(recorded(motion, CORRELATION, 3))
+    unknown = ", ".join(on_sine.open)
     opened, wide = designed.open or "nothing", _half(designed, "weights2")
     ends = np.array([(designed[name].low, designed[name].high) for name in NAMES])
     hits = ((ends[:, 0] <= TRUTH) & (ends[:, 1] >= TRUTH)).sum()
@@ -221,6 +202,7 @@ def run() -> dict[str, Any]:
     free = ("k", "weights", "F_c", "F_s")
     products = [fitted(white, bank(START, scale), free) for scale in BEGINNINGS]
     found = [(each["F_c"].value, each["weights1"].value) for each in products]
+    ratio = max(F for F, _ in found) / min(F for F, _ in found)
     pairs = " and ".join(f"F_c = {F:.3g} N with weights1 = {1e6 * w:.4g} µm/N" for F, w in found)
     thresholds = " and ".join(f"{1e6 * F * w:.2f}" for F, w in found)
     # What the first of them says of the direction that changes the force least.
@@ -424,4 +406,10 @@ LESSON = Lesson(
         *(_weights, _residuals, _intervals, _product),
     ),
     grid("abc;def", (8.8, 6.4)),
+    level="graduate",
+    questions=(
+        Question("unknown", choices=NAMES),
+        Question("too_short", rtol=0.3),
+        Question("ratio", rtol=0.1),
+    ),
 )

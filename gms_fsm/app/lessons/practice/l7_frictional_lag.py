@@ -12,17 +12,13 @@ follow. Above w = C/s they follow less and less, and the loop closes again.
 
 ## Predict
 
-A contact slides at 1.5 + cos(w t) mm/s and never stops. In steady sliding friction falls with
-speed.
+A contact slides at 1.5 + cos(w t) mm/s and never stops. In steady sliding friction is s(v), which
+falls with the speed; here it is about 1 N. After a change of the speed the deflections follow s(v)
+with the time constant s/C, C = 50 N/s.
 
 1. While it accelerates, is the friction "higher", "lower", or the "same" as while it decelerates,
    at the same speed?
 2. From 1 to 600 rad/s: at which w is the loop of friction over speed widest, in rad/s?
-
-```python
-accelerating = None  # "higher", "lower" or "same"
-widest = None  # rad/s
-```
 
 ## Measure
 
@@ -40,24 +36,11 @@ rad/s.
 So: friction depends on the speed a time s/C ago. "Wider with frequency" holds up to about w = C/s;
 the frequency of the widest loop reveals C.
 
-## Compare
-
-```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
-from gms_fsm.app.lessons.practice.l7_frictional_lag import OMEGAS
-
-reveal(accelerating, "higher" if min(result.widths) > 0 else "lower")
-reveal(widest, OMEGAS[int(result.widths.argmax())], "rad/s")
-```
-
-<details>
-<summary>Why?</summary>
+## Why
 
 The deflections follow s(v) with the time constant s/C, 1 N / 50 N/s = 20 ms. While the speed rises
 the friction is still that of a lower speed, which is higher. Below w = C/s the delay grows with w;
 above it the deflections hardly move any more.
-
-</details>
 
 ## Vary a parameter
 
@@ -97,6 +80,7 @@ import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, Trace, simulate
 from gms_fsm.app.lessons.engine.lesson import BROAD, DOTS, GUIDE, Lesson, grid, note, ticks
+from gms_fsm.app.lessons.engine.predict import Question
 from plots.style import ELEMENT_DASHES, INK, LINE_GREY, ramp
 
 MEAN, SWING = 1.5e-3, 1e-3  # m/s: v = MEAN + SWING cos(w t), never zero
@@ -123,6 +107,7 @@ def run() -> dict[str, Any]:
     widths = np.array([loop.F[750] - loop.F[250] for loop in loops.values()])
     width = dict(zip(OMEGAS, widths, strict=True))
     widest = max(width, key=lambda w: float(width[w]))
+    accelerating = "higher" if widths.min() > 0 else "lower"
     said_widths = [f"{1e3 * width[w]:.1f} mN at {w:g} rad/s" for w in SHOWN]
     count, fastest, corner = len(OMEGAS), OMEGAS[-1], C / STRIBECK.F_c
     at_widest, at_100, at_600 = width[widest], width[100.0], width[600.0]
@@ -177,4 +162,14 @@ def _widths(ax: Any, r: Any) -> str:
     return "width of the loop"
 
 
-LESSON = Lesson(__name__, run, (_loops, _widths), grid("ab", (8.2, 4.8), widths=(1.5, 1)))
+LESSON = Lesson(
+    __name__,
+    run,
+    (_loops, _widths),
+    grid("ab", (8.2, 4.8), widths=(1.5, 1)),
+    level="undergraduate",
+    questions=(
+        Question("accelerating", choices=("higher", "lower", "same")),
+        Question("widest", "rad/s", rtol=0.3),
+    ),
+)

@@ -19,18 +19,15 @@ residuals of both figures of the paper within a factor of 10. What the paper ran
 ## Predict
 
 One chart is run twice: by state machines, and by if-else code made from the same chart. Every
-number of the two traces is compared.
+number of the two traces is compared. The element forces are k z + sigma dz: in stick dz = v, and an
+element that begins to slip at z = s has dz = 0. The four sigma are 0.3, 0.4, 0.5 and 0.6 Ns/m; all
+break away together at v = 0.14 m/s.
 
 1. How many differ, with the same driver and located switches?
 2. Now the if-else code evaluates its guards once per step of 1 ms. How large is the largest
    difference of the force just after the first break-away, in N?
-3. And in the whole run of 30 s, in N?
-
-```python
-numbers_that_differ = None
-spike = None  # N
-largest = None  # N
-```
+3. At 12.5 s the motion reverses, and |v| is small enough for the elements to arrest for 50 us. Is
+   the largest difference after that "smaller", the "same" or "larger" than at the break-away?
 
 ## Measure
 
@@ -54,25 +51,12 @@ outputs are held. Steps of {PAPER_STEP!m:g} ms explain the shape of the paper's 
 the spikes, but here it is {smaller:.0f} times smaller; outputs held for {PAPER_STEP!m:g} ms explain
 it within a factor of {within:.0f}.
 
-## Compare
-
-```python
-from gms_fsm.app.lessons.engine.predict import reveal
-
-reveal(numbers_that_differ, result.differ[0])
-reveal(spike, result.between(4.9, 5.0).max(), "N")
-reveal(largest, result.between(0.0, 30.0).max(), "N")
-```
-
-<details>
-<summary>Why?</summary>
+## Why
 
 Both are made from one chart, so the same driver gives the same bits. A guard that is evaluated up
 to 1 ms late leaves the force of the old state for that time: a spike of the size of the drop at
-break-away. At a reversal the window |v| <= v_c is missed altogether, and from there on the two runs
-are different motions.
-
-</details>
+break-away, 1.8 Ns/m times 0.14 m/s. At a reversal the window |v| <= v_c is missed altogether, and
+from there on the two runs are different motions.
 
 ## The if-else text
 
@@ -111,6 +95,7 @@ from gms_fsm.app.lessons.engine.lesson import (
     grid,
     note,
 )
+from gms_fsm.app.lessons.engine.predict import Question
 from gms_fsm.app.paper import FORCE, HELD_STEPS, PAPER_RTOL, PAPER_STEP, VELOCITY
 from gms_fsm.app.paper.claims import differing_numbers, force_difference
 from gms_fsm.app.paper.held import OSCILLATION, PAPERS_FORCE, PAPERS_PLACE, RAMP, lag_of
@@ -148,6 +133,7 @@ def run() -> dict[str, Any]:
         return np.abs(residual[(t > begin) & (t < end)])
 
     spike, diverged = abs(residual[t == first])[0], between(arrest, END).max()
+    numbers_that_differ, at_reversal = differ[0], "larger" if diverged > spike else "smaller"
     before, after = np.median(between(0.0, 4.9)), np.median(between(LOOK, arrest - 0.1))
     late, left = np.array([_late(step, chart) for step in STEPS]).T
     late_for_the_papers = PAPERS * np.median(late / left)  # they are proportional
@@ -245,4 +231,10 @@ LESSON = Lesson(
     run,
     (forces, _residual, _breakaway, _lateness, _held_over_time, _held_over_period),
     grid("aa;bb;cd;ef", (8.2, 10.6), (1, 1.2, 1.5, 1.5)),
+    level="graduate",
+    questions=(
+        Question("numbers_that_differ", atol=0.5),
+        Question("spike", "N", rtol=0.1),
+        Question("at_reversal", choices=("smaller", "same", "larger")),
+    ),
 )

@@ -22,20 +22,13 @@ merely small. Each of these statements is checked here on a run, against a formu
 
 ## Predict
 
-1. A mass with Coulomb stiction (F_s = 1.5 N) is pulled through a spring of 2 N/m at 0.1 m/s. When
-   is it released, in s?
+1. A mass with Coulomb stiction (F_s = 1.5 N) is pulled from rest through a spring of 2 N/m at
+   0.1 m/s. When is it released, in s?
 2. What is the largest speed it has while it is stuck, in m/s?
-3. A motor turns a load through a gear with 0.04 rad of backlash at 0.05 rad/s. How long is the
-   load without contact at a reversal, in s?
+3. A motor turns a load through a gear at 0.05 rad/s, to and fro. A tooth has 0.04 rad to cross from
+   one flank to the other. How long is the load without contact at a reversal, in s?
 4. A mass of 1 kg at 1 m/s hits one of 3 kg at rest; the restitution is 0.5. How much energy is
    lost, in J?
-
-```python
-released = None  # s
-speed_while_stuck = None  # m/s
-dead_time_of_gear = None  # s
-lost = None  # J
-```
 
 ## Measure
 
@@ -58,25 +51,11 @@ So: whatever switches is a contact, a chart on a relative velocity; whatever mov
 exchange stiction for a bank, or a clutch for a bearing, exchange the chart: the bodies stay as they
 are.
 
-## Compare
-
-```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
-
-reveal(released, result.released, "s")
-reveal(speed_while_stuck, abs(result.speeds_while_stuck).max(), "m/s")
-reveal(dead_time_of_gear, result.gap_time, "s")
-reveal(lost, -result.gained[0], "J")
-```
-
-<details>
-<summary>Why?</summary>
+## Why
 
 The spring needs F_s/(K V) = 7.5 s to pull with 1.5 N. A lock holds the velocity at 0, exactly. The
 motor crosses 0.04 rad at 0.05 rad/s in 0.8 s; the damping of the flanks adds 2 ms. An impact loses
 (1 - e²)/2 of the reduced mass, 0.75 kg, times the speed squared: 0.28 J.
-
-</details>
 
 ## A system as code
 
@@ -141,6 +120,7 @@ import numpy as np
 from gms_fsm import Body, Contact, Spring, System, Trace, simulate
 from gms_fsm.app.lessons.basics.l6_stick_slip import SIGMA_2, F_c, F_s, bank
 from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, draw, grid, note
+from gms_fsm.app.lessons.engine.predict import Question
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.systems.parts import Motion
@@ -238,6 +218,7 @@ def run() -> dict[str, Any]:
     replayed = {"stiction": stiction, "GMS bank": bristles}
     speeds_while_stuck = stiction.v[stiction.states[:, 0] == "stuck"]
     rows, fastest = speeds_while_stuck.size, abs(speeds_while_stuck).max()
+    speed_while_stuck = fastest
     released, due = float(stiction.transitions.t[0]), F_s / (STIFFNESS * SPEED)
     slips = np.flatnonzero((bristles.states == "slip").all(axis=1))[0]
     crept = bristles.t[slips], bristles.x[slips]
@@ -246,6 +227,7 @@ def run() -> dict[str, Any]:
     turned = simulate(gear(), 2 * PERIOD)
     dead = dead_times(turned)
     gap_time, gap_due = np.diff(dead).mean(), dead_time()
+    dead_time_of_gear = gap_time
 
     hit = simulate(impact(), 0.3, initial={"one.v": PUSH})
     closed = simulate(clutch(), 2.0, initial={"one.v": SPUN})
@@ -254,6 +236,7 @@ def run() -> dict[str, Any]:
     momentum, spin = (_total(inertias, trace) for trace, inertias in pairs)
     moved = np.ptp(momentum), np.ptp(spin)
     gained = [np.diff(0.5 * _total(m, trace, 2)[[0, -1]])[0] for trace, m in pairs]
+    lost = -gained[0]
     return locals()
 
 
@@ -347,4 +330,11 @@ LESSON = Lesson(
     run,
     (_moving, _states, _before, _gear, *(partial(_both, pair=pair) for pair in PAIRS)),
     grid("ac;bc;dd;ef", (8.2, 8.6), (1.6, 0.5, 1.8, 1.8)),
+    level="undergraduate",
+    questions=(
+        Question("released", "s", rtol=0.02),
+        Question("speed_while_stuck", "m/s", atol=1e-9),
+        Question("dead_time_of_gear", "s", rtol=0.02),
+        Question("lost", "J", rtol=0.02),
+    ),
 )
