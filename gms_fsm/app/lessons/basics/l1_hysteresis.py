@@ -78,6 +78,14 @@ vary(inner_loop, 0, -20, 18, 1, "b [µm]")
 - How far back must b be before an element slips backward? Derive it from `PARAMETERS.weights`.
 - Add an element to the bank (`GMSParameters.from_shares`). Where does the loop change?
 - Run the same strokes with `LuGre` and look at the circle.
+
+## Solutions
+
+- The first element slips backward after 2 s_1 = 2 · 0.25 N / 40 N/mm = 12.5 um, so when b is below
+  20 - 12.5 = 7.5 um.
+- The first loading has one more corner, at the deflection s_i of the new element; each branch has
+  one at 2 s_i from its reversal.
+- The last stroke misses the circle: on the way to 0 and back LuGre loses 0.10 N.
 """
 
 from __future__ import annotations

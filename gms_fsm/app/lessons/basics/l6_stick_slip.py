@@ -78,6 +78,15 @@ vary(pulled, 0.05, 0.02, 0.3, 0.01, "V [m/s]")
 - At which speed does stick-slip end? Does a stiffer spring raise or lower that speed?
 - Remove the Stribeck curve: `bank(F_s=1.0)`.
 - With v_s = 1e-3 m/s it never comes to rest again. Why? Look at v just before break-away.
+
+## Solutions
+
+- Started from rest the mass sticks and slips up to 0.21 m/s. A stiffer spring lowers that speed: it
+  is 0.14 m/s with 8 N/m. The surplus of 0.5 N lasts for a shorter way, so the swing is smaller.
+- With F_s = F_c there is no surplus, and the mass slides on at V: no arrests.
+- The bristles creep at 2 mm/s when the first element breaks away, and at 23 mm/s when the last one
+  does. That is far beyond 1e-3 m/s: friction is down at F_c before the mass slides, as without a
+  Stribeck curve.
 """
 
 from __future__ import annotations

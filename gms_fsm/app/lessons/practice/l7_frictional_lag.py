@@ -69,6 +69,13 @@ vary(loop, 45.0, 0.0, 2.7, 0.05, "w [rad/s]", log=True)
 
 - Double C. At which frequency is the loop widest now?
 - In which direction is the loop traversed? Does it depend on the frequency?
+
+## Solutions
+
+- At twice the frequency, 90 rad/s, and it is as wide as before: only the product of w and s/C
+  counts.
+- Clockwise with v to the right: on the way to higher speeds friction is above the steady curve, on
+  the way back below it. A delay has one direction, whatever the frequency.
 """
 
 from __future__ import annotations

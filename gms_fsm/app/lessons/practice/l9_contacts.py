@@ -108,6 +108,18 @@ vary(with_gap, 0.02, 0.005, 0.05, 0.005, "gap [rad]")
   still?
 - Damp the flanks twenty times as much (`FLANK`, d = 8). Why does the formula for the dead time
   fail? Look at the speed of the load when the flank lets go.
+
+## Solutions
+
+- 0.375 J and 0.071 J: (1 - e²)/2 times the reduced mass, m_1 m_2/(m_1 + m_2) = 0.75 kg, times the
+  speed squared.
+- The contact takes P from the first shaft and gives 3 P to the second: 3 J_1 w_1 + J_2 w_2 is kept.
+  With 10 rad/s at the start the shafts turn at 8.18 and 2.73 rad/s.
+- No: the load moves on the bristles of the bank, in a bank of 100 Nm/rad by 0.45 mrad while it has
+  no contact.
+- The formula assumes that the load stands still when the flank lets go, and lets it go 40 ms early.
+  But the flank is pressed in by no more than 0.1 Nm / 200 Nm/rad, which the motor takes back in
+  10 ms; it lets go at once, while the load still turns at 0.05 rad/s. The dead time is 0.809 s.
 """
 
 from __future__ import annotations
