@@ -25,7 +25,17 @@ from gms_fsm.app.lessons.engine.lesson import Lesson, Result
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
 from gms_fsm.foundation.files import output_folder, write_text
 
-__all__ = ["LESSONS", "Lesson", "Result", "Taught", "lesson", "listed", "numbered", "teach"]
+__all__ = [
+    "LESSONS",
+    "Lesson",
+    "Result",
+    "Taught",
+    "lesson",
+    "listed",
+    "numbered",
+    "teach",
+    "write_page",
+]
 
 
 def _found() -> Mapping[int, Lesson]:
@@ -158,6 +168,37 @@ def teach(number: int, folder: str | Path) -> Taught:
         except MissingExtraError as error:
             warnings.warn(f"no {kind} was written: {error}", stacklevel=2)
     return Taught(result.lines(), tuple(files))
+
+
+def write_page(number: int, folder: str | Path) -> Path:
+    """Run a lesson and write it as one live page: predict, be judged, drag, read why.
+
+    Parameters
+    ----------
+    number : int
+        For example 6.
+    folder : str or Path
+        Output folder for ``lesson_6_live.html``.
+
+    Returns
+    -------
+    Path
+        The page, which needs no network.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such lesson.
+    OutputError
+        If the folder cannot be written.
+    MissingExtraError
+        If uPlot or matplotlib is not installed.
+    """
+    from gms_fsm.app.lessons.engine.page import live_page
+
+    chosen, name = lesson(number), f"lesson_{number}_live.html"
+    folder = output_folder(folder, [name])
+    return live_page(chosen.run()).save(folder / name)
 
 
 def _draw(result: Result, paths: list[Path]) -> list[Path]:

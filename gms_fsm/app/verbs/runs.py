@@ -307,11 +307,17 @@ def lesson_command(
     notebook: Annotated[
         bool, typer.Option("--notebook", help="Write it as a notebook instead, without running it.")
     ] = False,
+    page: Annotated[
+        bool,
+        typer.Option(
+            "--page", help="Write it as one live page instead: predict, be judged, drag, read why."
+        ),
+    ] = False,
 ) -> None:
     """Run a lesson: a figure, a replay page, and five lines with the measured values."""
-    from gms_fsm.app.lessons import LESSONS, listed, numbered, teach
+    from gms_fsm.app.lessons import LESSONS, listed, numbered, teach, write_page
 
-    if not number and not notebook:
+    if not number and not notebook and not page:
         say(listed())
         return
     if notebook:
@@ -320,7 +326,14 @@ def lesson_command(
         for each in [numbered(number)] if number else LESSONS:
             put(str(write_notebook(each, output)))
         return
+    if page and not number:
+        raise ParameterError("it writes one lesson", place="--page", advice="give its number, too")
     chosen = numbered(number)
+    if page:
+        with messages().status(f"running lesson {chosen}"):
+            written = write_page(chosen, output)
+        put(str(written))
+        return
     with messages().status(f"running lesson {chosen}"):
         taught = teach(chosen, output)
     for line in taught.lines:

@@ -354,4 +354,5 @@ LESSON = Lesson(
         Question("heater_at_20", choices=("on", "off", "either")),
         Question("first_slip", "s", rtol=0.05),
     ),
+    live=lambda: ((mass(), ENDS[2]), {"numbers.V": (0.02, 0.3), "pad.F_s": (1.0, 3.0)}, {}),
 )

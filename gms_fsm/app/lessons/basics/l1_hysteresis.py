@@ -255,6 +255,12 @@ def _states(ax: Any, r: Any) -> str:
     return "states of the elements"
 
 
+def _live() -> Any:
+    velocity, times = strokes(TURNS)
+    subject = GMS(PARAMETERS, law="signed"), Prescribed(velocity), float(times[-1])
+    return subject, {"k1": None, "weights1": None}, {"atol": FINE}
+
+
 LESSON = Lesson(
     __name__,
     run,
@@ -262,4 +268,5 @@ LESSON = Lesson(
     grid("ab;cc;dd", (8.2, 7.0), (3, 1, 1.1)),
     level="undergraduate",
     questions=(Question("first_slip", "um", rtol=0.02), Question("gap_at_a", "N", atol=1e-3)),
+    live=_live,
 )

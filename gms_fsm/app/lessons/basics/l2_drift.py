@@ -199,4 +199,9 @@ LESSON = Lesson(
         Question("lugre_drift", "mm/s", rtol=0.25),
         Question("gms_drift", "mm/s", atol=1e-3),
     ),
+    live=lambda: (
+        (GMS(BANK, law="signed"), Slider(1.0, FORCE), END),
+        {"mass": (0.5, 2.0), "weights1": None},
+        {},
+    ),
 )

@@ -203,4 +203,9 @@ LESSON = Lesson(
         Question("z_at_reversal", "m", rtol=0.1),
         Question("stored_energy", choices=("less", "same", "more")),
     ),
+    live=lambda: (
+        (GMS(PARAMETERS, law="published"), Prescribed(VELOCITY), FIG4_END),
+        {"C1": (0.02, 0.2), "F_c": (0.2, 1.0)},
+        {},
+    ),
 )

@@ -224,4 +224,9 @@ LESSON = Lesson(
         Question("error_of_four", "%", rtol=0.05),
         Question("loss_of_two", "% of the smooth curve", atol=1.0),
     ),
+    live=lambda: (
+        (bank(4), Prescribed(f"{SMALL * OMEGA}*cos({OMEGA}*t)"), 4.5 * math.pi / OMEGA),
+        {"weights1": None, "k1": None},
+        {"rtol": RTOL, "atol": ATOL},
+    ),
 )

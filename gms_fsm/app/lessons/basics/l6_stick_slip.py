@@ -251,4 +251,9 @@ LESSON = Lesson(
         Question("pull_at_stop", "N", rtol=0.15),
         Question("period", "s", rtol=0.1),
     ),
+    live=lambda: (
+        (bank(), PulledSlider(MASS, STIFFNESS, SPEED), END),
+        {"speed": (0.02, 0.3), "stiffness": (1.0, 8.0), "F_s": (1.0, 2.0)},
+        {},
+    ),
 )

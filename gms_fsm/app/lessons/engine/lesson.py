@@ -41,6 +41,9 @@ BROAD: dict[str, Any] = {"color": PALE_GREY, "linewidth": 6.0, "zorder": 1}
 DOTS: dict[str, Any] = {"color": INK, "linestyle": "", "marker": "o", "markersize": 5.0}
 
 Panel = Callable[[Any, Any], str]  # draws a result on axes, and returns the panel's title
+Live = Callable[
+    [], tuple[tuple[Any, ...], Mapping[str, tuple[float, float] | None], dict[str, Any]]
+]
 Sheet = Callable[[str, Any], tuple[Any, Sequence[Any]]]  # a figure with a heading, and its axes
 
 
@@ -82,6 +85,9 @@ class Lesson:
         For whom it is.
     questions : tuple of Question
         What is predicted, in the order of the items of *Predict*.
+    live : callable, optional
+        Makes the run of the live page: the first arguments of `plots.play`, the numbers with a
+        slider, as its ``vary``, and its options.
     """
 
     module: str
@@ -90,6 +96,7 @@ class Lesson:
     sheet: Sheet
     level: str = field(kw_only=True)
     questions: tuple[Question, ...] = field(kw_only=True)
+    live: Live | None = field(default=None, kw_only=True)
 
     @cached_property
     def words(self) -> Mapping[str, str]:

@@ -85,7 +85,17 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, Trace, simulate
+from gms_fsm import (
+    GMS,
+    Body,
+    Contact,
+    GMSParameters,
+    Prescribed,
+    Stribeck,
+    System,
+    Trace,
+    simulate,
+)
 from gms_fsm.app.lessons.engine.lesson import BROAD, DOTS, GUIDE, Lesson, grid, note, ticks
 from gms_fsm.app.lessons.engine.predict import Question
 from plots.style import ELEMENT_DASHES, INK, LINE_GREY, ramp
@@ -169,6 +179,16 @@ def _widths(ax: Any, r: Any) -> str:
     return "width of the loop"
 
 
+def _swung() -> System:
+    """Return the contact with its frequency as a number, for a slider."""
+    return System(
+        "a contact that never stops",
+        bodies=(Body("slider", velocity=f"{MEAN} + {SWING} * cos(w * t)"),),
+        contacts=(Contact("pad", MODEL),),
+        numbers={"w": 45.0},
+    )
+
+
 LESSON = Lesson(
     __name__,
     run,
@@ -179,4 +199,5 @@ LESSON = Lesson(
         Question("accelerating", choices=("higher", "lower", "same")),
         Question("widest", "rad/s", rtol=0.3),
     ),
+    live=lambda: ((_swung(), 1.5), {"numbers.w": (1.0, 600.0)}, {"rtol": RTOL, "atol": ATOL}),
 )

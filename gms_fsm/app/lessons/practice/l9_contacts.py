@@ -349,4 +349,9 @@ LESSON = Lesson(
         Question("dead_time_of_gear", "s", rtol=0.02),
         Question("lost", "J", rtol=0.02),
     ),
+    live=lambda: (
+        (pulled(), 25.0),
+        {"numbers.V": (0.02, 0.3), "numbers.K": (1.0, 8.0), "pad.F_s": (1.0, 3.0)},
+        {},
+    ),
 )
