@@ -32,6 +32,7 @@ logging.getLogger("traitlets").setLevel(logging.WARNING)  # no line per notebook
 
 ROOT = Path(__file__).parents[1]
 MORE = ROOT / "docs" / "lessons"
+PACK = ROOT / "gms_fsm" / "app" / "lessons" / "pack"
 PAGES = (ROOT / "docs" / "howto" / "desk-experiment.md",)  # how-to pages that are notebooks too
 # Warnings from inside the notebook packages are not ours to fix.
 OTHERS = "IPython|ipykernel|ipywidgets|jupyter|matplotlib_inline|tornado|traitlets|zmq"
@@ -65,7 +66,9 @@ def sources() -> dict[Path, str]:
         )
         for page in PAGES
     }
-    return lessons | pages
+    # The teaching pack brings the phone experiment along.
+    packed = {PACK / path.name: text for path, text in pages.items()}
+    return lessons | pages | packed
 
 
 # --------------------------------------------------------------------------- executing

@@ -33,6 +33,7 @@ from gms_fsm.app.verbs.difference import diff_command
 from gms_fsm.app.verbs.export import export_command
 from gms_fsm.app.verbs.fit import fit_command
 from gms_fsm.app.verbs.runs import (
+    class_command,
     copy_command,
     dap_command,
     debug_command,
@@ -231,6 +232,7 @@ app.command("play", cls=_Drawing)(play_command)
 app.command("debug", cls=_Verb)(debug_command)
 app.command("dap", cls=_Verb)(dap_command)
 app.command("lesson", cls=_Verb)(lesson_command)
+app.command("class", cls=_Verb)(class_command)
 app.command("code", cls=_Verb)(code_command)
 app.command("export", cls=_Verb)(export_command)
 app.command("benchmark", cls=_Verb)(benchmark_command)

@@ -298,6 +298,15 @@ def dap_command() -> None:
     raise typer.Exit(serve(launched, sys.stdin.buffer, sys.stdout.buffer))
 
 
+def class_command(output: OutputFolder = Path("class")) -> None:
+    """Write a teaching pack for 90 minutes: plan, slides, tasks, solutions, live lessons."""
+    from gms_fsm.app.lessons.pack import write_class
+
+    with messages().status("running the lessons") as status:
+        files = write_class(output, lambda what: status.update(f"making {what}"))
+    say(f"{len(files)} files in {output}; start with {files[0]}")
+
+
 def lesson_command(
     number: Annotated[
         str,

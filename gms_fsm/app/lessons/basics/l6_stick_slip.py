@@ -202,13 +202,14 @@ def last_cycle(trace: Trace) -> Cycle:
 def _portrait(ax: Any, r: Any) -> str:
     draw("portrait", ax, r.portrait, window=WINDOW)
     v = np.linspace(0.0, 0.38, 400)
-    ax.plot(v, bank().stribeck(v) + SIGMA_2 * v, **GUIDE | {"linestyle": "--", "linewidth": 1.2})
+    look = GUIDE | {"linestyle": "--", "linewidth": 1.2}
+    ax.plot(1e3 * v, bank().stribeck(v) + SIGMA_2 * v, **look)
     ax.set_ylim(0.6, 1.55)
     for text, place in (
-        ("thrown forward →", (0.13, 1.31)),
-        ("← slows down", (0.2, 1.03)),
-        ("waits, oscillating\non its bristles", (0.045, 0.77)),
-        (r"dashed: steady, s(v) + $\sigma_2$ v", (0.12, 0.63)),
+        ("thrown forward →", (150, 1.33)),
+        ("← slows down", (200, 1.03)),
+        ("waits, oscillating\non its bristles", (45, 0.77)),
+        (r"dashed: steady, s(v) + $\sigma_2$ v", (120, 0.63)),
     ):
         note(ax, text, place)
     return "friction over velocity"

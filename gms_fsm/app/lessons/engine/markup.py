@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 _MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
 _CODE = re.compile(r"(```.*?^```|``.*?``|`[^`]*`)", re.DOTALL | re.MULTILINE)
+_STAR = re.compile(r"(?<!\*)\*(?!\*)")  # not those of **bold**
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
 
 
-def html_of(text: str) -> str:
-    r"""Return Markdown as HTML. Links become their words, and stars are no emphasis.
+def html_of(text: str, *, links: bool = False) -> str:
+    r"""Return Markdown as HTML. Single stars are no emphasis; links become words by default.
 
     Examples
     --------
@@ -34,7 +35,8 @@ def html_of(text: str) -> str:
     '<ol>\n<li>F = k * z, see there</li>\n</ol>\n'
     """
     parts = _CODE.split(text)
-    parts[::2] = [_LINK.sub(r"\1", part).replace("*", r"\*") for part in parts[::2]]
+    plain = [part if links else _LINK.sub(r"\1", part) for part in parts[::2]]
+    parts[::2] = [_STAR.sub(r"\*", part) for part in plain]
     rendered: str = _MARKDOWN.render("".join(parts))
     return rendered
 

@@ -93,7 +93,7 @@ def compare(result: Result, **predictions: float | str | None) -> None:
     >>> result = lesson(9).run()
     >>> compare(result, released=7.5, speed_while_stuck=0)
     You predicted 7.5 s. Measured: 7.5 s. Right, within 2 %.
-    You predicted 0 m/s. Measured: 0 m/s. Right, within 1e-09 m/s.
+    You predicted 0 m/s. Measured: 0 m/s. Right, within 0.0001 m/s.
     """
     for question in result.lesson.questions:
         if question.name in predictions:

@@ -345,7 +345,7 @@ LESSON = Lesson(
     level="undergraduate",
     questions=(
         Question("released", "s", rtol=0.02),
-        Question("speed_while_stuck", "m/s", atol=1e-9),
+        Question("speed_while_stuck", "m/s", atol=1e-4),
         Question("dead_time_of_gear", "s", rtol=0.02),
         Question("lost", "J", rtol=0.02),
     ),
