@@ -631,6 +631,7 @@ rows = {
 }
 group("command", ParameterError, command, rows, "")
 rows = {
+    "page of no lesson": ("--page", ..., "lesson --page"),
     "chart file with a contact": ("--contact pad: own.toml", ..., "chart own.toml --contact pad"),
     "chart with a contact": ("--contact pad", ..., "chart lugre --contact pad"),
     "chart without a contact": ("pair.toml", ..., "chart pair.toml"),

@@ -108,6 +108,8 @@ OTHERS = {
     **{name: ["run", "mine.toml"] for name in (*RUN, "partial.npz", "overview.svg")},
     "ribbons.svg": ["plot", "t.npz"],
     "lesson_1.txt": ["lesson", "1"],
+    "lesson_1_live.html": ["lesson", "1", "--page"],
+    "slides.html": ["class"],
     "phenomena.csv": ["phenomena"],
     "fig4_laws.svg": ["paper"],
     "traces/fig4_chart.npz": ["paper"],

@@ -4,7 +4,12 @@
   const { questions, measured } = JSON.parse(one("#asked").textContent);
 
   // As `judged` in predict.py, with the same fields.
-  const said = (value, unit) => (typeof value === "string" ? value : `${Number(value.toPrecision(4))} ${unit}`.trim());
+  const short = (value) => { // as Python's .4g
+    const [digits, exponent] = value.toExponential(3).split("e"), size = Math.abs(exponent);
+    if (exponent >= -4 && exponent < 4) return String(Number(value.toPrecision(4)));
+    return `${Number(digits)}e${exponent < 0 ? "-" : "+"}${size < 10 ? "0" : ""}${size}`;
+  };
+  const said = (value, unit) => (typeof value === "string" ? value : `${short(value)} ${unit}`.trim());
   const off = (predicted, found, { rtol, atol }) => {
     if (Math.abs(predicted - found) <= Math.max(atol, rtol * Math.abs(found))) return "";
     const side = predicted > found ? "high" : "low";

@@ -96,9 +96,10 @@ def solutions(results: Sequence[Result]) -> str:
             items_of(lesson.words["tasks"]), items_of(lesson.words["solutions"]), strict=True
         )
         shown = "\n".join(f"<li>{html_of(task)}{html_of(found)}</li>" for task, found in tried)
+        heads = "<th>question</th><th>measured</th><th>right within</th>"
         parts.append(
-            f'<section class="lesson"><h2>{escape(lesson.heading)}</h2>\n<table><tr><th></th>'
-            f"<th>measured</th><th>right within</th></tr>{rows}</table>\n"
+            f'<section class="lesson"><h2>{escape(lesson.heading)}</h2>\n'
+            f"<table><tr>{heads}</tr>{rows}</table>\n"
             f"{html_of(lesson.words['why'])}\n<h3>What trying shows</h3>\n<ol>{shown}</ol>\n"
             f"<h3>The runs</h3>\n{lines}\n{picture_of(each)}</section>"
         )
