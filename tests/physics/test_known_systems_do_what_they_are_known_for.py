@@ -12,7 +12,9 @@ import pytest
 from gms_fsm import Belt, Body, ChartModel, Contact, PulledSlider, Spring, System, Trace, simulate
 from gms_fsm.app.scenario import Loaded, load_scenario
 from gms_fsm.charts import CHARTS
+from gms_fsm.scenarios import shipped
 from tests.helpers import FASTEST
+from tests.scenario_files import CommandLine
 
 DRY = ChartModel(CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.0})
 M, K, V = 1.0, 2.0, 0.1
@@ -145,6 +147,23 @@ def test_a_door_holds_up_to_the_angle_at_which_its_weight_exceeds_the_friction()
     assert stopped.size == 1
     assert 1.0 < stopped[0] < 4.0
     assert trace.sample([8.0]).v[0] > 0  # and swings open by itself, long after the second push
+
+
+# --------------------------------------------------------------------------- live pages
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+def test_a_known_system_is_a_live_page_unless_scipy_runs_it(
+    gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("uplot", "pygraphviz"):
+        pytest.importorskip(module, reason="a live page needs the extras replay and render")
+    two = {name: path for name, path in shipped().items() if name in ("earthquake", "door_hinge")}
+    monkeypatch.setattr("gms_fsm.app.verbs.traces.shipped", lambda: two)
+    done = gms_fsm("play", "--all", "-o", "pages")
+    assert (done.code, done.out) == (0, "pages/door_hinge.html\n")
+    assert "no page of earthquake: " in done.err
+    assert ", not Radau" in done.err
+    assert [each.name for each in Path("pages").iterdir()] == ["door_hinge.html"]
 
 
 # --------------------------------------------------------------------------- an error
