@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from gms_fsm.errors import TraceFileError as TraceFileError
     from gms_fsm.errors import UnitError as UnitError
     from gms_fsm.exporters import export as export
+    from gms_fsm.generation.generate import Generated as Generated
+    from gms_fsm.generation.generate import generate as generate
     from gms_fsm.identification.bank import initial_bank as initial_bank
     from gms_fsm.identification.choose import choose as choose
     from gms_fsm.identification.excite import excite as excite
@@ -104,6 +106,7 @@ _HOMES = {
     "errors": "ChartError CheckpointError ExpressionError GMSError MissingExtraError OutputError "
     "ParameterError RecordError ScenarioError SessionError SignalError TraceFileError UnitError",
     "exporters": "export",
+    "generation.generate": "Generated generate",
     "identification.bank": "initial_bank",
     "identification.choose": "choose",
     "identification.excite": "excite",

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import functools
-import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gms_fsm.app.scenario import kind_of, load_scenario, load_system
-from gms_fsm.charts.chart import SUPPLIED, Chart
-from gms_fsm.charts.parameters import Parameter, checked_values
-from gms_fsm.charts.stribeck import Stribeck
-from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.charts.chart import Chart
+from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.toml import parsed
 from gms_fsm.scenarios import scenario_path
-from gms_fsm.systems.models import ChartModel, Model
+from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System, system_of
 from gms_fsm.verification.facts import ContactFacts, facts_of
 
@@ -123,40 +120,3 @@ def own_file(name: str, law: str = "") -> OwnFile | None:
     loaded = load_scenario(path)
     period = loaded.arguments.get("step") if loaded.scenario.run.events == "held" else None
     return OwnFile(path, system=system_of(loaded.model, loaded.rig, period))
-
-
-def any_model(chart: Chart) -> ChartModel:
-    """Return a model of a chart with some numbers; a program has them as arguments.
-
-    Examples
-    --------
-    >>> from gms_fsm.charts import CHARTS
-    >>> any_model(CHARTS["stiction"]).values
-    {'F_c': 1.0, 'F_s': 1.0, 'b': 1.0}
-    """
-    values: dict[str, float] = {}
-    for each in chart.parameters:
-        values[each.name] = next(_satisfying(each, values, chart.parameters), 1.0)
-    curve = Stribeck(1.0, 1.0, 1.0) if "s" in chart.inputs else None
-    inputs = {name: 1.0 for name in chart.inputs if name not in SUPPLIED}
-    return ChartModel(chart, dict(values), stribeck=curve, inputs=inputs)
-
-
-def _satisfying(
-    parameter: Parameter, before: dict[str, float], every: tuple[Parameter, ...]
-) -> Iterator[float]:
-    """Yield numbers that satisfy a rule, given those of the parameters before it."""
-    limits = sorted(
-        {
-            before.get(bound.limit, 1.0) if isinstance(bound.limit, str) else bound.limit
-            for bound in parameter.bounds
-        }
-    )
-    between = [0.5 * (a + b) for a, b in itertools.pairwise(limits)]
-    known = [each for each in every if each.name in before] + [parameter]
-    for value in (1.0, *limits, *between, *(u + d for u in limits for d in (1.0, -1.0))):
-        try:
-            checked_values(known, {**before, parameter.name: value})
-        except GMSError:
-            continue
-        yield value

@@ -200,6 +200,31 @@ def folder_lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
         yield
 
 
+@contextlib.contextmanager
+def file_lock(path: Path) -> Iterator[bool]:
+    """Keep other processes out that read a file and write it anew; say whether there is one.
+
+    A file that is renamed over it has another number, and a lock of its own.
+    """
+    if sys.platform == "win32":
+        yield path.exists()
+        return
+    while True:
+        file = os.open(path, os.O_RDONLY | os.O_CREAT, 0o666)
+        with contextlib.suppress(OSError):  # a file system without locks: continue without one
+            fcntl.flock(file, fcntl.LOCK_EX)
+        with contextlib.suppress(FileNotFoundError):
+            if os.fstat(file).st_ino == path.stat().st_ino:
+                break
+        os.close(file)
+    try:
+        yield os.fstat(file).st_size > 0
+    finally:
+        if path.stat().st_size == 0:  # nothing was written
+            path.unlink()
+        os.close(file)
+
+
 # --------------------------------------------------------------------------- helpers
 def _write(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
     parts: dict[Path, Path] = {}

@@ -187,7 +187,7 @@ def reachability(prover: Prover) -> Iterator[Finding]:
         (edge.source, edge.name): prover.settle(
             "reachability",
             (edge.name,) if len(edge.sources) == 1 else (edge.source, edge.name),
-            _can_hold,
+            can_hold,
             edge,
         )
         for edge in chart.transitions
@@ -204,7 +204,8 @@ def reachability(prover: Prover) -> Iterator[Finding]:
     yield from guards.values()
 
 
-def _can_hold(prover: Prover, edge: Transition) -> Answer:
+def can_hold(prover: Prover, edge: Transition) -> Answer:
+    """Return whether an edge can ever be taken."""
     subject, reading = prover.subject, Reading()
     formulas = [
         reading.truth(subject.guard(edge), prover.still),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Chart, Parameter, State, Sweep, System, Trace
-from gms_fsm.app._own_files import OwnFile, any_model
+from gms_fsm.app._own_files import OwnFile
 from gms_fsm.app.scenario import (
     kind_of,
     load_scenario,
@@ -16,6 +16,7 @@ from gms_fsm.app.scenario import (
     run_debugger,
 )
 from gms_fsm.lowering.program import lower
+from gms_fsm.systems.any_model import any_model
 from tests import own_files
 from tests.plots.stored import data_of
 from tests.scenario_files import CommandLine, one_message

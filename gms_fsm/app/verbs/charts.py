@@ -290,11 +290,12 @@ def code_command(
     scenario's, and prints the switches.
     """
     from gms_fsm import Contact, Prescribed, PulledSlider, Slider
-    from gms_fsm.app._own_files import any_model, own_file
+    from gms_fsm.app._own_files import own_file
     from gms_fsm.app.verbs.catalogue import chosen
     from gms_fsm.exporters.alone import PERIOD, slow_velocity
     from gms_fsm.run.printed import printed
     from gms_fsm.run.problem import Problem
+    from gms_fsm.systems.any_model import any_model
     from gms_fsm.systems.models import demonstration
 
     own = own_file(name, law)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gms_fsm.app.verbs.console import note, put, say
 from gms_fsm.app.verbs.options import INTERRUPTED, ContactName, Overrides
 from gms_fsm.errors import GMSError, OutputError, ParameterError
-from gms_fsm.foundation.files import refuse_input
+from gms_fsm.foundation.files import file_lock, refuse_input
 
 if TYPE_CHECKING:
     from gms_fsm import Coverage
@@ -24,7 +24,8 @@ def cover_command(
         list[Path],
         typer.Argument(
             help="Scenario files, names of scenarios of the package, or saved traces (.npz, .csv); "
-            "all of the same charts.",
+            "all of the same charts. With --generate one of these, a system file, a chart file, or "
+            "an included chart.",
             show_default=False,
         ),
     ],
@@ -58,23 +59,48 @@ def cover_command(
             "--output",
             "-o",
             help="Picture of the chart, ending in {chart}: lines are the wider the more often an "
-            "edge was taken, and dashed if never.",
+            "edge was taken, and dashed if never. With --generate the folder for the motions.",
             show_default=False,
         ),
     ] = None,
     contact: ContactName = "",
+    generate: Annotated[
+        bool,
+        typer.Option(
+            "--generate",
+            help="Find motions that take every edge and every pair of edges that can be taken.",
+        ),
+    ] = False,
+    seed: Annotated[
+        int | None,
+        typer.Option(help="Of the search, for --generate; by default 0.", show_default=False),
+    ] = None,
+    bounds: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="For --generate, as v=-0.1..0.1; may be repeated. By default from the chart.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Run scenarios and say what of their charts was never taken, and why not.
 
     Counts states, edges from each of their sources, clauses of guards, true
     and false, and MC/DC: clauses that decided a guard alone. With --merge
     the counts of several calls add up. With --contact only this one is
-    judged and told; the file of counts has all.
+    judged and told; the file of counts has all. --generate makes the
+    scenarios: few short motions that try all that can be tried.
     """
     from gms_fsm import Coverage
     from gms_fsm.app.sweeps import axis
     from plots.output import formats
 
+    if generate:
+        _refuse({"--merge": merge, "--over": over, "--set": overrides}, "makes its own runs")
+        found = _generated(scenarios, contact, seed or 0, bounds or [], output)
+        _judge(found, fail_under)
+        return
+    _refuse({"--seed": seed, "--bounds": bounds}, "is for --generate", own=True)
     axes = [axis(text) for text in over or []]
     for path in filter(None, (merge, output)):  # before anything runs
         refuse_input(path, *scenarios)
@@ -84,30 +110,83 @@ def cover_command(
             )
     if output is not None:
         formats.chosen(output, "graph", "chart")
-    before = Coverage.load(merge) if merge is not None and merge.exists() else None
-    found: Coverage | None = None
+    if merge is not None and merge.exists():
+        Coverage.load(merge)  # a damaged one is refused
+    total: Coverage | None = None
     try:
         for path in scenarios:
-            found = _sum(found, _counted(path, overrides or [], axes), path)
+            total = _sum(total, _counted(path, overrides or [], axes), path)
     except KeyboardInterrupt:
         note("interrupted; nothing was written")
         raise typer.Exit(INTERRUPTED) from None
-    assert found is not None  # there is at least one
-    if before is not None and merge is not None:
-        found = _sum(found, before, merge)
-    part = _part(found, contact) if output is not None or contact else None
-    told = found if part is None or not contact else Coverage({contact: part})
+    assert total is not None  # there is at least one
+    if merge is not None:
+        with file_lock(merge) as there:  # several of these at once lose no counts
+            if there:
+                total = _sum(total, Coverage.load(merge), merge)
+            total.save(merge)
+    part = _part(total, contact) if output is not None or contact else None
+    told = total if part is None or not contact else Coverage({contact: part})
     put(str(told))
     if merge is not None:
-        put(str(found.save(merge)))
+        put(str(merge))
     if output is not None and part is not None:
         import plots
 
         put(str(plots.render(plots.statechart(part.chart, counts=part), output)))
+    _judge(told, fail_under)
+
+
+def _judge(told: Coverage, fail_under: float | None) -> None:
+    """Exit with 1 if a share is too low."""
     name, percent = told.lowest
     if fail_under is not None and percent < fail_under:
         say(f"the lowest is {name}: {percent:.1f} %, below {fail_under:g} %")
         raise typer.Exit(1)
+
+
+def _refuse(given: Mapping[str, object], why: str, own: bool = False) -> None:
+    """Refuse options that are for other calls."""
+    for option, value in given.items():
+        if value is not None:
+            said = f"it {why}" if own else f"--generate {why}"
+            raise ParameterError(said, place=option, advice=f"leave {option} out")
+
+
+def _generated(
+    given: Sequence[Path], contact: str, seed: int, bounds: Sequence[str], folder: Path | None
+) -> Coverage:
+    """Make motions, tell what they reach, and save them."""
+    from gms_fsm import generate
+    from gms_fsm.app._own_files import contacts_error, own_file
+    from gms_fsm.charts.registry import chart_named
+
+    if len(given) > 1:
+        raise ParameterError("--generate takes one chart", place=str(given[1]))
+    name, limits = str(given[0]), dict(map(_bound, bounds))
+    own = own_file(name)
+    what: Any = chart_named(name) if own is None else own.chart or own.system
+    if own is None and contact:
+        raise ParameterError("an included chart has no contacts", place=f"--contact {contact}")
+    if own is not None and own.system is not None and len(own.system.machines) > 1 and not contact:
+        raise contacts_error(own.path, [each.name for each in own.system.machines], "give")
+    found = generate(what, contact, seed=seed, bounds=limits)
+    put(str(found))
+    for path in [] if folder is None else found.save(folder):
+        put(str(path))
+    return found.coverage
+
+
+def _bound(text: str) -> tuple[str, tuple[float, float]]:
+    """Return the bounds that an option gives."""
+    name, _, pair = text.partition("=")
+    try:
+        low, high = map(float, pair.split(".."))
+    except ValueError:
+        raise ParameterError(
+            "give it as name=low..high, for example v=-0.1..0.1", place=f"--bounds {text}"
+        ) from None
+    return name.strip(), (low, high)
 
 
 def _counted(path: Path, overrides: Sequence[str], axes: Sequence[Axis]) -> Coverage:

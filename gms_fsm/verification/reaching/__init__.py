@@ -1,0 +1,1 @@
+"""Where edges of a chart can be taken: points on the surfaces of guards, and proofs of nowhere."""
