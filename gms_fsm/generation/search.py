@@ -134,33 +134,30 @@ def shown(tried: Tried) -> set[Goal]:
 def _turned(tried: Tried) -> set[Goal]:
     """Return the comparisons that the first row holds to the last bit, and that decide there."""
     trace, point, found = tried.trace, tried.point, set[Goal]()
-    chart = trace.model.chart
-    if not len(trace):
-        return found
-    for place, edge in chart.leaving(tried.motion.state):
+    chart, shape = trace.model.chart, trace.modes.T.shape
+    for place, edge in chart.leaving(tried.motion.state) if len(trace) else ():
         decision = decisions(chart)[edge.name]
-        names = frozenset[str]().union(*map(names_in, decision.comparisons))
-        columns = guard_columns(trace, names)
-        shape = trace.modes.T.shape
+        columns = guard_columns(trace, frozenset().union(*map(names_in, decision.comparisons)))
         vector = "".join(
             "01"[int(truths(each, {n: columns[n] for n in names_in(each)}, shape)[0, 0])]
             for each in decision.comparisons
         )
+        taken = (Taken(edge.name, edge.source),)
         for number, each in enumerate(decision.comparisons):
-            mine = point is not None and (point.edge.name, point.number) == (edge.name, number)
             if not decision.decides(vector, number):
                 continue
-            left, right = (_first(side, columns, shape) for side in (each.left, each.right))
+            left, right = (_at_first(side, columns, shape) for side in (each.left, each.right))
+            meant = point is not None and (point.edge.name, point.number) == (edge.name, number)
             if left == right:
-                found.add(Goal((Taken(edge.name, edge.source),), number, "equal"))
-            elif mine and not point.equal:  # type: ignore[union-attr]
-                found.add(Goal((Taken(edge.name, edge.source),), number, "across"))
+                found.add(Goal(taken, number, "equal"))
+            elif meant and point is not None and not point.equal:
+                found.add(Goal(taken, number, "across"))
         if decision.holds(vector) and place not in chart.arrests:
             break  # it goes first
     return found
 
 
-def _first(side: Any, columns: Mapping[str, Any], shape: tuple[int, ...]) -> float:
+def _at_first(side: Any, columns: Mapping[str, Any], shape: tuple[int, ...]) -> float:
     here = {name: np.broadcast_to(columns[name], shape) for name in names_in(side)}
     return float(np.broadcast_to(values_of(side, here), shape)[0, 0])
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -253,34 +253,44 @@ class Guards:
         """Yield for each comparison of each guard of a state where it decides, as far as found."""
         edges = [edge for _, edge in self.chart.leaving(state)]
         beside = {name for edge in edges for name in self.names(self.subject.guard(edge))}
-        levels = self._held(state)
         for edge in edges:
-            for number, (_, relation) in enumerate(self.pairs[edge.source, edge.name]):
-                alone: dict[bool, dict[str, float]] = {}
-                behind: dict[bool, dict[str, float]] = {}
-                seen = 0
-                for _, values in self._turns(relation, levels, levels, MOST_COMBINATIONS, beside):
-                    equal = self.margin(relation, values) == 0.0
-                    if not equal and self._same(relation, values):
-                        continue
-                    if not self._decides(edge, number, values):
-                        continue
-                    seen += 1
-                    found = behind if self._earlier(edge, values) else alone
-                    found.setdefault(equal, values)
-                    if len(alone) == 2 or seen > PATIENCE:
+            held = (True, False) if self.subject.arrests(edge) else (False,)
+            for number in range(len(self.pairs[edge.source, edge.name])):
+                for still in held:  # an arrest is taken where the velocity is 0
+                    points = self._turning(edge, number, self._levels_in(state, still), beside)
+                    yield from points
+                    if points:
                         break
-                for equal, values in {**behind, **alone}.items():
-                    yield TurningPoint(edge, number, equal, values)
+
+    def _turning(
+        self, edge: Transition, number: int, levels: Levels, beside: Set[str]
+    ) -> list[TurningPoint]:
+        """Return where a comparison decides; behind an earlier edge only if nowhere else."""
+        alone: dict[bool, dict[str, float]] = {}
+        behind: dict[bool, dict[str, float]] = {}
+        relation, seen = self.pairs[edge.source, edge.name][number][1], 0
+        for _, values in self._turns(relation, levels, levels, MOST_COMBINATIONS, beside):
+            equal = self.margin(relation, values) == 0.0
+            if (not equal and self._same(relation, values)) or not self._decides(
+                edge, number, values
+            ):
+                continue
+            seen += 1
+            found = behind if self._earlier(edge, values) else alone
+            found.setdefault(equal, values)
+            if len(alone) == 2 or seen > PATIENCE:
+                break
+        both = {**behind, **alone}
+        return [TurningPoint(edge, number, equal, values) for equal, values in both.items()]
 
     def _same(self, relation: Relation, values: Mapping[str, float]) -> bool:
         """Return whether a comparison is as true as where both sides are equal."""
         return self.holds(relation, values) == (relation.op in ("<=", ">="))
 
-    def _held(self, state: str) -> dict[str, Sequence[float]]:
-        """Return the levels in a state: a lock holds the velocities at 0."""
-        still = self.chart.velocities if self.subject.locked(state) else ()
-        return {name: (0.0,) if name in still else each for name, each in self.levels.items()}
+    def _levels_in(self, state: str, still: bool) -> Levels:
+        """Return the levels in a state; a lock holds the velocities at 0."""
+        zero = self.chart.velocities if still or self.subject.locked(state) else ()
+        return {name: (0.0,) if name in zero else each for name, each in self.levels.items()}
 
     def _decides(self, edge: Transition, number: int, values: Mapping[str, float]) -> bool:
         """Return whether a comparison alone decides a guard."""
