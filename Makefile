@@ -147,6 +147,7 @@ gallery: $(VENV)/dev.stamp
 	$(RUN)/python docs/make_screens.py
 	$(RUN)/python docs/make_zoo.py
 	$(RUN)/python docs/make_phenomena.py
+	$(RUN)/python docs/make_coverage.py
 
 docs: $(VENV)/docs.stamp
 	$(RUN)/sphinx-build --quiet --fail-on-warning --keep-going -d .docs-cache/doctrees docs site

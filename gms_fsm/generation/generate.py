@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,8 +18,9 @@ from gms_fsm.generation.search import Goal, Search, Taken, Tried, firings_of, go
 from gms_fsm.generation.search import shown as shown_by
 from gms_fsm.generation.stand import CONTACT, MASS, SETTINGS, Motion, Stand
 from gms_fsm.run.problem import Problem
+from gms_fsm.run.simulate import simulate
 from gms_fsm.session.tree.export import save_scenario
-from gms_fsm.systems.any_model import any_contact
+from gms_fsm.systems.any_model import any_contact, with_chart
 from gms_fsm.systems.given import mapping_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import contact_of
@@ -62,6 +63,43 @@ class GeneratedRun:
     t_start: float
     t_end: float
     trace: Trace = field(repr=False)
+
+    def again(self, chart: Chart) -> Trace:
+        """Run the same motion with another chart, such as one in which a guard is changed.
+
+        Parameters
+        ----------
+        chart : Chart
+            With the same names.
+
+        Returns
+        -------
+        Trace
+            As seen from the contact.
+
+        Raises
+        ------
+        ChartError, ParameterError
+            If its names are others.
+        SimulationError
+            If the run cannot continue.
+
+        Examples
+        --------
+        >>> from gms_fsm.charts import CHARTS
+        >>> run = generate(CHARTS["dog-clutch"]).runs[0]
+        >>> bool((run.again(CHARTS["dog-clutch"]).t == run.trace.t).all())
+        True
+        """
+        first, *others = self.system.machines
+        own = with_chart(first, chart)
+        kind = "contacts" if chart.velocities else "supervisors"
+        changed: Any = {kind: (own, *others)}
+        system = replace(self.system, **changed)
+        trace = simulate(
+            system, self.t_end, t_start=self.t_start, initial=self.initial, settings=SETTINGS
+        )
+        return trace.contact(CONTACT)
 
     def save(self, path: str | Path) -> Path:
         """Write it as a scenario file.

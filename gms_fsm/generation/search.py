@@ -33,6 +33,7 @@ STRIKES = (2.0, -2.0, 1.0, -1.0, 0.0)  # shares of a speed
 LOADS = (0.0, 1.0, -1.0, 2.0, -2.0)  # N, if no guard says more
 FAST = "compiled" if importlib.util.find_spec("llvmlite") else "ifelse"
 MOST_TOLD = 4  # edges in a title
+LONG = 1e4  # usual durations; nothing takes longer
 SHORT = 1e-3  # share of a usual duration that a run from a turning point lasts
 
 
@@ -267,8 +268,11 @@ class Search:
         trace, ended = self.stand.run(motion, engine=FAST if self.runs > MANY else "ifelse")
         self.runs += 1
         firings = firings_of(trace)
-        tail = SHORT * (motion.t_end - motion.t)
+        tail = min(self._short, SHORT * (motion.t_end - motion.t))
+        end = motion.t_end if not ended or not len(trace) else float(trace.t[-1])
         for before, each in followed(firings):
+            if ended and each.t + tail > end:
+                break
             pair = () if before is None else (before.taken,)
             for goal in (Goal((each.taken,)), Goal((*pair, each.taken))):
                 if goal not in self.found:
@@ -284,7 +288,7 @@ class Search:
         *first, last = goal.edges
         starts = list(self.nodes[first[0]]) if first else self._starts(last)
         best: tuple[tuple[float, float], Motion, int] | None = None
-        for start, motion in _by_turns({i: self._tries(s) for i, s in enumerate(starts)}):
+        for start, motion in _by_turns({i: self._tries(s, last) for i, s in enumerate(starts)}):
             tried = self.tried(motion)
             if goal in self.found:
                 return
@@ -301,9 +305,9 @@ class Search:
             if close is not None and close < best[0]:
                 best = close, motion, best[2]
 
-    def _tries(self, start: Motion) -> Iterator[Motion]:
-        """Yield what is tried from a start: what is planned, and random motions, mixed."""
-        planned = list(itertools.islice(self._attempts(start), PLANNED))
+    def _tries(self, start: Motion, last: Taken) -> Iterator[Motion]:
+        """Yield what is tried from a start: what aims at the edge, plans, and chance, mixed."""
+        planned = [*self._aimed(start, last), *itertools.islice(self._attempts(start), PLANNED)]
         self.dice.shuffle(planned)
         for pair in itertools.zip_longest(planned, self._random(start)):
             yield from filter(None, pair)
@@ -328,6 +332,7 @@ class Search:
         for leg in motion.legs[kept:]:
             last = {name: self._near(name, u) for name, u in leg.last.items()}
             hold = leg.duration * self.dice.choice((1.0, 1.0, 0.3, 0.7, 1.4, 3.0))
+            hold = min(hold, LONG * self.sizes.times[-1])
             first = level if not self.stand.free else last
             legs.append(Leg(hold, first, last))
             level = last
@@ -344,6 +349,23 @@ class Search:
         for level in self._levels(start.level):
             for hold in self._holds(level):
                 yield from self._ways(start, level, hold)
+
+    def _aimed(self, start: Motion, last: Taken) -> Iterator[Motion]:
+        """Yield motions that go to where a guard turns; a free body is struck to its velocity."""
+        drives = self.stand.drives
+        strikes = self.stand.free and len(drives) == 1 and start.strike is None
+        for point, there in self.points:
+            if (point.edge.name, point.edge.source) != last:
+                continue
+            for hold in self._holds(there.level):
+                yield from itertools.islice(self._ways(start, dict(there.level), hold), 2)
+                for name in drives.values() if strikes else ():
+                    strike = (start.t_end, point.values.get(self.chart.velocities[0], 0.0))
+                    calm = Leg(hold, *(({**start.level, name: 0.0},) * 2))
+                    for level in (there.level, {**there.level, name: 0.0}):
+                        leg = Leg(hold, level, level)
+                        yield start.then(leg, strike=strike)
+                        yield start.then(calm, leg, strike=strike)
 
     def _levels(self, base: Mapping[str, float]) -> Iterator[dict[str, float]]:
         seen = set[tuple[float, ...]]()
@@ -362,7 +384,8 @@ class Search:
         speed = max(abs(level[name]) for name in self.stand.drives.values())
         if speed == 0.0:
             return self.sizes.times[-1:]
-        return (3.0 * self.sizes.lengths[-1] / speed, *self.sizes.times[-1:])
+        usual = self.sizes.times[-1]
+        return min(3.0 * self.sizes.lengths[-1] / speed, LONG * usual), usual
 
     def _ways(self, start: Motion, level: dict[str, float], hold: float) -> Iterator[Motion]:
         before = start.level

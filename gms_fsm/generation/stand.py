@@ -24,7 +24,7 @@ from gms_fsm.verification.reaching.points import Guards
 CONTACT, STRIKER = "contact", "striker"
 MASS = 1.0  # kg
 MOST_STEPS = 2000  # of a run
-SETTINGS = Settings(max_steps=MOST_STEPS)
+SETTINGS = Settings(engine="ifelse", max_steps=MOST_STEPS)
 STRIKE = Chart(
     "one impact",
     inputs=("t",),

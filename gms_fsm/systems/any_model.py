@@ -1,4 +1,4 @@
-"""Numbers for a chart that has none: the first that its rules allow."""
+"""Numbers for a chart: those of its demonstration, the first that its rules allow, another's."""
 
 from __future__ import annotations
 
@@ -65,6 +65,32 @@ def any_contact(chart: Chart, name: str = "contact") -> Contact:
     if not chart.velocities:
         return Supervisor(name, chart, any_values(chart), inputs=inputs)
     return Contact(name, chart, any_values(chart), v=chart.velocities, inputs=inputs)
+
+
+def with_chart(contact: Contact, chart: Chart) -> Contact:
+    """Return a contact with another chart of the same names.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT
+    >>> contact = any_contact(GMS_ELEMENT["signed"])
+    >>> with_chart(contact, GMS_ELEMENT["published"]).chart.name
+    'GMS element, published law'
+    """
+    model = contact.model
+    if model is None:
+        return contact.replaced(chart=chart)
+    return contact.with_model(
+        ChartModel(
+            chart,
+            model.values,
+            n=model.n,
+            stribeck=model.stribeck,
+            sigma_2=model.sigma_2,
+            weights=model.weights,
+            inputs=getattr(model, "inputs", {}),
+        )
+    )
 
 
 def _satisfying(

@@ -6,16 +6,14 @@ sign: what somebody could get wrong who writes a guard.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from gms_fsm import Chart, ChartModel, System, simulate
+from gms_fsm import Chart
 from gms_fsm.charts.files.tables import ChartTable
-from gms_fsm.errors import GMSError
 from gms_fsm.generation.generate import Generated, GeneratedRun
 from gms_fsm.generation.search import Firing, firings_of
-from gms_fsm.generation.stand import CONTACT, SETTINGS
+from gms_fsm.generation.stand import CONTACT
 from gms_fsm.language import (
     Binary,
     Both,
@@ -124,31 +122,17 @@ def _minus(tree: Value) -> Value:
 
 
 # --------------------------------------------------------------------------- telling them apart
-def _log(run: GeneratedRun, system: System, engine: str) -> tuple[list[Firing], str]:
+def _log(run: GeneratedRun, chart: Chart) -> tuple[list[Firing], str]:
     try:
-        trace = simulate(
-            system, run.t_end, t_start=run.t_start, initial=run.initial, settings=SETTINGS,
-            engine=engine,
-        )  # fmt: skip
+        return [*firings_of(run.again(chart))], ""
     except SimulationError as error:
         return [*firings_of(error.trace.contact(CONTACT))], type(error).__name__
-    return [*firings_of(trace.contact(CONTACT))], ""
 
 
-def _mutated(system: System, chart: Chart) -> System:
-    first, *others = system.machines
-    if isinstance(first.model, ChartModel):
-        first = first.with_model(replace(first.model, chart=chart))
-    else:
-        first = first.replaced(chart=chart)
-    return replace(system, contacts=(first, *others))
-
-
-def killed(run: GeneratedRun, mutant: Chart, engine: str = "ifelse") -> bool:
+def killed(run: GeneratedRun, mutant: Chart) -> bool:
     """Return whether a motion shows another log: elements, edges, or times."""
-    mine, end = _log(run, run.system, engine)
-    its, other = _log(run, _mutated(run.system, mutant), engine)
-    if end != other or [each[1:] for each in mine] != [each[1:] for each in its]:
+    mine, (its, end) = firings_of(run.trace), _log(run, mutant)
+    if end or [each[1:] for each in mine] != [each[1:] for each in its]:
         return True
     least = CLOSE * (run.t_end - run.t_start)
     return any(
@@ -166,15 +150,6 @@ def judged(found: Generated, chart: Chart) -> Mapping[str, Sequence[GuardMutant]
 
 
 def _verdict(found: Generated, chart: Chart, mutant: GuardMutant) -> str:
-    for run in found.runs:
-        try:
-            if killed(run, mutant.chart):
-                return "killed"
-        except GMSError:  # it is refused: the guard cannot be read, or the stand not be built
-            return "killed"
+    if any(killed(run, mutant.chart) for run in found.runs):
+        return "killed"
     return "same" if sameness(chart, mutant.chart)[0].verdict == "equivalent" else "left"
-
-
-def counted(mutants: Sequence[GuardMutant]) -> Mapping[str, int]:
-    """Return how many there are of each kind."""
-    return Counter(each.how for each in mutants)

@@ -17,11 +17,11 @@ from dataclasses import replace
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import checked_values
 from gms_fsm.errors import GMSError
-from gms_fsm.language import Condition, Requirement, names_in, spell, split
+from gms_fsm.language import Condition, Requirement, names_in, split
 from gms_fsm.systems.parts import Contact
 from gms_fsm.verification._checks import can_hold
 from gms_fsm.verification._flows import inclusive, moving, ways
-from gms_fsm.verification._prover import Prover, Reading, Undecided
+from gms_fsm.verification._prover import Prover, Reading, Undecided, shown
 from gms_fsm.verification._subject import subject_of
 from gms_fsm.verification._switching import after
 from gms_fsm.verification.facts import ContactFacts
@@ -61,7 +61,7 @@ class Nowhere:
                 return ""
         except Undecided:
             return ""
-        said = ", ".join(dict.fromkeys(_text(part) for part in kept))
+        said = ", ".join(dict.fromkeys(shown(part.relation) for part in kept))
         return f"after {first.name}, {said} holds as long as {second.source} lasts"
 
     def _candidates(self, first: Transition, second: Transition) -> Iterator[Requirement]:
@@ -100,10 +100,6 @@ class Nowhere:
         margin = reading.margin(part, self.prover.still).value
         found: Condition = margin >= 0 if inclusive(part) else margin > 0
         return found
-
-
-def _text(part: Requirement) -> str:
-    return spell(part.relation) if part.holds else f"not {spell(part.relation)}"
 
 
 def numbers_fit(contact: Contact) -> bool:
