@@ -1,4 +1,4 @@
-"""Generate motions for all included charts, for docs/howto/coverage.md; run it with ``make gallery``.
+"""Generate motions for all charts, for docs/howto/coverage.md; run it with ``make gallery``.
 
 How many mutants of guards they kill is counted by `tests.difference.mutants`.
 """
@@ -14,9 +14,10 @@ from gms_fsm.foundation.files import write_whole
 
 HERE = Path(__file__).parent
 TABLE = HERE / "howto" / "coverage_table.txt"
-HEAD = """| chart | motions | edges | pairs | out of reach | open | MC/DC | mutants killed | the same |
-|---|---|---|---|---|---|---|---|---|
-"""
+HEAD = (
+    "| chart | motions | edges | pairs | out of reach | open | MC/DC | mutants killed | alike |\n"
+    f"{'|---' * 9}|\n"
+)
 
 
 def row(name: str, chart: Chart) -> str:

@@ -11,7 +11,6 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import MissingExtraError, ParameterError
 from gms_fsm.foundation.arguments import checked_integer, checked_path, refusing, unknown
-from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.files import output_folder
 from gms_fsm.foundation.quantities import wrapped
 from gms_fsm.generation.search import Goal, Search, Taken, Tried, firings_of, goals_of
@@ -143,8 +142,6 @@ class Unreached:
     reason: str
 
 
-@refusing()
-@displayed("html")
 @dataclass(frozen=True, eq=False)
 class Generated:
     """Motions that together try what is in a chart; `gms_fsm.generate` makes them.
@@ -176,6 +173,11 @@ class Generated:
     def open(self) -> tuple[Unreached, ...]:
         """What is neither taken nor proved to be out of reach."""
         return tuple(each for each in self.unreached if each.verdict == "open")
+
+    def __repr__(self) -> str:
+        name, pairs = self.coverage.contact(CONTACT).chart.name, self.pairs
+        said = f"{pairs.seen} of {pairs.of} pairs of edges, {len(self.open)} open"
+        return f"<Generated: {len(self.runs)} motions of {name}; {said}>"
 
     def __str__(self) -> str:
         return "\n".join(_lines(self))
@@ -246,7 +248,7 @@ def generate(
     >>> from gms_fsm.charts import CHARTS
     >>> found = generate(CHARTS["dog-clutch"])
     >>> len(found.runs), found.coverage.scores["edges"], found.pairs
-    (5, Score(seen=2, of=2), Score(seen=1, of=2))
+    (6, Score(seen=2, of=2), Score(seen=1, of=2))
     """
     if isinstance(what, Chart):
         if contact:
@@ -392,11 +394,9 @@ def _lines(found: Generated) -> Iterator[str]:
     scores = found.coverage.scores
     first = {name: scores[name] for name in ("states", "edges")}
     yield from lines({"": part}, {**first, "pairs": found.pairs, **scores})
+    if found.unreached:
+        yield "not taken:"
     for each in found.unreached:
-        said = f"{each.verdict:<6}  {each.what}: {each.reason}"
-        yield from wrapped(f"  {said}")
-    yield from wrapped(
-        "within "
-        + ", ".join(f"{name} {low:.4g}..{high:.4g}" for name, (low, high) in found.bounds.items())
-        + f"; seed {found.seed}"
-    )
+        yield from wrapped(f"  {each.verdict:<6}  {each.what}: {each.reason}")
+    limits = (f"{name} {low:.4g}..{high:.4g}" for name, (low, high) in found.bounds.items())
+    yield from wrapped(f"within {', '.join(limits)} (SI units); seed {found.seed}")

@@ -150,6 +150,7 @@ def judged(found: Generated, chart: Chart) -> Mapping[str, Sequence[GuardMutant]
 
 
 def _verdict(found: Generated, chart: Chart, mutant: GuardMutant) -> str:
-    if any(killed(run, mutant.chart) for run in found.runs):
+    likely = sorted(found.runs, key=lambda run: mutant.edge not in run.title)
+    if any(killed(run, mutant.chart) for run in likely):
         return "killed"
     return "same" if sameness(chart, mutant.chart)[0].verdict == "equivalent" else "left"
