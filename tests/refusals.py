@@ -65,6 +65,7 @@ from gms_fsm import (
     excite,
     export,
     fit,
+    generate,
     initial_bank,
     measure_phenomena,
     prove,
@@ -3358,8 +3359,28 @@ rows = {
     "sweep of a trace": ("run.npz", ..., "run.npz", "--over", "F_s=1:2:2"),
     "grid that is none": ("--over F_s", ..., "a.toml", "--over", "F_s"),
     "ending of a picture": ("path", "c.jpg", "a.toml", "-o", "c.jpg"),
+    "two charts at once": ("servo", ..., "stiction", "servo", "--generate"),
+    "motions into counts": ("--merge", ..., "stiction", "--generate", "--merge", "c.json"),
+    "motions over a grid": ("--over", ..., "stiction", "--generate", "--over", "F_s=1:2:2"),
+    "seed of given runs": ("--seed", ..., "a.toml", "--seed", "1"),
+    "bounds that are none": ("--bounds v", ..., "stiction", "--generate", "--bounds", "v"),
+    "contact of a chart": ("--contact a", ..., "stiction", "--generate", "--contact", "a"),
+    "which contact to try": ("pair.toml", ..., "pair.toml", "--generate"),
 }
 group("cover", ParameterError, covering, rows)
+rows = {
+    "contact of a chart": ("contact", "a", lambda: generate(CHARTS["backlash"], "a")),
+    "number for a chart": ("chart", 3, lambda: generate(3)),
+    "seed with a point": ("seed", 0.5, lambda: generate(CHARTS["backlash"], seed=0.5)),
+    "unknown bound": ("bounds", "q", lambda: generate(CHARTS["backlash"], bounds={"q": (0, 1)})),
+    "bound of one number": (
+        "bounds['v']", 1, lambda: generate(CHARTS["backlash"], bounds={"v": 1})
+    ),
+    "bounds the wrong way": (
+        "bounds['v']", (1, 0), lambda: generate(CHARTS["backlash"], bounds={"v": (1, 0)})
+    ),
+}  # fmt: skip
+group("generate", ParameterError, called, rows)
 rows = {"damaged counts": ("damaged.json", ..., "a.toml", "--merge", "damaged.json")}
 group("cover", TraceFileError, covering, rows)
 rows = {"scenario that is missing": ("gone.toml", ..., "gone.toml")}

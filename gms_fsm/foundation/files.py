@@ -202,27 +202,28 @@ def folder_lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
 
 @contextlib.contextmanager
 def file_lock(path: Path) -> Iterator[bool]:
-    """Keep other processes out that read a file and write it anew; say whether there is one.
+    """Keep others out that read a file and write it anew; say whether there is something in it.
 
-    A file that is renamed over it has another number, and a lock of its own.
+    What is renamed over a file is another file, with a lock of its own.
     """
-    if sys.platform == "win32":
-        yield path.exists()
-        return
-    while True:
-        file = os.open(path, os.O_RDONLY | os.O_CREAT, 0o666)
+    file = None
+    while file is None and sys.platform != "win32":
+        try:
+            file = os.open(path, os.O_RDONLY | os.O_CREAT, 0o666)
+        except OSError:  # who writes it says why
+            break
         with contextlib.suppress(OSError):  # a file system without locks: continue without one
             fcntl.flock(file, fcntl.LOCK_EX)
-        with contextlib.suppress(FileNotFoundError):
-            if os.fstat(file).st_ino == path.stat().st_ino:
-                break
-        os.close(file)
+        if not path.exists() or os.fstat(file).st_ino != path.stat().st_ino:
+            os.close(file)
+            file = None
     try:
-        yield os.fstat(file).st_size > 0
+        yield path.exists() and path.stat().st_size > 0
     finally:
-        if path.stat().st_size == 0:  # nothing was written
-            path.unlink()
-        os.close(file)
+        if file is not None:
+            if path.stat().st_size == 0:  # nothing was written
+                path.unlink()
+            os.close(file)
 
 
 # --------------------------------------------------------------------------- helpers

@@ -252,7 +252,9 @@ def generate(
     """
     if isinstance(what, Chart):
         if contact:
-            raise ParameterError("a chart has no contacts", place="contact", value=contact)
+            raise ParameterError(
+                "a chart has no contacts", place="contact", value=contact, advice="leave it out"
+            )
         own = any_contact(what)
     else:
         own = contact_of(what, contact)[0]
@@ -295,7 +297,9 @@ def _inner(bounds: Mapping[str, tuple[float, float]] | None) -> dict[str, tuple[
             ) from None
         low, high = (checked_scalar(place, u, "finite") for u in (low, high))
         if not low <= high:
-            raise ParameterError("the first is larger than the second", place=place, value=pair)
+            raise ParameterError(
+                "the first is larger than the second", place=place, value=pair, advice="swap them"
+            )
         found[name] = (low, high)
     return found
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import shutil
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from gms_fsm import Coverage, coverage, sweep
 from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.verbs.cover import added
 from tests import own_files
 from tests.scenario_files import OPEN_LOOP, CommandLine
 
@@ -120,3 +123,41 @@ def test_the_picture_is_of_the_counts(cover: CommandLine) -> None:
 
 def test_a_word_that_is_meant_is_named(gms_fsm: CommandLine) -> None:
     assert "Did you mean 'cover'?" in gms_fsm("coverage", "a.toml").err
+
+
+def test_generated_motions_are_files_that_count_the_same(cover: CommandLine) -> None:
+    answer = cover("dog-clutch", "--generate", "-o", "out", "--seed", "3", "--bounds", "load=-1..1")
+    assert answer.code == 0, answer.err
+    told, files = answer.out.split("(SI units); seed 3\n")
+    assert told.startswith("6 runs of Dog clutch\n")
+    paths = files.splitlines()
+    assert paths == [str(Path("out", f"motion_{i:02}.toml")) for i in range(1, 7)]
+    assert "load -1..1 " in told
+    again = cover(*paths).out.splitlines()
+    assert [line for line in again if "%" in line] == [
+        line for line in told.splitlines() if "%" in line and not line.startswith("pairs")
+    ]
+
+
+def test_motions_are_made_for_a_file_of_ones_own(cover: CommandLine) -> None:
+    answer = cover("pair.toml", "--contact", "gear", "--generate", "--fail-under", "100")
+    assert answer.code == 0, answer.err
+    assert "not taken" not in answer.out
+
+
+def test_a_short_share_of_generated_motions_is_told(cover: CommandLine) -> None:
+    answer = cover("backlash", "--generate", "--bounds", "v=0..1", "--fail-under", "100")
+    assert answer.code == 1
+    assert "below 100 %" in answer.err
+    assert "  open    touch_left from apart: not proved, and not reached by" in answer.out
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="nothing is locked on Windows")
+def test_several_calls_at_once_lose_no_counts(cover: CommandLine, tmp_path: Path) -> None:
+    path = tmp_path / "counts.json"
+    one = counted(FORTH)
+    with ThreadPoolExecutor(4) as pool:
+        for _ in pool.map(lambda _: added(one, path), range(12)):
+            pass
+    assert Coverage.load(path) == Coverage.merged([one] * 12)
+    assert [each.name for each in tmp_path.iterdir() if "counts" in each.name] == ["counts.json"]

@@ -25,6 +25,7 @@ from gms_fsm.app.lessons.practice import l8_chart_or_ifelse as l8
 from gms_fsm.app.lessons.practice import l9_contacts as l9
 from gms_fsm.app.lessons.practice import l10_which_model as l10
 from gms_fsm.app.lessons.practice import l11_what_a_record_tells as l11
+from gms_fsm.app.lessons.practice import l12_what_runs_have_not_tried as l12
 from gms_fsm.phenomena.specimens import bench_bank
 
 pytestmark = pytest.mark.slow  # they share the runs
@@ -501,3 +502,30 @@ def test_only_the_product_of_scale_and_weights_is_told(ran: Ran) -> None:
         assert each["k1"].told
     assert r.weakest.endswith(" N")
     assert all(name in r.weakest for name in ("F_c", "weights1", "weights2"))
+
+
+# ------------------------------------------------------------------ 12: what runs have not tried
+def test_runs_by_hand_take_all_edges_and_miss_a_lost_sign(ran: Ran) -> None:
+    r = ran(12)
+    assert (r.edges_taken, r.with_third, r.runs_that_differ) == (2, 3, 0)
+    waved = r.traces["to and fro"]
+    at = waved.transitions.v[waved.transitions.edge == l12.EDGE]
+    close(at, -0.1, atol=0.005)  # as the page says
+    edge = r.counts.edge(l12.EDGE, "stick")
+    assert {vector for vector in edge.asked if vector[0] == "1"} == {"11"}  # v was never asked
+    assert (r.decided, r.undecided) == (1, 3)
+
+
+def test_generated_motions_see_what_the_copy_does(ran: Ran) -> None:
+    r = ran(12)
+    assert r.generated.unreached == ()
+    assert {each.percent for each in r.generated.coverage.scores.values()} == {100.0}
+    assert 0 < r.telling < r.motions
+    assert (r.v, r.slips_at_rest) == (-l12.V_C, "copy")
+
+
+@pytest.mark.parametrize("share", [-3.0, -1.001, -1.0, 0.0, 0.999, 1.0, 3.0])
+def test_only_between_the_two_speeds_the_copy_slips_alone(share: float) -> None:
+    original, copy = (len(each.transitions) for each in l12.begun(share * l12.V_C).values())
+    assert bool(original) == (share < -1.0)
+    assert bool(copy) == (share < 1.0)

@@ -121,10 +121,7 @@ def cover_command(
         raise typer.Exit(INTERRUPTED) from None
     assert total is not None  # there is at least one
     if merge is not None:
-        with file_lock(merge) as there:  # several of these at once lose no counts
-            if there:
-                total = _sum(total, Coverage.load(merge), merge)
-            total.save(merge)
+        total = added(total, merge)
     part = _part(total, contact) if output is not None or contact else None
     told = total if part is None or not contact else Coverage({contact: part})
     put(str(told))
@@ -135,6 +132,16 @@ def cover_command(
 
         put(str(plots.render(plots.statechart(part.chart, counts=part), output)))
     _judge(told, fail_under)
+
+
+def added(found: Coverage, path: Path) -> Coverage:
+    """Add counts to those in a file, and return the sum; several of these at once lose none."""
+    from gms_fsm import Coverage
+
+    with file_lock(path) as there:
+        total = _sum(found, Coverage.load(path), path) if there else found
+        total.save(path)
+    return total
 
 
 def _judge(told: Coverage, fail_under: float | None) -> None:
@@ -162,12 +169,18 @@ def _generated(
     from gms_fsm.charts.registry import chart_named
 
     if len(given) > 1:
-        raise ParameterError("--generate takes one chart", place=str(given[1]))
+        raise ParameterError(
+            "--generate takes one chart", place=str(given[1]), advice="call it for each"
+        )
     name, limits = str(given[0]), dict(map(_bound, bounds))
     own = own_file(name)
     what: Any = chart_named(name) if own is None else own.chart or own.system
     if own is None and contact:
-        raise ParameterError("an included chart has no contacts", place=f"--contact {contact}")
+        raise ParameterError(
+            "an included chart has no contacts",
+            place=f"--contact {contact}",
+            advice="leave --contact out",
+        )
     if own is not None and own.system is not None and len(own.system.machines) > 1 and not contact:
         raise contacts_error(own.path, [each.name for each in own.system.machines], "give")
     found = generate(what, contact, seed=seed, bounds=limits)

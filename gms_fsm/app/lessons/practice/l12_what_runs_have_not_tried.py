@@ -112,7 +112,7 @@ from plots.panels import ribbons
 def both(share):
     figure = Figure(figsize=(6.4, 2.4), layout="constrained")
     axes = figure.subplots(2, sharex=True)
-    for ax, (name, trace) in zip(axes, begun(share * V_C).items()):
+    for ax, (name, trace) in zip(axes, begun(share * V_C).items(), strict=True):
         ribbons(ax, trace)
         ax.set(yticks=[], title=f"{name}, v = {share:g} v_c")
     return figure
