@@ -208,7 +208,7 @@ class Generated:
 
 @refusing()
 def generate(
-    what: Chart | Model | Contact | System,
+    chart: Chart | Model | Contact | System,
     contact: str = "",
     *,
     seed: int = 0,
@@ -222,9 +222,9 @@ def generate(
 
     Parameters
     ----------
-    what : Chart, Model, Contact or System
-        Whose chart. A chart alone has the numbers of its demonstration, one of your own the first
-        numbers that its rules allow.
+    chart : Chart, Model, Contact or System
+        The chart. Alone it has the numbers of its demonstration, one of your own the first that
+        its rules allow.
     contact : str
         The contact, of a system with several.
     seed : int
@@ -250,14 +250,14 @@ def generate(
     >>> len(found.runs), found.coverage.scores["edges"], found.pairs
     (6, Score(seen=2, of=2), Score(seen=1, of=2))
     """
-    if isinstance(what, Chart):
+    if isinstance(chart, Chart):
         if contact:
             raise ParameterError(
                 "a chart has no contacts", place="contact", value=contact, advice="leave it out"
             )
-        own = any_contact(what)
+        own = any_contact(chart)
     else:
-        own = contact_of(what, contact)[0]
+        own = contact_of(chart, contact)[0]
     stand = Stand(own)
     inner = _inner(bounds)
     guards = Guards(own, MASS, inner, checked_integer("seed", seed), stand.drives)

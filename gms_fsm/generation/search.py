@@ -256,7 +256,8 @@ class Search:
             self.tried(motion)
         for _ in range(2):
             for goal in self.wanted:
-                self._reach(goal)
+                if len(goal.edges) == 1 or all(Goal((each,)) in self.found for each in goal.edges):
+                    self._reach(goal)
 
     @property
     def _short(self) -> float:
